@@ -62,9 +62,10 @@ def write_page(written: Written, folder: Path) -> Path:
 
     Missing where another run has replaced the folder in the meantime.
     """
+    from .pages.player import reel
     from .shown import page_of
 
-    text, path = page_of(written.result, written.bodies), Path(folder) / PAGE
+    text, path = page_of(written.result, written.bodies, reel(folder)), Path(folder) / PAGE
     partial = path.with_name(path.name + ".partial")
     if not path.parent.is_dir() or _place(path.parent) != written.place:
         raise Missing(f"{folder}: replaced by another run while the page was drawn")

@@ -9,7 +9,7 @@ import numpy as np
 from ..core import rounded
 from . import scales
 from .drawing import curves, pictures
-from .pages import charts
+from .pages import charts, player
 from .pages.document import Section, document
 from .pages.words import G, headline, others, pair
 
@@ -57,13 +57,17 @@ def page(data: dict) -> str:
     lead += [f"<p class=soft>Note: {escape(text)}</p>" for text in summary["notes"]]
     drawn, shown = figures(data)
     sections = [Section("pictures", "Pictures", shown)] if drawn else []
+    film = data.get("film") if pressed(data) else None
+    if film is not None:
+        sections.append(player.section(film))
     if "measured" in data:
         sections += _table_one(data)
     if "levels" in data:
         sections.append(_table_of_levels(data["levels"]))
     sections += [_measures(data), _cost(data), _origin(data)]
-    return document(title, "".join(lead), sections, {"charts": drawn} if drawn else None,
-                    ("figures.js", "curves.js") if drawn else ())
+    scripts = ("figures.js", *(("curves.js",) if drawn else ()), *(("stage.js", "player.js") if film else ()))
+    return document(title, "".join(lead), sections, {"charts": drawn} | ({"player": film} if film else {}),
+                    scripts if drawn or film else ())
 
 
 def figures(data: dict) -> tuple:
@@ -233,8 +237,8 @@ def _table_one(data: dict) -> list:
     if not rows:
         text = "<p class=soft>No measured row has this frequency and input.</p>"
         return [Section("measured", "Against the measurement", text)]
-    text = ("<table><tr><th>reading<th class=n>measured<th class=n>computed"
-            f"<th class=n>ratio</tr>{''.join(rows)}</table><p class=soft>{escape(_unsettled(data).strip())}</p>")
+    text = ("<div class=across><table><tr><th>reading<th class=n>measured<th class=n>computed"
+            f"<th class=n>ratio</tr>{''.join(rows)}</table></div><p class=soft>{escape(_unsettled(data).strip())}</p>")
     return [Section("measured", "Against the measurement", text)]
 
 
@@ -258,9 +262,10 @@ def _table_of_levels(levels: list) -> Section:
                     + (f"<td>{escape(one['outcome'])}</td>" if judged else "")
                     + f"<td>{'stuck' if one['stuck'] else 'slips'}</td></tr>")
     sized = "force" if any(one.get("unit") == "N" for one in levels) else "base acceleration"
-    return Section("levels", "Levels", f"<table><tr><th class=n>level<th class=n>{sized}<th class=n>half peak-to-peak"
-            "<th class=n>peak acceleration<th class=n>its first harmonic<th class=n>third over first"
-            f"{'<th>outcome' if judged else ''}<th>interface</tr>{''.join(rows)}</table>")
+    heads = (f"<th class=n>level<th class=n>{sized}<th class=n>half peak-to-peak<th class=n>peak acceleration"
+             "<th class=n>its first harmonic<th class=n>third over first"
+             f"{'<th>outcome' if judged else ''}<th>interface")
+    return Section("levels", "Levels", f"<div class=across><table><tr>{heads}</tr>{''.join(rows)}</table></div>")
 
 
 def measure(value: float, unit: str, error: float | None) -> dict:
@@ -282,8 +287,9 @@ def _measures(data: dict) -> Section:
         rows.append(f"<tr>{cells}<td class=soft>{escape(means.get(name, ''))}</td></tr>")
     note = (f"<p class=soft>The run holds {data['cycles']:.2g} of a cycle: measures per cycle are not those of a "
             "whole one.</p>") if part_of_cycle(data) else ""
-    return Section("measures", "Measures", "<div class=across><table><tr><th>measure<th class=n>value<th class=n>error "
-                   f"(±)<th>unit<th>in other units<th>what it is</tr>{''.join(rows)}</table></div>{note}")
+    return Section("measures", "Measures", "<div class='across many'><table><tr><th>measure<th class=n>value"
+                   "<th class=n>error (±)"
+                   f"<th>unit<th>in other units<th>what it is</tr>{''.join(rows)}</table></div>{note}")
 
 
 def _cost(data: dict) -> Section:
@@ -293,8 +299,8 @@ def _cost(data: dict) -> Section:
                    f"<td class=n>{e['seconds']:.3f}</td></tr>" for e in summary["effects"])
     parts = ", ".join(f"{k} {v:.3f} s" for k, v in summary["seconds"].items())
     shared = " The law and the modes share one loop; its time stands with the law." if summary["kind"] == "rig" else ""
-    text = (f"<table><tr><th>effect<th>equations<th class=n>seconds</tr>{rows}"
-            f"</table><p class=soft>{escape(parts)}.{shared}</p>"
+    text = (f"<div class=across><table><tr><th>effect<th>equations<th class=n>seconds</tr>{rows}"
+            f"</table></div><p class=soft>{escape(parts)}.{shared}</p>"
             f"<p class=soft>Not in the scene, so neither imported nor computed: "
             f"{escape(', '.join(summary['not_in_scene']))}.</p>")
     return Section("cost", "What ran and what it cost", text)

@@ -56,9 +56,10 @@ def report_data(result: Result) -> dict:
     return data
 
 
-def page_of(result: Result, bodies: dict) -> str:
-    """The HTML page of a run; bodies: the pressed pieces as `fields.bodies.write_fields` returns them."""
-    return page(report_data(result) | ({"bodies": bodies} if bodies else {}))
+def page_of(result: Result, bodies: dict, film: dict | None = None) -> str:
+    """The HTML page of a run; bodies: the pressed pieces as `fields.bodies.write_fields` returns them; film: what
+    `pages.player.reel` makes of the fields of its folder."""
+    return page(report_data(result) | ({"bodies": bodies} if bodies else {}) | ({"film": film} if film else {}))
 
 
 def axes(result: Result, names: tuple, onto=None):

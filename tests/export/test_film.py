@@ -15,10 +15,10 @@ from exported import write_small
 from PIL import Image
 
 from patchfem.export.drawing import reels
-from patchfem.export.drawing.film import APART, SIZE, film_of, images, moving
+from patchfem.export.drawing.film import SIZE, film_of, images
 from patchfem.export.drawing.flat import Picture
 from patchfem.export.drawing.panels import slide_of, upper_points
-from patchfem.export.fields.series import Series
+from patchfem.export.fields.series import APART, Series, moving
 
 WIDE, HIGH = 1200, 680
 TITLE = 180  # rows of the titles, of which one names the folder

@@ -85,7 +85,7 @@ def test_exact_the_page_replaces_no_result(scene, tmp_path):
 def test_always_the_results_are_in_place_before_the_page(scene, tmp_path, monkeypatch, raised, code, text):
     out, seen = tmp_path / "out", []
 
-    def stop(result, bodies):
+    def stop(*_):
         seen.append(({path.name for path in out.iterdir()}, "results: " in said.getvalue()))
         raise raised
 
@@ -122,10 +122,10 @@ def test_exact_a_full_disk_leaves_no_part_of_a_page(scene, tmp_path, monkeypatch
 def test_refuses_to_put_its_page_into_the_results_of_another_run(scene, tmp_path, monkeypatch):
     out, page_of = tmp_path / "out", shown.page_of
 
-    def slow(result, bodies):  # another run of the same folder ends while this one draws
+    def slow(*given):  # another run of the same folder ends while this one draws
         os.replace(out, tmp_path / "first")
         assert cli("run", scene, "-o", out, "--no-page", "--set", "slide.cycles=3").code == 0
-        return page_of(result, bodies)
+        return page_of(*given)
 
     monkeypatch.setattr(shown, "page_of", slow)
     answer = cli("run", scene, "-o", out)
@@ -149,4 +149,4 @@ def test_exact_the_page_of_a_patch_shows_the_pieces(tmp_path):
     (tmp_path / "scene.toml").write_text(COATED, "utf-8")
     assert cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out").code == 0
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert page.count("<figure>") == page.count("</figure>") == 2 and "Both pieces with their coatings" in page
+    assert page.count("<figure") == page.count("</figure>") == 3 and "Both pieces with their coatings" in page

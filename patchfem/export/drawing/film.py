@@ -12,12 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from ...core import PatchfemError
-from ..fields.series import Frame, Series
+from ..fields.series import Frame, Series, moving
 from .flat import Picture
 from .panels import near, panels, rounded, slide_of
 from .reels import write
 
-APART = 3.0  # of the usual step between frames: a longer one divides the pressed state from the last cycle
 SIZE = (12.0, 6.8)  # inches; an even number of pixels, as video wants
 SLIDE = 0.03  # share of the length of the pieces that the largest slide takes
 LASTS = 2.4  # s that a cycle takes, as far as LEAST and MOST let it
@@ -53,17 +52,6 @@ class Film:
         """The panels of a frame, with the windows and colours of the film."""
         return tuple(replace(one, window=window, top=top, over=over) for one, window, top, over in zip(
             panels(frame, self.factors, self.close, self.aside), self.windows, self.tops, self.over))
-
-
-def moving(times) -> tuple:
-    """Numbers of the frames that follow each other up to the end of the times (f,) [s].
-
-    Of a rig these are the frames of its last cycle, without the pressed state long before them; of a bench all of its
-    slide.
-    """
-    steps = np.diff(times)
-    apart = np.flatnonzero(steps > APART * np.median(steps)) if steps.size else steps
-    return tuple(range(int(apart[-1]) + 1 if apart.size else 0, len(times)))
 
 
 def film_of(series: Series, magnify: float | None = None) -> Film:

@@ -10,6 +10,19 @@ from ...core import Missing, PatchfemError
 from .blocks import NAMES, Block, joined
 from .vtkhdf import NAME
 
+APART = 3.0  # of the usual step between frames: a longer one divides the pressed state from the last cycle
+
+
+def moving(times) -> tuple:
+    """Numbers of the frames that follow each other up to the end of the times (f,) [s].
+
+    Of a rig these are the frames of its last cycle, without the pressed state long before them; of a bench all of its
+    slide.
+    """
+    steps = np.diff(times)
+    apart = np.flatnonzero(steps > APART * np.median(steps)) if steps.size else steps
+    return tuple(range(int(apart[-1]) + 1 if apart.size else 0, len(times)))
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Frame:
@@ -97,6 +110,28 @@ class Series:
         one = joined(blocks)
         return Frame(blocks, one.points, one.connectivity, one.offsets, one.types, one.point_data, one.cell_data,
                      self.units | {"part": "1"}, float(self.times[number]), number)
+
+    def names(self, block: str, kind: str) -> tuple:
+        """Names of the arrays of a block; kind: "PointData" or "CellData"."""
+        return tuple(self.root[block][kind])
+
+    def stack(self, block: str, kind: str, name: str, numbers: list) -> np.ndarray:
+        """One array of a block, on its points or its cells, in several frames: (f, n, ...)."""
+        group = self.root[block]
+        rows, size = group[f"{kind}/{name}"], len(group["Points" if kind == "PointData" else "Types"])
+        first = group[f"Steps/{kind}Offsets/{name}"][:][numbers]
+        if np.all(np.diff(first) == size):  # one after the other: one read
+            whole = rows[int(first[0]):int(first[-1]) + size]
+            return whole.reshape(len(numbers), size, *whole.shape[1:])
+        return np.stack([rows[int(at):int(at) + size] for at in first])
+
+    def points(self, block: str) -> np.ndarray:
+        """Points (n, 3) [m] of a block."""
+        return self.root[block]["Points"][:]
+
+    def cells(self, block: str) -> tuple:
+        """Connectivity and offsets (c + 1,) of the cells of a block."""
+        return self.root[block]["Connectivity"][:], self.root[block]["Offsets"][:]
 
     @staticmethod
     def _block(group, number: int) -> Block:

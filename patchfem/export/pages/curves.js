@@ -65,13 +65,20 @@
       name: mark.x.map(() => mark.name || ""), ...more}});
   }
 
+  const BESIDE = 215;                            // pixels that axis, scale of colours and tools take beside a frame
+  function framed([wide, tall], place) {         // a frame as large as its place lets it be
+    const share = Math.min(1, (place.clientWidth - BESIDE) / wide);
+    return {sizing_mode: "fixed", frame_width: Math.round(share * wide), frame_height: Math.round(share * tall)};
+  }
+
   function draw(chart) {
+    const place = document.getElementById(chart.anchor);
     const range = (axis) => axis.range ? new Bokeh.Range1d({start: axis.range[0], end: axis.range[1]}) : undefined;
     const ranges = {x_range: range(chart.x), y_range: range(chart.y)};
     Object.keys(ranges).forEach((name) => ranges[name] === undefined && delete ranges[name]);
     const fig = figure(chart.x, named(chart.y), {y_axis_type: chart.y.log ? "log" : "linear",
       height: chart.height ?? 330, tools: "pan,box_zoom,wheel_zoom,reset,save", ...ranges,
-      ...(chart.frame ? {sizing_mode: "fixed", frame_width: chart.frame[0], frame_height: chart.frame[1]} : {})});
+      ...(chart.frame ? framed(chart.frame, place) : {})});
     const shown = chart.marks.map((mark) => kinds[mark.kind](fig, mark)).filter((one) => one);
     const rows = [[named(chart.x), "@x{%.7g}"], [named(chart.y), "@y{%.7g}"]];
     const several = new Set(chart.marks.map((mark) => mark.name)).size > 1;
@@ -82,7 +89,7 @@
     fig.title.text = chart.title;
     Object.assign(fig.title, {text_color: ink("--ink"), text_font_style: "normal", text_font_size: "13px"});
     if (chart.marks.some((mark) => mark.name)) legend(fig);
-    put(fig, document.getElementById(chart.anchor));
+    put(fig, place);
   }
 
   const all = () => data.charts.forEach(draw);

@@ -1,10 +1,8 @@
 """A sweep as its page takes it, and a browser where there is one."""
 
-import shutil
-import subprocess
-
 import numpy as np
 import pytest
+from chromium import Chromium, program
 
 
 @pytest.fixture
@@ -31,20 +29,17 @@ def table() -> dict:
             "folders": [f"cases/{number:04x}/summary.json" for number in range(12)]}
 
 
-@pytest.fixture
-def browser(tmp_path):
-    """A function from a page to the document that a browser made of it; the test is skipped where there is none."""
-    program = next((found for found in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if found),
-                   None)
-    if program is None:
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory):
+    """A browser for all tests of a process, which are skipped where there is none."""
+    if program() is None:
         pytest.skip("no Chromium here")
+    browser = Chromium(tmp_path_factory.mktemp("chromium"))
+    yield browser
+    browser.close()
 
-    def opened(page: str) -> str:
-        (tmp_path / "page.html").write_text(page, encoding="utf-8")
-        command = [program, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-quic",
-                   "--disable-background-networking", "--disable-component-update", "--disable-sync",
-                   f"--user-data-dir={tmp_path / 'user'}", "--virtual-time-budget=6000", "--dump-dom",
-                   (tmp_path / "page.html").as_uri()]
-        return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
 
-    return opened
+@pytest.fixture
+def browser(chromium):
+    """A function from a page to the document that a browser made of it in 6 s of the page's clock."""
+    return lambda page: chromium.after(page, 6000)

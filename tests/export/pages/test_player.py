@@ -1,0 +1,232 @@
+"""The player of a page: a thinned mesh keeps areas and means, numbers and places are those of the fields file."""
+
+import base64
+import json
+
+import h5netcdf
+import numpy as np
+import pytest
+from page_data import data_of
+
+from patchfem.export import report
+from patchfem.export.drawing.panels import panels
+from patchfem.export.fields.series import Series, moving
+from patchfem.export.pages import player
+from patchfem.export.pages.thinned import areas, corners, thinned
+
+SIDES = ("lower", "upper")
+
+
+def unpacked(box: dict) -> np.ndarray:
+    """What the page makes of a packed array."""
+    number = np.frombuffer(base64.b64decode(box["data"]), "<u2").astype(float)
+    return np.where(number == 65535, np.nan, box["low"] + box["step"] * number).reshape(box["shape"])
+
+
+def grid(x, depth) -> tuple:
+    """Points and cells of a tensor grid."""
+    points = np.stack(np.meshgrid(x, depth, indexing="ij"), axis=-1).reshape(-1, 2)
+    node = np.arange(len(points)).reshape(len(x), -1)
+    return points, np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)
+
+
+@pytest.fixture(scope="module")
+def graded() -> tuple:
+    """A grid of 90 by 24 cells, finer towards both ends and the top, four rows of it coated."""
+    x, depth = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 91)), np.linspace(0, 1, 25)**2
+    points, cells = grid(x, depth)
+    return points, cells, np.tile(np.arange(24) < 4, 90)
+
+
+@pytest.mark.parametrize("most", [200, 700, 2000])
+def test_exact_a_thinned_grid_keeps_area_outline_and_coating(graded, most):
+    points, cells, coated = graded
+    mesh = thinned(points, cells, coated, most)
+    kept = points[mesh.nodes]
+    assert len(mesh.cells) <= most * 1.15
+    size = areas(kept, mesh.cells)
+    covered = np.add.reduceat(mesh.areas, mesh.starts)[mesh.groups]
+    np.testing.assert_allclose(size, covered, rtol=1e-12)  # every cell covers exactly those whose mean it has
+    assert size.sum() == pytest.approx(2.0, rel=1e-12)
+    coat = coated[mesh.order[mesh.starts]][mesh.groups]
+    assert size[coat].sum() == pytest.approx(2 * (4 / 24)**2, rel=1e-12)
+
+
+def test_exact_means_keep_the_integral_and_a_linear_field_its_middle_value(graded):
+    points, cells, coated = graded
+    mesh = thinned(points, cells, coated, 300)
+    middle = points[cells].mean(axis=1)
+    field = np.stack([3 + 2 * middle[:, 0] - middle[:, 1], np.sin(9 * middle[:, 0])], axis=1)
+    means, size = mesh.means(field), areas(points[mesh.nodes], mesh.cells)
+    np.testing.assert_allclose(size @ means, areas(points, cells) @ field, rtol=1e-12, atol=1e-13)
+    own = points[mesh.nodes][mesh.cells].mean(axis=1)
+    np.testing.assert_allclose(means[:, 0], 3 + 2 * own[:, 0] - own[:, 1], rtol=1e-12, atol=1e-12)
+
+
+def test_always_any_mesh_is_thinned_to_whole_cells_of_the_same_outline():
+    rng = np.random.default_rng(4)
+    points, cells = grid(np.linspace(-1, 1, 61), np.linspace(0, 1, 41))
+    inner = (np.abs(points[:, 0]) < 1) & (points[:, 1] > 0) & (points[:, 1] < 1)
+    points = points + inner[:, None] * rng.uniform(-0.3, 0.3, points.shape) * [1 / 30, 1 / 40]
+    triangles = np.concatenate([cells[:, [0, 1, 2, 2]], cells[:, [0, 2, 3, 3]]])
+    mesh = thinned(points, triangles, np.zeros(len(triangles), bool), 600)
+    assert 100 < len(mesh.cells) <= 660
+    size = areas(points[mesh.nodes], mesh.cells)
+    assert size.min() > 0 and size.sum() == pytest.approx(2.0, rel=0.05)
+    kept = points[mesh.nodes]
+    assert (kept.min(axis=0) == points.min(axis=0)).all() and (kept.max(axis=0) == points.max(axis=0)).all()
+    np.testing.assert_allclose(mesh.means(np.full((len(triangles), 1), 7.0)), 7.0, rtol=1e-14)
+
+
+def test_exact_a_small_mesh_stays_as_it_is():
+    points, cells = grid(np.arange(4.0), np.arange(3.0))
+    mesh = thinned(points, cells, np.zeros(6, bool), 6)
+    assert np.array_equal(points[mesh.nodes][mesh.cells], points[cells])
+    np.testing.assert_array_equal(mesh.means(np.arange(6.0)[:, None])[:, 0], np.arange(6.0))
+    assert np.array_equal(corners(np.array([4, 5, 6, 0, 1, 2, 3]), np.array([0, 3, 7])), [[4, 5, 6, 6], [0, 1, 2, 3]])
+
+
+def test_exact_packed_numbers_are_within_half_a_step():
+    values = np.random.default_rng(1).normal(size=(3, 50)) * 1e7
+    values[1, 3] = np.nan
+    found = unpacked(player.packed(values))
+    np.testing.assert_allclose(found, values, atol=0.51 * np.ptp(values[np.isfinite(values)]) / 65534)
+    assert np.array_equal(unpacked(player.packed(np.arange(5000))).round(), np.arange(5000))
+    assert np.array_equal(unpacked(player.packed(np.full(3, 2.5))), np.full(3, 2.5))
+
+
+@pytest.fixture(scope="module")
+def film(bench):
+    return player.reel(bench)
+
+
+def test_exact_numbers_and_places_are_those_of_the_fields(bench, film, monkeypatch):
+    """What the player draws at some factors is what the pictures of `view` draw at the same ones."""
+    monkeypatch.setattr(player, "CELLS", 10**6)
+    monkeypatch.setattr(player, "BYTES", 10**9)
+    film = player.reel(bench)
+    assert film["cells"][0] == film["cells"][1]
+    with Series(bench) as series:
+        numbers = moving(series.times)
+        assert film["of"] == len(numbers)
+        gap, aside = 200.0, 50.0
+        for at, time in list(enumerate(film["times"]))[::5]:
+            frame = series.frame(int(np.searchsorted(series.times, time)))
+            drawn = panels(frame, (gap, gap), aside=aside)[0]
+            assert film["slide"][at] == pytest.approx(drawn.slide, rel=1e-9)
+            shift = np.array([aside * film["slide"][at], 0.0])
+            parts = np.split(drawn.places[:sum(len(series.points(one)) for one in SIDES)],
+                             [len(series.points("lower"))])
+            for side, piece, places in zip((0, 1), film["pieces"], parts):
+                found = unpacked(piece["points"]) + gap * unpacked(piece["moves"])[at] + side * shift
+                np.testing.assert_allclose(found, places, atol=2e-4 * np.ptp(places))
+                stress = frame.blocks[SIDES[side]].cell_data
+                for number, one in enumerate((stress["von_mises"], *stress["stress"][:, [0, 1, 3]].T)):
+                    box = piece["colours"][number]
+                    scale = {"MPa": 1e-6, "kPa": 1e-3}[film["colours"][number]["unit"]]
+                    np.testing.assert_allclose(unpacked(box)[at], one * scale, atol=box["step"])
+            line = frame.blocks["interface"].point_data
+            pressure = film["curves"][0]
+            np.testing.assert_allclose(unpacked(pressure["values"])[at] * 1e6, line["normal_stress"],
+                                       atol=1e6 * pressure["values"]["step"])
+
+
+def test_always_a_page_holds_what_it_can(film):
+    assert len(film["times"]) <= player.FRAMES and film["cells"][0] <= film["cells"][1]
+    told = player.section(film).html
+    assert "frames from" in told and "Motion and gap are drawn with one factor" in told
+
+
+def test_exact_results_without_fields_have_no_player(tmp_path):
+    assert player.reel(tmp_path) is None
+
+
+@pytest.fixture(scope="module")
+def opened(bench, film, chromium):
+    """The page of the bench in a browser, its title and the scene with markup in them."""
+    summary = json.loads((bench / "summary.json").read_text("utf-8"))
+    summary["title"] = '<img src=x onerror="window.hacked=1"></script><script>window.hacked=1</script>'
+    with h5netcdf.File(bench / "result.nc", "r") as file:
+        x, fields = file["x"][...], {"normal_stress": file["normal_stress"][...], "time": file["frame_time"][...],
+                                     "shear_stress": file["shear_stress"][...]}
+    text = report.page({"name": "a", "summary": summary, "scene": "</pre><b id=evil>&", "resolved": "", "sentence": "s",
+                        "engine": "", "fields": fields, "x": x, "cycles": None, "versions": {}, "film": film})
+    assert len(text.encode()) < 3e6 and data_of(text)["player"]["of"] == film["of"]
+    return chromium.opened(text)
+
+
+def told(page) -> str:
+    return page.js("document.getElementById('stage-told').textContent")
+
+
+def test_exact_in_a_browser_slider_keys_and_buttons_move_the_frame(opened, film):
+    count = len(film["times"])
+    assert opened.faults == [] and told(opened).startswith(f"Frame {film['first'] + 1} of {count}, ")
+    seen = {}
+    for number in (0, count // 2, count - 1):
+        opened.js(f"(at => {{ at.value = {number}; at.dispatchEvent(new Event('input')); }})"
+                  "(document.getElementById('play-frame'))")
+        assert told(opened).startswith(f"Frame {number + 1} of {count}, {film['times'][number]:.7g} s")
+        seen[opened.js("document.getElementById('stage-pieces').toDataURL()")] = number
+    assert len(seen) == 3  # three frames, three pictures
+    opened.js("document.getElementById('stage').focus()")
+    for key, number in (("ArrowLeft", count - 1), ("Home", 1), ("ArrowRight", 2), ("End", count)):
+        opened.pressed(key)
+        assert told(opened).startswith(f"Frame {number} of")
+    opened.pressed(" ")
+    assert opened.js("document.getElementById('play-run').textContent") == "pause"
+    assert opened.js("new Promise(done => setTimeout(() => done(document.getElementById('play-frame').value), 700))") \
+        != str(count - 1)
+    opened.js("document.getElementById('play-run').click()")
+    assert opened.js("document.getElementById('play-run').textContent") == "play"
+
+
+def test_exact_in_a_browser_the_pointer_reads_values(opened, film):
+    opened.js("document.getElementById('play-frame').value = 0;"
+              "document.getElementById('play-frame').dispatchEvent(new Event('input'));"
+              "document.getElementById('stage').scrollIntoView()")
+    left, top, wide, high = opened.js("(({x, y, width, height}) => [x, y, width, height])"
+                                      "(document.getElementById('stage-curve').getBoundingClientRect())")
+    opened.pointed(left + wide / 2, top + high / 2)
+    tip = opened.js("document.getElementById('stage-tip').textContent")
+    place, value = (float(part.split()[1 if at == 0 else 0]) for at, part in
+                    enumerate((tip.split(":")[0], tip.split(": pressure ")[1])))
+    x, sigma = unpacked(film["x"]), unpacked(film["curves"][0]["values"])[0]
+    assert value == pytest.approx(sigma[np.argmin(np.abs(x - place))], rel=1e-3)
+    left, top, wide, high = opened.js("(({x, y, width, height}) => [x, y, width, height])"
+                                      "(document.getElementById('stage-pieces').getBoundingClientRect())")
+    for share, side in ((0.25, "upper"), (0.75, "lower")):
+        opened.pointed(left + 0.45 * wide, top + share * high)
+        assert f"{side} piece" in opened.js("document.getElementById('stage-tip').textContent")
+        assert "von Mises stress" in opened.js("document.getElementById('stage-tip').textContent")
+
+
+def test_exact_in_a_browser_both_themes_a_narrow_window_and_paper(opened):
+    def shown(dark: bool, media: str = "") -> tuple:
+        """The colour of the words, and the mean grey of what is drawn on the canvas of the curve."""
+        opened.themed(dark, media)
+        return tuple(opened.js("""new Promise(done => setTimeout(() => {
+            const at = document.getElementById('stage-curve'), all = at.getContext('2d').getImageData(0, 0, at.width,
+                at.height).data;
+            let sum = 0, weight = 0;
+            for (let k = 0; k < all.length; k += 4) {
+                sum += all[k + 3] * (all[k] + all[k + 1] + all[k + 2]) / 3; weight += all[k + 3]; }
+            done([getComputedStyle(document.getElementById('stage-told')).color, sum / weight]); }, 100))"""))
+
+    light, dark = shown(False), shown(True)
+    assert light[0] == "rgb(28, 36, 48)" and dark[0] == "rgb(228, 233, 239)" and dark[1] > light[1] + 20
+    paper = shown(True, "print")  # dark inks on white paper, whatever the reader's theme is
+    assert paper[0] == light[0] and abs(paper[1] - light[1]) < 10, (light, dark, paper)
+    assert opened.printed().startswith(b"%PDF")
+    assert shown(False) == light
+    opened.sized(420, 900)
+    try:
+        wide = opened.js("new Promise(done => setTimeout(() => done(document.documentElement.scrollWidth), 100))")
+        assert wide <= 420
+    finally:
+        opened.sized(1200, 900)
+
+
+def test_always_markup_in_a_title_or_a_scene_is_text(opened):
+    assert not opened.js("window.hacked") and opened.js("document.getElementById('evil')") is None
+    assert opened.js("document.querySelector('h1').textContent").startswith('<img src=x onerror=')

@@ -1,0 +1,147 @@
+"""A headless Chromium driven over a pipe: real pointer and keys, both themes, prints; one start for many pages."""
+
+import base64
+import fcntl
+import json
+import os
+import shutil
+from pathlib import Path
+
+FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-quic", "--disable-sync",
+         "--disable-background-networking", "--disable-component-update", "--disable-extensions", "--mute-audio")
+
+
+def program() -> str | None:
+    """The Chromium of this machine."""
+    return next((found for found in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if found),
+                None)
+
+
+class Chromium:
+    """A browser with one page; `opened` shows a text of HTML, what was wrong in its scripts is in `faults`."""
+
+    def __init__(self, home: Path):
+        self.home, self.number, self.faults = home, 0, []
+        (take, self.out), (self.into, give) = os.pipe(), os.pipe()
+        far = [fcntl.fcntl(one, fcntl.F_DUPFD, 10) for one in (take, give)]  # 3 and 4 are where it listens and speaks
+        null = os.open(os.devnull, os.O_RDWR)
+        places = [(os.POSIX_SPAWN_DUP2, *pair) for pair in ((null, 1), (null, 2), (far[0], 3), (far[1], 4))]
+        words = [program(), *FLAGS, f"--user-data-dir={home / 'user'}", "--remote-debugging-pipe", "about:blank"]
+        self.process = os.posix_spawn(words[0], words, os.environ, file_actions=places)
+        for one in (take, give, null, *far):
+            os.close(one)
+        self.reader, self.session = os.fdopen(self.into, "rb"), None
+        self.target = next(one for one in self.ask("Target.getTargets")["targetInfos"] if one["type"] == "page")
+        self.target = self.target["targetId"]
+        self._attach()
+
+    def _attach(self) -> None:
+        self.session = None
+        self.session = self.ask("Target.attachToTarget", targetId=self.target, flatten=True)["sessionId"]
+        for part in ("Page", "Runtime"):
+            self.ask(f"{part}.enable")
+
+    def _next(self) -> dict:
+        parts = bytearray()
+        while (one := self.reader.read(1)) != b"\0":
+            if not one:
+                raise EOFError("the browser has ended")
+            parts += one
+        said = json.loads(parts)
+        if said.get("method") == "Runtime.exceptionThrown":
+            what = said["params"]["exceptionDetails"]
+            self.faults.append(what.get("exception", {}).get("description") or what["text"])
+        return said
+
+    def ask(self, method: str, **params) -> dict:
+        """The answer to one message of the browser's protocol."""
+        self.number += 1
+        message = {"id": self.number, "method": method, "params": params}
+        message |= {"sessionId": self.session} if self.session else {}
+        os.write(self.out, json.dumps(message).encode() + b"\0")
+        while (said := self._next()).get("id") != self.number:
+            pass
+        assert "error" not in said, said
+        return said["result"]
+
+    def opened(self, text: str, width: int = 1200, height: int = 900, dark: bool = False) -> "Chromium":
+        """Show a page and wait until its pictures stand."""
+        self.sized(width, height)
+        self.themed(dark)
+        self._to(text, "Page.loadEventFired")
+        self.settled()
+        return self
+
+    def after(self, text: str, milliseconds: float) -> str:
+        """The document that a page has become after some time of its own clock, which waits for nothing."""
+        old, self.session = self.target, None
+        self.target = self.ask("Target.createTarget", url="about:blank")["targetId"]
+        self.ask("Target.closeTarget", targetId=old)
+        self._attach()
+        self.sized(1200, 900)
+        self._to(text, "Page.loadEventFired")
+        self.ask("Emulation.setVirtualTimePolicy", policy="pauseIfNetworkFetchesPending", budget=milliseconds)
+        while self._next().get("method") != "Emulation.virtualTimeBudgetExpired":
+            pass
+        return self.js("document.documentElement.outerHTML")
+
+    def _to(self, text: str, event: str) -> None:
+        path = self.home / f"page{self.number}.html"
+        path.write_text(text, "utf-8")
+        self.faults = []
+        self.ask("Page.navigate", url=path.as_uri())
+        while self._next().get("method") != event:
+            pass
+
+    def settled(self) -> None:
+        """Wait until every picture of BokehJS is drawn."""
+        self.js("""new Promise((done) => { const look = () => [...document.querySelectorAll('.chart')].every((one) =>
+            one.firstElementChild?.shadowRoot) ? requestAnimationFrame(() => requestAnimationFrame(done))
+            : setTimeout(look, 20); look(); setTimeout(done, 8000); })""")
+
+    def sized(self, width: int, height: int) -> None:
+        self.ask("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+
+    def themed(self, dark: bool, media: str = "") -> None:
+        self.ask("Emulation.setEmulatedMedia", media=media,
+                 features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}])
+
+    def js(self, text: str):
+        """The value of an expression in the page, a promise waited for."""
+        found = self.ask("Runtime.evaluate", expression=text, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in found, found["exceptionDetails"]
+        return found["result"].get("value")
+
+    def pointed(self, x: float, y: float, kind: str = "mouseMoved", **more) -> None:
+        """Move or press the pointer at a place of the window."""
+        self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
+
+    def pressed(self, key: str) -> None:
+        """Press a key on what has the focus."""
+        code = {"ArrowRight": 39, "ArrowLeft": 37, " ": 32, "Home": 36, "End": 35}[key]
+        for kind in ("keyDown", "keyUp"):
+            text = {"text": key} if key == " " and kind == "keyDown" else {}
+            self.ask("Input.dispatchKeyEvent", type=kind, key=key, code=key.strip() or "Space",
+                     windowsVirtualKeyCode=code, **text)
+
+    def picture(self, path: Path | None = None, whole: bool = False) -> bytes:
+        """What the window shows as PNG; whole: all of the page."""
+        found = base64.b64decode(self.ask("Page.captureScreenshot", captureBeyondViewport=whole)["data"])
+        if path is not None:
+            Path(path).write_bytes(found)
+        return found
+
+    def printed(self) -> bytes:
+        """The page as PDF."""
+        return base64.b64decode(self.ask("Page.printToPDF", printBackground=True)["data"])
+
+    def close(self) -> None:
+        """End the browser."""
+        try:
+            self.session = None
+            self.ask("Browser.close")
+        except (EOFError, OSError):
+            pass
+        os.close(self.out)
+        os.waitpid(self.process, 0)
+        self.reader.close()
