@@ -27,6 +27,7 @@ from .commands.run import run  # noqa: E402
 from .commands.scene import check, mesh, plan  # noqa: E402
 from .commands.shared import Ended, Refused, say  # noqa: E402
 from .commands.start import cite, demo, doctor, new, schema  # noqa: E402
+from .commands.streams import plain, ready  # noqa: E402
 from .commands.study import cost, fit  # noqa: E402
 from .commands.sweep import sweep  # noqa: E402
 from .commands.torture import torture_of  # noqa: E402
@@ -47,6 +48,8 @@ app.register_install_completion_command(help="Complete commands and options in t
 
 def main(argv: list | None = None) -> None:
     """Entry point: exit codes 0 done, 2 bad input, 3 not converged, 4 missing or out of a resource, 130 interrupted."""
+    if argv is None:
+        ready()
     code = _guarded(sys.argv[1:] if argv is None else argv)
     if argv is None:
         _leave(code)
@@ -74,7 +77,7 @@ def _guarded(words: list) -> int:
         sys.stdout.flush()
         return 0
     except (Refused, CycloptsError) as error:
-        say(f"patchfem: {' '.join(str(error).split())}")
+        say(plain(f"patchfem: {' '.join(str(error).split())}"))
         return 2
     except Ended as end:
         return end.code
@@ -92,18 +95,18 @@ def _guarded(words: list) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        say(f"{error.filename or 'patchfem'}: {error.strerror or error}")
+        say(plain(f"{error.filename or 'patchfem'}: {error.strerror or error}"))
         return 4
     except Exception as error:
         if hasattr(error, "mistakes"):  # SceneError, which is not named: words are read 20 ms faster before pydantic is
             for line in error.mistakes:
-                say(line)
+                say(plain(line))
             return 2
         code = getattr(error, "code", None)
         if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
-            say(str(error))
+            say(plain(str(error)))
             return code
-        say(f"patchfem: internal fault, please report it: {type(error).__name__}: {error}")
+        say(plain(f"patchfem: internal fault, please report it: {type(error).__name__}: {error}"))
         if os.environ.get("PATCHFEM_DEBUG"):
             raise
         return 1

@@ -56,8 +56,11 @@ class Refused(Exception):
 
 
 def say(text: str) -> None:
-    """One line on stderr."""
-    print(text, file=sys.stderr, flush=True)
+    """One line on stderr; a stream that takes none is left alone, as nothing else could be told of it."""
+    try:
+        print(text, file=sys.stderr, flush=True)
+    except (OSError, ValueError):
+        pass
 
 
 def scene_of(path: Path, sets, faults=None):

@@ -131,7 +131,7 @@ def _kind(model: type, name: str) -> str:
     many = "" if not arrays else "list of " if ... in arrays[0] else "pair of "
     marks = [inner for mark in (*model.model_fields[name].metadata, *types)
              for inner in (mark, *getattr(mark, "metadata", ()))]
-    limits = [f"{sign} {getattr(mark, word):g}" for mark in marks for word, sign in SIGNS.items()
+    limits = [f"{sign} {getattr(mark, word):.15g}" for mark in marks for word, sign in SIGNS.items()
               if isinstance(getattr(mark, word, None), int | float)]
     return ", ".join([many + ", ".join(dict.fromkeys(words)), *dict.fromkeys(limits)])
 

@@ -28,10 +28,12 @@ class Folder:
 
     def __init__(self, target: Path, resume: bool = False):
         self.target = Path(os.path.abspath(target)).resolve()
-        self.path = self.target.with_name(self.target.name + ".partial")
+        self.path = self.target.parent / (self.target.name + ".partial")
         self.shown, self.resume = target, resume
 
     def __enter__(self) -> "Folder":
+        if not self.target.name:
+            raise PatchfemError(f"{self.shown}: the root of the file system cannot be replaced; name another -o")
         if Path.cwd().is_relative_to(self.target):
             raise PatchfemError(f"{self.shown}: the working folder cannot be replaced by results; name another -o")
         for place in (self.target, self.path):

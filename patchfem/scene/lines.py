@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
+DEEPEST = 50  # parts of a dotted key; no key of a scene has more than five
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _BLANK = re.compile(r"(?:[ \t]+|\r?\n|#[^\n]*)*")
 _SCALAR = re.compile(r"[^,\]}\n#]*")
@@ -22,6 +23,7 @@ def key_lines(text: str) -> dict[str, int]:
 
     Items of an array of tables count from 0 (``structure.mode.0.name``); a table that only its sub-tables or dotted
     keys create has the line of the first of these. A text that is not TOML gives what was found before the fault.
+    TooDeep for a key of more than DEEPEST parts: the paths of all of them would take the square of their number.
     """
     scan = _Scan(text)
     try:
@@ -37,6 +39,14 @@ def key_lines(text: str) -> dict[str, int]:
 
 class _Fault(Exception):
     """The text is not TOML here."""
+
+
+class TooDeep(ValueError):
+    """A key of more than DEEPEST parts; `line`: where it stands, from 1."""
+
+    def __init__(self, line: int) -> None:
+        super().__init__(f"a key of more than {DEEPEST} parts; table.key is wanted")
+        self.line = line
 
 
 class _Scan:
@@ -122,6 +132,8 @@ class _Scan:
             self.peek()
             if not self.take("."):
                 return parts
+            if len(parts) >= DEEPEST:
+                raise TooDeep(self.line())
 
     def string(self) -> str:
         for form in _STRINGS:

@@ -15,6 +15,9 @@ from .keys.tables import Tables
 from .keys.types import Table, choices, keys, kind_of, model_of, parts
 
 _PLAIN_TEXT = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')  # a text in quotes without escapes
+_LONG_WORD = re.compile(r"[^\s/\\:]{200,}")  # no key, unit or name of a file is as long
+_LIMITS = {"greater_than": ("gt", ">"), "greater_than_equal": ("ge", ">="), "less_than": ("lt", "<"),
+           "less_than_equal": ("le", "<=")}  # fmt: skip
 _LAST = 10**9  # sorts the mistakes of --set behind those of the file
 
 
@@ -25,7 +28,7 @@ class Draft:
         self.path, self.lines, self.raw = path, lines, raw
         self.sets: set[str] = set()
         self.tables = _made(Tables, {})
-        self.mistakes: list[tuple[int, str]] = []
+        self.mistakes: dict[tuple[int, str], None] = {}  # each once, in the order in which they were found
         self.remarks: list[str] = []
         self.read_before: dict[int, tuple[dict, Any]] = {}  # id of a written table -> itself, and the table without
         self.made: dict[int, tuple[dict, Any]] = {}  # mistakes that was read from it before; those read now
@@ -96,13 +99,19 @@ class Draft:
         return line, f"{self.path}:{line}" if line else self.path
 
     def _note(self, order: int, where: str, text: str) -> None:
+        text = _LONG_WORD.sub(lambda word: f"{word[0][:60]}...", text)
         mistake = (order, f"{where}: " + "".join(sign if sign.isprintable() else " " for sign in text))
-        if mistake not in self.mistakes:
-            self.mistakes.append(mistake)
+        self.mistakes.setdefault(mistake)
 
 
 def apply_set(draft: Draft, assignment: str) -> None:
     """Apply one ``table.key=value`` as if the scene said so; the value stands without quotes, modes by name."""
+    try:
+        assignment.encode()
+    except UnicodeEncodeError:
+        shown = assignment.encode(errors="backslashreplace").decode()
+        draft.refuse_set(f"{shown}: holds bytes that are no UTF-8 text; write it in UTF-8")
+        return
     key, equals, text = assignment.partition("=")
     pieces = [piece.strip() for piece in key.split(".")]
     if not equals or not all(pieces):
@@ -240,7 +249,8 @@ def _validated(draft: Draft, model: type[Table], values: dict[str, Any], at: str
         model.model_validate(values, context=good)
     except ValidationError as caught:
         seen = set()
-        for error in caught.errors(include_url=False):
+        # of the answers of several types to one value, that of the type which only its limits refuse comes first
+        for error in sorted(caught.errors(include_url=False), key=lambda one: one["type"] not in _LIMITS):
             key = str(error["loc"][0])
             if (error["type"] == "missing" and len(error["loc"]) == 1) or key in seen:
                 continue
@@ -321,13 +331,12 @@ def _wanted(model: type[Table], name: str) -> str:
 
 
 def _message(model: type[Table], name: str, error: Any, value: Any) -> str:
-    limits = {"greater_than": ("gt", ">"), "greater_than_equal": ("ge", ">="), "less_than": ("lt", "<"),
-              "less_than_equal": ("le", "<=")}  # fmt: skip
     allowed = _allowed(model, name)
-    if error["type"] in limits:
-        key, sign = limits[error["type"]]
+    if error["type"] in _LIMITS:
+        key, sign = _LIMITS[error["type"]]
         bound = error["ctx"][key]
-        return f"must be {sign} {bound:g}, not {_show(value)}; {_wanted(model, name)}"
+        bound = str(bound) if isinstance(bound, int) else f"{bound:g}"
+        return f"must be {sign} {bound}, not {_show(value)}; {_wanted(model, name)}"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
     if allowed and isinstance(value, str):

@@ -18,7 +18,7 @@ from typing import Any
 from ..effects import takes
 from .keys import tables
 from .keys.types import keys as keys_of
-from .lines import key_lines
+from .lines import DEEPEST, TooDeep, key_lines
 from .reader import Draft, apply_set
 from .rules.check import check
 from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
@@ -27,6 +27,9 @@ from .rules.friction import kinetic_unused, temperature_unused
 from .rules.limits import combinations, not_yet_built
 from .rules.methods import method_unused
 from .text import effects, toml
+
+MOST_COORDINATES = 2000  # masses or modes of a rig
+LARGEST = 32 * 2**20  # bytes of a scene
 
 
 class SceneError(Exception):
@@ -106,10 +109,14 @@ def load(path: str | Path, sets: Iterable[str] = (), faults: Callable | None = N
 def text_of(path: str | Path) -> str:
     """The text of a scene file; SceneError where it cannot be read."""
     try:
-        content = Path(path).read_bytes()
+        with open(path, "rb") as file:
+            content = file.read(LARGEST + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise SceneError([f"{path}: cannot be read: {reason}"]) from None
+    if len(content) > LARGEST:
+        raise SceneError([f"{path}: more than {LARGEST >> 20} MiB, which no scene needs; put matrices into a file and "
+                          "name it as structure.file"])
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -164,12 +171,9 @@ def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = (), 
 
     more(tables, whole) gives (key, message) of mistakes beside those of the text; whole: the tables have none.
     """
-    try:
-        raw = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise SceneError([_syntax(error, text, path)]) from None
+    raw, lines = _parsed(text, path)
     sets, axes = tuple(sets), []
-    draft = Draft(str(path), key_lines(text), raw)
+    draft = Draft(str(path), lines, raw)
     if "sweep" in raw:
         axes = _axes(draft, raw.pop("sweep"))
     given = [axis for axis in axes if not draft.given(axis.key)]  # a key that only [sweep] holds has its first value
@@ -198,13 +202,38 @@ def scene_of(draft: Draft, path: str | Path, text: str, sets: tuple[str, ...], m
 
 def axes_of(text: str, path: str | Path) -> tuple[list, list[str]]:
     """(axes, mistakes) of the table [sweep] of a text, of which nothing else is read; SceneError if it is no TOML."""
-    try:
-        raw = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise SceneError([_syntax(error, text, path)]) from None
-    draft = Draft(str(path), key_lines(text), raw)
+    raw, lines = _parsed(text, path)
+    draft = Draft(str(path), lines, raw)
     axes = _axes(draft, raw["sweep"]) if "sweep" in raw else []
     return axes, draft.lines_of_mistakes()
+
+
+def _parsed(text: str, path: str | Path) -> tuple[dict, dict[str, int]]:
+    """The plain values of a text and the lines of its keys; SceneError if it is no TOML, or names too many masses."""
+    try:
+        if any(line.count(".") > DEEPEST for line in text.split("\n")):
+            key_lines(text)  # it refuses keys of so many parts that reading them takes minutes
+        raw = tomllib.loads(text)
+        _refuse_crowds(raw, text, path)
+        return raw, key_lines(text)
+    except TooDeep as error:
+        raise SceneError([f"{path}:{error.line}: {error}"]) from None
+    except (ValueError, RecursionError) as error:
+        raise SceneError([_syntax(error, text, path)]) from None
+
+
+def _refuse_crowds(raw: dict, text: str, path: str | Path) -> None:
+    """SceneError for more masses or modes than any run can take, before each of their tables is read."""
+    structure = raw.get("structure")
+    for key, form in (("masses", r"masses\s*="), ("mode", r"\[\[\s*structure\s*\.\s*mode\s*\]\]")):
+        count = len(items) if isinstance(structure, dict) and isinstance(items := structure.get(key), list) else 0
+        if count > MOST_COORDINATES:
+            found = re.search(rf"^[ \t]*{form}", text, re.MULTILINE)
+            line = f":{text.count(chr(10), 0, found.start()) + 1}" if found else ""
+            raise SceneError([f"{path}{line}: structure.{key}: {count} are more than {MOST_COORDINATES}, whose modes "
+                              f"are solved as one full matrix: {8e-9 * 3 * count**2:.2g} GB and some "
+                              f"{1.5e-9 * count**3:.2g} s; give fewer, or the modes that the drive reaches as "
+                              "structure.file"])
 
 
 def _axes(draft: Draft, table: Any) -> list:

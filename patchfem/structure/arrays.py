@@ -70,6 +70,8 @@ def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
             _lacks(data, f"the matrix {key}", where)
     M, K, C = (_square(data, key, where) for key in ("M", "K", "C"))
     n = len(M)
+    if n == 0:
+        raise PatchfemError(f"{where}: M holds no coordinate; a square matrix [kg] of at least one is wanted")
     if pairs and "slide" in data:
         raise PatchfemError(f"{where}: holds slide, and [[structure.interface]] names interfaces as well: keep one")
     over = [k for pair in pairs for k in pair if k > n]

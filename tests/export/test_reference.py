@@ -65,7 +65,7 @@ def test_exact_nothing_is_left_out():
 def test_exact_rows_say_kind_limits_default_and_what_needs_the_key():
     rows = {key: rest for key, *rest in section("`[contact]`")}
     assert rows["`length`"][:3] == ["length, > 0", "", "yes"]
-    assert rows["`pairs`"][:3] == ["whole number, >= 1", "1", ""]
+    assert rows["`pairs`"][:3] == ["whole number, >= 1, <= 1000000", "1", ""]
     assert rows["`plane`"][:2] == ["`strain`, `stress`", "`strain`"]
     assert rows["`load`"][2] == "unless [contact.approach]"
     rows = {key: rest for key, *rest in section("`[friction]`")}
@@ -73,7 +73,7 @@ def test_exact_rows_say_kind_limits_default_and_what_needs_the_key():
     assert rows["`breakaway`"][:2] == ["number, >= 0, <= 1", "0"]
     rows = {key: rest for key, *rest in section("`[drive]`")}
     assert rows["`levels`"][0] == "list of acceleration, >= 0" and rows["`from`"][2] == "waveform `sweep`"
-    assert section("`[[structure.spring]]`")[0][:2] == ["`between`", "pair of whole number, >= 0"]
+    assert section("`[[structure.spring]]`")[0][:2] == ["`between`", "pair of whole number, >= 0, <= 1000000"]
     assert {key for key, *_ in section("`[[structure.interface]]`")} == {"`between`", "`load`"}
 
 

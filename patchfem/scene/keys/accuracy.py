@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator
 
-from .types import NotNegative, Positive, Speed, Table, whole
+from .types import Positive, Share, Speed, Table, whole
 
 
 def _still_summed(value: object) -> object:
@@ -23,12 +23,12 @@ class Accuracy(Table):
 
     tolerance: Positive = 1e-3
     method: Literal["auto", "exact", "march", "duhamel", "newmark", "euler", "harmonic"] = "auto"
-    steps_per_cycle: whole(4) | None = None
+    steps_per_cycle: whole(4, 10_000_000) | None = None
     quadrature: Summing = "auto"
-    tail: NotNegative | None = None
-    merge: NotNegative | None = None
-    harmonics: whole(1) | None = None
-    shear_modes: whole(1) | None = None
+    tail: Share | None = None
+    merge: Share | None = None
+    harmonics: whole(1, 10_000) | None = None
+    shear_modes: whole(1, 10_000) | None = None
     convergence: Literal["force", "velocity", "displacement"] | None = None
     convergence_tolerance: Positive | None = None
     stick_speed: Speed | None = None

@@ -140,7 +140,7 @@ def outermost(width: float, count: int) -> float:
 class Strips(Table):
     """The patch as equal strips side by side over the width."""
 
-    count: whole(1)
+    count: whole(1, 10_000)
     roll: quantity("angle") = 0.0
     offset: Place | None = None
 
@@ -152,7 +152,7 @@ class Contact(Table):
     width: Length
     height: Length
     load: Force | None = None
-    pairs: whole(1) = 1
+    pairs: whole(1, 1_000_000) = 1
     plane: Literal["strain", "stress"] = "strain"
     element_size: Length | None = None
     substrate: Substance

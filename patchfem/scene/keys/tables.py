@@ -30,6 +30,7 @@ from .types import (
     Speed,
     Table,
     Text,
+    Title,
     number,
     quantity,
     whole,
@@ -75,7 +76,7 @@ class Friction(Table):
     micro_damping: quantity("damping", ge=0) = 0.0
     viscous: quantity("damping", ge=0) = 0.0
     reading: Literal["stretch", "report"] = "stretch"
-    order: Number = 1.0
+    order: number(le=100) = 1.0
     rest_growth: Acceleration | None = None
     slip_growth: Length | None = None
     rest_speed: Speed | None = None
@@ -130,7 +131,8 @@ class Bonded(Table):
     wavelength: Length | None = None
 
 
-Between = tuple[whole(0), whole(0)]
+MOST_MASSES = 1_000_000
+Between = tuple[whole(0, MOST_MASSES), whole(0, MOST_MASSES)]
 
 
 class Spring(Table):
@@ -170,7 +172,7 @@ class Structure(Table):
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
     masses: tuple[Mass, ...] | None = None
-    output_mass: whole(1) | None = None
+    output_mass: whole(1, MOST_MASSES) | None = None
     spring: tuple[Spring, ...] = ()
     damper: tuple[Damper, ...] = ()
     interface: tuple[Interface, ...] = ()
@@ -200,7 +202,7 @@ class Drive(Table):
     onset: Literal["slip", "distortion", "gauge"] = "distortion"
     onset_length: Length | None = None
     force: Force | None = None
-    mass: whole(1) | None = None
+    mass: whole(1, MOST_MASSES) | None = None
     cycles: Positive | None = None
     duration: Seconds | None = None
     file: Text | None = None
@@ -220,7 +222,7 @@ class Wear(Table):
     coefficient: quantity("wear coefficient", ge=0)
     upper_share: Share = 0.5
     cycles: Positive
-    jumps: Literal["auto"] | whole(1) = "auto"
+    jumps: Literal["auto"] | whole(1, 1_000_000) = "auto"
     form: Literal["archard", "energy"] = "archard"
     scheme: Literal["implicit", "explicit"] = "implicit"
 
@@ -237,7 +239,7 @@ class Measured(Table):
 class Tables(Table):
     """The whole scene as tables, in the order in which effects are named."""
 
-    title: str = ""
+    title: Title = ""
     contact: Contact | None = None
     normal: Normal | None = None
     friction: Friction | None = None

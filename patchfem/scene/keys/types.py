@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache, partial
 from typing import Annotated, Any, get_args
+from unicodedata import category
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, WithJsonSchema, field_validator
 from pydantic.types import AllowInfNan
@@ -65,13 +66,22 @@ def number(**limits: float) -> Any:
     return Annotated[float, Strict(), AllowInfNan(False), Field(**limits), After(partial(_within, least=0.0))]
 
 
-def whole(least: int) -> Any:
-    """The type of a key that holds a whole number from `least` on."""
-    return Annotated[int, Strict(), Field(ge=least)]
+def whole(least: int, most: int) -> Any:
+    """The type of a key that holds a whole number from `least` to `most`."""
+    return Annotated[int, Strict(), Field(ge=least, le=most)]
+
+
+def _printable(value: str) -> str:
+    """A text without signs that no file of results can hold: control characters and halves of a pair."""
+    wrong = next((sign for sign in value if category(sign) in ("Cc", "Cs") and sign not in "\n\t"), None)
+    if wrong is not None:
+        raise ValueError(f"holds the sign U+{ord(wrong):04X}, which no text can show; leave it out")
+    return value
 
 
 # kinds that many keys share
-Text = Annotated[str, Field(min_length=1)]
+Text = Annotated[str, Field(min_length=1), After(_printable)]
+Title = Annotated[str, After(_printable)]
 Number, Share, Positive, NotNegative = number(), number(ge=0, le=1), number(gt=0), number(ge=0)
 Place, Length, Force = quantity("length"), quantity("length", gt=0), quantity("force", ge=0)
 Mass, Seconds, Frequency = quantity("mass", gt=0), quantity("time", gt=0), quantity("frequency", gt=0)

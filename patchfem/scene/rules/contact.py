@@ -5,6 +5,8 @@ from .draft import ASPERITIES, Draft, _needs
 from .limits import NOT_YET_BUILT
 from .outlines import flat_of, outlines
 
+MOST_ELEMENTS = 100_000  # over the interface; the patch of a tenth of them takes gigabytes
+
 
 def _contact(draft: Draft) -> None:
     contact = draft.tables.contact
@@ -20,6 +22,10 @@ def _contact(draft: Draft) -> None:
     if contact.element_size and flat and contact.element_size > flat:
         name = "contact.length" if flat == contact.length else "the interface,"
         draft.say("contact.element_size", f"{contact.element_size} m is longer than {name} {flat} m")
+    if contact.element_size and contact.length and contact.length > MOST_ELEMENTS * contact.element_size:
+        draft.say("contact.element_size", f"{contact.element_size:g} m makes more than {MOST_ELEMENTS} elements over "
+                                          f"{contact.length:g} m; at least {contact.length / MOST_ELEMENTS:.3g} m, or "
+                                          "leave it out")
     if contact.element_size and contact.mesh:
         draft.remark("contact.element_size is not used beside contact.mesh, whose elements are those of the file")
     pieces = [("contact.coating", contact.coating, contact.height)]

@@ -74,6 +74,8 @@ def clings(model: Model, element: Element) -> float:
     rig, modes = model.rig, model.rig.modes
     if modes.omega.size > 1 or not modes.slide[0]:
         return 1.0
+    if not element.limit:
+        return 0.0
     r = modes.mass * largest(rig.drive) * abs(modes.base[0] / modes.slide[0]) / element.limit
     return min(1.0, float(np.exp(EASES * (1 - r))))
 

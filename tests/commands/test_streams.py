@@ -1,0 +1,58 @@
+"""The command line on streams that are closed, full or of few signs, and with names of any bytes."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from command_line import cli
+from scene_texts import COULOMB, POINT, STRUCTURE
+
+from patchfem.commands.streams import plain
+
+SCENE = 'title = "ü ± µ"\n' + POINT + COULOMB + STRUCTURE
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text(SCENE, encoding="utf-8")
+    return path
+
+
+def patchfem(*words, **options) -> subprocess.CompletedProcess:
+    return subprocess.run([sys.executable, "-m", "patchfem", *map(str, words)], timeout=120, **options)
+
+
+def test_exact_closed_streams_change_no_exit_code_and_no_file(scene, tmp_path):
+    out = tmp_path / "out"
+    done = patchfem("run", scene, "-o", out, "--no-page", preexec_fn=lambda: (os.close(1), os.close(2)))
+    assert done.returncode == 0
+    files = {one.name: one.read_bytes() for one in out.iterdir()}
+    assert set(files) == {"summary.json", "result.nc", "scene.resolved.toml"}
+    assert files["result.nc"].startswith(b"\x89HDF") and not any(b"outcome: " in one for one in files.values())
+
+
+def test_exact_a_full_stderr_hides_a_mistake_but_not_its_code(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text("x = 1\n")
+    with open("/dev/full", "wb") as full:
+        assert patchfem("check", path, stderr=full).returncode == 2
+
+
+def test_exact_a_stream_of_few_signs_shows_the_others_by_their_codes(scene, tmp_path):
+    done = patchfem("run", scene, "-o", tmp_path / "out", "--no-page", capture_output=True,
+                    env=os.environ | {"PYTHONIOENCODING": "ascii"})
+    assert done.returncode == 0 and done.stdout.startswith(rb"\xfc \xb1 \xb5") and not done.stderr
+
+
+def test_refuses_the_root_as_a_folder_of_results(scene):
+    answer = cli("run", scene, "-o", "/")
+    assert answer.code == 2 and answer.err.count("\n") == 1 and "/: the root" in answer.err
+
+
+def test_exact_a_name_is_shown_on_one_line_without_moving_the_cursor(tmp_path):
+    answer = cli("check", str(tmp_path / "a\x1b[31m\nb.toml"))
+    assert answer.code == 2 and answer.err.count("\n") == 1
+    assert "a?[31m?b.toml: cannot be read" in answer.err
+    assert plain("a\udcffü") == "a?ü"
