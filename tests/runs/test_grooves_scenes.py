@@ -45,6 +45,9 @@ cycles = 30
 steps_per_cycle = 100
 """
 WAVE = 2 * np.pi / 80e-6
+LATER = {"iwan": ["friction.law=iwan", "friction.stiffness=1e7 N/m", "friction.chi=-0.5", "friction.beta=0.5"],
+         "bouc-wen": ["friction.law=bouc-wen", "friction.stiffness=1e7 N/m"],
+         "lugre": ["friction.law=lugre", "friction.stiffness=1e7 N/m", "friction.stribeck_speed=1 mm/s"]}
 
 
 def flat(text):
@@ -121,6 +124,19 @@ def test_exact_a_slow_slide_of_a_force_that_follows_the_speed():
     t = 7.5e-6 * WAVE * np.sin(WAVE * q)
     dashpot = 115 * 0.4 / 1000 * 1e-3 * np.trapezoid(2 * (1 + t**2)**1.5, q)
     assert value(slow, "loop_area") == pytest.approx(dashpot, rel=1e-6)
+
+
+@pytest.mark.parametrize("law", LATER)
+def test_always_a_law_of_constant_load_acts_along_the_flank(law):
+    """Books close, in a bench and in a rig with a lifted mass; of a stiff law the loop of a slow slide is Coulomb's."""
+    stiff = [one.replace("1e7 N/m", "4e8 N/m") for one in LATER[law]]
+    found = pf.run(loads(BENCH, sets=[*stiff, "accuracy.steps_per_cycle=2000"]))
+    assert value(found, "energy_balance") < 1e-10 and value(found, "work_check") < 1e-3
+    assert value(found, "loop_area") == pytest.approx(area(115, 0.4, 7.5e-6, 30e-6), rel=0.02)
+    found = pf.run(loads(RIG, sets=[*LATER[law], "normal.grooves.lifted_mass=0.3 kg", "drive.cycles=6"]))
+    assert found.extra["engine"] == "march" and value(found, "energy_balance") < 1e-10
+    assert value(found, "normal_load_least") < 115 < value(found, "normal_load_peak")
+    assert loads(RIG, sets=LATER[law]) and pf.plan(loads(RIG, sets=LATER[law])).engine == "march"
 
 
 @pytest.mark.parametrize("law", ["elastic-plastic", "nonlocal"])
@@ -216,8 +232,10 @@ def test_exact_the_plan_prints_stiffness_and_capacity():
     (RIG, ["accuracy.method=exact"], "accuracy.method", "no exact solution exists beside [normal.grooves]"),
     (RIG, ["accuracy.method=harmonic"], "accuracy.method", "beside [normal.grooves]"),
     (RIG, ["accuracy.method=newmark"], "accuracy.method", "beside [normal.grooves]"),
-    (RIG, ["friction.law=iwan", "friction.stiffness=1e7 N/m", "friction.chi=-0.5", "friction.beta=0.5"],
-     "friction.law", "beside [normal.grooves]: use law 'coulomb'"),
+    (RIG, ["friction.law=convolution", "friction.bond_length=1 um"], "friction.law",
+     "beside [normal.grooves]: use law 'coulomb'"),
+    (RIG, [*LATER["iwan"], "accuracy.method=harmonic"], "accuracy.method",
+     "'harmonic' with law 'iwan' beside [normal.grooves]"),
     (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "accuracy.method=harmonic"], "accuracy.method",
      "'harmonic' with law 'nonlocal' beside [normal.grooves]"),
     (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.order=2"], "friction.order",

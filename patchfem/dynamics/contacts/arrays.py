@@ -88,6 +88,19 @@ class Climbing(namedtuple("Climbing", ("flank", "now_at", "share", *Rub._fields)
     __slots__ = ()
 
 
+class Flanked(NamedTuple):
+    """A law of constant load along flanks, `grooves.element_kernels`: flank and now_at as of `Climbing`; num (1, k),
+    mem (1, m) as the law has them under the load; tried (1, m): room for the memory of a step that is tried; bound
+    (1,): largest force [N] under the load, infinite where none is."""
+
+    flank: np.ndarray
+    now_at: np.ndarray
+    num: np.ndarray
+    mem: np.ndarray
+    tried: np.ndarray
+    bound: np.ndarray
+
+
 class Stops(NamedTuple):
     """The m elements of set-valued friction among joints, `march.joints_stops_kernels`.
 

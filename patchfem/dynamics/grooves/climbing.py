@@ -112,19 +112,20 @@ class ClimbingModel:
         return {"nodes": np.stack([force, over + contact.b @ contact.modes, contact.share * contact.now_at[VERTICAL]])}
 
 
-class ClimbingRun(Run):
-    """The arrays of a march over grooves, and its clock."""
+class FlankRun(Run):
+    """The arrays of a march of a contact along flanks, and its clock."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
         super().__init__(modes, drive, model, steps_per_cycle, travel, hub, start)
         q, v = self.modes.slide @ self.state[0], self.modes.slide @ self.state[1]
-        steep, c = float(model.grooves.slope(q)), self.contact
-        c.now_at[RISE] = steep * v
+        steep, at = float(model.grooves.slope(q)), self.contact.now_at
         normal = model.load * np.hypot(1.0, steep)
-        c.memory[:] *= normal / c.now_at[NORMAL]  # it was built at the slide 0
-        c.before[:] = c.now[:] = normal * c.share
-        c.now_at[[BEFORE, NORMAL]] = normal
+        self._pressed(normal / at[NORMAL])
+        at[RISE], at[BEFORE], at[NORMAL] = steep * v, normal, normal
         self.ledger[0] += self.strained()
+
+    def _pressed(self, share: float) -> None:
+        """Bring the memory to a normal force that is `share` of that at the slide 0, for which it was built."""
 
     def response(self, rows, number) -> Response:
         """Histories; with a lifted mass `extra` has normal_load [N], the vertical force N + m (t q'' + t' q'^2)."""
@@ -143,3 +144,12 @@ class ClimbingRun(Run):
             self.outcome = Outcome.NOT_CONVERGED
             self.message = lifts(self.model.grooves, self.done * self.prop.dt)
 
+
+class ClimbingRun(FlankRun):
+    """The arrays of a march whose points have a memory of their loads."""
+
+    def _pressed(self, share: float) -> None:
+        c = self.contact
+        c.memory[:] *= share
+        c.before[:] *= share
+        c.now[:] *= share

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
-from ...effects import has
+from ...effects import carries, has
 from ...friction.record import law_from
 from .engine import ELEMENTS, Engine
 from .follow import follow
@@ -45,10 +45,14 @@ def climbing(model, load: float, patch=None, count: int | None = None):
     """
     from ...dynamics.grooves.climbing import giving, model_of
 
-    f = model.friction
+    f, modes = model.friction, model.rig.modes if model.rig is not None else None
+    grooves = model.grooves if modes is not None else replace(model.grooves, lifted_mass=0.0)
+    if not carries(f, "varying-load"):
+        from ...dynamics.grooves import elements
+
+        return elements.model_of(grooves, load, f.static, law_from(f, load).element(load), modes)
     law = model.bonds if has(f.law, "bonds") else None
-    found = model_of(model.grooves if model.rig is not None else replace(model.grooves, lifted_mass=0.0), load,
-                     f.static, f.bond_length, law, model.rig.modes if model.rig is not None else None)
+    found = model_of(grooves, load, f.static, f.bond_length, law, modes)
     return giving(found, patch, count, model.accuracy.tolerance) if model.soft else found
 
 

@@ -174,7 +174,7 @@ def _harmonic(m: Motion, method: str) -> str:
         return unbuilt(f"'harmonic' with a law that jumps beside {m.spring}", "march or stiff")
     if not has(law.law, "set-valued") and not carries(law, "harmonic"):
         return f"'harmonic' with {named(law)}: use 'march', or {refusal('harmonic')}"
-    if m.spring.endswith("grooves]") and has(law.law, "bonds"):
+    if m.spring.endswith("grooves]") and (has(law.law, "bonds") or not carries(law, "varying-load")):
         return unbuilt(f"'harmonic' with law '{law.law}' beside {m.spring}", "march or stiff")
     if m.spring.endswith("grooves]") and m.soft:
         return unbuilt(f"'harmonic' with law '{law.law}' beside {m.spring} and {m.soft}", "march")
