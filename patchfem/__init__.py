@@ -4,28 +4,29 @@ Read the package in this order. A module imports its own entry of the list and t
 
 1. `core`         the nouns that travel: interface, compliance, pressure, modal basis, response, measure, outcome
 2. `effects`      which key of a scene needs which module and equation
-3. `compiled`     where compiled code is kept
-4. `closed_forms` exact answers that tests, studies and users share
-5. `scene`        a TOML file becomes SI values, every mistake named at once
-6. `inputs`       files of measurements: columns, slide paths, signals, loops
-7. `mesh`         two coated pieces as tagged meshes
-8. `surface`      measured or made height profiles as a share of the gap
-9. `elasticity`   the pieces condensed to their interface, fields recovered inside
-10. `contact`     gap shapes, unilateral contact, skins, strips, contact maps
-11. `friction`    laws of friction and the sum over bonds along the path
-12. `slip`        partial slip of the pieces: elements, shear modes, load paths
-13. `structure`   the modes of the rig and what drives it
-14. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
-15. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
-16. `response`    measures of a run, outcome, events, levels, ringing
-17. `wear`        worn depth over many cycles
-18. `runs`        patch, bench and rig: where the pillars meet
-19. `identify`    values from measurements with intervals
-20. `campaigns`   many runs: fits, error against cost, sweeps
-21. `export`      summary, netCDF, VTK, report
-22. `api`         load, build, plan and run from Python
-23. `torture`     seeded attacks on the command line
-24. `commands`    the verbs of the command line
+3. `disk`         files written whole, folders with one writer
+4. `compiled`     where compiled code is kept
+5. `closed_forms` exact answers that tests, studies and users share
+6. `scene`        a TOML file becomes SI values, every mistake named at once
+7. `inputs`       files of measurements: columns, slide paths, signals, loops
+8. `mesh`         two coated pieces as tagged meshes
+9. `surface`      measured or made height profiles as a share of the gap
+10. `elasticity`   the pieces condensed to their interface, fields recovered inside
+11. `contact`     gap shapes, unilateral contact, skins, strips, contact maps
+12. `friction`    laws of friction and the sum over bonds along the path
+13. `slip`        partial slip of the pieces: elements, shear modes, load paths
+14. `structure`   the modes of the rig and what drives it
+15. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
+16. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
+17. `response`    measures of a run, outcome, events, levels, ringing
+18. `wear`        worn depth over many cycles
+19. `runs`        patch, bench and rig: where the pillars meet
+20. `identify`    values from measurements with intervals
+21. `campaigns`   many runs: fits, error against cost, sweeps
+22. `export`      summary, netCDF, VTK, report
+23. `api`         load, build, plan and run from Python
+24. `torture`     seeded attacks on the command line
+25. `commands`    the verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used.
 """

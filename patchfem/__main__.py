@@ -4,7 +4,11 @@ import gc
 import os
 import signal
 
-signal.signal(signal.SIGINT, lambda *_: os._exit(130))  # until main() takes over, an interrupt just leaves
+# what asks a process to end: a person, a batch queue, a terminal that is closed (unless nohup lets it pass)
+ENDINGS = [one for one in (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP"))
+           if one is not None and signal.getsignal(one) is not signal.SIG_IGN]
+for one in ENDINGS:
+    signal.signal(one, lambda *_: os._exit(130))  # until main() takes over, it just leaves
 
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # looking for some costs every command 30 ms
 # everything large holds BLAS to one thread anyway; others would only wait and cost a small run 0.1 s of CPU
@@ -32,7 +36,8 @@ from .commands.study import cost, fit  # noqa: E402
 from .commands.sweep import sweep  # noqa: E402
 from .commands.torture import torture_of  # noqa: E402
 
-signal.signal(signal.SIGINT, signal.default_int_handler)
+for one in ENDINGS:
+    signal.signal(one, signal.default_int_handler)
 
 VERBS = (new, demo, check, plan, run, sweep, profile, compare, cost, fit, mesh, import_, export, view, report, schema,
          doctor, cite)
@@ -82,7 +87,7 @@ def _guarded(words: list) -> int:
     except Ended as end:
         return end.code
     except KeyboardInterrupt:
-        say("interrupted; nothing was replaced")
+        say(_interrupted())
         return 130
     except MemoryError:
         say("out of memory; make contact.element_size larger or the run shorter")
@@ -110,6 +115,18 @@ def _guarded(words: list) -> int:
         if os.environ.get("PATCHFEM_DEBUG"):
             raise
         return 1
+
+
+def _interrupted() -> str:
+    """What an interrupted command leaves."""
+    there = sys.modules.get(f"{__package__}.disk.whole")
+    placed = there.replaced() if there else []
+    kept = [one for one in dict.fromkeys(there.KEPT) if one.is_dir()] if there else []
+    text = "interrupted; nothing was replaced"
+    if placed:
+        text = f"interrupted; whole and in place: {', '.join(placed[-3:])}" + \
+            f" and {len(placed) - 3} more" * (len(placed) > 3)
+    return text + "".join(f"; what is kept in {there.shown(one)} goes on with --resume" for one in kept)
 
 
 if __name__ == "__main__":

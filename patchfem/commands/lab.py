@@ -70,8 +70,8 @@ def _table(file: Path, out: Path, asked, zero: bool) -> dict:
 
 
 def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
+    from ..disk.whole import write_text
     from ..export.lab.modes import fragment
-    from ..export.lab.write import write_text
     from ..identify import measured_modes as measured
 
     shapes, notes = _shapes(file, asked, how)

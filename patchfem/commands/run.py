@@ -28,12 +28,7 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
         talk(f"about {what.seconds:.1f} s, {what.steps} steps, engine {what.engine}")
     target = out if out is not None else Path("out") / what.model.source.path.stem
     with progress_bar(quiet or json_) as progress:
-        try:
-            written = run_into(what, target, talk, progress, fresh, resume)
-        except KeyboardInterrupt:
-            if (target.with_name(target.name + ".partial") / "wear.npz").is_file():
-                talk(f"{target}: the wear so far is kept; go on with --resume")
-            raise
+        written = run_into(what, target, talk, progress, fresh, resume)
     answer = written.summary
     try:
         if quiet and not json_:
@@ -55,13 +50,15 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
 
 def _draw(written, target: Path) -> None:
     """Draw the page last: whatever stops it, the results are in place and their place is said."""
+    from ..disk.whole import Unwritten
     from ..export.folder import write_page
 
     try:
         write_page(written, target)
-    except (OSError, MemoryError) as error:
-        why = getattr(error, "strerror", None) or "out of memory"
-        say(f"{target / 'report.html'}: {why}; the results are whole, only their page is missing")
+    except (OSError, MemoryError, Unwritten) as error:
+        why = str(error) if isinstance(error, Unwritten) else \
+            f"{target / 'report.html'}: {getattr(error, 'strerror', None) or 'out of memory'}"
+        say(f"{why}; the results are whole, only their page is missing")
         raise Ended(4) from None
 
 

@@ -48,13 +48,14 @@ def schema(*, out: out_in("scene.json in place of the screen") = None):
 
     Example: patchfem schema -o scene.json
     """
+    from ..disk.whole import write_text
     from ..scene.schema import schema as make
 
     text = json.dumps(make(), indent=1, ensure_ascii=False) + "\n"
     if out is None:
         print(text, end="")
         return
-    out.write_text(text, encoding="utf-8")
+    write_text(out, text)
     print(f"{out}: begin a scene with the line #:schema {out}")
 
 

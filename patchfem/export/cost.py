@@ -4,6 +4,7 @@ import csv
 from pathlib import Path
 
 from ..campaigns.cost import cheapest, sentence, turned_by
+from ..disk.whole import whole, write_text
 from .drawing.pictures import drawing, styled
 
 AXES = {"element_size": "element size", "steps_per_cycle": "steps per cycle", "shear_modes": "shear modes",
@@ -30,7 +31,7 @@ def write(folder: Path, curves: dict) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     names = list(dict.fromkeys(name for runs in curves.values() for one in runs for name in one.values))
     table = folder / "cost.csv"
-    with open(table, "w", newline="", encoding="utf-8") as file:
+    with whole(table) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow(["knob", "setting", "seconds", "timings",
                        *(text for name in names for text in (name, f"error_{name}", f"distance_{name}"))])
@@ -45,7 +46,7 @@ def write(folder: Path, curves: dict) -> Path:
 def write_picture(folder: Path, knob: str, runs: list, tolerance: float, names: list) -> Path:
     """Write cost_KNOB.svg into a folder that exists, and return its path; arguments as `draw`."""
     picture = Path(folder) / f"cost_{knob}.svg"
-    picture.write_text(draw(knob, runs, tolerance, names), encoding="utf-8")
+    write_text(picture, draw(knob, runs, tolerance, names))
     return picture
 
 

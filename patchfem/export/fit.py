@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..disk.whole import whole
 from .drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
 from .scales import axis_unit
 
@@ -20,7 +21,7 @@ def write_rows(path: Path, time, displacement, measured, model, held, quantity: 
     unit = "[N]" if quantity == "force" else "[1]"
     head = [*([] if time is None else ["time [s]"]), "displacement [m]", f"{quantity} {unit}", "fitted", "held"]
     columns = [*([] if time is None else [time]), displacement, measured, model]
-    with open(path, "w", newline="", encoding="utf-8") as file:
+    with whole(path) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow(head)
         for *values, out in zip(*(column.tolist() for column in columns), held.tolist()):

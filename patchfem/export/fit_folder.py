@@ -6,6 +6,7 @@ import numpy as np
 
 from .. import __version__
 from ..campaigns.fit import Fitted
+from ..disk.whole import write_text
 from ..identify.least_squares import Fit
 from ..model.model import build, resolved
 from ..scene.ranges import Range
@@ -74,9 +75,9 @@ def fit_into(fitted: Fitted, target: Path) -> dict:
     answer, loop = answer_of(fitted), fitted.loop
     with Folder(target) as folder:
         write_json(answer, folder.path / "fit.json")
-        (folder.path / "scene.fitted.toml").write_text(fitted_scene(fitted, folder.target), encoding="utf-8")
+        write_text(folder.path / "scene.fitted.toml", fitted_scene(fitted, folder.target))
         write_rows(folder.path / "fit.csv", loop.time, loop.displacement, loop.reading, fitted.model, fitted.held,
                    loop.quantity)
         picture = draw(loop.displacement, loop.reading, fitted.model, fitted.held, loop.quantity)
-        (folder.path / "fit.svg").write_text(picture, encoding="utf-8")
+        write_text(folder.path / "fit.svg", picture)
     return answer

@@ -12,6 +12,7 @@ from .. import __version__
 from ..campaigns.rows.fit import FittedRows
 from ..campaigns.rows.nulls import NULLS
 from ..core import G_N
+from ..disk.whole import whole, write_text
 from .drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
 from .fit_folder import scene_text, value_of
 from .summary import write_json
@@ -42,9 +43,7 @@ class Starts:
         """The ends kept under a name, None where there are none; or keep `ends` under it."""
         if ends is not None:
             self.known[name] = ends
-            part = self.path.with_name(self.path.name + ".partial")
-            part.write_text(json.dumps({"question": self.key, "ends": self.known}), "utf-8")
-            part.replace(self.path)
+            write_text(self.path, json.dumps({"question": self.key, "ends": self.known}))
         return self.known.get(name)
 
 
@@ -117,7 +116,7 @@ def _rows(fitted: FittedRows) -> list:
 def write_table(path: Path, answer: dict) -> None:
     """Write a CSV of the rows of fit.json in g and mil, with what was computed beside them."""
     head = ["frequency [Hz]", "input [g]", "acceleration [g]", "displacement [mil]", "flag"]
-    with open(path, "w", newline="", encoding="utf-8") as file:
+    with whole(path) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow([*head, "computed acceleration [g]", "computed displacement [mil]", "held"])
         for one in answer["rows"]:
@@ -157,9 +156,9 @@ def fit_into(fitted: FittedRows, folder, target: Path) -> dict:
     answer, asked = answer_of(fitted), fitted.asked
     write_json(answer, folder / "fit.json")
     text = scene_text(asked.fitted(fitted.fit.values), asked.wanted, fitted.fit, fitted.cells.path, target)
-    (folder / "scene.fitted.toml").write_text(text, encoding="utf-8")
+    write_text(folder / "scene.fitted.toml", text)
     write_table(folder / "fit.csv", answer)
-    (folder / "fit.svg").write_text(draw(answer), encoding="utf-8")
+    write_text(folder / "fit.svg", draw(answer))
     return answer
 
 

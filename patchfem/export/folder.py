@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from .. import __version__
 from ..core import Missing
+from ..disk.whole import write_text
 from ..runs.results.result import Result
 from ..runs.run import Kept, run
 from . import netcdf
@@ -45,7 +46,7 @@ def write(result: Result, path: Path) -> Written:
     """Write every file of a run but its page into the folder `path`."""
     begin, bodies = perf_counter(), {}
     text = result.plan.model.source.resolved
-    (path / "scene.resolved.toml").write_text(text, encoding="utf-8")
+    write_text(path / "scene.resolved.toml", text)
     netcdf.write(contents(result), path / "result.nc")
     if result.patch is not None:
         from .fields.bodies import write_fields
@@ -66,14 +67,9 @@ def write_page(written: Written, folder: Path) -> Path:
     from .shown import page_of
 
     text, path = page_of(written.result, written.bodies, reel(folder)), Path(folder) / PAGE
-    partial = path.with_name(path.name + ".partial")
     if not path.parent.is_dir() or _place(path.parent) != written.place:
         raise Missing(f"{folder}: replaced by another run while the page was drawn")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    write_text(path, text)
     return path
 
 

@@ -12,6 +12,8 @@ import h5netcdf
 import h5py
 import numpy as np
 
+from ..disk.whole import write_bytes
+
 LONG = {
     "relative_displacement": ("m", "displacement of the block relative to the base at its output"),
     "relative_velocity": ("m s-1", "velocity of the block relative to the base at its output"),
@@ -188,20 +190,18 @@ def described(data: Contents, summary: dict, scene_text: str, versions: dict) ->
 
 
 def write(data: Contents, path: Path) -> None:
-    """Write contents as netCDF4 to `path`, whole beside it first and then renamed.
+    """Write contents as netCDF4 to `path`.
 
     The file is made in memory, so that a full disk is an OSError of one write and nothing is left open.
     """
     path = Path(path)
-    partial = path.with_name(path.name + ".partial")
     with h5py.File(path.name, "w", driver="core", backing_store=False, track_order=True) as memory:
         with h5netcdf.File(memory, "w") as file:
             file.attrs.update(data.attributes)
             _write_variables(file, data)
         memory.flush()
         image = memory.id.get_file_image()
-    partial.write_bytes(image)
-    partial.replace(path)
+    write_bytes(path, image)
 
 
 def _write_variables(file, data: Contents) -> None:

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from ..core import Missing, PatchfemError
+from ..core import PatchfemError
+from ..disk.whole import fault, write_text
 from .pages import beside, sweep
 from .sweeps import page as sweeps
 
@@ -31,9 +32,7 @@ def report_of(folders: list, out: Path | None = None) -> Path:
 def _written(text: str, out: Path) -> Path:
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        partial = out.with_name(out.name + ".partial")
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(out)
-    except OSError as fault:
-        raise Missing(f"{out}: cannot be written: {fault.strerror or fault}") from None
+    except OSError as error:
+        raise fault(error, out, out) from None
+    write_text(out, text)
     return out

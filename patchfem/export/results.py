@@ -1,4 +1,4 @@
-"""The results folder: everything is written into DIR.partial and renamed to DIR when whole.
+"""The results folder: everything is written into DIR.partial, which takes the place of DIR when whole.
 
 Only folders that hold nothing but patchfem results are ever replaced; anything else is refused before a run starts.
 """
@@ -8,6 +8,9 @@ import shutil
 from pathlib import Path
 
 from ..core import Missing, PatchfemError
+from ..disk.claim import Claim
+from ..disk.exchange import aside, put, restore, undisturbed
+from ..disk.whole import KEPT, unfinished
 
 PAGE = "report.html"
 FILES = ("summary.json", "result.nc", "fields.vtkhdf", PAGE, "scene.resolved.toml", "fields.pvd",
@@ -21,54 +24,66 @@ STATES = (STATE, STARTS)  # of an interrupted run or fit, from which it goes on
 class Folder:
     """Context of a results folder, which is claimed at entry.
 
-    `path` is the partial folder to write into. Leaving without an error renames it, leaving with one removes it but for
-    kept STATES, which `resume` leaves in place at the next entry. PatchfemError for a target that holds other files,
-    Missing where it is in use or cannot be written.
+    `path` is the partial folder to write into. Leaving without an error puts it in the place of an older one, leaving
+    with one removes it but for kept STATES, which `resume` leaves in place at the next entry. PatchfemError for a
+    target that holds other files, Missing where it is in use or cannot be written.
     """
 
     def __init__(self, target: Path, resume: bool = False):
         self.target = Path(os.path.abspath(target)).resolve()
         self.path = self.target.parent / (self.target.name + ".partial")
         self.shown, self.resume = target, resume
+        self.claim = Claim(self.target.with_name(f".{self.target.name}{LOCK}"), target, "run")
 
     def __enter__(self) -> "Folder":
         if not self.target.name:
             raise PatchfemError(f"{self.shown}: the root of the file system cannot be replaced; name another -o")
         if Path.cwd().is_relative_to(self.target):
             raise PatchfemError(f"{self.shown}: the working folder cannot be replaced by results; name another -o")
-        for place in (self.target, self.path):
-            _only_ours(place, self.shown)
+        self._refuse_others()
         try:
-            if self.path.exists() and not self.resume:
-                shutil.rmtree(self.path)
-            self.path.mkdir(parents=True, exist_ok=True)
-            (self.path / LOCK).write_text(str(os.getpid()))
+            self.target.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise Missing(f"{self.shown}: the results folder cannot be made ({error.strerror})") from None
+        self.claim.take()
+        try:
+            restore(self.target)
+            self._refuse_others()
+            if self.path.exists() and not self.resume:
+                shutil.rmtree(self.path)
+            self.path.mkdir(exist_ok=True)
+        except BaseException as error:
+            self.claim.release()
+            if isinstance(error, OSError):
+                raise Missing(f"{self.shown}: the results folder cannot be made ({error.strerror})") from None
+            raise
         return self
 
     def __exit__(self, kind, value, trace) -> None:
-        if kind is not None:
-            self._abandon()
-            return
-        try:
-            for state in STATES:
-                (self.path / state).unlink(missing_ok=True)
-            (self.path / LOCK).unlink()
-            old = self.target.with_name(f".{self.target.name}.old{os.getpid()}")
-            if self.target.exists():
-                os.replace(self.target, old)
-            os.replace(self.path, self.target)
-            shutil.rmtree(old, ignore_errors=True)
-        except OSError as error:
-            raise Missing(f"{self.shown}: the results cannot be put in place ({error.strerror}); they are in "
-                          f"{self.path.name} beside it") from None
+        with undisturbed():
+            try:
+                if kind is not None:
+                    self._abandon()
+                    return
+                for state in (*STATES, LOCK):
+                    (self.path / state).unlink(missing_ok=True)
+                put(self.path, self.target)
+            except OSError as error:
+                raise Missing(f"{self.shown}: the results cannot be put in place ({error.strerror}); they are in "
+                              f"{self.path.name} beside it") from None
+            finally:
+                self.claim.release()
+
+    def _refuse_others(self) -> None:
+        for place in (self.target, self.path, aside(self.target)):
+            refuse_others(place, self.shown, (*FILES, LOCK), "patchfem results")
 
     def _abandon(self) -> None:
         """Remove everything but a kept state; the folder too where there is none."""
         if not any((self.path / state).is_file() for state in STATES):
             shutil.rmtree(self.path, ignore_errors=True)
             return
+        KEPT.append(self.path)
         for part in self.path.iterdir():
             if part.name not in STATES:
                 shutil.rmtree(part, ignore_errors=True) if part.is_dir() else part.unlink(missing_ok=True)
@@ -85,21 +100,7 @@ def refuse_others(place: Path, shown, known, kind: str, dots: bool = False) -> N
     if not place.is_dir():
         raise PatchfemError(f"{shown}: {place.name} is a file, a folder is wanted; name another -o")
     others = sorted(one.name for one in place.iterdir() if one.name.removesuffix(".partial") not in known
-                    and not (dots and one.name.startswith(".")))
+                    and not unfinished(one.name) and not (dots and one.name.startswith(".")))
     if others:
         raise PatchfemError(f"{shown}: {place.name} holds files that are not {kind} ({', '.join(others[:3])}"
                             f"{', ...' if len(others) > 3 else ''}); name another -o")
-
-
-def refuse_second(lock: Path, shown, kind: str) -> None:
-    """Missing where the process that a lock file names is alive and not this one."""
-    writer = lock.read_text() if lock.is_file() else ""
-    if writer.isdigit() and int(writer) != os.getpid() and Path(f"/proc/{writer}").exists():
-        raise Missing(f"{shown}: another {kind} (process {writer}) is writing it; name another -o or wait; if that "
-                      f"process is no patchfem, remove {lock.parent.name}/{lock.name}")
-
-
-def _only_ours(place: Path, shown) -> None:
-    """Refuse a place that is no folder, holds foreign files or is being written by a living process."""
-    refuse_others(place, shown, (*FILES, LOCK), "patchfem results")
-    refuse_second(place / LOCK, shown, "run")

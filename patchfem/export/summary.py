@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from .. import __version__
+from ..disk.whole import write_text
 from ..effects import EFFECTS
 from ..runs.results.chosen import chosen
 from ..runs.results.result import Result
@@ -43,7 +44,7 @@ def summary(version: str, title: str, kind: str, outcome: str, measures: dict, e
 
 def write_json(value: dict, path: Path) -> None:
     """Write `value` to `path` as strict JSON with a final newline; ValueError for NaN or infinity in it."""
-    Path(path).write_text(json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 def summary_of(result: Result) -> dict:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..campaigns.wear_coefficient import KEY, Coefficient
+from ..disk.whole import write_text
 from .results import Folder
 from .summary import write_json
 
@@ -24,5 +25,5 @@ def fit_into(fitted: Coefficient, title: str, text: str, target: Path) -> dict:
     with Folder(target) as folder:
         write_json(answer, folder.path / "fit.json")
         told = f"# {KEY} fitted to {one.name}" + ("" if one.where == "--to" else f" of {Path(one.where).name}")
-        (folder.path / "scene.fitted.toml").write_text(f"{told}\n\n{text}", encoding="utf-8")
+        write_text(folder.path / "scene.fitted.toml", f"{told}\n\n{text}")
     return answer

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core import Missing, PatchfemError
+from ..core import PatchfemError
+from ..disk.whole import whole
 from .anymesh import PairMesh, Tagged, pieces
 from .decks import read_inp, read_unv
 from .pairs import blocks
@@ -58,10 +59,8 @@ def write_mesh(lower, path: Path, upper=None) -> None:
     else:
         mesh.cell_data = {"tag": tags}
         kind = {"file_format": "vtu"}
-    try:
-        meshio.write(path, mesh, **kind)
-    except OSError as error:
-        raise Missing(f"{path}: cannot be written ({error.strerror or error})") from None
+    with whole(path) as partial:
+        meshio.write(partial, mesh, **kind)
 
 
 def read_bodies(path: Path) -> tuple:

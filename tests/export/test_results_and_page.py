@@ -106,16 +106,17 @@ def test_always_the_results_are_in_place_before_the_page(scene, tmp_path, monkey
 
 
 def test_exact_a_full_disk_leaves_no_part_of_a_page(scene, tmp_path, monkeypatch):
-    write = results_folder.Path.write_text
+    write = results_folder.Path.write_bytes
 
-    def full(path, *args, **kwargs):
-        if path.name.startswith("report"):
-            write(path, "<html>", **kwargs)
+    def full(path, data):
+        if path.name.startswith(".report"):
+            write(path, data[:1000])
             raise OSError(28, "No space left on device", str(path))
-        return write(path, *args, **kwargs)
+        return write(path, data)
 
-    monkeypatch.setattr(results_folder.Path, "write_text", full)
+    monkeypatch.setattr(results_folder.Path, "write_bytes", full)
     answer = cli("run", scene, "-o", tmp_path / "out")
+    assert "No space left on device" in answer.err and "only their page is missing" in answer.err
     assert answer.code == 4 and {path.name for path in (tmp_path / "out").iterdir()} == WHOLE
 
 

@@ -508,8 +508,6 @@ def test_refuses_to_replace_what_is_not_a_results_folder(written, tmp_path, monk
     monkeypatch.chdir(mine)
     for target in (".", "..", ""):
         assert cli("run", scene, "-o", target).code == 2
-    partial = tmp_path / "next.partial"
-    partial.mkdir()
-    (partial / ".writer").write_text("1", "utf-8")  # a process that lives
+    (tmp_path / ".next.writer").write_text("1", "utf-8")  # a process that lives
     busy = cli("run", scene, "-o", tmp_path / "next")
     assert busy.code == 4 and "another run" in busy.err

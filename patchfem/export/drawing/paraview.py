@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core import Missing
+from ...disk.whole import write_text
 from ..fields.series import Frame, Series
-from ..fields.vtu import frames_beside, whole, write_pvd
+from ..fields.vtu import frames_beside, write_pvd
 from .film import Film, film_of
 from .panels import moved, slide_of, upper_points
 
@@ -106,11 +106,8 @@ def write_script(folder: Path, out: Path) -> str:
     with Series(folder) as series:
         film = film_of(series)
         text = script(out, film)
-        try:
-            write_pvd(fields, series, film.numbers, with_motion)
-            whole(out, lambda partial: partial.write_text(text, "utf-8"))
-        except OSError as error:
-            raise Missing(f"{out}: cannot be written ({error.strerror or error})") from None
+        write_pvd(fields, series, film.numbers, with_motion)
+        write_text(out, text)
     return f"{out}: {len(film.numbers)} frames, {fields.name} and {frames_beside(fields).name} beside it"
 
 

@@ -7,12 +7,12 @@ a broken driver ends the process that asks; without it a picture is drawn by mat
 import os
 import subprocess
 import sys
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from ...core import Missing, PatchfemError
+from ...disk.whole import whole
 from ..fields.series import Frame, Series
 from ..scales import axis_unit
 from . import reels
@@ -55,16 +55,13 @@ def view(folder: Path, out: Path | None, frame: int | None = None, magnify: floa
     if out is None:
         _window(one, head, magnify)
         return
-    try:
-        _picture(one, head, magnify, Path(out), say)
-    except OSError as error:
-        raise Missing(f"{out}: cannot be written ({error.strerror or error})") from None
+    _picture(one, head, magnify, Path(out), say)
     print(f"{out}: {head}")
 
 
 def _picture(one: Frame, head: str, magnify, out: Path, say) -> None:
     why = no_opengl() if out.suffix == ".png" else None
-    with _whole(out) as partial:
+    with whole(out) as partial:
         if why is None and out.suffix == ".png":
             _plotter(one, head, magnify, True).screenshot(partial)
         else:
@@ -82,23 +79,9 @@ def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> 
 
     reels.ready(out)
     with Series(folder) as series:
-        try:
-            with _whole(out) as partial:
-                said = shoot(series, series.path.parent.resolve().name, magnify, partial)
-        except OSError as error:
-            raise Missing(f"{out}: cannot be written ({error.strerror or error})") from None
+        with whole(out) as partial:
+            said = shoot(series, series.path.parent.resolve().name, magnify, partial)
     print(f"{out}: {said}")
-
-
-@contextmanager
-def _whole(out: Path):
-    """The place where a file is written, of the same ending; it takes the place of an older one only when whole."""
-    partial = out.with_name(f".{out.stem}.partial{out.suffix}")
-    try:
-        yield partial
-        os.replace(partial, out)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _window(one: Frame, head: str, magnify) -> None:

@@ -7,7 +7,7 @@ VTK 9.6 and 9.7 stay at the first time without `Steps` beside the blocks; 9.4 ta
 So `Steps` is a whole mesh too, an empty one that the assembly leaves out.
 
 A series of more than LARGE bytes is packed, its numbers rounded to BITS, and written frame after frame: what a killed
-process leaves in `.partial` holds every frame that its `NSteps` count.
+process leaves (`.fields.*.vtkhdf`) holds every frame that its `NSteps` count.
 """
 
 from pathlib import Path
@@ -15,6 +15,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from ...disk.whole import sturdy, whole
 from .blocks import CODES, Block
 
 NAME = "fields.vtkhdf"
@@ -32,11 +33,11 @@ def write_series(path: Path, blocks: dict, times, units: dict) -> None:
     file is written whole beside `path` and then renamed; it is of an HDF5 version that VTK's reader knows.
     """
     path = Path(path)
-    partial = path.with_name(path.name + ".partial")
-    large = sum(values.nbytes for one in blocks.values() for data in (one.point_data, one.cell_data)
-                for values in data.values()) > LARGE
-    later = []
-    with h5py.File(partial, "w", libver=("earliest", "v110")) as file:
+    size = sum(values.nbytes for one in blocks.values() for data in (one.point_data, one.cell_data)
+               for values in data.values())
+    large, later = size > LARGE, []
+    with whole(path, None if large else size) as partial, sturdy(partial) as kept, \
+            h5py.File(kept, "w", libver=("earliest", "v110")) as file:
         root = _group(file, "VTKHDF")
         root.attrs["Version"] = VERSION
         root.attrs.create("Type", np.bytes_("MultiBlockDataSet"))
@@ -50,7 +51,6 @@ def write_series(path: Path, blocks: dict, times, units: dict) -> None:
         steps["Steps"] = root[next(iter(blocks))]["Steps"]
         if later:
             _frames(file, [steps, *(root[name]["Steps"] for name in blocks)], later, len(times))
-    partial.replace(path)
 
 
 def _frames(file, steps: list, later: list, count: int) -> None:

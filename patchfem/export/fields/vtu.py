@@ -7,7 +7,6 @@ numbers because meshio refuses a file with field arrays of text. ParaView reads 
 """
 
 import base64
-import os
 import re
 import shutil
 import zlib
@@ -16,7 +15,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ...core import Missing, PatchfemError
+from ...core import PatchfemError
+from ...disk.whole import fault, unfinished, whole, write_text
 from .blocks import CODES, NAMES, Block
 from .series import Frame, Series
 
@@ -38,17 +38,15 @@ def export(folder: Path, out: Path, frame: int | None = None) -> str:
     if frame is not None and out.suffix in (".pvd", ".vtkhdf"):
         raise PatchfemError(f"--frame: {out.suffix} holds the whole series; name a .vtu or .csv for one frame")
     with Series(folder) as series:
-        try:
-            return _export(series, out, -1 if frame is None else frame)
-        except OSError as error:
-            raise Missing(f"{out}: cannot be written ({error.strerror or error})") from None
+        return _export(series, out, -1 if frame is None else frame)
 
 
 def _export(series: Series, out: Path, number: int) -> str:
     if out.suffix == ".vtkhdf":
         if out.exists() and out.samefile(series.path):
             raise PatchfemError(f"{out}: is the file that is exported; name another -o")
-        whole(out, lambda partial: shutil.copyfile(series.path, partial))
+        with whole(out, series.path.stat().st_size) as partial:
+            shutil.copyfile(series.path, partial)
         return f"{out}: {len(series)} frames"
     if out.suffix == ".pvd":
         return f"{out}: {write_pvd(out, series)} frames in {frames_beside(out).name}"
@@ -58,16 +56,6 @@ def _export(series: Series, out: Path, number: int) -> str:
     else:
         write_csv(out, one)
     return f"{out}: frame {one.number} of {len(series)}, {one.time:.6g} s"
-
-
-def whole(path: Path, write) -> None:
-    """Write beside `path` and rename, so that an older file is replaced only by a whole one."""
-    partial = path.with_name(path.name + ".partial")
-    try:
-        write(partial)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def frames_beside(path: Path) -> Path:
@@ -84,11 +72,14 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
     """
     folder = frames_beside(path)
     old = list(folder.iterdir()) if folder.is_dir() else []
-    strange = sorted(one.name for one in old if not _ours(one.name.removesuffix(".partial")))
+    strange = sorted(one.name for one in old if not _ours(one.name) and not unfinished(one.name))
     if strange:
         raise PatchfemError(f"{folder}: holds files that are not frames of patchfem ({', '.join(strange[:3])}); "
                             "name another -o")
-    folder.mkdir(exist_ok=True)
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise fault(error, folder, folder) from None
     lines, written = [], set()
     numbers = range(len(series)) if numbers is None else numbers
     for number in numbers:
@@ -100,7 +91,7 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
     _listing(path, "Collection", "0.1", lines)
     for one in old:
         if one.name not in written:
-            one.unlink()
+            one.unlink(missing_ok=True)
     return len(numbers)
 
 
@@ -120,7 +111,7 @@ def _listing(path: Path, kind: str, version: str, lines: list) -> None:
     text = "\n".join(['<?xml version="1.0"?>',
                       f'<VTKFile type="{kind}" version="{version}" byte_order="LittleEndian">', f"  <{kind}>",
                       *("    " + line for line in lines), f"  </{kind}>", "</VTKFile>", ""])
-    whole(path, lambda partial: partial.write_text(text, "utf-8"))
+    write_text(path, text)
 
 
 def _ours(name: str) -> bool:
@@ -143,7 +134,7 @@ def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> Non
              _array("connectivity", frame.connectivity.astype(np.int64)),
              _array("offsets", frame.offsets[1:].astype(np.int64)), _array("types", frame.types.astype(np.uint8)),
              "</Cells>", "</Piece>", "</UnstructuredGrid>", "</VTKFile>", ""]
-    whole(path, lambda partial: partial.write_text("\n".join(text), "ascii"))
+    write_text(path, "\n".join(text), "ascii")
 
 
 def _meanings(names: tuple, units: dict) -> list:
@@ -183,4 +174,4 @@ def write_csv(path: Path, frame: Frame) -> None:
             head.append(f"{label} [{frame.units.get(name, '1')}]")
             columns.append([str(value) for value in part])
     text = "\n".join([",".join(head), *map(",".join, zip(*columns)), ""])
-    whole(path, lambda partial: partial.write_text(text, "utf-8"))
+    write_text(path, text)

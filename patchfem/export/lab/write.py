@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from ...core import Missing, PatchfemError
-from ..fields.vtu import whole
+from ...core import PatchfemError
+from ...disk.whole import whole
 from . import ENDINGS, matlab, modes, table, universal
 from .series import histories_of
 
@@ -21,37 +21,25 @@ def export(folder: Path, out: Path) -> str:
     rows = found.columns[0].values.size
     told = f"{out}: {rows} rows of {', '.join(one.label for one in found.columns[:8])}" + \
         (f" and {len(found.columns) - 8} more" if len(found.columns) > 8 else "")
-    try:
+    with whole(out) as partial:
         if out.suffix.lower() == ".mat":
-            whole(out, lambda partial: matlab.write(partial, found))
+            matlab.write(partial, found)
         elif out.suffix.lower() == ".csv":
-            whole(out, lambda partial: table.write(partial, found.time, found.columns))
+            table.write(partial, found.time, found.columns)
         else:
-            whole(out, lambda partial: universal.write(partial, found))
+            universal.write(partial, found)
             told += f"; {len(found.loops())} loops"
-    except OSError as error:
-        raise Missing(f"{out}: cannot be written ({error.strerror or error})") from None
     return told
 
 
 def write_table(out: Path, values: dict, units: dict) -> None:
     """Write arrays of one length by name as CSV with their units; Missing where `out` cannot be written."""
     columns = [table.Column(name, units[name], column, 0) for name, column in values.items()]
-    _written(out, lambda partial: table.write(partial, None, columns))
-
-
-def write_text(out: Path, text: str) -> None:
-    """Write a text; Missing where `out` cannot be written."""
-    _written(out, lambda partial: partial.write_text(text, encoding="utf-8"))
+    with whole(out) as partial:
+        table.write(partial, None, columns)
 
 
 def write_response(out: Path, estimate, drive: str, response: str) -> None:
     """Write a frequency response as a universal file; Missing where `out` cannot be written."""
-    _written(out, lambda partial: modes.write_response(partial, estimate, drive, response))
-
-
-def _written(out: Path, write) -> None:
-    try:
-        whole(Path(out), write)
-    except OSError as error:
-        raise Missing(f"{out}: cannot be written ({error.strerror or error})") from None
+    with whole(out) as partial:
+        modes.write_response(partial, estimate, drive, response)

@@ -8,6 +8,7 @@ import numpy as np
 from ... import __version__
 from ...campaigns.compare import Pressed
 from ...campaigns.compare import data_of as pressed_data
+from ...disk.whole import write_text
 from ...surface.areal import level_plane
 from ...surface.compare.compare import Comparison
 from ...surface.compare.quantity import LEVEL, Quantity
@@ -121,13 +122,13 @@ def write_trace(path: Path, trace: Profile) -> Path:
     """Write a trace as text that a scene reads with heights = "surface"."""
     middle = (trace.x[0] + trace.x[-1]) / 2
     rows = "\n".join(f"{x:.6f},{z:.6f}" for x, z in zip((trace.x - middle) * 1e6, trace.z * 1e6))
-    path.write_text(f"x [um],z [um]\n{rows}\n", encoding="utf-8")
+    write_text(path, f"x [um],z [um]\n{rows}\n")
     return path
 
 
 def write_page(path: Path, parts: list, found: tuple, pressing: Pressed | None = None) -> None:
     """Write the page."""
-    path.write_text(page(parts, found, pressing), encoding="utf-8")
+    write_text(path, page(parts, found, pressing))
 
 
 def page(parts: list, found: tuple, pressing: Pressed | None = None) -> str:

@@ -4,6 +4,7 @@ from html import escape
 from pathlib import Path
 
 from ... import __version__
+from ...disk.whole import write_text
 from ...surface.profile import say
 from ...surface.roughness.report import RoughnessReport, Value
 from ..drawing.inline import CSS
@@ -97,7 +98,7 @@ def page(reports: list) -> str:
 
 def write_page(path: Path, reports: list) -> None:
     """Write the page."""
-    Path(path).write_text(page(reports), encoding="utf-8")
+    write_text(path, page(reports))
 
 
 def _section(number: int, report: RoughnessReport, several: bool) -> str:

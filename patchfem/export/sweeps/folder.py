@@ -16,11 +16,13 @@ from pathlib import Path
 from ... import __version__
 from ...campaigns.sweeps.cases import Cases
 from ...core import Measure, Missing, PatchfemError
+from ...disk.claim import Claim
+from ...disk.exchange import put
 from ...effects import EFFECTS
 from ...model.model import Model
 from ...runs.many.answers import FAILED, Answers
 from ..folder import save
-from ..results import LOCK, PAGE, refuse_others, refuse_second
+from ..results import LOCK, PAGE, refuse_others
 from ..summary import summary
 
 CASES, SUMMARY, TABLES = "cases", "summary.json", ("sweep.csv", "sweep.nc", "report.html")
@@ -82,20 +84,21 @@ class Folder:
 
     def __init__(self, target: Path, keys: Sequence[str], shared: bool = False):
         self.target, self.shown, self.keys, self.shared = Path(os.path.abspath(target)), target, keys, shared
+        self.claim = Claim(self.target / LOCK, target, "sweep")
 
     def __enter__(self) -> Folder:
         refuse_others(self.target, self.shown, (CASES, *TABLES), "those of a sweep", dots=True)
         try:
             (self.target / CASES).mkdir(parents=True, exist_ok=True)
-            if not self.shared:
-                self._claim()
         except OSError as error:
             raise Missing(f"{self.shown}: the folder of the sweep cannot be made ({error.strerror})") from None
+        if not self.shared:
+            self.claim.take()
         return self
 
     def __exit__(self, *_) -> None:
         if not self.shared:
-            (self.target / LOCK).unlink(missing_ok=True)
+            self.claim.release()
 
     def there(self) -> list[int]:
         """Numbers of the cases that have an answer."""
@@ -115,8 +118,7 @@ class Folder:
             try:
                 os.rename(draft, place)
             except OSError:  # it is there already
-                shutil.rmtree(place, ignore_errors=True)
-                os.rename(draft, place)
+                put(draft, place)
         except OSError as error:
             raise Missing(f"{self.shown}: a case cannot be written ({error.strerror}); what is whole is kept") from None
 
@@ -149,13 +151,12 @@ class Folder:
         own = set(self.keys)
         for one in os.scandir(self.target / CASES):
             if one.name.startswith(".") or one.name.endswith(".partial") or (others and one.name not in own):
-                shutil.rmtree(one.path, ignore_errors=True)
+                if one.is_dir(follow_symlinks=False):
+                    shutil.rmtree(one.path, ignore_errors=True)
+                else:  # what says who writes the folder of a case, of a killed one
+                    Path(one.path).unlink(missing_ok=True)
         for name in TABLES:
             (self.target / f"{name}.partial").unlink(missing_ok=True)
-
-    def _claim(self) -> None:
-        refuse_second(self.target / LOCK, self.shown, "sweep")
-        (self.target / LOCK).write_text(str(os.getpid()))
 
 
 def _read(found: Answers, case: int, one: dict) -> None:

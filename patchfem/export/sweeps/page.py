@@ -16,6 +16,7 @@ from ... import __version__
 from ...campaigns.sweeps.asked import Asked
 from ...campaigns.sweeps.cases import Cases
 from ...core import PatchfemError
+from ...disk.whole import write_text
 from ...runs.many.answers import Answers
 from ...runs.results.result import meaning
 from ..pages import sweep
@@ -25,10 +26,8 @@ WHOLE, SHORT = "report.html", "summary.json"  # what a click on a case opens: it
 
 
 def write_page(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Path) -> None:
-    """Write the page of all cases beside their tables, whole beside its place first and then renamed."""
-    partial = folder / "report.html.partial"
-    partial.write_text(sweep.page(table_of(asked, cases, found, keys, folder)), encoding="utf-8")
-    partial.replace(folder / "report.html")
+    """Write the page of all cases beside their tables."""
+    write_text(folder / "report.html", sweep.page(table_of(asked, cases, found, keys, folder)))
 
 
 def table_of(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Path) -> dict:

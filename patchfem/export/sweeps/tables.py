@@ -13,6 +13,7 @@ import numpy as np
 from ... import __version__
 from ...campaigns.sweeps.asked import Asked
 from ...campaigns.sweeps.cases import Cases
+from ...disk.whole import whole
 from ...response import rows
 from ...runs.many.answers import Answers
 from ...runs.results.patch_rows import TABLE as STATIC
@@ -51,13 +52,11 @@ def lines(cases: Cases, found: Answers, keys: Sequence[str] = ()) -> Iterator[li
 
 
 def write_csv(cases: Cases, found: Answers, keys: Sequence[str], path: Path) -> Path:
-    """Write sweep.csv to `path`, whole beside it first and then renamed."""
-    partial = path.with_name(path.name + ".partial")
-    with open(partial, "w", newline="", encoding="utf-8") as file:
+    """Write sweep.csv to `path`."""
+    with whole(path) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
         out = csv.writer(file)
         out.writerow(head(cases, found, keys))
         out.writerows(lines(cases, found, keys))
-    partial.replace(path)
     return path
 
 

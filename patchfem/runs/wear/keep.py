@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import PatchfemError
+from ...disk.whole import whole
 from ...wear.jumps import Worn
 from .evolve import Evolved, Moment, evolve
 
@@ -37,12 +38,10 @@ def save(path: Path, key: str, state: Worn, moments: tuple) -> None:
     arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE}
     arrays |= {f"moment_{name}": np.array([getattr(one, name) for one in moments]) for name in MOMENT}
     values = np.array([[one.values[name] for name in names] for one in moments], float)
-    partial = path.with_name(path.name + ".partial")
-    with open(partial, "wb") as file:
+    with whole(path) as partial, open(partial, "wb") as file:
         np.savez(file, key=np.array(key), names=np.array(names), values=values, **arrays)
         file.flush()
         os.fsync(file.fileno())
-    os.replace(partial, path)
 
 
 def load(path: Path, key: str) -> tuple:

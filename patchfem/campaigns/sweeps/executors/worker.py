@@ -8,7 +8,9 @@ from multiprocessing.connection import Connection
 def main() -> None:
     """Answer the chunks of a work that come through the pipe whose number is the first word of the command line; a
     second word keeps it silent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the business of the process that asks
+    for one in ("SIGINT", "SIGHUP"):  # an interrupt is the business of the process that asks
+        if hasattr(signal, one):
+            signal.signal(getattr(signal, one), signal.SIG_IGN)
     pipe = Connection(int(sys.argv[1]))
     try:
         work = pipe.recv()

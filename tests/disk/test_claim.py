@@ -1,0 +1,224 @@
+"""A folder has one writer: starts at one instant, killed owners, numbers given again, kills between renames."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from command_line import cli
+from scene_texts import BENCH
+
+from patchfem.core import Missing
+from patchfem.disk import exchange
+from patchfem.disk.claim import HELD, HOST, Claim, alive, started
+from patchfem.export.results import Folder
+
+PYTHON = [sys.executable, "-c"]
+# each of several processes tries to own every file, all at the same instants
+RACE = """\
+import sys
+from pathlib import Path
+from patchfem.core import Missing
+from patchfem.disk.claim import Claim
+place, count = Path(sys.argv[1]), int(sys.argv[2])
+print("ready", flush=True)
+sys.stdin.readline()
+for k in range(count):
+    try:
+        Claim(place / str(k), k, "run").take()
+        print(k)
+    except Missing as error:
+        assert "another run (process" in str(error), error
+sys.stdin.readline()  # owners live on until all have tried
+"""
+HOLD = """\
+import sys
+from pathlib import Path
+from patchfem.disk.claim import Claim
+Claim(Path(sys.argv[1]), "out", "run").take()
+print("taken", flush=True)
+sys.stdin.readline()
+"""
+KILLED = """\
+import os, sys
+from pathlib import Path
+from patchfem.disk import exchange
+from patchfem.export.results import Folder
+exchange.exchanged = lambda *both: False  # a system that cannot
+real, moved = os.rename, []
+def rename(*both):
+    if len(moved) == int(sys.argv[2]):
+        os._exit(9)  # killed
+    moved.append(real(*both))
+with Folder(Path(sys.argv[1])) as folder:
+    (folder.path / "summary.json").write_text("new")
+    os.rename = rename
+"""
+
+
+def process(code: str, *words):
+    return subprocess.Popen([*PYTHON, code, *map(str, words)], text=True, stdin=subprocess.PIPE,
+                            stdout=subprocess.PIPE)
+
+
+def names(place: Path) -> set:
+    return {one.name for one in place.iterdir()}
+
+
+def test_always_one_of_many_that_start_at_one_instant_owns_a_folder(tmp_path):
+    count = 100
+    for k in range(0, count, 2):  # every second one was left by a dead process
+        (tmp_path / str(k)).write_text(f"4194305 17 {HOST}")
+    several = [process(RACE, tmp_path, count) for _ in range(3)]
+    for one in several:
+        assert one.stdout.readline() == "ready\n"
+    for one in several:
+        one.stdin.write("\n")
+        one.stdin.flush()
+    won = [[] for _ in several]
+    threads = [threading.Thread(target=lambda one=one, mine=mine: mine.extend(map(int, one.stdout)))
+               for one, mine in zip(several, won)]
+    for one in threads:
+        one.start()
+    for one in several:
+        one.stdin.close()
+    for one in (*threads, *several):
+        one.join() if isinstance(one, threading.Thread) else one.wait()
+    assert sorted(k for mine in won for k in mine) == list(range(count))
+    assert all(one.returncode == 0 for one in several)
+
+
+def test_refuses_a_second_writer_until_the_first_is_gone(tmp_path):
+    (tmp_path / "scene.toml").write_text(BENCH, "utf-8")
+    words = ("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page", "-q")
+    lock = tmp_path / ".out.writer"
+    first = process(HOLD, lock)
+    assert first.stdout.readline() == "taken\n"
+    answer = cli(*words)
+    assert answer.code == 4 and f"another run (process {first.pid}) is writing it" in answer.err
+    assert names(tmp_path) == {"scene.toml", ".out.writer"}
+    first.kill()
+    while not (Path(f"/proc/{first.pid}/stat").read_text().split(") ")[1].startswith("Z")):
+        pass
+    assert not alive(first.pid)  # nobody has waited for it, but it works no more
+    assert cli(*words).code == 0 and names(tmp_path) == {"scene.toml", "out"}
+    first.communicate()
+
+
+def test_exact_an_owner_is_a_number_a_start_and_a_machine(tmp_path):
+    path, pid = tmp_path / "lock", os.getppid()
+    own = Claim(path, "out", "run")
+    for text, free in ((f"{pid} {started(pid)} {HOST}", False), (f"{pid} 17 {HOST}", True), (f"{pid} - {HOST}", False),
+                       (str(pid), False), ("4194305", True), ("", True), ("\udcff\0", True), ("x" * 300, True),
+                       (f"{pid} 17 01234567", False), (f"4194305 17 {HOST}", True),
+                       (f"{os.getpid()} {started(os.getpid())} {HOST}", True)):  # its own, which never ended
+        path.write_text(text, errors="surrogateescape")
+        if free:
+            own.take()
+            assert path.read_text() == own.me and path in HELD
+            with pytest.raises(Missing):  # another thread
+                Claim(path, "out", "run").take()
+            own.release()
+            assert not path.exists() and path not in HELD
+        else:
+            with pytest.raises(Missing, match="of another machine" if "01234567" in text else r"process \d+\)"):
+                own.take()
+            assert path.read_text() == text
+    path.write_text("4194305")
+    own.release()  # what another one owns stays
+    assert path.read_text() == "4194305"
+    assert started(os.getpid()).isdecimal() and not alive(4194305) and alive(os.getpid())
+
+
+def test_refuses_a_claim_through_a_link_or_in_the_way(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    (tmp_path / "link").symlink_to(tmp_path / "mine.txt")
+    (tmp_path / "folder").mkdir()
+    for name in ("link", "folder", "none/lock"):
+        with pytest.raises(Missing, match="out: cannot be written"):
+            Claim(tmp_path / name, "out", "run").take()
+    assert (tmp_path / "mine.txt").read_text() == "mine" and names(tmp_path) == {"mine.txt", "link", "folder"}
+
+
+@pytest.mark.parametrize("can", [True, False], ids=["in one step", "in two"])
+def test_exact_exchange_leaves_nothing_behind(tmp_path, monkeypatch, can):
+    if not can:
+        monkeypatch.setattr(exchange, "exchanged", lambda *both: False)
+    for text in ("first", "second"):
+        with Folder(tmp_path / "out") as folder:
+            (folder.path / "summary.json").write_text(text)
+            (folder.path / "fields_frames").mkdir()
+        assert names(tmp_path) == {"out"} and (tmp_path / "out" / "summary.json").read_text() == text
+
+
+def test_always_there_is_a_folder_at_every_instant_of_an_exchange(tmp_path):
+    """A reader in a thread never misses the folder: with two renames it would."""
+    place, new = tmp_path / "out", tmp_path / "new"
+    for one in place, new:
+        one.mkdir()
+    if not exchange.exchanged(new, place):
+        pytest.skip("this file system cannot exchange two folders")
+    missed, end = [], threading.Event()
+
+    def look():
+        while not end.is_set():
+            try:
+                os.stat(place)
+            except FileNotFoundError:
+                missed.append(1)
+
+    reader = threading.Thread(target=look)
+    reader.start()
+    for _ in range(300):
+        new.mkdir(exist_ok=True)
+        exchange.put(new, place)
+    end.set()
+    reader.join()
+    assert not missed
+
+
+@pytest.mark.parametrize("after, left", [
+    (0, {"out", "out.partial", ".out.writer"}), (1, {".out.old", "out.partial", ".out.writer"}),
+    (2, {"out", ".out.old", ".out.writer"})], ids=["before", "between", "behind"])
+def test_exact_a_kill_between_two_renames_loses_nothing(tmp_path, after, left):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "summary.json").write_text("older")
+    code = KILLED if after < 2 else KILLED.replace("moved = os.rename, []", "moved = os.rename, []\n"
+                                                   "exchange.shutil.rmtree = lambda path, **_: "
+                                                   "path.exists() and os._exit(9)")
+    assert subprocess.run([*PYTHON, code, out, str(after)]).returncode == 9
+    assert names(tmp_path) == left
+    with pytest.raises(ZeroDivisionError), Folder(out) as folder:
+        assert (out / "summary.json").read_text() == ("new" if after == 2 else "older")
+        raise ZeroDivisionError
+    assert folder.target == out and names(tmp_path) == {"out"}
+
+
+def test_refuses_to_remove_what_is_not_its_own(tmp_path):
+    for name in ("out", "out.partial", ".out.old"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "mine.txt").write_text("mine")
+        with pytest.raises(Exception, match=r"mine\.txt"), Folder(tmp_path / "out"):
+            pass
+        assert names(tmp_path) == {name}
+        (tmp_path / name / "mine.txt").unlink()
+        (tmp_path / name).rmdir()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_exact_a_signal_in_the_exchange_waits_until_it_is_done(tmp_path, monkeypatch, number):
+    before = signal.signal(number, signal.default_int_handler)
+    real = exchange.exchanged
+    monkeypatch.setattr(exchange, "exchanged", lambda *both: signal.raise_signal(number) or real(*both))
+    try:
+        (tmp_path / "out").mkdir()
+        with pytest.raises(KeyboardInterrupt), Folder(tmp_path / "out") as folder:
+            (folder.path / "summary.json").write_text("new")
+        assert signal.getsignal(number) is signal.default_int_handler
+    finally:
+        signal.signal(number, before)
+    assert names(tmp_path) == {"out"} and (tmp_path / "out" / "summary.json").read_text() == "new"

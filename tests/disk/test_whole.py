@@ -1,0 +1,177 @@
+"""Files are whole or not there: every kind of file under limits on its size, devices, and what killed writers leave."""
+
+import os
+import resource
+import stat
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from command_line import cli
+from scene_texts import BENCH, COATED
+
+from patchfem.core import Missing
+from patchfem.disk.whole import PLACED, Overflow, beside, room, sturdy, unfinished, whole, write_text
+
+SIZES = [1 << 10, 1 << 14, 1 << 16]
+
+
+@contextmanager
+def limited(size: int):
+    """No file of this process grows beyond `size` bytes."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """(scene, results folder) of pressed pieces."""
+    place = tmp_path_factory.mktemp("results")
+    (place / "scene.toml").write_text(COATED, "utf-8")
+    assert cli("run", place / "scene.toml", "-o", place / "out", "--no-page").code == 0
+    return place / "scene.toml", place / "out"
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_always_a_run_without_room_names_path_need_and_room_and_keeps_the_older_results(results, tmp_path, size):
+    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    scene.write_text(COATED, "utf-8")
+    out.mkdir()
+    (out / "summary.json").write_text("older")
+    with limited(size):
+        answer = cli("run", scene, "-o", out)
+    assert answer.code == 4 and len(answer.err.splitlines()) == 1 and "out.partial/" in answer.err, answer.err
+    assert "wanted" in answer.err and f"{size / 1e3:.3g} kB is the limit on the size of a file" in answer.err
+    assert [one.name for one in out.iterdir()] == ["summary.json"] and (out / "summary.json").read_text() == "older"
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["out", "scene.toml"]
+
+
+def test_exact_a_process_without_room_ends_with_4_and_not_by_a_signal(tmp_path):
+    """HDF5 once wrote again what had no room when the process ended with a thread at work, and died of it."""
+    (tmp_path / "scene.toml").write_text(COATED, "utf-8")
+    code = "import resource, threading; resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536)); " \
+           "threading.Thread(target=threading.main_thread().join).start(); from patchfem.__main__ import main; main()"
+    done = subprocess.run([sys.executable, "-c", code, "run", tmp_path / "scene.toml", "-o", tmp_path / "out"],
+                          text=True, capture_output=True, timeout=120)
+    assert done.returncode == 4 and "no room" in done.stderr and "Traceback" not in done.stderr, done.stderr
+    assert [one.name for one in tmp_path.iterdir()] == ["scene.toml"]
+
+
+@pytest.mark.parametrize("words", [
+    ("mesh", "SCENE", "-o", "a.msh"), ("mesh", "SCENE", "-o", "a.vtu"), ("export", "OUT", "-o", "a.vtkhdf"),
+    ("export", "OUT", "-o", "a.vtu"), ("export", "OUT", "-o", "a.pvd"), ("export", "OUT", "-o", "a.csv"),
+    ("report", "OUT", "-o", "a.html"), ("schema", "-o", "a.json"), ("view", "OUT", "-o", "a.svg"),
+], ids=" ".join)
+def test_always_every_file_is_the_older_one_where_there_is_no_room(results, tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    name = words[-1]
+    Path(name).write_text("older")
+    with limited(2048):
+        answer = cli(*({"SCENE": results[0], "OUT": results[1]}.get(word, word) for word in words))
+    assert answer.code == 4 and "no room" in answer.err and "2.05 kB is the limit" in answer.err, answer.err
+    assert len(answer.err.splitlines()) == 1
+    assert Path(name).read_text() == "older"
+    assert [one for one in tmp_path.rglob("*") if one.is_file() and one.stat().st_size == 2048] == []
+    assert {one.name for one in tmp_path.iterdir()} <= {name, "a_frames"}
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full is Linux's")
+def test_exact_a_device_is_written_and_stays_a_device(tmp_path):
+    for device, code in ("/dev/full", 4), ("/dev/null", 0):
+        answer = cli("schema", "-o", device)
+        assert answer.code == code and stat.S_ISCHR(os.stat(device).st_mode)
+        assert not code or "/dev/full: no room (No space left on device)" in answer.err
+
+
+@pytest.mark.parametrize("size", [0, 100, 2048, 5000, 40_000, 81_000])
+def test_exact_hdf5_closes_in_good_order_however_little_room_there_is(tmp_path, size):
+    data = np.arange(10_000.0)
+    with limited(size), pytest.raises(OSError) as caught, sturdy(tmp_path / "a.h5") as kept, \
+            h5py.File(kept, "w") as file:
+        file["a"] = data
+        file.flush()
+        file["b"] = file["a"][::2] + 1
+    assert caught.value.errno == 27 and not file and (tmp_path / "a.h5").stat().st_size <= size
+
+
+def test_exact_hdf5_with_room_reads_back(tmp_path):
+    with sturdy(tmp_path / "a.h5") as kept, h5py.File(kept, "w") as file:
+        file["a"] = np.arange(10_000.0)
+        file["b"] = file["a"][::2] + 1
+    with h5py.File(tmp_path / "a.h5", "r") as file:
+        assert (file["a"][...] == np.arange(10_000.0)).all() and (file["b"][...] == 1 + np.arange(0, 1e4, 2)).all()
+
+
+def test_exact_what_was_dropped_reads_as_zeros(tmp_path):
+    with open(tmp_path / "a", "w+b", buffering=0) as raw:
+        file = Overflow(raw)
+        with limited(10):
+            assert file.write(np.ones(20, np.int8)) == 20 and file.error.errno == 27 and file.write(b"x") == 1
+        file.seek(0)
+        buffer = bytearray(b"?" * 20)
+        assert file.readinto(buffer) == 20 and buffer == b"\x01" * 10 + b"\0" * 10
+
+
+@pytest.mark.parametrize("raised", [ValueError, KeyboardInterrupt, OSError])
+def test_exact_what_is_not_whole_replaces_nothing(tmp_path, raised):
+    path = tmp_path / "a.txt"
+    path.write_text("older")
+    with pytest.raises(Missing if raised is OSError else raised), whole(path) as partial:
+        partial.write_text("new")
+        raise raised("an end")
+    assert [one.name for one in tmp_path.iterdir()] == ["a.txt"] and path.read_text() == "older"
+    write_text(path, "größer")
+    assert path.read_bytes() == "größer".encode() and [one.name for one in tmp_path.iterdir()] == ["a.txt"]
+    assert PLACED[-1] == path
+
+
+def test_exact_what_a_killed_writer_left_goes_with_the_next_one_of_the_name(tmp_path):
+    path, name = tmp_path / "a.vtu", beside(tmp_path / "a.vtu").name
+    dead = tmp_path / name.replace(str(os.getpid()), "4194305")  # beyond the largest number of a process
+    living = tmp_path / name.replace(str(os.getpid()), str(os.getppid()))
+    other = tmp_path / name.replace(str(os.getpid()), "4194305").replace(".a.", ".b.")
+    for one in dead, living, other, tmp_path / ".a.mine.vtu":
+        one.write_text("half")
+        assert unfinished(one.name) == (one.name != ".a.mine.vtu")
+    write_text(path, "new")
+    assert {one.name for one in tmp_path.iterdir()} == {living.name, other.name, ".a.mine.vtu", "a.vtu"}
+
+
+def test_refuses_before_it_writes_what_has_no_room(tmp_path):
+    there, where = room(tmp_path / "not" / "yet" / "a")
+    assert there > 0 and ("free" in where or "limit" in where)
+    with limited(100):
+        assert room(tmp_path / "a") == (100, "is the limit on the size of a file (ulimit -f)")
+        with pytest.raises(Missing, match=r"a: no room: 101 bytes wanted, 100 bytes is the limit"), \
+                whole(tmp_path / "a", 101):
+            raise AssertionError("written")
+        write_text(tmp_path / "a", "x" * 100)
+    assert (tmp_path / "a").stat().st_size == 100
+
+
+def test_refuses_a_place_that_cannot_be_written(tmp_path):
+    (tmp_path / "folder").mkdir()
+    for place in tmp_path / "folder", tmp_path / "none" / "a", tmp_path / ("a" * 300):
+        with pytest.raises(Missing, match="cannot be written"):
+            write_text(place, "text")
+    assert [one.name for one in tmp_path.iterdir()] == ["folder"] and not list((tmp_path / "folder").iterdir())
+
+
+def test_exact_a_sweep_without_room_keeps_its_cases(tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(BENCH, "utf-8")
+    words = ("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "out", "-q")
+    with limited(8192):  # a summary has room, the table with the page has not
+        answer = cli(*words)
+    assert answer.code == 4 and "no room" in answer.err and "out/" in answer.err
+    assert len(list((tmp_path / "out" / "cases").iterdir())) == 2
+    assert not [one for one in (tmp_path / "out").rglob("*") if one.name.startswith(".")]
+    assert cli(*words, "--resume").code == 0
