@@ -1,8 +1,10 @@
 """Numbers from a comma-separated table whose header carries the units, every mistake named with file and line."""
 
 import re
+from codecs import getincrementaldecoder
 from collections.abc import Mapping
 from dataclasses import dataclass
+from io import IncrementalNewlineDecoder
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,9 @@ import numpy as np
 from ..core import Missing, PatchfemError, frozen_array
 
 LARGEST = 64 * 2**20  # bytes of text
+BLOCK = 2**17  # bytes read at a time
+BEYOND = 1e50  # SI, as for the keys of a scene
+_PLAIN = re.compile(r"[0-9eE+.,\t -]*")
 NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _HEAD = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
 _WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
@@ -37,31 +42,83 @@ def read_columns(path, units: Mapping, wanted: tuple, header: str, what: str, re
     may stand without a unit, or with one where `labels` says so; they are kept as text. PatchfemError names file and
     line, Missing where there is no file.
     """
-    path = Path(path)
-    lines = text_of(path, what, remedy).split("\n")
-    names, factors = _header(path, lines[0], units, wanted, header, labels)
-    last = max((n for n, line in enumerate(lines) if line.strip()), default=0)
-    numbers, texts = [], []
-    for number, line in enumerate(lines[1:last + 1], 2):
-        cells = _cells(path, number, line, names)
-        numbers.append([_number(path, number, name, cells[name]) for name in factors])
-        texts.append([cells[name] for name in names if name not in factors])
-    if len(numbers) < 2:
-        raise PatchfemError(f"{path}:{last + 1}: {what} is at least two rows below its header, not {len(numbers)}")
-    table = np.array(numbers).reshape(len(numbers), len(factors)) * list(factors.values())
+    path, number = Path(path), 2
+    blocks = _blocks(path, what, remedy)
+    names, factors = _header(path, next(blocks)[0], units, wanted, header, labels)
+    tables, texts = [np.zeros((0, len(factors)))], []
+    for lines in blocks:
+        table, more = _rows(path, number, lines, names, factors)
+        number += len(lines)
+        tables.append(table)
+        texts += more
+    table = np.concatenate(tables)
+    if len(table) < 2:
+        raise PatchfemError(f"{path}:{number - 1}: {what} is at least two rows below its header, not {len(table)}")
     free = [name for name in names if name not in factors]
     return Columns({name: frozen_array(column) for name, column in zip(factors, table.T)},
-                   {name: tuple(row[k] for row in texts) for k, name in enumerate(free)}, len(numbers))
+                   {name: tuple(row[k] for row in texts) for k, name in enumerate(free)}, len(table))
+
+
+def _blocks(path: Path, what: str, remedy: str):
+    """The first line, then the others some megabyte at a time, without blank lines at the end of the file."""
+    blank, head = [], True
+    for lines in lines_of(path, what, remedy):
+        if head:
+            yield lines[:1]
+            lines, head = lines[1:], False
+        last = max((n for n, line in enumerate(lines) if line.strip()), default=-1)
+        if last >= 0:
+            yield [*blank, *lines[:last + 1]]
+            blank = []
+        blank = blank or lines[last + 1:last + 2]  # the first of blank lines, a mistake where more follows
+
+
+def _rows(path: Path, number: int, lines: list, names: list, factors: dict) -> tuple:
+    """Numbers (rows, columns) in SI of lines from `number` on, and the rows of the other columns as texts.
+
+    A block of plain numbers is turned at once, 0.3 us a row and a tenth of the memory; one in which anything else
+    stands goes line by line, so that a mistake is named.
+    """
+    joined = ",".join(lines)
+    if len(names) == len(factors) and _PLAIN.fullmatch(joined):
+        if all(line.count(",") == len(names) - 1 for line in lines):
+            try:
+                table = np.array(list(map(float, joined.split(",")))).reshape(len(lines), -1) * list(factors.values())
+            except ValueError:  # an empty cell, or signs of a number that are none
+                table = np.full((1, 1), np.inf)
+            if np.abs(table).max() <= BEYOND:
+                return table, []
+    numbers, texts = [], []
+    for at, line in enumerate(lines, number):
+        cells = _cells(path, at, line, names)
+        numbers.append([_number(path, at, name, cells[name], factor) for name, factor in factors.items()])
+        texts.append([cells[name] for name in names if name not in factors])
+    return np.array(numbers).reshape(len(numbers), len(factors)), texts
 
 
 def text_of(path: Path, what: str, remedy: str = "") -> str:
     """The text of a file with plain ends of lines; Missing where there is none, PatchfemError where it is too large."""
+    return "\n".join(line for lines in lines_of(path, what, remedy) for line in lines)
+
+
+def lines_of(path: Path, what: str, remedy: str = ""):
+    """The lines of a file some megabyte at a time, the last of which may be empty; errors as `text_of`."""
+    decoder = IncrementalNewlineDecoder(getincrementaldecoder("utf-8-sig")(), translate=True)
+    begun, seen = [], 0
     try:
         with open(path, "rb") as file:
-            data = file.read(LARGEST + 1)
-        if len(data) > LARGEST:
-            raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB of text; keep every few rows of {what}")
-        return data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+            while data := file.read(BLOCK):
+                seen += len(data)
+                if seen > LARGEST:
+                    raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB of text; keep every few rows of {what}")
+                *whole, last = decoder.decode(data).split("\n")
+                if whole:
+                    begun.append(whole[0])
+                    yield ["".join(begun), *whole[1:]]
+                    begun = []
+                begun.append(last)
+        begun.append(decoder.decode(b"", final=True))
+        yield "".join(begun).split("\n")
     except FileNotFoundError:
         raise Missing(f"{path}: no such {what.split()[-1]}{remedy}") from None
     except (OSError, UnicodeDecodeError, ValueError) as error:
@@ -103,7 +160,10 @@ def _cells(path, number: int, line: str, names) -> dict:
     return dict(zip(names, cells))
 
 
-def _number(path, number: int, name: str, cell: str) -> float:
+def _number(path, number: int, name: str, cell: str, factor: float) -> float:
     if not NUMBER.fullmatch(cell) or not np.isfinite(float(cell)):
         raise PatchfemError(f"{path}:{number}: {name}: '{cell[:80]}' is not a finite number")
-    return float(cell)
+    value = float(cell) * factor
+    if abs(value) > BEYOND:
+        raise PatchfemError(f"{path}:{number}: {name}: {value:g} in SI is beyond what can be computed with, {BEYOND:g}")
+    return value

@@ -5,6 +5,7 @@ bytes that are there: a library that trusts them can be made to crash. Layout: "
 element is a tag (kind, bytes) and its data, padded to eight bytes.
 """
 
+import os
 import struct
 import zlib
 from collections.abc import Callable
@@ -15,6 +16,8 @@ import numpy as np
 from ..core import PatchfemError
 
 LARGEST = 15 * 10**7  # numbers of one variable
+LARGEST_FILE = 512 * 2**20  # bytes
+_DAMAGED = "the header of the MATLAB file is damaged or of version 4; save it anew with save(name, '-v7')"
 RATIO, SMALL = 200, 2**20  # unpacked to packed size of what unpacks to more than SMALL bytes
 MOST = 1000  # variables
 _STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
@@ -44,14 +47,24 @@ class _Known(NamedTuple):
     total: int
 
 
+def content(path) -> bytes:
+    """The bytes of a MATLAB file; PatchfemError where it does not start like one or is too large. OSError as `open`."""
+    with open(path, "rb") as file:
+        data = file.read(128)
+        if len(data) < 128 or 0 in data[:4]:  # zeros there: version 4, or a file of something else
+            raise PatchfemError(f"{path}: {_DAMAGED}")
+        if os.fstat(file.fileno()).st_size > LARGEST_FILE:
+            raise PatchfemError(f"{path}: more than {LARGEST_FILE >> 20} MiB; save the variables that are wanted alone")
+        return data + file.read()
+
+
 def variables(path, data: bytes) -> dict:
     """Name -> `Array` of the real arrays and texts of a MATLAB file; PatchfemError where it is damaged or too large."""
     if data.startswith(b"MATLAB 7.3"):
         raise PatchfemError(f"{path}: a MATLAB file of version 7.3; save it with save(name, '-v7')")
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if order is None:
-        raise PatchfemError(f"{path}: the header of the MATLAB file is damaged or of version 4; save it anew with "
-                            "save(name, '-v7')")
+        raise PatchfemError(f"{path}: {_DAMAGED}")
     found, at = {}, 128
     while at + 8 <= len(data):
         kind, size = struct.unpack_from(order + "II", data, at)

@@ -11,6 +11,7 @@ UNITS = {"frequency": {"Hz": 1.0, "kHz": 1e3},
          "input": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
          "acceleration": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
          "displacement": {"mil": 25.4e-6, "in": 0.0254, "m": 1.0, "mm": 1e-3, "um": 1e-6}}
+LARGEST = 4 * 2**20  # bytes: a hundred thousand conditions
 FLAGS = {"U": "unstable", "*": "no reading of the gauge", "R": "repeat run"}
 
 
@@ -35,7 +36,12 @@ def read_table(path: Path) -> list:
     frequency and input must stand in every row. PatchfemError names line and column of a mistake.
     """
     try:
-        lines = list(csv.reader(Path(path).read_text(encoding="utf-8-sig").splitlines()))
+        with open(path, "rb") as file:
+            data = file.read(LARGEST + 1)
+        if len(data) > LARGEST:
+            raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB; a table of measured conditions has a row for "
+                                "each")
+        lines = list(csv.reader(data.decode("utf-8-sig").splitlines()))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise PatchfemError(f"{path}: the measured table cannot be read ({error})") from None
     if not lines:

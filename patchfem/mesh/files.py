@@ -20,6 +20,7 @@ from .recognise import grids
 from .tensor import TensorGrid
 
 CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
+LARGEST = 256 * 2**20  # bytes of a file
 EDGE_TAGS = {"upper_interface": 11, "lower_interface": 12, "upper_far": 13, "lower_far": 14}
 
 
@@ -82,6 +83,8 @@ def read_pieces(path: Path) -> PairMesh:
     path = Path(path)
     if not path.is_file():
         raise PatchfemError(f"{path}: no such mesh file")
+    if path.stat().st_size > LARGEST:
+        raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB; a mesh of two plane pieces is smaller")
     if path.suffix in (".inp", ".unv"):
         try:
             raw = (read_inp if path.suffix == ".inp" else read_unv)(path.read_text("utf-8", "replace"))

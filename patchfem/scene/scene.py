@@ -15,6 +15,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
+from ..core import MOST_COORDINATES
 from ..effects import takes
 from .keys import tables
 from .keys.types import keys as keys_of
@@ -28,7 +29,6 @@ from .rules.limits import combinations, not_yet_built
 from .rules.methods import method_unused
 from .text import effects, toml
 
-MOST_COORDINATES = 2000  # masses or modes of a rig
 LARGEST = 32 * 2**20  # bytes of a scene
 
 

@@ -6,15 +6,20 @@ ratios or (n, n) D [1/s], moving_mass [kg]. Both: slide (n,) or (i, n), base (n,
 as they stand; other arrays in the file are left alone.
 """
 
-import numpy as np
+from math import prod
+from zipfile import ZipFile
 
-from ..core import ModalBasis, PatchfemError, frozen_array
-from ..inputs.matlab import variables
+import numpy as np
+from numpy.lib import format as npy
+
+from ..core import MOST_COORDINATES, ModalBasis, PatchfemError, frozen_array
+from ..inputs.matlab import content, variables
 from . import masses, matrices
 
 PATCH = ("normal", "pitch", "lateral", "yaw")
 KNOWN = ("M", "K", "C", "omega", "frequency", "damping", "moving_mass", "slide", "base", "output", "force", *PATCH,
          "names")
+LONGEST = 1024  # bytes of a value: a name
 
 
 def read(path) -> dict:
@@ -24,10 +29,12 @@ def read(path) -> dict:
     """
     try:
         if str(path).lower().endswith(".npz"):
-            with np.load(path, allow_pickle=False) as file:
-                return {key: file[key] for key in KNOWN if key in file.files}
-        with open(path, "rb") as file:
-            found = variables(path, file.read())
+            with ZipFile(path) as file:
+                return {key: _member(file, key) for key in KNOWN if f"{key}.npy" in file.namelist()}
+        found = variables(path, content(path))
+        for key in KNOWN:
+            if key in found:
+                _refuse_large(key, found[key].shape)
         return {key: _plain(found[key].values()) for key in KNOWN if key in found}
     except PatchfemError as error:
         why = str(error).removeprefix(f"{path}: ")
@@ -35,6 +42,24 @@ def read(path) -> dict:
     except Exception as error:  # a damaged file raises whatever its reader trips over
         raise PatchfemError(f"structure.file: {path} cannot be read ({error}); plain arrays are wanted, no objects") \
             from None
+
+
+def _member(file: ZipFile, key: str) -> np.ndarray:
+    """An array of a .npz file, refused by its header where it is large or holds objects."""
+    with file.open(f"{key}.npy") as part:
+        head = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}[npy.read_magic(part)]
+        shape, _, kind = head(part)
+    _refuse_large(key, shape)
+    if kind.itemsize > LONGEST:
+        raise PatchfemError(f"{key} holds values of {kind.itemsize} bytes each")
+    with file.open(f"{key}.npy") as part:
+        return npy.read_array(part, allow_pickle=False)
+
+
+def _refuse_large(key: str, shape: tuple) -> None:
+    if prod(shape) > MOST_COORDINATES**2:
+        raise PatchfemError(f"{key} of shape {'x'.join(map(str, shape))} is larger than {MOST_COORDINATES} coordinates "
+                            "squared; give a reduced model, or the modes that the drive reaches")
 
 
 def _plain(value):

@@ -1,10 +1,13 @@
 """Measured modes from a universal file: shapes of dataset 55, or frequency responses of dataset 58 to be fitted."""
 
+from pathlib import Path
+
 import numpy as np
 
 from ..core import Missing, PatchfemError
 from .places import AXES, Shapes
 
+LARGEST = 256 * 2**20  # bytes of a file
 NORMAL, COMPLEX = 2, (3, 7)  # analysis types of dataset 55
 POWER = {8: 0, 11: 1, 12: 2}  # ordinate type of dataset 58 -> derivatives of displacement
 FORCE = (9, 13)
@@ -35,6 +38,8 @@ def _sets(path) -> list:
         import pyuff
     except ImportError:
         raise Missing("structure.file: the package pyuff reads universal files; install it") from None
+    if Path(path).stat().st_size > LARGEST:
+        raise PatchfemError(f"structure.file: {path} has more than {LARGEST >> 20} MiB; export fewer responses")
     try:
         file = pyuff.UFF(str(path))
         wanted = [k for k, kind in enumerate(file.get_set_types()) if kind in (55, 58, 164)]

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from ...core import Missing, PatchfemError
-from ..matlab import variables
+from ..matlab import content, variables
 from .records import LARGEST, Records, Wanted, checked, factor_of
 
 _COLUMN = re.compile(r"(\w+)\(:,\s*([1-9][0-9]*)\)")
@@ -21,7 +21,7 @@ def read(path: Path, asked: list) -> Records:
         raise Missing(f"{path}: there is no such file")
     if path.stat().st_size > LARGEST:
         raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB; save fewer variables or a part of the record")
-    arrays = {name: one for name, one in variables(path, path.read_bytes()).items() if one.kind == "number"}
+    arrays = {name: one for name, one in variables(path, content(path)).items() if one.kind == "number"}
     held = ", ".join(f"{name} {'x'.join(map(str, one.shape))}" for name, one in list(arrays.items())[:20]) or \
         "no plain array of numbers (structures and objects are not read)"
     if not asked:

@@ -1,0 +1,127 @@
+"""Files that are long, or unpack to more than they seem: read block by block, or refused by their heads."""
+
+import io
+import tracemalloc
+import zipfile
+
+import numpy as np
+import pytest
+
+from patchfem.core import PatchfemError
+from patchfem.inputs import columns, measured
+from patchfem.inputs.columns import read_columns
+from patchfem.mesh import files as meshes
+from patchfem.structure import arrays, universal
+
+UNITS = {"time": {"s": 1.0, "ms": 1e-3}, "displacement": {"m": 1.0, "um": 1e-6}}
+
+
+def read(path):
+    return read_columns(path, UNITS, ("time", "displacement"), "time [s],displacement [m]", "a path")
+
+
+@pytest.fixture
+def table(tmp_path):
+    def made(body, head="time [ms],displacement [um]", end="\n"):
+        path = tmp_path / "a.csv"
+        path.write_bytes(end.join([head, *body]).encode())
+        return path
+    return made
+
+
+def peak_of(call) -> tuple:
+    """What a call returns or raises, and the most memory [bytes] that it took."""
+    tracemalloc.start()
+    try:
+        return call(), tracemalloc.get_traced_memory()[1]
+    except PatchfemError as error:
+        return str(error), tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("block", [7, 64, 2**17])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_exact_blocks_change_no_number(table, monkeypatch, block, end):
+    monkeypatch.setattr(columns, "BLOCK", block)
+    rng = np.random.default_rng(3)
+    rows = np.column_stack([np.arange(50.0), rng.standard_normal(50) * 10.0**rng.integers(-9, 9, 50)])
+    found = read(table([f" {a!r},\t{b!r} " for a, b in rows.tolist()] + ["", "  ", ""], end=end))
+    assert found.rows == 50
+    assert found.values["time"].tolist() == [a * 1e-3 for a in rows[:, 0]]
+    assert found.values["displacement"].tolist() == [b * 1e-6 for b in rows[:, 1]]
+
+
+@pytest.mark.parametrize("block", [7, 2**17])
+@pytest.mark.parametrize("cell, says", [
+    ("0,1e308", "displacement: 1e+302 in SI is beyond"), ("nan,1", "'nan' is not a finite"), ("1_0,1", "'1_0' is not"),
+    ("1 2,1", "'1 2' is not"), ("--1,1", "'--1' is not"), ("1,", "'' is not"), ("1", "two cells"), ("", "two cells"),
+    ("1,2,3", "two cells"), ("1e999,1", "not a finite"), ("0x1,1", "'0x1' is not")])
+def test_refuses_a_cell_at_its_line(table, monkeypatch, block, cell, says):
+    monkeypatch.setattr(columns, "BLOCK", block)
+    with pytest.raises(PatchfemError) as caught:
+        read(table([*(f"{k},0" for k in range(20)), cell, "21,0"]))
+    assert str(caught.value).partition("a.csv:")[2].startswith("22: ") and says in str(caught.value)
+
+
+def test_always_a_long_table_takes_little_more_than_its_numbers(table):
+    path = table([f"{k}.000,{k % 100}e-3" for k in range(30_000)])
+    found, peak = peak_of(lambda: read(path))
+    assert found.rows == 30_000 and peak < 4e6  # numbers of 0.5 MB; 67 MB with room for the largest file and all lines
+
+
+def bomb(path, shape):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as whole, whole.open("K.npy", "w") as part:
+        np.lib.format.write_array_header_1_0(part, {"descr": "<f8", "fortran_order": False, "shape": shape})
+        part.write(bytes(1000))
+    return path
+
+
+@pytest.mark.parametrize("shape", [(20_000, 20_000), (2_000_000, 2_000_000), (2001, 2000)])
+def test_refuses_an_array_by_its_head_before_it_is_unpacked(tmp_path, shape):
+    said, peak = peak_of(lambda: arrays.read(bomb(tmp_path / "a.npz", shape)))
+    assert f"K of shape {shape[0]}x{shape[1]} is larger than 2000 coordinates" in said and peak < 2e6
+
+
+def test_refuses_a_matrix_of_matlab_by_its_head(tmp_path):
+    import scipy.io
+
+    scipy.io.savemat(tmp_path / "a.mat", {"K": np.ones((2001, 2000), np.uint8)}, do_compression=True)
+    said, peak = peak_of(lambda: arrays.read(tmp_path / "a.mat"))
+    assert "K of shape 2001x2000" in said and peak < 1e6
+
+
+def test_refuses_matrices_of_nothing():
+    nothing = np.zeros((0, 0))
+    with pytest.raises(PatchfemError, match="M holds no coordinate"):
+        arrays.basis({"M": nothing, "K": nothing, "slide": np.zeros(0), "output": np.zeros(0)})
+
+
+def test_exact_arrays_of_a_file_are_those_that_were_saved(tmp_path):
+    saved = {"M": np.eye(3), "K": np.asfortranarray(np.arange(9.0).reshape(3, 3)), "names": np.array(["a", "b", "ü"]),
+             "other": np.zeros(5)}
+    np.savez_compressed(tmp_path / "a.npz", **saved)
+    found = arrays.read(tmp_path / "a.npz")
+    assert set(found) == {"M", "K", "names"} and all(np.array_equal(found[key], saved[key]) for key in found)
+    with pytest.raises(PatchfemError, match="holds values of 4000 bytes"):
+        np.savez(tmp_path / "b.npz", names=np.array(["a" * 1000]))
+        arrays.read(tmp_path / "b.npz")
+
+
+@pytest.mark.parametrize("name, reader, says", [
+    ("a.csv", measured.read_table, "more than 4 MiB"), ("a.msh", meshes.read_pieces, "more than 256 MiB"),
+    ("a.uff", universal.read, "more than 256 MiB"), ("a.mat", arrays.read, "is damaged or of version 4"),
+    ("a.csv", read, "more than 64 MiB of text")])
+def test_refuses_gigabytes_of_zeros_at_once(tmp_path, name, reader, says):
+    path = tmp_path / name
+    with open(path, "wb") as file:
+        file.truncate(3 << 30)  # no block of the disk is taken
+    said, peak = peak_of(lambda: reader(path))
+    assert says in said and peak < 4.5 * columns.LARGEST
+
+
+def test_exact_a_text_is_its_lines(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_bytes("\ufeffa\r\nü\rb\n\nc".encode())
+    assert columns.text_of(path, "a text") == "a\nü\nb\n\nc"
+    assert io.StringIO(columns.text_of(path, "a text")).readlines()[1] == "ü\n"
