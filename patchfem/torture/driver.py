@@ -28,6 +28,15 @@ class Campaign(NamedTuple):
 CAMPAIGNS = {
     "grammar": Campaign(7000, "scenes.by_grammar", "scenes with wrong keys and values"),
     "bytes": Campaign(3000, "scenes.by_bytes", "scenes with wrong bytes"),
+    "profiles": Campaign(1000, "tables.profiles", "traces of a surface"),
+    "instruments": Campaign(1000, "tables.instruments", "scans as instruments write them"),
+    "signals": Campaign(1000, "tables.signals", "recorded drives"),
+    "paths": Campaign(1000, "tables.paths", "recorded slides"),
+    "rows": Campaign(1000, "tables.rows", "measured rows"),
+    "loops": Campaign(1000, "tables.loops", "friction loops"),
+    "universal": Campaign(1000, "tables.universal", "universal files"),
+    "arrays": Campaign(1000, "tables.arrays", "matrices in .npz and .mat"),
+    "energy": Campaign(1000, "physics.energy", "books of energy of laws and engines"),
 }
 WARM = (  # scenes that load what most trials need, so that a forked trial finds it
     '[normal]\nload = "26 lbf"\n[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n[structure]\n'

@@ -1,0 +1,72 @@
+"""Random scenes whose books must close: energy in every engine, dissipation of every law, wear as it is worn."""
+
+from . import grammar
+from .results import BALANCE
+from .toml import text_of
+from .trial import Trial, Wrong
+
+WORK = 0.05  # of the work, by which the trapezoid of coarse samples may miss the ledger
+CREATED = -1e-12  # of the work that passed, the least that a passive law dissipates
+ENGINES = ("auto", "auto", "exact", "march", "harmonic", "newmark", "euler", "duhamel")
+
+
+def energy(trial: Trial) -> None:
+    """A rig or a bench of any law and engine: its ledger closes, and no law gives back more than it took."""
+    kind = trial.draw("rig", "rig", "rig", "bench", "masses", "linear")
+    tables = grammar.scene(trial, kind)
+    for table in ("wear",):
+        tables.pop(table, None)
+    if kind not in ("bench", "linear"):
+        tables["accuracy"]["method"] = trial.draw(*ENGINES)
+    found = solved(trial, tables)
+    if found is None:  # mostly an engine that this scene has not
+        tables["accuracy"]["method"] = "auto"
+        found = solved(trial, tables)
+    if found is None:
+        return
+    balance, work = (found.measures.get(name) for name in ("energy_balance", "work_check"))
+    settled = found.outcome.value not in ("not_converged", "grows")
+    if balance is not None and balance.value is not None and settled and \
+            balance.value > max(BALANCE, balance.error or 0.0):
+        raise Wrong(f"{found.outcome.value} with an energy balance of {balance.value:.3g}")
+    if work is not None and work.value is not None and settled and work.value > WORK and not found.warnings:
+        raise Wrong(f"{found.outcome.value} with a work check of {work.value:.3g} and no warning")
+    passive(found, tables)
+
+
+def passive(found, tables: dict) -> None:
+    """Wrong where the friction of a law that cannot create energy gave some back over the whole run, or over a cycle
+    of a periodic motion."""
+    laws = [tables["friction"]] if "friction" in tables else tables.get("structure", {}).get("interface", [])
+    if not laws or any(law.get("reading") == "report" or law["law"] == "convolution" for law in laws):
+        return
+    book = found.extra.get("book", {})
+    passed = max((abs(value) for value in book.values() if isinstance(value, float)), default=0.0)
+    if book.get("friction", 0.0) < CREATED * passed:
+        raise Wrong(f"friction dissipated {book['friction']:.3g} J of {passed:.3g} J that passed")
+    area = found.measures.get("loop_area")
+    if area is not None and area.value is not None and found.outcome.value == "steady" and \
+            area.value < -(area.error or 0.0) - 1e-9 * passed:
+        raise Wrong(f"a loop of {area.value:.3g} ± {area.error or 0.0:.2g} J")
+
+
+def solved(trial: Trial, tables: dict, most: float = 3.0):
+    """The Result of a scene, None where it is refused, found no end or is announced as longer than `most` seconds."""
+    from ..api import NotConverged, PatchfemError, load, plan, run
+
+    text = text_of(tables)
+    (trial.folder / "scene.toml").write_text(text, "utf-8")
+    trial.tell("patchfem run scene.toml")
+    try:
+        read = load(trial.folder / "scene.toml")
+        seconds = plan(read).seconds
+        if seconds > most:
+            return None
+        trial.limit(seconds + 10.0)
+        return run(read, say=lambda text: None)
+    except (NotConverged, PatchfemError):
+        return None
+    except Exception as error:
+        if hasattr(error, "mistakes"):
+            return None
+        raise Wrong(f"{type(error).__name__}: {error}") from None

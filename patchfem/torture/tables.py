@@ -1,0 +1,239 @@
+"""Files of numbers with wrong cells, heads and bytes: traces, scans, signals, paths, rows, universal and MATLAB files.
+
+A wound that leaves no meaning (a word for a number, no unit, no rows, time that goes back) must be refused.
+"""
+
+import io
+import json
+import zipfile
+
+import numpy as np
+import pyuff  # here, before any fork, as the next: each trial by itself would wait for them
+import scipy.optimize  # noqa: F401
+from scipy.io import savemat
+
+from .results import ran
+from .scenes import damage
+from .toml import text_of
+from .trial import Trial, Wrong, strict
+
+HEADS = {"trace": "x [um],z [um]", "signal": "time [s],acceleration [m/s^2]", "path": "time [s],displacement [m]",
+         "rows": "frequency [Hz],input [g],acceleration [g],displacement [mil],flag",
+         "loop": "time [s],displacement [m],force [N]"}
+RUBS = {"normal": {"load": "20 N"}, "friction": {"law": "coulomb", "static": 0.3}, "accuracy": {"tolerance": 1e-2}}
+RIG = RUBS | {"structure": {"moving_mass": "1 kg", "mode": [
+    {"name": "m", "frequency": "100 Hz", "damping": 0.01, "slide": 1.0}]}}
+BASE = {"kind": "base", "frequency": "90 Hz", "acceleration": "5 m/s^2", "cycles": 3}
+ODD = ("", " ", "0", "-0", "1e308", "-1e308", "1e-320", "1e400", "0x10", "1,5", "1.5.2", "½", "1_000", "٣", "1e5000",
+       "9" * 400, "=1+1", '"', "'", "#", "inf", "nan", "-", "1d5", "true", "\x00", "x" * 5000)
+
+
+def numbers(trial: Trial, kind: str) -> list:
+    """Rows of a valid table of a kind, as lists of texts."""
+    count = int(trial.r.integers(12, 60))
+    step = trial.r.uniform(0.5, 1.5, count) if trial.chance(0.5) else np.ones(count)
+    rough = np.cumsum(trial.r.normal(size=count))
+    if kind == "trace":
+        columns = (np.cumsum(step), rough)
+    elif kind == "rows":
+        rows = [(f"{f:.1f}", f"{a:.2f}", f"{3 * a:.3f}", f"{5 * a:.3f}", trial.draw("", "", "U", "R", "*"))
+                for f, a in zip(trial.r.uniform(80, 160, count), trial.r.uniform(1, 9, count))]
+        return [list(row) for row in rows]
+    else:
+        columns = [np.cumsum(step) * 1e-3, rough * (1e-6 if kind == "path" else 1.0)]
+        columns[1] = columns[1] - columns[1][0] * (kind == "path")
+        columns[0] = columns[0] - columns[0][0]
+        columns += [np.tanh(rough)] if kind == "loop" else []
+    return [[repr(float(value)) for value in row] for row in zip(*columns)]
+
+
+def csv(trial: Trial, kind: str) -> tuple:
+    """(bytes of a table with wounds, whether it must be refused)."""
+    rows, head, bad = numbers(trial, kind), HEADS[kind], False
+    how = trial.draw("whole", "cell", "cell", "word", "unit", "empty", "headless", "back", "short", "long", "order",
+                     "damage", "damage", "comma", "huge")
+    row = int(trial.r.integers(len(rows)))
+    if how == "cell":
+        rows[row][int(trial.r.integers(2))] = trial.draw(*ODD)
+    elif how == "word":
+        rows[row][int(trial.r.integers(2))], bad = trial.draw("abc", "1.5 apples", "--", "1..2", "1e"), True
+    elif how == "unit":
+        head, bad = head.replace("[um]", "[parsec]").replace("[s]", "[fortnight]").replace("[Hz]", "[rpm]"), True
+    elif how == "empty":
+        rows, bad = [], kind != "rows"
+    elif how == "headless":
+        head, bad = "", True
+    elif how == "back" and kind in ("signal", "path", "loop"):
+        rows[1:] = rows[:0:-1]
+        bad = True
+    elif how == "short":
+        rows[row], bad = rows[row][:1], True
+    elif how == "long":
+        rows[row] = [*rows[row], "1", "2"]
+    elif how == "order":
+        trial.r.shuffle(rows)
+    elif how == "huge":
+        rows[row][1] = trial.draw("1e300", "-1e300", "1e25")
+    sign = ";" if how == "comma" else trial.draw(",", ",", ",", "\t")
+    text = trial.draw("\n", "\n", "\r\n").join([head.replace(",", sign)] * bool(head) + [sign.join(r) for r in rows])
+    if how == "comma":
+        text = text.replace(".", ",")
+    data = text.encode(trial.draw("utf-8", "utf-8", "utf-8-sig", "utf-16"), "replace")
+    if how == "damage":
+        return wounded(trial, data), False
+    return data, bad
+
+
+def wounded(trial: Trial, data: bytes) -> bytes:
+    """The same with a few wounds of its bytes."""
+    out = bytearray(data)
+    for _ in range(trial.draw(1, 1, 2, 5)):
+        damage(trial, out)
+    return bytes(out)
+
+
+def of_scene(trial: Trial, tables: dict, name: str, data: bytes, bad: bool) -> None:
+    """Check, plan and run a scene that reads a file; Wrong where a bad file passes."""
+    (trial.folder / name).write_bytes(data)
+    (trial.folder / "scene.toml").write_text(text_of(tables), "utf-8")
+    if ran(trial, "scene.toml") is not None and bad:
+        raise Wrong(f"{name} has no meaning and was taken")
+
+
+def profiles(trial: Trial) -> None:
+    """Traces in text, by themselves, against each other, or pressed."""
+    data, bad = csv(trial, "trace")
+    (trial.folder / "trace.csv").write_bytes(data)
+    answered(trial, bad, "profile", "trace.csv", "--json", *(("--cutoff", "5 um") if trial.chance(0.3) else ()))
+    if trial.chance(0.3):
+        (trial.folder / "other.csv").write_bytes(csv(trial, "trace")[0])
+        answered(trial, bad, "compare", "trace.csv", "other.csv", "--direction", "x", "-o", "out", "--json")
+    if trial.chance(0.3):
+        contact = {"length": "10 mm", "width": "10 mm", "height": "5 mm", "load": "50 N", "substrate": "steel",
+                   "element_size": "0.5 mm", "profile": {"file": "trace.csv"}}
+        of_scene(trial, {"contact": contact, "accuracy": {"tolerance": 1e-2}}, "trace.csv", data, bad)
+
+
+def answered(trial: Trial, bad: bool, *words) -> None:
+    """A command whose stdout is JSON; Wrong where a bad file passes."""
+    ended = trial.run(*words)
+    if ended.code == 0:
+        if bad:
+            raise Wrong("a file without meaning was taken")
+        strict(ended.out)
+
+
+def instruments(trial: Trial) -> None:
+    """Traces and scans as instruments and programs write them, with wounded bytes."""
+    kind = trial.draw("npy", "mat", "sdf", "x3p", "dektak", "npz")
+    x, z = np.arange(40.0), trial.r.normal(size=40)
+    file = io.BytesIO()
+    if kind == "npy":
+        np.save(file, trial.draw(np.column_stack([x, z]), np.empty((0, 2)), np.array([x, z], object), z[:, None, None],
+                                 np.full((5, 2), np.nan), np.column_stack([x, z]).astype("f2")), allow_pickle=True)
+    elif kind == "mat":
+        savemat(file, trial.draw({"x": x, "z": z}, {"z": z}, {"a": np.column_stack([x, z])}, {"x": x, "z": z[:3]},
+                                 {"x": x, "z": "text"}, {"x": x, "z": z * 1j}, {"x": {"y": 1}}, {}))
+    elif kind == "npz":
+        np.savez(file, x=x, z=z)
+    elif kind == "x3p":
+        _x3p(file, z)
+    elif kind == "sdf":
+        head = {"ManufacID": "x", "NumPoints": 20, "NumProfiles": trial.draw(1, 2), "Xscale": 1e-6, "Yscale": 1e-6,
+                "Zscale": 1e-9, "Zresolution": -1, "Compression": 0, "DataType": 7, "CheckType": 0}
+        if trial.chance(0.5):
+            head[trial.draw(*head)] = trial.draw(0, -1, 10**9, 10**30, "nan", 1e308, 1e-320, "x", 2.5)
+        file.write(("aISO-1.0\n" + "".join(f"{k} = {v}\n" for k, v in head.items()) + "*\n"
+                    + " ".join(f"{int(1e4 * one)}" for one in z) + "\n*\n").encode())
+    else:
+        file.write(("Scan Parameters\nLength,40 um\nStylus,Radius: 2.5 um\n\nLateral um,Raw Micrometer,\n"
+                    + "".join(f"{a:.1f},{b:.4f},\n" for a, b in zip(x, z))).encode())
+    data = file.getvalue() if trial.chance(0.3) else wounded(trial, file.getvalue())
+    (trial.folder / f"scan.{kind.replace('dektak', 'csv')}").write_bytes(data)
+    units = ("--units", "um,um") if kind in ("npy", "mat") else ()
+    answered(trial, False, "profile", f"scan.{kind.replace('dektak', 'csv')}", "--json", *units)
+
+
+def _x3p(file, z) -> None:
+    axes = "".join(f"<{name}><AxisType>{kind}</AxisType><DataType>D</DataType><Increment>1e-6</Increment>"
+                   f"<Offset>0</Offset></{name}>" for name, kind in (("CX", "I"), ("CY", "I"), ("CZ", "A")))
+    xml = ("<p:ISO5436_2 xmlns:p='http://www.opengps.eu/2008/ISO5436_2'><Record1><Revision>ISO5436 - 2000</Revision>"
+           f"<FeatureType>PRF</FeatureType><Axes>{axes}</Axes></Record1><Record3><MatrixDimension><SizeX>{z.size}"
+           "</SizeX><SizeY>1</SizeY><SizeZ>1</SizeZ></MatrixDimension><DataList>"
+           + "".join(f"<Datum>{one:.6g}</Datum>" for one in z) + "</DataList></Record3></p:ISO5436_2>")
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("main.xml", xml)
+
+
+def signals(trial: Trial) -> None:
+    """A recorded base motion of a rig."""
+    data, bad = csv(trial, "signal")
+    of_scene(trial, RIG | {"drive": {"kind": "base", "waveform": "file", "file": "s.csv"}}, "s.csv", data, bad)
+
+
+def paths(trial: Trial) -> None:
+    """A recorded slide of a bench."""
+    data, bad = csv(trial, "path")
+    of_scene(trial, RUBS | {"slide": {"kind": "file", "file": "p.csv"}}, "p.csv", data, bad)
+
+
+def rows(trial: Trial) -> None:
+    """Measured rows beside a rig's results."""
+    data, bad = csv(trial, "rows")
+    of_scene(trial, RIG | {"drive": BASE, "measured": {"file": "t.csv"}}, "t.csv", data, bad)
+
+
+def loops(trial: Trial) -> None:
+    """A friction loop to which a bench is fitted, or which is imported."""
+    data, bad = csv(trial, "loop")
+    (trial.folder / "loop.csv").write_bytes(data)
+    if trial.chance(0.7):
+        answered(trial, bad, "import", "loop.csv", "-o", "out.csv", "--json")
+        return
+    (trial.folder / "scene.toml").write_text(text_of(RUBS | {"slide": {"kind": "sine", "amplitude": "10 um",
+                                                                       "frequency": "10 Hz"}}), "utf-8")
+    answered(trial, bad, "fit", "scene.toml", "--to", "loop.csv", "--free", "friction.static=0.1..0.6", "-o", "out",
+             "--json", "-q")
+
+
+def universal(trial: Trial) -> None:
+    """Records of a universal file, imported."""
+    time = np.arange(64) / 500
+    one = {"type": 58, "binary": trial.draw(0, 1), "func_type": trial.draw(1, 1, 4), "rsp_node": 1, "rsp_dir": 1,
+           "ref_node": 0, "ref_dir": 0, "abscissa_spacing": trial.draw(0, 1), "abscissa_spec_data_type": 17,
+           "ordinate_spec_data_type": trial.draw(8, 9, 12, 13), "orddenom_spec_data_type": 0, "x": time,
+           "data": trial.r.normal(size=64) * trial.draw(1.0, 1e300, np.nan)}
+    pyuff.UFF(str(trial.folder / "made.uff")).write_sets([one, one | {"rsp_node": 2}], "add")
+    data = (trial.folder / "made.uff").read_bytes()
+    (trial.folder / "lab.uff").write_bytes(data if trial.chance(0.2) else wounded(trial, data))
+    out = trial.draw("out.csv", "out.csv", "out.toml", "out.uff")
+    channel = trial.draw("force=1:+x", "displacement=2:+x", "acceleration=1:+x")
+    trial.run("import", "lab.uff", "-o", out, "--map", channel)
+    if trial.chance(0.3):
+        (trial.folder / "scene.toml").write_text(text_of(
+            RUBS | {"structure": {"file": "lab.uff", "slide_at": "1:+x"}, "drive": BASE}), "utf-8")
+        ran(trial, "scene.toml")
+
+
+def arrays(trial: Trial) -> None:
+    """Matrices of a rig in .npz and .mat, and records in .mat."""
+    mass, spring = np.diag([1.0, 0.5]), np.array([[3e5, -1e5], [-1e5, 1e5]])
+    given = {"M": mass, "K": spring, "C": 1e-5 * spring}
+    name = trial.draw(*given)
+    given[name] = trial.draw(
+        given[name], given[name] * (1 + 0.2j), -given[name], given[name][:1], np.empty((0, 0)), given[name] * np.nan,
+        given[name] * 1e300, given[name] * 1e-300, np.zeros((2, 2)), np.array([["a", "b"]]), given[name].astype(object),
+        np.ones((2, 2, 2)), given[name].astype("i1"), given[name] + [[0, 1e3], [0, 0]], np.array(3.0))
+    ending, file = trial.draw("npz", "mat"), io.BytesIO()
+    if ending == "npz":
+        np.savez(file, **given)
+    else:
+        savemat(file, given)
+    data = file.getvalue() if trial.chance(0.5) else wounded(trial, file.getvalue())
+    (trial.folder / f"rig.{ending}").write_bytes(data)
+    at = json.loads(trial.draw('{"slide_at": "1"}', '{"slide_at": "2", "base_at": "1"}', '{"slide_at": "9"}', "{}"))
+    (trial.folder / "scene.toml").write_text(text_of(
+        RUBS | {"structure": {"file": f"rig.{ending}"} | at, "drive": BASE}), "utf-8")
+    ran(trial, "scene.toml")
+    if ending == "mat":
+        trial.run("import", "rig.mat", "-o", "out.csv", "--map", "force=K(:,1) [N]", "--map", "time=M(:,1) [s]")
