@@ -1,6 +1,5 @@
 """Measures of many runs as columns, with errors, outcome and reasons: what `runs.rig.rig` makes of one Solution."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -16,6 +15,7 @@ from ....response.settling import CLASSES, steady_amplitudes, windows_of
 from ....structure.drive_sizes import largest, omega_of, slowest
 from ...results.notes import BOOKS
 from ..answers import Answers
+from .warned import said
 
 MAIN, PHASE = "relative_displacement_amplitude", "slip_start_phase"
 
@@ -29,8 +29,7 @@ class Runs:
     whether nothing slipped, and whether a run must be made by itself; errors: measure -> (n,) beside `least` of its
     value; closes: gap of the energy balance beyond which a run has not converged; loads: (n,) of a stuck run, whether
     what it holds still rises; steady: ((n,), (n,)) [m] amplitude and error of the motion that a run is known to settle
-    to, NaN where none is; chosen: what each run chose besides; said(model, outcome, Answers, case) -> its warnings,
-    those of measures that are known less well than asked among them: without it such a case is run by itself.
+    to, NaN where none is; chosen: what each run chose besides.
     """
 
     cycles: int
@@ -47,7 +46,6 @@ class Runs:
     loads: np.ndarray | bool = False
     steady: tuple | None = None
     chosen: tuple = ()
-    said: Callable | None = None
 
     @property
     def amplitudes(self) -> np.ndarray:
@@ -57,8 +55,8 @@ class Runs:
 
 
 def answered(models, runs: Runs, numerics: dict) -> tuple:
-    """(Answers of the models, (n,) whether a case must be run by itself, for a warning that needs its whole result,
-    (n,) whether all its errors but that of the steady estimate are within its tolerance).
+    """(Answers of the models, (n,) whether a case must be run by itself, (n,) whether all its errors but that of the
+    steady estimate are within its tolerance).
 
     numerics: as `results.chosen` has it.
     """
@@ -77,14 +75,15 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
     still = np.array([one is Outcome.TRANSIENT for one in outcome]) & ~np.isnan(steady) & ~runs.stuck
     values["relative_displacement_amplitude_steady"] = np.where(still, steady, np.nan)
     errors["relative_displacement_amplitude_steady"] = steady_error(steady, error, values[MAIN], errors[MAIN])
-    moved, resolved = np.array([model.rig.displacement for model in models]), np.ones(n, bool)
+    moved, resolved, loose = np.array([model.rig.displacement for model in models]), np.ones(n, bool), np.zeros(n, bool)
     for name, value in values.items():
         there = ~np.isnan(value)
         if not there.any():
             continue
         row, floor = TABLE[name], floor_of(name, moved)
         wide = there & (errors[name] > tolerance * np.abs(value) + floor)
-        if runs.said is None or name == MAIN:
+        loose |= wide & ~grows
+        if name == MAIN:  # a run by itself may be made again with finer steps
             alone |= wide & ~grows
         if not name.endswith("_steady"):
             resolved &= ~wide
@@ -94,9 +93,8 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
     _reasons(models, runs, found)
     for case, model in enumerate(models):
         found.numerics[case] = numerics | runs.chosen[case] if runs.chosen else numerics
-        said = runs.said(model, outcome[case], found, case) if runs.said is not None else []
-        if said := [*model.source.remarks, *model.rig.notes, *said]:
-            found.warnings[case] = said
+        if warnings := [*model.source.remarks, *model.rig.notes, *said(model, outcome[case], found, case, loose[case])]:
+            found.warnings[case] = warnings
     return found, alone, resolved
 
 

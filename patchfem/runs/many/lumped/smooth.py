@@ -1,51 +1,32 @@
 """Smooth laws without states of their own on one mode under a sine: motions side by side, `dynamics.smooth.many`."""
 
-from typing import NamedTuple
-
 import numpy as np
 
-from ....compiled import load
-from ....core import Measure
+from ....compiled import kernels, load
 from ....dynamics.second_book import gap
-from ....dynamics.smooth import reading_kernels as read
 from ....dynamics.smooth import run as hub
 from ....dynamics.smooth.lanes import fits
 from ....dynamics.smooth.many import together
 from ....dynamics.smooth.waves import wave_of
 from ....effects import has
-from ....model.model import Model
 from ....response.errors import tolerance_error
 from ....response.loops import interface_loops
 from ....response.measures import ROUND, energy_balance
 from ....response.ringing import LEAST_SAMPLES
 from ....response.run_events import rings
 from ....response.spectrum import distorted
-from ...results.loose import loose
 from ...rig.engines import COARSER, SMOOTH, engine_of
 from ...rig.numerics import local_of
-from ...rig.rig import said_of_law
 from ...rig.smooth.choice import element_of
 from ...rig.smooth.solve import CLEAR, LOCATED, SAFE
 from .columns import Runs
 from .threads import in_threads
 
 KERNELS = "dynamics.smooth.reading_kernels"
+read = kernels(KERNELS)  # its places of numbers, without the compiler that it brings
 LONGEST = 4000  # cycles of a run whose extremes are all held
 TOGETHER = 64  # motions whose samples are held at once
 NUMERICS = {"engine": "smooth"}
-
-
-class _Plan(NamedTuple):
-    model: Model
-
-
-class _Seen(NamedTuple):
-    """What `loose` asks of a result."""
-
-    plan: _Plan
-    measures: dict
-    patch: None
-    extra: dict
 
 
 def refuses(model) -> str:
@@ -80,16 +61,7 @@ def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     book = {name: np.concatenate([one[2][name] for one in solved]) for name in solved[0][2]}
     extremes, phasors, lost = (np.concatenate([one[k] for one in solved]) for k in (3, 4, 5))
     return Runs(cycles, window, values, book, extremes, phasors, np.zeros(len(models), bool), lost, errors,
-                SMOOTH.least, np.inf, chosen=sum((one[6] for one in solved), ()), said=_said)
-
-
-def _said(model, outcome, found, case: int) -> list:
-    """Warnings of a case, of its law and of what is known less well than asked."""
-    known = {name: Measure(float(values[case]), found.units[name], float(found.errors[name][case]),
-                           float(found.floors[name][case])) for name, values in found.values.items()
-             if not np.isnan(found.errors[name][case])}
-    drift = {name: one for name, one in known.items() if name == "drift_per_cycle"}
-    return [*said_of_law(model, outcome, drift, 0.0), *loose(_Seen(_Plan(model), known, None, {}))]
+                SMOOTH.least, np.inf, chosen=sum((one[6] for one in solved), ()))
 
 
 def _solved(models, cycles: int, window: int) -> tuple:
