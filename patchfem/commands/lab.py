@@ -25,13 +25,13 @@ class Estimate:
 def import_(file: Path, /, *, out: Annotated[Path, Parameter(
         name=["-o", "--out"], help="table.csv of the records in SI, modes.toml for a scene, response.uff")],
             map_: texts('which channel of the file is what: "force=Load cell [lbf]", "displacement=12:+x", "time=t '
-                        '[s]", "force=data(:,2) [N]"; of shapes: slide=12:+x; may be repeated; without it channels are '
-                        'taken that say so themselves', "--map") = (),
+                        '[s]", "force=run.load(:,2) [N]"; of shapes: slide=12:+x; may be repeated; without it channels '
+                        'are taken that say so themselves', "--map") = (),
             zero: flag("count time and displacement from their first row") = False,
             modes: Annotated[Estimate, Parameter(name="*")] = Estimate(), json_: Json = False):
-    """Turn the records of a laboratory file (.uff: datasets 58 in the units of 164; .mat of version 5 to 7; .csv with
-    units in its header) into the table that drive.file, slide.file and fit --to read, or into modes: of an input and a
-    response, of a free decay, of shapes (dataset 55) or frequency responses.
+    """Turn the records of a laboratory file (.uff: datasets 58 in the units of 164; .mat; .csv with units in its
+    header) into the table that drive.file, slide.file and fit --to read, or into modes: of an input and a response, of
+    a free decay, of shapes (dataset 55) or frequency responses.
 
     Example: patchfem import bench.uff --map "force=Load cell [lbf]" --map displacement=12:+x -o loop.csv
     """

@@ -1,50 +1,13 @@
-"""Arrays of a MATLAB file of version 5 to 7: numbers, sparse numbers and texts; nothing else of it is looked at.
-
-Sizes are read from the header of each variable and limited before it is unpacked, and every count is compared with the
-bytes that are there: a library that trusts them can be made to crash. Layout: "MAT-File Format", The MathWorks; every
-element is a tag (kind, bytes) and its data, padded to eight bytes.
-"""
+"""Arrays of a MATLAB file of any version from 5 on, whatever it calls itself."""
 
 import os
-import struct
-import zlib
-from collections.abc import Callable
-from typing import NamedTuple
-
-import numpy as np
 
 from ..core import PatchfemError
+from .matlab5 import DAMAGED
+from .matlab5 import variables as of_version_5
 
-LARGEST = 15 * 10**7  # numbers of one variable
 LARGEST_FILE = 512 * 2**20  # bytes
-_DAMAGED = "the header of the MATLAB file is damaged or of version 4; save it anew with save(name, '-v7')"
-RATIO, SMALL = 200, 2**20  # unpacked to packed size of what unpacks to more than SMALL bytes
-MOST = 1000  # variables
-_STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-_TEXTS = {2: "latin-1", 16: "utf-8", 17: "utf-16", 4: "utf-16"}
-_MATRIX, _COMPRESSED = 14, 15
-_CELL, _CHAR, _SPARSE, _NUMERIC = 1, 4, 5, range(6, 16)  # classes of arrays
-_COMPLEX = 0x0800
-_HEAD = 1024  # bytes that hold the shape and the name of an array
-_BROKEN = (zlib.error, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError, MemoryError)
-
-
-class Array(NamedTuple):
-    """One variable: "number", "sparse" or "text"; its shape; a call that gives its values, full and as floats."""
-
-    kind: str
-    shape: tuple
-    values: Callable
-
-
-class _Known(NamedTuple):
-    """What the head of a variable tells: class, shape, name, place of its data, bytes of all of it."""
-
-    kind: int
-    shape: tuple
-    name: str
-    at: int
-    total: int
+HDF5 = b"\x89HDF\r\n\x1a\n"  # at the begin, or behind the block that MATLAB puts there
 
 
 def content(path) -> bytes:
@@ -52,149 +15,20 @@ def content(path) -> bytes:
     with open(path, "rb") as file:
         data = file.read(128)
         if len(data) < 128 or 0 in data[:4]:  # zeros there: version 4, or a file of something else
-            raise PatchfemError(f"{path}: {_DAMAGED}")
+            raise PatchfemError(f"{path}: {DAMAGED}")
         if os.fstat(file.fileno()).st_size > LARGEST_FILE:
             raise PatchfemError(f"{path}: more than {LARGEST_FILE >> 20} MiB; save the variables that are wanted alone")
         return data + file.read()
 
 
 def variables(path, data: bytes) -> dict:
-    """Name -> `Array` of the real arrays and texts of a MATLAB file; PatchfemError where it is damaged or too large."""
-    if data.startswith(b"MATLAB 7.3"):
-        raise PatchfemError(f"{path}: a MATLAB file of version 7.3; save it with save(name, '-v7')")
-    order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
-    if order is None:
-        raise PatchfemError(f"{path}: {_DAMAGED}")
-    found, at = {}, 128
-    while at + 8 <= len(data):
-        kind, size = struct.unpack_from(order + "II", data, at)
-        if at + 8 + size > len(data) or len(found) > MOST:
-            raise PatchfemError(f"{path}: the MATLAB file is cut off or damaged; save it anew")
-        body = memoryview(data)[at + 8:at + 8 + size]
-        try:
-            known = _head(path, body, kind == _COMPRESSED, order) if kind in (_MATRIX, _COMPRESSED) else None
-        except _BROKEN as error:
-            raise PatchfemError(f"{path}: a variable of the MATLAB file is damaged ({_short(error)}); save it anew"
-                                ) from None
-        if known is not None:
-            found[known.name] = _array(path, body, kind == _COMPRESSED, order, known)
-        at += 8 + size + (0 if kind == _COMPRESSED else -size % 8)
-    return found
+    """Name -> `matlab5.Array` of the real arrays and texts of a MATLAB file; a field of a structure is named
+    STRUCTURE.FIELD.
 
+    path: for messages; data: the bytes of the file. PatchfemError where it is damaged or too large.
+    """
+    if data.startswith((HDF5, b"MATLAB 7.3")) or data[512:520] == HDF5:
+        from .matlab73 import variables as of_hdf5  # h5py takes 0.1 s
 
-def _head(path, body, packed: bool, order: str) -> _Known | None:
-    """Head of a variable, None for what is no real array and no text."""
-    head, total = bytes(body[:_HEAD]), len(body)
-    if packed:
-        head = zlib.decompressobj().decompress(body, _HEAD)
-        kind, total = struct.unpack_from(order + "II", head)
-        if kind != _MATRIX:
-            return None
-        head = head[8:]
-    flag, shape, name, at = _described(head, order)
-    kind = flag & 0xFF
-    if kind not in (_CELL, _CHAR, _SPARSE, *_NUMERIC) or flag & _COMPLEX:
-        return None
-    count = 1
-    for one in shape:
-        count *= one
-    if not shape or min(shape) < 0 or count > LARGEST:
-        raise PatchfemError(f"{path}: a variable of shape {shape}, more than {LARGEST:.1e} numbers; save a part of it")
-    if kind in _NUMERIC and total > 8 * count + at + 16:
-        raise ValueError(f"{total} bytes for {count} numbers")
-    return _Known(kind, shape, name.decode("latin-1"), at, total)
-
-
-def _described(data, order: str) -> tuple:
-    """(flags, shape, name, where the data begin) of a matrix element."""
-    _, flags, at = _element(data, 0, order)
-    _, dims, at = _element(data, at, order)
-    _, name, at = _element(data, at, order)
-    return struct.unpack_from(order + "I", flags)[0], struct.unpack(f"{order}{len(dims) // 4}i", dims), name, at
-
-
-def _array(path, body, packed: bool, order: str, known: _Known) -> Array:
-    def values():
-        try:
-            data = _unpacked(path, body, known.total) if packed else body
-            if known.kind in _NUMERIC:
-                return _numbers(data, known.at, known.shape, order)
-            return _sparse(data, known, order) if known.kind == _SPARSE else _texts(data, known, order)
-        except _BROKEN as error:
-            name = known.name[:40] if known.name.isprintable() else "?"
-            raise PatchfemError(f"{path}: variable {name} is damaged ({_short(error)}); save it anew") from None
-
-    kind = "number" if known.kind in _NUMERIC else "sparse" if known.kind == _SPARSE else "text"
-    return Array(kind, known.shape, values)
-
-
-def _unpacked(path, body, total: int) -> bytes:
-    if total > max(SMALL, RATIO * len(body)):
-        raise PatchfemError(f"{path}: a variable unpacks to more than {RATIO} times its packed size; save it with "
-                            "save(name, '-v6')")
-    unpack = zlib.decompressobj()
-    data = unpack.decompress(body, 8 + total + 1)[8:]
-    if not unpack.eof:  # there its checksum has been compared
-        raise ValueError("it ends too early or too late")
-    return data
-
-
-def _numbers(data, at: int, shape: tuple, order: str) -> np.ndarray:
-    kind, stored, _ = _element(data, at, order)
-    return np.frombuffer(stored, order + _STORED[kind]).reshape(shape, order="F").astype(float)
-
-
-def _sparse(data, known: _Known, order: str) -> np.ndarray:
-    """A sparse matrix in full: row numbers, starts of the columns, values."""
-    parts, at = [], known.at
-    for _ in range(3):
-        kind, stored, at = _element(data, at, order)
-        parts.append(np.frombuffer(stored, order + _STORED[kind]))
-    rows, starts, values = parts
-    count, wide = known.shape[1], np.diff(starts)
-    if starts.size != count + 1 or starts[0] != 0 or (wide < 0).any() or starts[-1] > min(rows.size, values.size):
-        raise ValueError("its columns do not fit")
-    rows, values = rows[:starts[-1]], values[:starts[-1]]
-    if rows.size and not 0 <= rows.min() <= rows.max() < known.shape[0]:
-        raise ValueError("its rows do not fit")
-    out = np.zeros(known.shape)
-    np.add.at(out, (rows, np.repeat(np.arange(count), wide)), values.astype(float))
-    return out
-
-
-def _texts(data, known: _Known, order: str) -> np.ndarray:
-    """The rows of a matrix of letters, or the first row of each text of a cell array, without blanks at their ends."""
-    if known.kind == _CHAR:
-        kind, stored, _ = _element(data, known.at, order)
-        coding = _TEXTS[kind] + ({"<": "-le", ">": "-be"}[order] if _TEXTS[kind] == "utf-16" else "")
-        letters = np.array(list(stored.decode(coding)), dtype=object).reshape(known.shape, order="F")
-        found = ["".join(row).rstrip() for row in letters.reshape(known.shape[0], -1)]
-    else:
-        found, at = [], known.at
-        while len(found) < max(known.shape, default=0):
-            kind, stored, at = _element(data, at, order)
-            flag, shape, name, inner = _described(stored, order)
-            if kind != _MATRIX or flag & 0xFF != _CHAR:
-                raise ValueError("a cell that is no text")
-            one = _Known(_CHAR, shape, name.decode("latin-1"), inner, len(stored))
-            found.append(_texts(stored, one, order)[0])
-    out = np.empty(len(found), dtype=object)
-    out[:] = found
-    return out
-
-
-def _element(data, at: int, order: str) -> tuple:
-    """(kind, data, where the next one begins) of the element at a place."""
-    kind, size = struct.unpack_from(order + "II", data, at)
-    if kind >> 16:  # four bytes or fewer, inside the tag
-        kind, size, start, after = kind & 0xFFFF, kind >> 16, at + 4, at + 8
-    else:
-        start, after = at + 8, at + 8 + size + -size % 8
-    if size > len(data) - start or (start == at + 4 and size > 4):
-        raise ValueError("an element ends too early")
-    return kind, bytes(data[start:start + size]), after
-
-
-def _short(error) -> str:
-    text = " ".join(str(error).split())
-    return text[:120] if text.isprintable() else type(error).__name__
+        return of_hdf5(path, data)
+    return of_version_5(path, data)

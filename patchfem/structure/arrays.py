@@ -25,7 +25,7 @@ LONGEST = 1024  # bytes of a value: a name
 def read(path) -> dict:
     """Known arrays of a .npz or .mat file by name (`KNOWN`); other arrays are left alone.
 
-    PatchfemError for a file that cannot be read, holds objects, or is a .mat file of version 7.3.
+    PatchfemError for a file that cannot be read or holds objects.
     """
     try:
         if str(path).lower().endswith(".npz"):

@@ -1,4 +1,5 @@
-"""Records of a .mat file by an explicit map: a variable, or a column of one, for each quantity and with its unit."""
+"""Records of a .mat file by an explicit map: a variable, a field of a structure or a column of either for each
+quantity, with its unit."""
 
 import re
 from pathlib import Path
@@ -7,13 +8,13 @@ from ...core import Missing, PatchfemError
 from ..matlab import content, variables
 from .records import LARGEST, Records, Wanted, checked, factor_of
 
-_COLUMN = re.compile(r"(\w+)\(:,\s*([1-9][0-9]*)\)")
+_COLUMN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
 
 
 def read(path: Path, asked: list) -> Records:
-    """`Records` of a .mat file of version 5 to 7; asked: `Wanted`, each with a variable such as `F` or `data(:,2)`.
+    """`Records` of a .mat file; asked: `Wanted`, each with a variable such as `F`, `data(:,2)` or `run.load.F`.
 
-    Only plain real arrays are read; nothing in the file is run or unpickled. PatchfemError names what is not there,
+    Only real arrays are read; nothing in the file is run or unpickled. PatchfemError names what is not there,
     Missing where there is no file.
     """
     path = Path(path)
@@ -23,7 +24,7 @@ def read(path: Path, asked: list) -> Records:
         raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB; save fewer variables or a part of the record")
     arrays = {name: one for name, one in variables(path, content(path)).items() if one.kind == "number"}
     held = ", ".join(f"{name} {'x'.join(map(str, one.shape))}" for name, one in list(arrays.items())[:20]) or \
-        "no plain array of numbers (structures and objects are not read)"
+        "no array of numbers (objects and structures of several elements are not read)"
     if not asked:
         raise PatchfemError(f"{path}: say what its variables are, such as --map \"time=t [s]\" --map \"force=F [N]\"; "
                             f"it holds {held}")
