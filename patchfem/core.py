@@ -310,3 +310,11 @@ class Response:
     force: np.ndarray
     slip: np.ndarray
     extra: dict = field(default_factory=dict)
+
+
+def say(length: float, digits: int = 4) -> str:
+    """A length [m] as words for a message, such as "200 um" or "12.7 mm", to so many digits."""
+    for unit, factor in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
+        if abs(length) >= factor * (1 - 1e-9):
+            return f"{length / factor:.{digits}g} {unit}"
+    return f"{length / 1e-9:.{digits}g} nm" if length else "0 um"

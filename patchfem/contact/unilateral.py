@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Compliance, NotConverged, Outcome, PatchfemError, Pressure, frozen_array
+from ..core import Compliance, NotConverged, Outcome, PatchfemError, Pressure, frozen_array, say
 from ..elasticity.lapack import one_thread
 from .active_set import ROUND, Ask, Found, Operator, factor, flaw, nested_set, rest, settle
 from .gradients import descend, gradients
@@ -194,7 +194,7 @@ def press_by(pieces: Compliance, gap: np.ndarray, approach: float, rotation: flo
     if approach <= gap.min():
         return _apart(gap, approach, rotation)
     if approach - gap.min() < LEAST:
-        raise PatchfemError(f"contact.approach: an overlap of {approach - gap.min():.3g} m is too small to compute "
+        raise PatchfemError(f"contact.approach: an overlap of {say(approach - gap.min(), 3)} is too small to compute "
                             f"with; take {gap.min():.6g} m for a touch without load")
     return _pressed(pieces, Ask(pieces.interface.x, gap - approach), start, approach, rotation)
 

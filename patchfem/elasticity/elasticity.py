@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core import NotConverged, frozen_array
+from ..core import NotConverged, frozen_array, say
 from .condense import Condensed, condense
 from .tensor_stiffness import matrix_of, tensor_stencil
 
@@ -107,8 +107,8 @@ def remedy(layers: Layers, coated: bool, least: float, size: tuple) -> str:
     if coated and not 1e-3 < ratio < 1e3:
         return (f"the Young's moduli of coating and substrate differ {max(ratio, 1 / ratio):.2g} times: bring them "
                 f"nearer, make the coating thicker, or leave it out")
-    return (f"the shortest cell is {least:.2g} m in a piece of {size[0]:.2g} x {size[1]:.2g} m: ask for longer cells "
-            f"(contact.element_size, or those of contact.mesh)")
+    return (f"the shortest cell is {say(least, 3)} in a piece of {say(size[0], 3)} x {say(size[1], 3)}: ask for "
+            "longer cells (contact.element_size, or those of contact.mesh)")
 
 
 def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:

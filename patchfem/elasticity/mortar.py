@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import coo_array, csr_array, eye_array
 
-from ..core import PatchfemError, frozen_array
+from ..core import PatchfemError, frozen_array, say
 
 CLOSE = 1e-9  # lengths below this share of the interface are nothing
 SOFTER = 20.0  # times softer at the scale of a cell: that piece's nodes carry the pressure though they are finer
@@ -254,7 +254,7 @@ def _reason(grids, name: str, ripple: float, place: float) -> str:
     where = f"the nodes of the {name} piece" if name != "both" else "nodes of both pieces in turns"
     low, high, x = (grids[key].size for key in ("lower", "upper", name))
     return f"pressure on {where} ({x} points, the lower interface has {low}, the upper one {high}) is expected to " \
-           f"ripple by {100 * ripple:.2g} % near x = {place:.3g} m"
+           f"ripple by {100 * ripple:.2g} % near x = {say(place, 3)}"
 
 
 def _plain(c: tuple, x, side: str) -> None:

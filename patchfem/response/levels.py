@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..core import Outcome
+from ..core import Outcome, say
 
 KEPT = ("relative_displacement_amplitude", "absolute_acceleration_peak", "absolute_acceleration_fundamental",
         "acceleration_distortion", "slip_amplitude",
@@ -47,7 +47,7 @@ def past_onset(kind: str, length: float | None = None) -> Callable[[Level], bool
 
 def no_onset(kind: str, length: float | None = None) -> str:
     """The reason why a run of levels has no onset; arguments as in `past_onset`."""
-    what = {"slip": "slips", "gauge": f"moves the output by more than {length:g} m" if length else ""}.get(
+    what = {"slip": "slips", "gauge": f"moves the output by more than {say(length)}" if length else ""}.get(
         kind, f"distorts the acceleration (third over first harmonic) by more than {DISTORTED:g}")
     return f"no level on the way up {what}"
 

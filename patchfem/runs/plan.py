@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ..core import Missing
+from ..core import Missing, say
 from ..effects import EFFECTS
 from ..model.model import Model, build
 from ..model.source import placed
@@ -112,7 +112,7 @@ def _verdict(model: Model, groups: dict, size: int, said: list) -> list:
         out.append(f"run will refuse: about {size / 1e9:.3g} GB are needed, {free_bytes() / 1e9:.3g} GB are free")
     out += [*said[1], *said[2]]
     if "slip_length" in groups:
-        out.append(f"the pieces shear elastically by about {groups['slip_length']:.2g} m before the patch slips")
+        out.append(f"the pieces shear elastically by about {say(groups['slip_length'], 3)} before the patch slips")
     if model.kind == "rig" and model.soft and model.rig.load_varies:
         out.append(f"{model.soft} by tangential modes of all nodes, as the load changes with the motion; half as many "
                    "check them")

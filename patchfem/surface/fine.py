@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..core import PatchfemError
-from .profile import Profile, level, say
+from ..core import PatchfemError, say
+from .profile import Profile, level
 
 ELEMENTS = 2  # a wave shorter than this many elements has no place on the nodes
 LIMIT = 0.1  # share of the height in such waves from which something is really lost

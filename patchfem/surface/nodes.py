@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array
-from .profile import Profile, say
+from ..core import PatchfemError, frozen_array, say
+from .profile import Profile
 
 
 def placed(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:

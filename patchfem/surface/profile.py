@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array
+from ..core import PatchfemError, frozen_array, say
 
 WINDOW = 7  # samples of the running median; what is three samples wide or less can be a spike
 SPIKE = 8.0  # robust standard deviations from the running median
@@ -133,11 +133,3 @@ def _running(z) -> tuple:
         middle[part] = np.partition(windows[part], half, axis=1)[:, half]
         spread[part] = np.partition(np.abs(windows[part] - middle[part, None]), half, axis=1)[:, half]
     return middle, spread
-
-
-def say(length: float) -> str:
-    """A length [m] as words for a message, such as "200 um" or "12.7 mm", to four digits."""
-    for unit, factor in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
-        if abs(length) >= factor * (1 - 1e-9):
-            return f"{length / factor:.4g} {unit}"
-    return f"{length / 1e-9:.4g} nm" if length else "0 um"

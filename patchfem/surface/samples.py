@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array
-from .profile import Profile, say
+from ..core import PatchfemError, frozen_array, say
+from .profile import Profile
 
 LONGEST = 10.0  # [m] beyond which a unit must be wrong
 SHORTEST = 1e-9  # [m]
@@ -105,7 +105,7 @@ def plausible(path, x, z, stated: bool = False) -> tuple:
         raise PatchfemError(f"{path}: {np.isfinite(z).sum()} heights; a trace wants two at least")
     length, span = float(x[-1] - x[0]), float(np.nanmax(z) - np.nanmin(z))
     if length < SHORTEST:
-        raise PatchfemError(f"{path}: the profile is {length:.3g} m long; is the unit of x right?")
+        raise PatchfemError(f"{path}: the profile is {say(length, 3)} long; is the unit of x right?")
     if span <= length:
         return ()
     steep = f"{path}: heights span {say(span)} over a length of {say(length)}"

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array
+from ..core import PatchfemError, frozen_array, say
 
 BITE = 1e-3  # default mean depth taken in one place of one pass, as a share of the combined root mean square height
 CLOSE = 1e-9  # by which the mean overlap may miss its target before it is scaled to it
@@ -55,8 +55,8 @@ def rub(lower: np.ndarray, upper: np.ndarray, step: float, stroke: float, worn: 
     cycles = int(np.ceil(worn / (visits * bite)))
     depth = worn / (cycles * visits)
     if depth < FINEST * max(np.abs(low).max(), np.abs(up).max()):
-        raise PatchfemError(f"a depth of {depth:.2g} m at a time is lost in the round-off of the heights; use a larger "
-                            "bite, or surfaces about zero")
+        raise PatchfemError(f"a depth of {say(depth, 3)} at a time is lost in the round-off of the heights; use a "
+                            "larger bite, or surfaces about zero")
     pair = _Pair(low, up, upper_share)
     for _ in range(cycles):
         for place in places:

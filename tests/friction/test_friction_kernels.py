@@ -99,7 +99,7 @@ def jenkins_numpy(dq, stretch, stiffness, limit):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_exact_jenkins_is_a_clip(seed):
     rng = np.random.default_rng(seed)
-    stiffness, limit = rng.uniform(0.1, 3, 30), rng.uniform(0.05, 2, 30)
+    stiffness, limit = rng.uniform(0.1, 3, 29), rng.uniform(0.05, 2, 29)
     element = parallel(stiffness, limit)
     num, mem = element.numbers[None], element.memory[None].copy()
     stretch, now = mem[0, 3:], mem[0, :3]
@@ -113,8 +113,17 @@ def test_exact_jenkins_is_a_clip(seed):
         dissipated = elastic_plastic_kernels.commit(num, mem, 0, dq, force, 0.0, 0.0, 1.0, 0.0)
         share = stiffness * limit
         assert now == pytest.approx([stiffness @ new, stiffness @ new**2 / 2, share @ new / share.sum()], abs=1e-12)
+        assert elastic_plastic_kernels.state(num, mem, 0, dq, 0.0) == (now[0], now[1], dq - now[2])
         assert stretch == pytest.approx(new, abs=1e-15) and dissipated == pytest.approx(loss, abs=1e-11)
         assert dissipated >= -1e-15
+
+
+@pytest.mark.parametrize(("travel", "force", "slope"), [(0.2, 1.5, 3.0), (0.9, 2.1, 0.0), (-1.2, -2.1, 0.0),
+                                                        (-1.0, -2.1, 3.0), (0.0, 0.9, 3.0)])
+def test_exact_one_element_ends_a_slide_where_it_clips(travel, force, slope):
+    """A spring of 3 N/m that slips at 0.7 m, from 0.9 N: up to that it only stretches, with its whole stiffness."""
+    num = parallel([3.0], [0.7]).numbers[None]
+    assert elastic_plastic_kernels.at_end(num, 0, 0.9, 4.0, travel) == pytest.approx((force, 0.0, slope), abs=1e-14)
 
 
 def test_exact_a_tiny_step_of_stretched_elements_keeps_its_force():

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from traces import UM, bumpy
 
-from patchfem.core import PatchfemError
-from patchfem.surface.profile import SPIKE, Profile, cleaned, level, say, spikes
+from patchfem.core import PatchfemError, say
+from patchfem.surface.profile import SPIKE, Profile, cleaned, level, spikes
 from patchfem.surface.synthetic import peaks, self_affine, sine
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import ModalBasis, NotConverged
+from ...core import ModalBasis, NotConverged, say
 from .harmonic import Balance, pack, solve_linear, unpack
 
 
@@ -130,7 +130,7 @@ class FreeBalance:
                     break
                 share /= 2
             x = best[1]
-        raise NotConverged(f"backbone: no free motion of amplitude {amplitude:.3g} m was found; give more amplitudes")
+        raise NotConverged(f"backbone: no free motion of amplitude {say(amplitude, 3)} was found; give more amplitudes")
 
 
 def _inverse(p) -> np.ndarray:

@@ -4,8 +4,8 @@ from html import escape
 from pathlib import Path
 
 from ... import __version__
+from ...core import say
 from ...disk.whole import write_text
-from ...surface.profile import say
 from ...surface.roughness.report import RoughnessReport, Value
 from ..drawing.inline import CSS
 from ..scales import LADDERS, step_of

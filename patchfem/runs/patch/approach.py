@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...contact.unilateral import press
-from ...core import Compliance, NotConverged, PatchfemError, frozen_array
+from ...core import Compliance, NotConverged, PatchfemError, frozen_array, say
 
 MISSED, ROUND = 1e-6, 1e-9  # of the distance and of the gap: what the search may leave of the distance
 
@@ -83,7 +83,8 @@ def refuse_opening(asked, pieces: Compliance) -> None:
 
     limit = brentq(closing, 0.0, asked.offset, xtol=1e-4 * abs(asked.offset))
     holder = "raise" if asked.spring > 0 else "name"
-    raise PatchfemError(f"the load line lies {asked.offset:.6g} m off the middle; beyond {limit:.3g} m the middle of "
-                        f"the piece opens as the load grows, so no one load closes it by {asked.approach:.6g} m; bring "
-                        f"contact.load_line.offset nearer, {holder} contact.holder.rotational_stiffness or give "
+    raise PatchfemError(f"the load line lies {say(asked.offset, 6)} off the middle; beyond {say(limit, 3)} the "
+                        f"middle of the piece opens as the load grows, so no one load closes it by "
+                        f"{say(asked.approach, 6)}; bring contact.load_line.offset nearer, {holder} "
+                        "contact.holder.rotational_stiffness or give "
                         "contact.load in place of the approach", "contact.approach.distance")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import edges
-from ...core import Measure, PatchfemError
+from ...core import Measure, PatchfemError, say
 from ...mesh.nested import plan_of
 from ...scene.keys.contact import outermost
 from ..results.patch_rows import DECISIVE, TABLE
@@ -60,7 +60,7 @@ def band_words(asked, mine: dict, theirs: dict) -> list:
     """The sentence of `plane_band`, from values by name in the plane state of the model and in the other one."""
     first = "approach" if asked.approach is None else "normal_load"
     closing = (theirs["approach"] - mine["approach"]) if first == "approach" else 0.0
-    parts = [f"approach by {closing:+.2g} m"] if closing else []
+    parts = [f"approach by {'+' * (closing > 0)}{say(closing, 3)}"] if closing else []
     shares = [(name, theirs[name] / mine[name] - 1) for name in (first, *BANDED) if name != "approach" and mine[name]]
     parts += [f"{name} by {100 * share:+.2g} %" for name, share in shares if abs(share) > 1e-3]
     other = "stress" if asked.plane == "strain" else "strain"

@@ -4,7 +4,7 @@ from math import ceil, log2
 
 import numpy as np
 
-from ...core import Outcome
+from ...core import Outcome, say
 from ...friction.bonds.parameters import ripening
 
 BOOKS = 1e-3  # relative gap of the two books of energy beyond which a run says so
@@ -18,8 +18,8 @@ def climbing_as_one(model, patch) -> list:
     limit = model.friction.static * patch.pressure.sigma_n * patch.pieces.interface.weight
     apart = float((patch.giving @ limit).max())
     return [f"{model.soft} over grooves: the pieces climb as one, by height and slope at the slide of the holders, "
-            f"from which a point at its limit lies up to {apart:.3g} m, {apart / model.grooves.wavelength:.2g} of the "
-            "wavelength; the points share the normal force as they share the load"]
+            f"from which a point at its limit lies up to {say(apart, 3)}, {apart / model.grooves.wavelength:.2g} of "
+            "the wavelength; the points share the normal force as they share the load"]
 
 
 def warming(model, patch, response, work: float | None = None) -> list:

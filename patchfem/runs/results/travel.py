@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ...core import say
 from ...response.outcome import off_the_piece
 
 FAR = 0.1  # of the contact length; from there on the fixed pressure is doubtful
@@ -28,7 +29,7 @@ def travelled(patch, slide) -> list:
     largest, contact = reach(slide), contact_length(patch)
     if not contact > 0 or largest < FAR * contact:
         return []
-    return [f"slide amplitude {largest:.3g} m is {largest / contact:.2g} of the contact length {contact:.3g} m: the "
+    return [f"slide amplitude {say(largest, 3)} is {largest / contact:.2g} of the contact length {say(contact)}: the "
             f"pressure is taken as fixed and the overhang of the pieces is not modelled (limit {FAR:g})"]
 
 

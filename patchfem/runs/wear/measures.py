@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import Measure, frozen_array
+from ...core import Measure, frozen_array, say
 from ..patch.limits import limit
 from ..patch.press import pressed
 from ..patch.values import values
@@ -61,10 +61,10 @@ def _deep(model, found) -> list:
     for share, piece, name in ((model.wear.upper_share, asked.upper, "upper"),
                                (1 - model.wear.upper_share, asked.lower, "lower")):
         if piece.coating is not None and share * depth > piece.thickness:
-            out.append(f"the coating of the {name} piece, {piece.thickness:.3g} m, is worn through: it lost up to "
-                       f"{share * depth:.3g} m; from there on the substrate would rub")
+            out.append(f"the coating of the {name} piece, {say(piece.thickness)}, is worn through: it lost up to "
+                       f"{say(share * depth, 3)}; from there on the substrate would rub")
         elif share * depth > 0.2 * (piece.thickness or piece.height):
-            out.append(f"the {name} piece lost up to {share * depth:.3g} m, more than 0.2 of its "
+            out.append(f"the {name} piece lost up to {say(share * depth, 3)}, more than 0.2 of its "
                        f"{'coating' if piece.coating is not None else 'height'}: its stiffness is still that of the "
                        "unworn piece")
     return out

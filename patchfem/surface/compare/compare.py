@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array
+from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
-from ..profile import Profile, say
+from ..profile import Profile
 from ..roughness.filter import even
 from ..roughness.spectrum import BAND
 from . import depth as worn_depth

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array
+from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal, level_plane
-from ..profile import Profile, level, say
+from ..profile import Profile, level
 from ..roughness.filter import even
 from ..roughness.intervals import Intervals
 from ..roughness.parameters import Heights

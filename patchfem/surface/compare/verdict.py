@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..profile import say
+from ...core import say
 from .compare import Comparison
 from .quantity import SIDE, Quantity
 

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import PatchfemError
-from ..profile import Printed, Profile, say
+from ...core import PatchfemError, say
+from ..profile import Printed, Profile
 from ..samples import checked
 from .raw import Raw, shown
 from .text import text_of, values

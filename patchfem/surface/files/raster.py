@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array
+from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
-from ..profile import Profile, say
+from ..profile import Profile
 from ..samples import bounded, checked, evened, plausible
 from .raw import POINTS
 

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array
-from ..profile import Profile, level, say
+from ...core import PatchfemError, frozen_array, say
+from ..profile import Profile, level
 
 ALPHA = np.sqrt(np.log(2) / np.pi)  # half of a wave as long as the cut-off passes
 REACH = 1.25  # cut-offs to either side; beyond them lies 1.5e-10 of the weight

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array
+from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal, level_plane
-from ..profile import Profile, level, say, spikes
+from ..profile import Profile, level, spikes
 from . import rows
 from .areal import areal_intervals, areal_parameters
 from .bearing import abbott, core_of

@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array
-from ..profile import Profile, level, say
+from ...core import PatchfemError, frozen_array, say
+from ..profile import Profile, level
 from .filter import even
 
 TAPERS = 3  # of the first look, and the fewest

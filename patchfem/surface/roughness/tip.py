@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..profile import say
+from ...core import say
 from .parameters import Heights
 from .spacing import mean_spacing
 

@@ -158,7 +158,7 @@ REFUSED = {
     "x [mm],z [mm]\n0,1\n1,2\n2,99999\n": "{path}:4: z is 100 m; is its unit right? a missing height is written nan",
     "x [um],z [mm]\n0,1\n5,2\n10,1\n": "{path}: heights span 1 mm over a length of 10 um; is the unit of z right? a "
                                        "missing height is written nan",
-    "x [nm],z [nm]\n0,0\n0.1,0\n": "{path}: the profile is 1e-10 m long; is the unit of x right?",
+    "x [nm],z [nm]\n0,0\n0.1,0\n": "{path}: the profile is 0.1 nm long; is the unit of x right?",
     "x [um],z [um]\n0,1\n1,2\n3,1\n2,2\n4,1\n": "{path}:5: x turns back, 3 um and then 2 um; a trace runs one way: "
                                                   "keep one trace per file",
     "x [um],z [um]\n4,1\n1,2\n2,1\n0,2\n": "{path}:4: x turns back, 1 um and then 2 um; a trace runs one way: keep one "

@@ -6,7 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from ....compiled import load
-from ....core import BaseSine, NotConverged, Outcome
+from ....core import BaseSine, NotConverged, Outcome, say
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.balance import cycle_energy, periodic_response
 from ....dynamics.harmonic.balance import regime as balanced_regime
@@ -116,7 +116,7 @@ class Balance:
         found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance, start=lasts[0])
         half = max(1, found.harmonics // 2)
         other = periodic_point(self.modes, drive, self.group, half, self.tolerance, start=found)
-        sizes = ", ".join(f"{one.amplitude(self.modes.output):.3g} m" for one in every)
+        sizes = ", ".join(say(one.amplitude(self.modes.output), 3) for one in every)
         note = f"at this drive {len(every)} steady motions balance ({sizes}), {len(lasts)} of which last" + (
             "" if len(lasts) == 1 else "; the smallest of these is shown, accuracy.method = \"march\" tells which one "
             "is reached from rest")
