@@ -4,11 +4,13 @@ import base64
 import fcntl
 import json
 import os
+import select
 import shutil
 from pathlib import Path
 
 FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-quic", "--disable-sync",
          "--disable-background-networking", "--disable-component-update", "--disable-extensions", "--mute-audio")
+PATIENCE = 60  # s without a word after which it counts as hung
 
 
 def program() -> str | None:
@@ -21,7 +23,7 @@ class Chromium:
     """A browser with one page; `opened` shows a text of HTML, what was wrong in its scripts is in `faults`."""
 
     def __init__(self, home: Path):
-        self.home, self.number, self.faults = home, 0, []
+        self.home, self.number, self.faults, self.events, self.buffer = home, 0, [], [], b""
         (take, self.out), (self.into, give) = os.pipe(), os.pipe()
         far = [fcntl.fcntl(one, fcntl.F_DUPFD, 10) for one in (take, give)]  # 3 and 4 are where it listens and speaks
         null = os.open(os.devnull, os.O_RDWR)
@@ -30,7 +32,7 @@ class Chromium:
         self.process = os.posix_spawn(words[0], words, os.environ, file_actions=places)
         for one in (take, give, null, *far):
             os.close(one)
-        self.reader, self.session = os.fdopen(self.into, "rb"), None
+        self.session = None
         self.target = next(one for one in self.ask("Target.getTargets")["targetInfos"] if one["type"] == "page")
         self.target = self.target["targetId"]
         self._attach()
@@ -42,15 +44,19 @@ class Chromium:
             self.ask(f"{part}.enable")
 
     def _next(self) -> dict:
-        parts = bytearray()
-        while (one := self.reader.read(1)) != b"\0":
-            if not one:
+        while b"\0" not in self.buffer:
+            if not select.select([self.into], [], [], PATIENCE)[0]:
+                raise TimeoutError(f"the browser has said nothing for {PATIENCE} s")
+            if not (more := os.read(self.into, 1 << 20)):
                 raise EOFError("the browser has ended")
-            parts += one
-        said = json.loads(parts)
+            self.buffer += more
+        text, _, self.buffer = self.buffer.partition(b"\0")
+        said = json.loads(text)
         if said.get("method") == "Runtime.exceptionThrown":
             what = said["params"]["exceptionDetails"]
             self.faults.append(what.get("exception", {}).get("description") or what["text"])
+        if "method" in said:
+            self.events.append(said["method"])
         return said
 
     def ask(self, method: str, **params) -> dict:
@@ -64,34 +70,43 @@ class Chromium:
         assert "error" not in said, said
         return said["result"]
 
+    def asked(self, event: str, method: str, **params) -> None:
+        """Send a message and wait for an event, which may come before the answer."""
+        self.events.clear()
+        self.ask(method, **params)
+        while event not in self.events:
+            self._next()
+
     def opened(self, text: str, width: int = 1200, height: int = 900, dark: bool = False) -> "Chromium":
         """Show a page and wait until its pictures stand."""
+        self._fresh()
         self.sized(width, height)
         self.themed(dark)
-        self._to(text, "Page.loadEventFired")
+        self._to(text)
         self.settled()
         return self
 
     def after(self, text: str, milliseconds: float) -> str:
         """The document that a page has become after some time of its own clock, which waits for nothing."""
+        self._fresh()
+        self.sized(1200, 900)
+        self._to(text)
+        self.asked("Emulation.virtualTimeBudgetExpired", "Emulation.setVirtualTimePolicy",
+                   policy="pauseIfNetworkFetchesPending", budget=milliseconds)
+        return self.js("document.documentElement.outerHTML")
+
+    def _fresh(self) -> None:
+        """Another page: the clock of the one before may stand still."""
         old, self.session = self.target, None
         self.target = self.ask("Target.createTarget", url="about:blank")["targetId"]
         self.ask("Target.closeTarget", targetId=old)
         self._attach()
-        self.sized(1200, 900)
-        self._to(text, "Page.loadEventFired")
-        self.ask("Emulation.setVirtualTimePolicy", policy="pauseIfNetworkFetchesPending", budget=milliseconds)
-        while self._next().get("method") != "Emulation.virtualTimeBudgetExpired":
-            pass
-        return self.js("document.documentElement.outerHTML")
 
-    def _to(self, text: str, event: str) -> None:
+    def _to(self, text: str) -> None:
         path = self.home / f"page{self.number}.html"
         path.write_text(text, "utf-8")
         self.faults = []
-        self.ask("Page.navigate", url=path.as_uri())
-        while self._next().get("method") != event:
-            pass
+        self.asked("Page.loadEventFired", "Page.navigate", url=path.as_uri())
 
     def settled(self) -> None:
         """Wait until every picture of BokehJS is drawn."""
@@ -140,8 +155,7 @@ class Chromium:
         try:
             self.session = None
             self.ask("Browser.close")
-        except (EOFError, OSError):
+        except (EOFError, OSError):  # it may hang up before it answers
             pass
-        os.close(self.out)
+        os.close(self.out), os.close(self.into)
         os.waitpid(self.process, 0)
-        self.reader.close()
