@@ -15,8 +15,6 @@ from typing import NamedTuple
 import numpy as np
 
 STICK = 1e-2  # share of the cycle's peak slip speed below which a memory law counts as sticking
-
-MOST_COORDINATES = 2000  # masses or modes of a rig, whose matrices are full
 G_N = 9.80665  # standard gravity [m s-2]
 
 

@@ -20,6 +20,8 @@ motion or the curve of them), "endless" (it needs cycles or a duration to end).
 from importlib import import_module
 from typing import NamedTuple
 
+MOST_COORDINATES = 2000  # masses or modes of a rig, whose matrices are full; here, for a scene loads no numpy
+
 
 class Effect(NamedTuple):
     """module: "" where the scene's own values suffice; needs, gives: what earlier effects hand on; of a law of friction

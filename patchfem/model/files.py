@@ -1,21 +1,14 @@
 """Faults of the files that a scene names, found by reading each of them; nothing is computed.
 
 Each file is read as the run reads it, so that what passes here is not refused there. Of a large mesh
-only the first bytes are looked at.
+only the first bytes are looked at. What reads a file is imported where a scene names such a file: half of the time of a
+check otherwise.
 """
 
 from pathlib import Path
 
-import numpy as np
-
 from ..core import PatchfemError
-from ..inputs.measured import read_table
-from ..scene.rules.limits import sideways
 from ..scene.scene import files_of, is_there
-from .drive import record
-from .patch import AUTOMATIC_CELLS, interface_of, pieces_asked
-from .profile import profile_gap, trace_of
-from .slide import rows_of
 
 WHOLE = 2 * 2**20  # bytes of a mesh that is read whole
 STARTS = {".msh": (b"$MeshFormat",), ".vtu": (b"<?xml", b"<VTKFile"), ".inp": (b"*",), ".unv": (b"-1", b"    -1")}
@@ -53,6 +46,11 @@ def _mesh(path: Path, tables, whole: bool) -> None:
 
 def _profile(path: Path, tables, whole: bool) -> None:
     """A trace that covers the interface and is no finer than its elements."""
+    import numpy as np
+
+    from .patch import AUTOMATIC_CELLS, interface_of, pieces_asked
+    from .profile import profile_gap, trace_of
+
     trace_of(path)
     contact = tables.contact
     if not whole or contact.mesh is not None:
@@ -65,12 +63,17 @@ def _profile(path: Path, tables, whole: bool) -> None:
 
 def _slide(path: Path, tables, whole: bool) -> None:
     """A path that the law and the contact can follow, sideways too where it goes there."""
+    from ..scene.rules.limits import sideways
+    from .slide import rows_of
+
     across = len(rows_of(path)) == 3
     if whole and across and (reason := sideways(tables)):
         raise PatchfemError(reason)
 
 
 def _drive(path: Path, tables, whole: bool) -> None:
+    from .drive import record
+
     if whole or tables.drive.kind is not None:
         record(path, tables.drive.kind)
 
@@ -87,6 +90,8 @@ def _structure(path: Path, tables, whole: bool) -> None:
 
 
 def _measured(path: Path, tables, whole: bool) -> None:
+    from ..inputs.measured import read_table
+
     read_table(path)
 
 

@@ -15,8 +15,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
-from ..core import MOST_COORDINATES
-from ..effects import takes
+from ..effects import MOST_COORDINATES, takes
 from .keys import tables
 from .keys.types import keys as keys_of
 from .lines import DEEPEST, TooDeep, key_lines

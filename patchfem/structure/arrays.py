@@ -12,7 +12,8 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.lib import format as npy
 
-from ..core import MOST_COORDINATES, ModalBasis, PatchfemError, frozen_array
+from ..core import ModalBasis, PatchfemError, frozen_array
+from ..effects import MOST_COORDINATES
 from ..inputs.matlab import content, variables
 from . import masses, matrices
 
