@@ -11,11 +11,13 @@ from . import scales
 from .drawing import curves, pictures
 from .pages import charts, player
 from .pages.document import Section, document
-from .pages.words import G, headline, others, pair
+from .pages.words import G, headline, linked, others, pair
 
 SETTLED = ("steady", "stuck", "done")
 DASH = "&ndash;"
-FILES = (("summary.json", "measures, outcome, warnings, what ran"),
+ROOM = 700_000  # characters that the numbers of all charts may take: with library and player below 3 MB
+FILES = (("fields.vtkhdf", "both pieces and their interface, frame by frame (ParaView 5.13 or newer)"),
+         ("summary.json", "measures, outcome, warnings, what ran"),
          ("result.nc", "histories and fields along the interface (xarray, MATLAB, ncdump)"),
          ("scene.resolved.toml", "the scene in SI with every default"))
 
@@ -40,7 +42,7 @@ def pressed(data: dict) -> bool:
 def verdict(data: dict) -> str:
     """The answer of a run in a few sentences of HTML, with the error of each number."""
     answer = f"<b>{escape(data['summary']['outcome'])}</b>: {escape(data['sentence'])}"
-    text = headline(data["summary"], data.get("cycles"), lambda number: f"<span class=v>{escape(number)}</span>")
+    text = headline(data["summary"], data.get("cycles"), lambda number, name: linked(number, name, " class=v"))
     return f"{answer}{escape(curves.regime(data.get('steady')))} {text}".strip()
 
 
@@ -48,14 +50,16 @@ def page(data: dict) -> str:
     """The whole HTML page from the plain data of a run, as `shown.report_data` gives them."""
     summary = data["summary"]
     title = summary["title"] or data.get("name") or "patchfem run"
-    lead = [f"<p class=soft>patchfem {escape(summary['patchfem'])} &middot; {escape(summary['kind'])} &middot; engine "
-            f"{escape(data['engine'] or 'static')} &middot; {summary['seconds'].get('total', 0):.2f} s</p>",
+    motion = f" &middot; {escape(data['driven'])}" if data.get("driven") else ""
+    lead = [f"<p class=soft>patchfem {escape(summary['patchfem'])} &middot; {escape(summary['kind'])}{motion} &middot; "
+            f"engine {escape(data['engine'] or 'static')} &middot; {summary['seconds'].get('total', 0):.2f} s</p>",
             f"<p class=verdict>{verdict(data)}</p>"]
     warnings = [w for w in summary["warnings"] if w != data["sentence"]]
     if warnings:
         lead.append("<div class='verdict warn'>" + "".join(f"<p>{escape(w)}</p>" for w in warnings) + "</div>")
     lead += [f"<p class=soft>Note: {escape(text)}</p>" for text in summary["notes"]]
     drawn, shown = figures(data)
+    drawn = charts.within(drawn, ROOM)
     sections = [Section("pictures", "Pictures", shown)] if drawn else []
     film = data.get("film") if pressed(data) else None
     if film is not None:
@@ -100,14 +104,16 @@ def picture(name: str, data: dict) -> Picture | None:
 
 def _curve(data: dict) -> Picture | None:
     found = data.get("curve")
-    return None if found is None else Picture(curves.curve, (found,), curves.caption(found))
+    text = data.get("driven", "")
+    return None if found is None else Picture(curves.curve, (found,), curves.caption(found) + (
+        f" {text[0].upper()}{text[1:]}." if text else ""))
 
 
 def _levels(data: dict) -> Picture | None:
     if "levels" not in data:
         return None
     return Picture(curves.levels, (data["levels"],), "Amplitude at the end of every level, the state carried from one "
-                   "to the next; arrows show the order of the test.")
+                   f"to the next; arrows show the order of the test.{_under(data)}")
 
 
 def _wear(data: dict) -> Picture | None:
@@ -155,10 +161,11 @@ def _loop(data: dict) -> Picture | None:
         return None
     own = data["loop"]
     whole = "window" not in data or part_of_cycle(data)
-    span = "the whole run" if whole else f"the last {(own['time'][-1] - own['time'][0]) / own['period']:.3g} cycles"
+    count = 0.0 if whole else (own["time"][-1] - own["time"][0]) / own["period"]
+    span = "the whole run" if whole else f"the last {count:.3g} cycles" if count > 1 + 1e-6 else "one cycle"
     title = "Friction force against slide" if part_of_cycle(data) or data.get("cycles") is None else "Friction loop"
     return Picture(pictures.loop, (own["slide"], own["force"], title),
-                   f"Resultant friction force against the slide of the interface, over {span}.")
+                   f"Resultant friction force against the slide of the interface, over {span}.{_under(data)}")
 
 
 def _histories(data: dict) -> Picture | None:
@@ -167,14 +174,15 @@ def _histories(data: dict) -> Picture | None:
     history, period, window, title = data["history"], data["loop"].get("period"), None, ""
     if "window" not in data:
         force = " and friction force" if np.any(history["force"]) else ""
-        return Picture(pictures.histories, (history, None, None), f"Slide{force} over the whole run.")
+        return Picture(pictures.histories, (history, None, None), f"Slide{force} over the whole run.{_under(data)}")
     w = data["window"]
     late = w["time"] >= w["time"][-1] - 3 * period * (1 + 1e-9)
     window = {k: v[late] for k, v in w.items()}
     count = (window["time"][-1] - window["time"][0]) / period
     title = f"The run's {count:.2g} cycles" if count >= data.get("cycles") - 1e-6 else f"Last {count:.2g} cycles"
     title = f"The run: {count:.2g} of a cycle" if part_of_cycle(data) else title
-    caption = "Displacement over the whole run; displacement, and acceleration of block and base, at its end."
+    bodies = "block and base" if np.any(window["base"]) else "the block"
+    caption = f"Displacement over the whole run; displacement, and acceleration of {bodies}, at its end.{_under(data)}"
     begin = pictures.whole_from(history["time"], period, w["time"][0])
     kept = int(np.sum(history["time"] < begin))
     if kept:
@@ -183,6 +191,14 @@ def _histories(data: dict) -> Picture | None:
         unit, scale = scales.axis_unit(history["time"], "s")
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
     return Picture(pictures.histories, (history, window, period, title), caption)
+
+
+def _under(data: dict) -> str:
+    """What moves the run, as a sentence behind a caption; beside a curve the frequency of the motion that is shown."""
+    text = data.get("driven", "")
+    if text and "curve" in data and data.get("loop", {}).get("period"):
+        return f" The steady motion at {1 / data['loop']['period']:.5g} Hz; {text}."
+    return f" {text[0].upper()}{text[1:]}." if text else ""
 
 
 def _measured(data: dict) -> Picture | None:
@@ -232,7 +248,7 @@ def _table_one(data: dict) -> list:
             mine = mine * (_factor(m) if name == "acceleration" else 1.0)
             kind = f"{name}{' (repeat run)' if 'R' in r.flag else ''}"
             ratio = f"{mine / value:.2f}" if value else "&ndash;"
-            rows.append(f"<tr><td>{kind}</td><td class=n>{value / scale:.3g} {unit}</td>"
+            rows.append(f"<tr><td>{linked(kind, key)}</td><td class=n>{value / scale:.3g} {unit}</td>"
                         f"<td class=n>{mine / scale:.3g} {unit}</td><td class=n>{ratio}</td></tr>")
     if not rows:
         text = "<p class=soft>No measured row has this frequency and input.</p>"
@@ -262,9 +278,10 @@ def _table_of_levels(levels: list) -> Section:
                     + (f"<td>{escape(one['outcome'])}</td>" if judged else "")
                     + f"<td>{'stuck' if one['stuck'] else 'slips'}</td></tr>")
     sized = "force" if any(one.get("unit") == "N" for one in levels) else "base acceleration"
-    heads = (f"<th class=n>level<th class=n>{sized}<th class=n>half peak-to-peak<th class=n>peak acceleration"
-             "<th class=n>its first harmonic<th class=n>third over first"
-             f"{'<th>outcome' if judged else ''}<th>interface")
+    texts = ("half peak-to-peak", "peak acceleration", "its first harmonic", "third over first")
+    heads = (f"<th class=n>level<th class=n>{sized}"
+             + "".join(f"<th class=n>{linked(text, name)}" for text, (name, _) in zip(texts, OF_LEVELS))
+             + f"{'<th>outcome' if judged else ''}<th>interface")
     return Section("levels", "Levels", f"<div class=across><table><tr>{heads}</tr>{''.join(rows)}</table></div>")
 
 
@@ -301,16 +318,20 @@ def _cost(data: dict) -> Section:
     shared = " The law and the modes share one loop; its time stands with the law." if summary["kind"] == "rig" else ""
     text = (f"<div class=across><table><tr><th>effect<th>equations<th class=n>seconds</tr>{rows}"
             f"</table></div><p class=soft>{escape(parts)}.{shared}</p>"
-            f"<p class=soft>Not in the scene, so neither imported nor computed: "
-            f"{escape(', '.join(summary['not_in_scene']))}.</p>")
+            f"<details><summary>Not in the scene, so neither imported nor computed</summary><p class=soft>"
+            f"{escape(', '.join(summary['not_in_scene']))}.</p></details>")
     return Section("cost", "What ran and what it cost", text)
 
 
 def _origin(data: dict) -> Section:
     """The scene as written and as understood, the files beside the page, the versions."""
     versions = ", ".join(f"{k} {v}" for k, v in data["versions"].items())
-    files = "".join(f"<li><a href={name}>{name}</a>: {what}</li>" for name, what in FILES)
-    return Section("origin", "Scene and files", f"<details><summary>Scene</summary><pre>{escape(data['scene'])}</pre>"
-                   "</details><details><summary>Scene in SI, every default written out</summary><pre>"
-                   f"{escape(data['resolved'])}</pre></details><p>Beside this page:</p><ul>{files}</ul>"
-                   f"<p class=soft>{escape(versions)}</p>")
+    there = FILES[1:] if data["x"] is None else FILES
+    files = "".join(f"<li><a href={name}>{name}</a>: {what}</li>" for name, what in there)
+    again = "" if "command" not in data else \
+        f"<p>To run it again, beside its scene:</p><pre>{escape(data['command'])}</pre>"
+    return Section("origin", "Scene and files", f"{again}<p>Beside this page:</p><ul>{files}</ul>"
+                   f"<details><summary>Scene</summary><pre>{escape(data['scene'])}</pre></details>"
+                   "<details><summary>Scene in SI, every default written out</summary><pre>"
+                   f"{escape(data['resolved'])}</pre></details><details><summary>Versions</summary>"
+                   f"<p class=soft>patchfem {escape(data['summary']['patchfem'])}, {escape(versions)}</p></details>")

@@ -1,9 +1,12 @@
 """What a finished run is shown by: the plain data of its page, its page and its pictures."""
 
+import tomllib
+
 from ..core import BaseSine
 from ..runs.results.result import Result
 from ..structure.drive_sizes import largest
 from .histories import largest_multiplier
+from .pages.driven import command, driven
 from .report import page, picture
 from .summary import cycles_of, summary_of, versions
 
@@ -11,8 +14,10 @@ from .summary import cycles_of, summary_of, versions
 def report_data(result: Result) -> dict:
     """Plain arrays and texts of a run for the report page, by name; SI units throughout."""
     model, r, w = result.plan.model, result.response, result.window
-    source = model.source
-    data = {"name": source.path.stem, "summary": summary_of(result), "scene": source.text, "resolved": source.resolved,
+    source, resolved = model.source, model.source.resolved
+    scene = tomllib.loads(resolved)
+    data = {"name": source.path.stem, "summary": summary_of(result), "scene": source.text, "resolved": resolved,
+            "driven": driven(scene), "command": command(source.path, source.sets),
             "sentence": result.outcome.sentence, "cycles": cycles_of(result), "engine": result.extra.get("engine", ""),
             "fields": result.fields,
             "x": None if result.patch is None else result.patch.x, "versions": versions(),

@@ -129,7 +129,8 @@ def build(scene: Scene) -> Model:
     found = Model(None, scene.kind, patch, point, friction, heat, spread, pad, slide, rig, scene.accuracy,
                   _measured(scene, measured) if measured else None,
                   _wear(scene), _absent(named), grooves)
-    source = Source(scene.path, scene.title, scene.text, partial(resolved, scene, found), named, tuple(scene.remarks))
+    source = Source(scene.path, scene.title, scene.text, partial(resolved, scene, found), named, tuple(scene.remarks),
+                    scene.sets)
     return replace(found, source=source)
 
 

@@ -14,7 +14,7 @@ class Source:
     """Origin of a model: path and text of the scene, with what messages need.
 
     text: as read; write() -> the TOML of `resolved`; effects: what the scene names; remarks: sentences on keys that
-    nothing uses.
+    nothing uses; sets: `key=value` given beside the text.
     """
 
     path: Path
@@ -23,6 +23,7 @@ class Source:
     write: Callable
     effects: tuple
     remarks: tuple
+    sets: tuple = ()
 
     @property
     def resolved(self) -> str:

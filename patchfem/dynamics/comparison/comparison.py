@@ -44,10 +44,11 @@ class Comparison:
         """Histories of every step, slide and force of the first interface; moving: the drive is that of the base.
         `extra`: "forces" (i, k) [N], "residual" (i, k) [N], "iterations" (k,)."""
         face = modes.interfaces[0]
-        accel = self.accelerations(modes) @ modes.output + (self.drive if moving else 0.0)
+        base = self.drive if moving else np.zeros_like(self.drive)
+        accel = self.accelerations(modes) @ modes.output + base
         slide = self.z @ face
         return Response(self.time, self.z, self.v, slide, self.v @ face, self.z @ modes.output, self.v @ modes.output,
-                        accel, self.drive, self.force[0], slide,
+                        accel, base, self.force[0], slide,
                         {"forces": self.force, "residual": self.residual, "iterations": self.iterations})
 
     @property

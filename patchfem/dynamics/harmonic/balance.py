@@ -87,5 +87,5 @@ def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> 
     loads = [cycle(s.load) for s in found if s.load is not None]
     return Response(np.arange(samples + 1) * (2 * np.pi / omega / samples), cycle(z), cycle(rate), cycle(track.q),
                     cycle(omega * track.rate), cycle(modes.output @ z), cycle(modes.output @ rate),
-                    cycle(modes.output @ accel + floor), cycle(base), cycle(forces[0]), cycle(slip),
+                    cycle(modes.output @ accel + floor), cycle(floor), cycle(forces[0]), cycle(slip),
                     {"normal_load": loads[0]} if loads else {})

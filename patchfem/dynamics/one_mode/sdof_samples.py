@@ -198,11 +198,10 @@ def force(u, rows, owner, block: OneMode):
 
 def response(time, z, v, gain, pushed, block: OneMode) -> Response:
     """The histories of a run from z, v, z'' (k,) at `time` (k,) [s] and the friction force `pushed` (k,) [N]."""
-    base = block.drive.values(time)
-    moving = base if getattr(block.drive, "moving", True) else 0.0
+    base = block.drive.values(time) if getattr(block.drive, "moving", True) else np.zeros(np.size(time))
     slide = block.slide * z
     return Response(time, z[:, None], v[:, None], slide, block.slide * v, block.output * z, block.output * v,
-                    block.output * gain + moving, base, pushed, slide)
+                    block.output * gain + base, base, pushed, slide)
 
 
 def stretches(low, high, rows, block: OneMode) -> tuple:

@@ -14,7 +14,7 @@ from ..scales import LADDERS, axis_unit
 from .charts import COLOURS, mark
 from .document import Section, document
 from .sweep import NUMBER, label
-from .words import pair, units
+from .words import linked, meaning, pair, units
 
 POINTS = 4000  # of one line in a picture
 CYCLES = 2.0  # of the last motion that are shown: result.nc keeps so many whole
@@ -82,6 +82,10 @@ def page(runs: list) -> str:
     sections += [Section(one["anchor"] + "-part", one["title"], f'<div id="{one["anchor"]}" class=chart role=img '
                          f'aria-label="{escape(one["told"])}"></div><p class=soft>{escape(one["told"])}</p>')
                  for one in charts]
+    known = dict.fromkeys(name for run in runs for name in run.summary["measures"])
+    means = "".join(f"<tr id='measure-{escape(name)}'><td>{escape(label(name))}</td><td>{escape(meaning(name))}</td>"
+                    "</tr>" for name in known)
+    sections.append(Section("means", "What the measures are", f"<table><tbody>{means}</tbody></table>"))
     title = " and ".join(names) if len(names) < 4 else f"{len(names)} runs side by side"
     return document(title, f"<p class=verdict>{outcomes}.</p>", sections, {"charts": charts} if charts else None,
                     ("figures.js", "curves.js") if charts else ())
@@ -172,7 +176,7 @@ def _measures(runs: list, names: list) -> str:
         found = [run.summary["measures"].get(name) for run in runs]
         cells = "".join(f"<td class=n>{_cell(name, one, found[0] if number else None)}</td>"
                         for number, one in enumerate(found))
-        rows.append(f"<tr><td>{escape(label(name))}</td>{cells}</tr>")
+        rows.append(f"<tr><td>{linked(label(name), name)}</td>{cells}</tr>")
     return ("<p class=soft>Value and estimated numerical error. Bold with its change in per cent: differs from the "
             "first run by more than both errors together.</p><div class=across><table><thead><tr><th>measure</th>"
             f"{_heads(names)}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>")

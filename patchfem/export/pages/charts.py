@@ -15,7 +15,10 @@ from ..drawing.pictures import closer, envelope, part_in_contact, whole_from
 from ..drawing.wear import MEASURES, SHOWN
 from ..scales import axis_unit
 
-LINE, FRAMES = 6000, 40  # points of a line, frames of the shear stress behind the largest one
+LINE, FRAMES = 6000, 24  # points of a line, frames of the shear stress behind the largest one
+FAINT, FEWEST = 400, 200  # points of such a frame, and those that every line keeps
+GRID = 6000  # cells of a piece in a picture
+NUMBER = 13  # characters of a number in a page
 REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded": "dotted"}
 COLOURS = ("accent", "warm", "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86")
 MIL = 25.4e-6
@@ -37,15 +40,43 @@ def mark(kind: str, colour: str, name: str = "", **numbers) -> dict:
     return {"kind": kind, "colour": colour, "name": name, **numbers}
 
 
-def line(x, y, colour: str, name: str = "", **style) -> dict:
-    """A line of at most LINE points; of a longer one every so manieth is drawn, its turning points among them."""
+def line(x, y, colour: str, name: str = "", most: int = LINE, **style) -> dict:
+    """A line of at most `most` points; of a longer one those that `sampled` keeps."""
     x, y = np.asarray(x, float), np.asarray(y, float)
-    if x.size > LINE:
-        step = -(-x.size // LINE)
-        turns = np.flatnonzero(np.diff(np.sign(np.diff(y)))) + 1
-        keep = np.unique(np.concatenate([np.arange(0, x.size, step), turns, [x.size - 1]]))
-        x, y = x[keep], y[keep]
-    return mark("line", colour, name, x=x, y=y, **style)
+    keep = sampled(x, y, most)
+    return mark("line", colour, name, x=x[keep], y=y[keep], **style)
+
+
+def sampled(x, y, most: int) -> np.ndarray:
+    """Numbers of at most `most` points of a line: of every stretch of it the lowest and highest x and y."""
+    if x.size <= most:
+        return np.arange(x.size)
+    size = -(-x.size // ((most - 2) // 4))
+    first = np.arange(0, x.size, size)
+    room = np.full((2, first.size * size), np.nan)
+    room[:, :x.size] = x, y
+    held = np.where(np.isnan(room), 0.0, room).reshape(2, -1, size)
+    held[:, -1, x.size - first[-1]:] = held[:, -1, :1]  # the last stretch may be shorter
+    ends = np.concatenate([held.argmin(axis=2).ravel(), held.argmax(axis=2).ravel()]) + np.tile(first, 4)
+    return np.unique(np.concatenate([[0], ends, [x.size - 1]]))
+
+
+def within(made: list, room: int) -> list:
+    """Charts of lines and bands sampled so that all of them take about `room` characters, NUMBER for each number."""
+    sizes = [sum(np.size(value) for value in one.values() if not isinstance(value, str | dict))
+             for found in made for one in found["marks"]]
+    if (total := NUMBER * sum(sizes)) <= room:
+        return made
+    return [found | {"marks": [_slim(one, room / total) for one in found["marks"]]} for found in made]
+
+
+def _slim(one: dict, share: float) -> dict:
+    rows = {"line": ("x", "y"), "band": ("x", "low", "high")}.get(one["kind"])
+    if rows is None or np.size(one["x"]) <= FEWEST:
+        return one
+    x, *_, y = (np.asarray(one[name], float) for name in rows)
+    keep = sampled(x, y, max(int(share * x.size), FEWEST))
+    return one | {name: np.asarray(one[name], float)[keep] for name in rows}
 
 
 def interface(x, fields: dict) -> list:
@@ -63,7 +94,7 @@ def interface(x, fields: dict) -> list:
         frame = int(np.argmax(np.abs(tau @ np.gradient(x))))
         name, per = axis_unit(fields["time"], "s")
         shown = np.unique(np.linspace(1, len(tau) - 1, min(FRAMES, len(tau) - 1)).round().astype(int))
-        frames = [line(x * size, tau[k] * scale, "soft", width=0.6, alpha=0.6) for k in shown]
+        frames = [line(x * size, tau[k] * scale, "soft", most=FAINT, width=0.6, alpha=0.6) for k in shown]
         out.append(chart(f"Shear stress, largest resultant at {fields['time'][frame] * per:.4g} {name}", place,
                          axis("shear stress", unit), [*frames, line(x * size, tau[frame] * scale, "warm")]))
     return out
@@ -81,12 +112,30 @@ def bodies(x, depths, mises, sigma) -> list:
         cells = [part[i.start:i.stop - 1, :row.size - 1] * scale for part, row in zip(mises, rows)]
         # the part around the contact comes first and sets the colours
         top = top or float(np.quantile(np.concatenate([part.ravel() for part in cells]), 0.998))
-        marks = [mark("cells", "", x=x[i] * size, y=side * row * size, value=part, top=top, unit=unit)
-                 for side, row, part in zip((-1, 1), rows, cells)]
+        marks = []
+        for side, row, part in zip((-1, 1), rows, cells):
+            along, down, means = coarser(x[i], row, part, GRID)
+            # four digits: they are colours first
+            values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(means.shape)
+            marks.append(mark("cells", "", x=along * size, y=side * down * size, value=values, top=top, unit=unit))
         across, up = ({"range": [low * size, high * size]} for low, high in ((left, right), (-height, height)))
         out.append(chart("Von Mises stress", axis("x", name) | across, axis("y", name) | up, marks)
                    | {"frame": _frame((right - left) / (2 * height))})
     return out[::-1]
+
+
+def coarser(x, depth, cells, most: int) -> tuple:
+    """Lines (n,), (m,) and cells (n - 1, m - 1) of a grid of about `most` cells, each with the mean over its area."""
+    if cells.size <= most:
+        return x, depth, cells
+    rows = min(depth.size - 1, max(int((most / 2)**0.5), most // (x.size - 1)))
+    kept = [np.linspace(0, line.size - 1, count + 1).round().astype(int)
+            for line, count in ((x, min(x.size - 1, most // rows)), (depth, rows))]
+    for axis, (line, keep) in enumerate(zip((x, depth), kept)):
+        size = np.diff(line)
+        parts = np.add.reduceat(np.moveaxis(cells, axis, -1) * size, keep[:-1], axis=-1)
+        cells = np.moveaxis(parts / np.add.reduceat(size, keep[:-1]), -1, axis)
+    return x[kept[0]], depth[kept[1]], cells
 
 
 def _frame(ratio: float) -> list:
@@ -122,9 +171,10 @@ def histories(history: dict, window: dict | None, period: float | None, title: s
     (name, per), (unit, scale) = axis_unit(since, "s"), axis_unit(window["displacement"], "m")
     out.append(chart(title, axis("time", name), axis("displacement", unit),
                      [line(since * per, window["displacement"] * scale, "accent")]))
+    moves = np.any(window["base"])
     out.append(chart(title, axis("time", name), axis("acceleration", "g"),
-                     [line(since * per, window["acceleration"] / G_N, "warm", "block"),
-                      line(since * per, window["base"] / G_N, "soft", "base", dash="dashed")]))
+                     [line(since * per, window["acceleration"] / G_N, "warm", "block" if moves else ""),
+                      line(since * per, window["base"] / G_N, "soft", "base", dash="dashed") if moves else None]))
     return out
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..scales import LADDERS, axis_unit
 from .document import Section, document
+from .words import linked
 
 SETTLED = ("steady", "stuck", "done", "no_contact")
 FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", "onset_level", "pressure_peak")
@@ -155,7 +156,8 @@ def _cases(table: dict) -> str:
     shown = shown[:6]
     columns = [_measure(name, table["measures"][name], slice(None)) for name in shown]
     head = "".join(f"<th>{escape(one['name'])}</th>" for one in table["keys"]) + "<th>outcome</th>" + "".join(
-        f"<th class=n>{escape(one['label'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}</th>" for one in columns)
+        f"<th class=n>{linked(one['label'], one['name'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}</th>"
+        for one in columns)
     rows = []
     for i, outcome in enumerate(table["outcome"][:LISTED]):
         cells = "".join(f"<td>{escape(brief(str(one['texts'][i])))}</td>" for one in table["keys"])
@@ -184,9 +186,10 @@ def _number(value: float) -> str:
 
 
 def _meanings(table: dict) -> str:
-    rows = "".join(f"<tr><td>{escape(label(name))}</td><td>{escape(one['unit'])}</td><td>{escape(one.get('means', ''))}"
-                   "</td></tr>" for name, one in table["measures"].items())
-    return f"<table><thead><tr><th>measure</th><th>unit</th><th>meaning</th></tr></thead><tbody>{rows}</tbody></table>"
+    rows = "".join(f"<tr id='measure-{escape(name)}'><td>{escape(label(name))}</td><td>{escape(one['unit'])}</td>"
+                   f"<td>{escape(one.get('means', ''))}</td></tr>" for name, one in table["measures"].items())
+    return ("<div class=across><table><thead><tr><th>measure</th><th>unit</th><th>meaning</th></tr></thead>"
+            f"<tbody>{rows}</tbody></table></div>")
 
 
 def _again(table: dict) -> str:

@@ -62,11 +62,11 @@ def others(name: str, measure: dict) -> str:
     return " = ".join(out)
 
 
-def headline(summary: dict, cycles: float | None, number: Callable[[str], str] = str) -> str:
+def headline(summary: dict, cycles: float | None, number: Callable[[str, str], str] | None = None) -> str:
     """The measures that answer first, as one sentence; "" where there is none.
 
-    summary: as summary.json holds it; cycles: of the drive that were run, None where it has none; number: marks a
-    value with its error in the text.
+    summary: as summary.json holds it; cycles: of the drive that were run, None where it has none; number: makes of a
+    value with its error, and of the name of its measure, what stands in the text.
     """
     measures, parts = summary["measures"], []
     whole = cycles is None or cycles >= 1 - 1e-6
@@ -74,7 +74,8 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str], str] =
     def said(name: str, text: str) -> None:
         found = measures.get(name)
         if found and found["value"] is not None:
-            parts.append(text.format(number(pair(name, found))))
+            value = pair(name, found)
+            parts.append(text.format(value if number is None else number(value, name)))
 
     if summary["outcome"] != "no_contact":
         said("relative_displacement_amplitude", "the block moves {} half peak-to-peak")
@@ -104,6 +105,20 @@ def least_known(result: Result) -> str:
     one = result.measures[name]
     found = pair(name, {"value": one.value, "error": one.error, "unit": one.unit})
     return f"Every measure with an error meets the tolerance {tolerance:g}; least well {name}, {found}."
+
+
+def linked(text: str, name: str, more: str = "") -> str:
+    """A text as a link to the definition of a measure on the same page."""
+    return f"<a{more} href='#measure-{escape(name)}'>{escape(text)}</a>"
+
+
+def meaning(name: str) -> str:
+    """What a measure is, in a sentence; "" for one that no table has."""
+    for known in (name, re.sub(r"_\d+$", "", name)):
+        for table in (MOTION, STATIC):
+            if known in table:
+                return table[known].text
+    return ""
 
 
 def group_of(name: str, pressed: bool = True) -> str:

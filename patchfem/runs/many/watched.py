@@ -118,8 +118,6 @@ class Watcher:
         one = self._once("balance", lambda: Balance(self.model, self.numerics, self.patch, self.say))
         found = point(one.modes, drive, one.group, one.harmonics, one.tolerance, start=near)
         window = periodic_response(found, one.modes, drive, SAMPLES)
-        if not drive.moving:
-            window = replace(window, base_acceleration=0 * window.base_acceleration)
         return Watched(window, acceleration_peak(window), found.amplitude(one.modes.output), found)
 
     def _events(self, drive, near) -> Watched | None:

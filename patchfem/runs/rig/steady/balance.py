@@ -1,6 +1,5 @@
 """The steady motion of laws with memory and of springs that bend, by harmonic balance; its curve through folds."""
 
-from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -146,8 +145,7 @@ class Balance:
 
     def _response(self, found, drive):
         """One cycle of a Periodic as histories."""
-        response = periodic_response(found, self.modes, drive, SAMPLES)
-        return response if drive.moving else replace(response, base_acceleration=0 * response.base_acceleration)
+        return periodic_response(found, self.modes, drive, SAMPLES)
 
     def _measured(self, found, drive) -> tuple:
         response = self._response(found, drive)
