@@ -9,11 +9,15 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numba
 import pytest
+from limits import limited
 from scene_texts import PLASTIC, POINT, STRUCTURE
 
 import patchfem
 from patchfem import compiled
+from patchfem.compiled import kept
+from patchfem.disk import own
 
 SCENE = (
     POINT + PLASTIC + STRUCTURE.replace("cycles = 30", "cycles = 4")
@@ -113,29 +117,135 @@ def test_exact_cache_folder(tmp_path, monkeypatch):
     assert compiled.cache_folder().is_relative_to(tmp_path / "home" / ".cache")
 
 
-@pytest.mark.parametrize("obstacle", ["a file in the way", "no right to write"])
-def test_exact_cache_falls_back(tmp_path, monkeypatch, obstacle):
-    base = tmp_path / "base"
+@pytest.mark.parametrize("obstacle", ["a file in the way", "no right to write", "others may write", "of another user"])
+def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obstacle):
+    """No folder of a common name in the temporary folder either: who was there first could have put code into it."""
+    base, temporary = tmp_path / "base", tmp_path / "temporary"
+    temporary.mkdir()
     if obstacle == "a file in the way":
         base.write_text("not a folder", "utf-8")
+    elif obstacle == "no right to write":
+        real = os.access
+        monkeypatch.setattr(os, "access", lambda path, how: not Path(path).is_relative_to(base) and real(path, how))
     else:
-        base.mkdir()
-        touch = Path.touch
-
-        def refuse(self, *args, **options):
-            if self.is_relative_to(base):
-                raise PermissionError(13, "Permission denied", str(self))
-            touch(self, *args, **options)
-
-        monkeypatch.setattr(Path, "touch", refuse)
-    (tmp_path / "temporary").mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+        (base / "patchfem").mkdir(parents=True)
+        if obstacle == "others may write":
+            (base / "patchfem").chmod(0o777)
+        else:
+            monkeypatch.setattr(own, "_of_others", lambda folder: "" if not folder.is_relative_to(base) else
+                                f"{folder} belongs to another user")
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     monkeypatch.setenv("PATCHFEM_CACHE", str(base))
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "session"))
     found = compiled.cache_folder()
-    assert found.is_relative_to(tmp_path / "temporary") and found.is_dir()
+    assert found == tmp_path / "session" / "patchfem" / compiled.kernel_key() and found.is_dir()
+    assert str(base) in compiled.why_elsewhere()
+    monkeypatch.delenv("XDG_RUNTIME_DIR")
+    own.private.cache_clear()
+    try:
+        first = compiled.cache_folder()
+        assert first.is_relative_to(temporary) and first.is_dir() and not (temporary / "patchfem").exists()
+        assert os.stat(own.private()).st_mode & 0o77 == 0
+        assert compiled.cache_folder() == first  # the same in one process
+        own.private.cache_clear()
+        assert compiled.cache_folder() != first  # another in the next
+        monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
+        own.private.cache_clear()
+        assert not compiled.cache_folder().exists()  # nothing is kept, nothing fails
+    finally:
+        own.private.cache_clear()
+
+
+def test_exact_a_folder_is_made_the_user_s_own(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATCHFEM_CACHE", str(tmp_path))
+    (tmp_path / "patchfem").mkdir()
+    (tmp_path / "patchfem").chmod(0o775)  # as an umask of 002 makes it
+    assert compiled.cache_folder().parent == tmp_path / "patchfem"
+    assert os.stat(tmp_path / "patchfem").st_mode & 0o777 == 0o755
+    assert os.stat(compiled.cache_folder()).st_mode & 0o777 == 0o700
+    monkeypatch.delenv("PATCHFEM_CACHE")
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", lambda: (_ for _ in ()).throw(RuntimeError("no home")))
+    assert own.cache_base() == own.private()  # a number without a name
+
+
+def toy(tmp_path, monkeypatch):
+    """A new dispatcher of one function, kept in a folder under `tmp_path`."""
+    monkeypatch.setattr(compiled, "_folder", lambda: tmp_path / "code")
+    space = {}
+    source = tmp_path / "toy.py"
+    if not source.exists():
+        source.write_text("def toy(x):\n    return 2 * x + 1\n", "utf-8")
+    exec(compile(source.read_text("utf-8"), str(source), "exec"), space)
+    return kept.kept_on_disk(numba.njit(space["toy"]))
+
+
+def missed(found) -> tuple:
+    """(Compiled, loaded) at a call."""
+    assert found(20) == 41
+    return sum(found.stats.cache_misses.values()), sum(found.stats.cache_hits.values())
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("harm", ["cut", "emptied", "a bit", "gone", "a folder"])
+def test_always_a_damaged_cache_is_rebuilt_by_itself(tmp_path, monkeypatch, ending, harm):
+    assert missed(toy(tmp_path, monkeypatch)) == (1, 0) and missed(toy(tmp_path, monkeypatch)) == (0, 1)
+    [path] = (tmp_path / "code").rglob(f"*.{ending}")
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes({"cut": data[:-5], "a bit": data}.get(harm, b""))
+    if harm in ("gone", "a folder"):
+        path.unlink()
+    if harm == "a folder":
+        path.mkdir()
+    assert missed(toy(tmp_path, monkeypatch)) == (1, 0)
+    if harm != "a folder":
+        assert missed(toy(tmp_path, monkeypatch)) == (0, 1)
+
+
+@pytest.mark.parametrize("obstacle", ["no room", "a file in the way", "read-only"])
+def test_always_a_cache_that_cannot_be_written_is_no_fault(tmp_path, monkeypatch, obstacle):
     if obstacle == "a file in the way":
-        (tmp_path / "temporary" / "patchfem" / compiled.kernel_key()).rmdir()
-        (tmp_path / "temporary" / "patchfem").rmdir()
-        (tmp_path / "temporary" / "patchfem").write_text("in the way too", "utf-8")
-        last = compiled.cache_folder()
-        assert last.parent == tmp_path / "temporary" and last.is_dir()
+        (tmp_path / "code").write_text("mine")
+    elif obstacle == "read-only":
+        def refuse(*where, **how):
+            raise OSError(30, "Read-only file system")
+
+        monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
+    found = toy(tmp_path, monkeypatch)
+    with limited(0 if obstacle == "no room" else 1 << 30):
+        assert missed(found) == (1, 0)
+    assert not [one for one in (tmp_path / "code").rglob("*") if one.is_file()]
+    monkeypatch.undo()
+    if obstacle == "no room":
+        assert missed(toy(tmp_path, monkeypatch)) == (1, 0) and missed(toy(tmp_path, monkeypatch)) == (0, 1)
+
+
+def test_always_a_made_module_lives_without_a_file_and_a_damaged_file_is_made_again(tmp_path, monkeypatch):
+    text = "WIDE = 3\nfrom . import inner as part\n\n\ndef wide(x):\n    return WIDE * x\n"
+    monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
+    with limited(0):
+        found = compiled.written("compiled.without_file", text)
+        assert found.WIDE == 3 and found.module().wide(2) == 6
+        assert found.module().part.__name__ == "patchfem.compiled.inner"
+    assert not [one for one in tmp_path.rglob("*") if one.is_file()]
+    for harm in ("", text[:20], "mine = 1"):
+        (tmp_path / "instances").mkdir(exist_ok=True)
+        (tmp_path / "instances" / "compiled.with_file.py").write_text(harm)
+        sys.modules.pop("patchfem.compiled.with_file", None)
+        assert compiled.written("compiled.with_file", text).module().wide(2) == 6
+        assert (tmp_path / "instances" / "compiled.with_file.py").read_text() == text
+    for name in ("with", "without"):
+        sys.modules.pop(f"patchfem.compiled.{name}_file")
+
+
+def test_exact_what_is_said_of_a_cache_without_room(tmp_path, monkeypatch):
+    said = []
+    monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
+    with limited(1000):
+        compiled._told.__wrapped__(said.append)
+    compiled._told.__wrapped__(said.append)
+    if compiled.PLAIN:
+        assert not said
+    else:
+        assert "at every command" in said[0] and "is the limit on the size" in said[0] and "once" in said[1]

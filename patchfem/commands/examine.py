@@ -5,7 +5,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, requires, version
-from pathlib import Path
 from typing import NamedTuple
 
 PICTURE = """\
@@ -61,14 +60,12 @@ def _version(name: str) -> str:
 
 def _cache() -> Finding:
     """Compiled code: a folder that cannot be written makes every command compile anew."""
-    from ..compiled import cache_folder
+    from ..compiled import cache_folder, why_elsewhere
 
-    folder = cache_folder()
-    wanted = Path(os.environ.get("PATCHFEM_CACHE") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder, why = cache_folder(), why_elsewhere()
     sizes = [one.stat().st_size for one in folder.rglob("*") if one.is_file()]
-    fine = folder.is_relative_to(wanted)
-    return Finding("compiled code", fine, f"{len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}",
-                   "" if fine else f"{wanted} cannot be written; name another folder in PATCHFEM_CACHE")
+    return Finding("compiled code", not why, f"{len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}",
+                   why and f"{why}; name another folder in PATCHFEM_CACHE")
 
 
 def _threads() -> Finding:

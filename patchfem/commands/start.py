@@ -22,11 +22,11 @@ def new(kind: str = "", /, *, out: out_in("mine.toml in place of the screen") = 
     if out is None:
         print(text, end="")
         return
-    try:
-        with out.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise Refused(f"{out}: is there already; name another file by -o, or remove it") from None
+    if out.exists():
+        raise Refused(f"{out}: is there already; name another file by -o, or remove it")
+    from ..disk.whole import write_text
+
+    write_text(out, text)
     print(f"{out}: {KINDS[kind]}\nnext: patchfem {'sweep' if '[sweep]' in text else 'run'} {out}")
 
 

@@ -18,21 +18,23 @@ import os
 import platform
 import re
 import sys
-import tempfile
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from importlib.metadata import version
-from importlib.util import module_from_spec, spec_from_file_location
+from importlib.util import module_from_spec, spec_from_file_location, spec_from_loader
 from operator import add, mul, neg, pos, sub, truediv
 from pathlib import Path
 
+from ..disk import own
+from ..disk.whole import short
 from . import machine
 
 HERE = Path(__file__).parents[1]  # the package
 # tuples that kernels take: numba's cache would not notice two of their fields that change places
 TUPLES = "plant.py", "contacts/arrays.py", "smooth/arrays.py", "piecewise/plant.py", "piecewise/elements.py"
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # numba's own switch: all runs as the Python it is
+LEAST = 1 << 21  # bytes of the machine code of a run
 UNKEPT = set()  # functions called here whose machine code cannot be kept: every process brings up numba for them
 ARITHMETIC = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv, ast.Pow: pow, ast.USub: neg, ast.UAdd: pos}
 
@@ -61,19 +63,31 @@ def _cpu() -> str:
 
 
 def cache_folder() -> Path:
-    """The user's cache folder for this state of the kernels, or a temporary one where that cannot be written."""
-    base = os.environ.get("PATCHFEM_CACHE") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    for root in (Path(base), Path(tempfile.gettempdir())):
-        folder = root / "patchfem" / kernel_key()
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            probe = folder / f".probe{os.getpid()}"
-            probe.touch()
-            probe.unlink()
-            return folder
-        except OSError:
-            continue
-    return Path(tempfile.mkdtemp(prefix="patchfem"))
+    """The user's cache folder for this state of the kernels; where it is not the user's own or cannot be written, that
+    of the session (XDG_RUNTIME_DIR), else one of this process alone."""
+    return _place()[0]
+
+
+def why_elsewhere() -> str:
+    """Why `cache_folder` is not among the user's caches, "" where it is."""
+    return _place()[1]
+
+
+@cache
+def _placed() -> tuple[Path, str]:
+    """The folder of this process, and why it is not the user's."""
+    return _place()
+
+
+def _place() -> tuple[Path, str]:
+    session, name = os.environ.get("XDG_RUNTIME_DIR"), Path("patchfem") / kernel_key()
+    first = own.refused(own.cache_base() / name)
+    if not first:
+        return own.cache_base() / name, ""
+    if session and not own.refused(Path(session) / name):
+        return Path(session) / name, first
+    own.refused(own.private() / name)  # makes it where it can
+    return own.private() / name, first
 
 
 class Kernels:
@@ -83,7 +97,7 @@ class Kernels:
     the module imported, anything else of it.
     """
 
-    def __init__(self, name: str, text: Path, bring):
+    def __init__(self, name: str, text: Path | str, bring):
         self.__name__, self._text, self._bring, self._entries = name, text, bring, {}
 
     def __getattr__(self, name: str):
@@ -179,10 +193,10 @@ class Entry:
 
 
 @cache
-def _constants(path: Path) -> dict:
-    """Names of a module that stand for numbers or texts, read from its text."""
+def _constants(text: Path | str) -> dict:
+    """Names of a module that stand for numbers or texts, read from its text or its file."""
     out = {}
-    for line in ast.parse(path.read_text("utf-8")).body:
+    for line in ast.parse(text.read_text("utf-8") if isinstance(text, Path) else text).body:
         if isinstance(line, ast.Assign) and len(line.targets) == 1:
             try:
                 value, target = _value(line.value, out), line.targets[0]
@@ -262,23 +276,29 @@ def written(module: str, text: str, say=None, parts=()):
     parts: Kernels that the text imports, brought before it.
     """
     name = f"patchfem.{module}"
-    path = _prepared(say) / "instances" / f"{module}.py"
-    if not path.exists():
-        path.parent.mkdir(exist_ok=True)
-        draft = path.with_suffix(f".{os.getpid()}")
-        draft.write_text(text, "utf-8")
-        draft.replace(path)
+    path, data = _prepared(say) / "instances" / f"{module}.py", text.encode()
+    kept = _bytes_of(path) == data or own.put(path, data)
 
     def bring():
         if name not in sys.modules:
             for part in parts:
                 part.module()
-            spec = spec_from_file_location(name, path)
+            spec = spec_from_file_location(name, path) if kept else spec_from_loader(name, None)
             sys.modules[name] = module_from_spec(spec)
-            spec.loader.exec_module(sys.modules[name])
+            if kept:
+                spec.loader.exec_module(sys.modules[name])
+            else:  # it lives as long as the process
+                exec(compile(text, str(path), "exec"), sys.modules[name].__dict__)
         return sys.modules[name]
 
-    return Kernels(name, path, bring)
+    return Kernels(name, path if kept else text, bring)
+
+
+def _bytes_of(path: Path) -> bytes | None:
+    try:
+        return path.read_bytes()
+    except OSError:
+        return None
 
 
 def _prepared(say=None) -> Path:
@@ -291,7 +311,9 @@ def _prepared(say=None) -> Path:
 
 @cache
 def _folder() -> Path:
-    folder = cache_folder()
+    folder, elsewhere = _placed()
+    if elsewhere:
+        os.environ["PATCHFEM_CACHE"] = str(folder.parents[1])  # for processes that this one starts
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
     if "numba" in sys.modules:
         sys.modules["numba"].config.CACHE_DIR = str(folder)
@@ -301,4 +323,7 @@ def _folder() -> Path:
 @cache
 def _told(say) -> None:
     if not PLAIN and not any(_folder().rglob("*.nbi")):
-        say("compiling the time loop for this machine, once (10 to 30 s)")
+        why = _placed()[1] or short(_folder() / "code", LEAST)
+        say("compiling the time loop for this machine, " +
+            (f"at every command (10 to 30 s): {why}; name another folder in PATCHFEM_CACHE" if why else
+             "once (10 to 30 s)"))

@@ -17,6 +17,8 @@ from numba.core.options import DefaultOptions
 from numba.core.registry import CPUDispatcher
 from numba.core.types.functions import BaseFunction
 
+from .kept import kept_on_disk
+
 NO_C, NO_PYTHON = ({flag: True} if hasattr(DefaultOptions, flag) else {}
                    for flag in ("no_cfunc_wrapper", "no_cpython_wrapper"))  # who does not call it
 HOOKS = ("_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals", "get_pointer_to_function")
@@ -30,7 +32,8 @@ def njit(cache: bool = False, **options):
     if numba.config.DISABLE_JIT:
         return lambda function: function
     if cache or not all(hasattr(JITCodeLibrary, name) for name in HOOKS):
-        return numba.njit(cache=cache, **NO_C, **options)
+        made = numba.njit(**NO_C, **options)
+        return (lambda function: kept_on_disk(made(function))) if cache else made
     return lambda function: Inner(function, {}, {"nopython": True, "boundscheck": None, **options}, Inside)
 
 
@@ -81,7 +84,7 @@ class Inner(CPUDispatcher):
     def enable_caching(self):
         """Keep on disk what calls from Python compile."""
         if not self._kept:
-            self._alone.enable_caching()
+            kept_on_disk(self._alone)
             self._kept = True
 
     def alone(self) -> CPUDispatcher:

@@ -19,6 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..disk import own
+
 FINE = (0, -2)  # numba's status of a function that returned something, or nothing
 NUMBERS = {float: "d", int: "q", np.float64: "d", np.int64: "q"}
 _KINDS = {}  # (dtype, dimensions, flags) of an array -> its kind, what packs its words, whether it lends its memory
@@ -158,11 +160,7 @@ def keep(path: Path, function, arguments: tuple) -> bool:
             return False
         about = {"name": name, "results": results, "calls": calls, "sha256": hashlib.sha256(code).hexdigest(),
                  "nogil": bool(function.targetoptions.get("nogil"))}
-        path.parent.mkdir(exist_ok=True)
-        draft = path.with_suffix(f".{os.getpid()}")
-        draft.write_bytes(json.dumps(about).encode() + b"\n" + code)
-        draft.replace(path)
-        return True
+        return own.put(path, json.dumps(about).encode() + b"\n" + code)
     except Exception:  # of numba's and llvmlite's insides: whatever they refuse, the run has its function already
         return False
 

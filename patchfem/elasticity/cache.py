@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import frozen_array
+from ..disk import own
 
 MOST_BYTES = 512 * 2**20
 PARTS = ("nn", "tt", "nt")
@@ -21,8 +22,7 @@ PARTS = ("nn", "tt", "nt")
 
 def folder() -> Path:
     """Folder of the kept compliances: patchfem/operators below PATCHFEM_CACHE, XDG_CACHE_HOME or ~/.cache."""
-    base = os.environ.get("PATCHFEM_CACHE") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(base) / "patchfem" / "operators"
+    return own.cache_base() / "patchfem" / "operators"
 
 
 GRID_SOURCE = ("elasticity.py", "tensor_stiffness.py", "condense.py", "grid_fronts.py")
@@ -67,6 +67,8 @@ def fetch(key: str, columns: int) -> tuple | None:
     Each is (columns, columns), read-only [m2/N].
     """
     path = folder() / f"{key}.npz"
+    if not path.is_file() or own.refused(path.parent):
+        return None
     try:
         with np.load(path, allow_pickle=False) as kept:
             parts = tuple(frozen_array(kept[name]) for name in PARTS)
@@ -82,16 +84,18 @@ def keep(key: str, parts: tuple) -> None:
 
     The file is written whole and renamed. The files unused for longest are deleted beyond 512 MiB.
     """
-    place = folder()
+    place, name = folder(), None
+    if own.refused(place):
+        return
     try:
-        place.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=place, suffix=".partial")
         with os.fdopen(handle, "wb") as file:
             np.savez(file, **dict(zip(PARTS, parts)))
         os.replace(name, place / f"{key}.npz")
         _trim(place)
     except OSError:
-        return
+        if name is not None:
+            Path(name).unlink(missing_ok=True)
 
 
 def _trim(place: Path) -> None:

@@ -32,6 +32,7 @@ for k in range(count):
         print(k)
     except Missing as error:
         assert "another run (process" in str(error), error
+print("done", flush=True)
 sys.stdin.readline()  # owners live on until all have tried
 """
 HOLD = """\
@@ -78,16 +79,10 @@ def test_always_one_of_many_that_start_at_one_instant_owns_a_folder(tmp_path):
     for one in several:
         one.stdin.write("\n")
         one.stdin.flush()
-    won = [[] for _ in several]
-    threads = [threading.Thread(target=lambda one=one, mine=mine: mine.extend(map(int, one.stdout)))
-               for one, mine in zip(several, won)]
-    for one in threads:
-        one.start()
+    won = [int(line) for one in several for line in iter(one.stdout.readline, "done\n")]
     for one in several:
-        one.stdin.close()
-    for one in (*threads, *several):
-        one.join() if isinstance(one, threading.Thread) else one.wait()
-    assert sorted(k for mine in won for k in mine) == list(range(count))
+        one.communicate()
+    assert sorted(won) == list(range(count))
     assert all(one.returncode == 0 for one in several)
 
 

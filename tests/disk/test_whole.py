@@ -1,34 +1,22 @@
 """Files are whole or not there: every kind of file under limits on its size, devices, and what killed writers leave."""
 
 import os
-import resource
 import stat
 import subprocess
 import sys
-from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 from command_line import cli
+from limits import limited
 from scene_texts import BENCH, COATED
 
 from patchfem.core import Missing
 from patchfem.disk.whole import PLACED, Overflow, beside, room, sturdy, unfinished, whole, write_text
 
 SIZES = [1 << 10, 1 << 14, 1 << 16]
-
-
-@contextmanager
-def limited(size: int):
-    """No file of this process grows beyond `size` bytes."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.fixture(scope="module")

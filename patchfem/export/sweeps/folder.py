@@ -18,6 +18,7 @@ from ...campaigns.sweeps.cases import Cases
 from ...core import Measure, Missing, PatchfemError
 from ...disk.claim import Claim
 from ...disk.exchange import put
+from ...disk.whole import Unwritten, write_text
 from ...effects import EFFECTS
 from ...model.model import Model
 from ...runs.many.answers import FAILED, Answers
@@ -114,13 +115,15 @@ class Folder:
         draft = place.with_name(f".{place.name}.{os.getpid()}")
         try:
             draft.mkdir(exist_ok=True)
-            (draft / SUMMARY).write_text(text, encoding="utf-8")
+            write_text(draft / SUMMARY, text)
             try:
                 os.rename(draft, place)
             except OSError:  # it is there already
                 put(draft, place)
-        except OSError as error:
-            raise Missing(f"{self.shown}: a case cannot be written ({error.strerror}); what is whole is kept") from None
+        except (OSError, Unwritten) as error:
+            shutil.rmtree(draft, ignore_errors=True)
+            why = str(error) if isinstance(error, Unwritten) else error.strerror
+            raise Missing(f"{self.shown}: a case cannot be written ({why}); what is whole is kept") from None
 
     def answers(self, numbers: Iterable[int], whole: bool = False, pages: bool = False) -> tuple[list[int], Answers]:
         """(numbers, Answers) of the cases whose summary is there and can be read; whole: of those alone that have their
