@@ -7,9 +7,10 @@ from scipy.integrate import solve_ivp
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.contacts.stop_kernels import inside, through
 from patchfem.dynamics.events.histories import simulate
-from patchfem.dynamics.march import varying_load
-from patchfem.dynamics.march.march import march
+from patchfem.dynamics.march import loop_kernels, varying_load
+from patchfem.dynamics.march.march import march, plant_of
 from patchfem.dynamics.march.models import coulomb_model
+from patchfem.dynamics.propagator import propagator
 
 
 def one(zeta=0.02):
@@ -70,7 +71,7 @@ def test_exact_a_slide_that_holds_has_no_speed():
     r = done.response
     held = np.flatnonzero(np.diff(r.slide) == 0.0)
     assert held.size > 100 and np.abs(r.slide_rate[held + 1]).max() <= 1e-13 * np.abs(r.slide_rate).max()
-    assert np.abs(r.force).max() <= 0.1 * (1 + 1e-12)
+    assert np.abs(r.force).max() <= 0.1 * (1 + 1e-12) and closes(done)[0] < 1e-11
 
 
 def test_always_a_step_takes_energy_and_no_more_than_static_friction():
@@ -175,3 +176,35 @@ def test_order_two_of_stops_under_a_load_in_time():
         assert done.outcome is None and balance < 1e-11 and created == 0.0
         errors.append(np.abs(done.response.slide[::3 * steps // 40] - truth).max() / np.abs(truth).max())
     assert errors[0] < 1e-2 and errors[1] < errors[0] / 4 and errors[2] < errors[1] / 4
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_exact_force_that_holds_at_the_end_of_a_step(coupled):
+    """Against the equation of motion, integrated over a step under a constant force: the slide that stops there stays
+    where the force is the one that leaves it no acceleration."""
+    rng, n, drive = np.random.default_rng(4), 3, BaseSine(30.0, 70.0)
+    omega, zeta, mass, used = np.array([300.0, 700.0, 1500.0]), np.array([0.02, 0.1, 0.3]), 0.7, 4.0
+    slide, base = np.array([1.0, -0.6, 0.4]), np.array([0.9, 0.5, -0.3])
+    damping = np.diag(2 * zeta * omega)
+    if coupled:
+        spread = rng.normal(size=(n, n))
+        damping += 40 * spread @ spread.T
+    modes = ModalBasis(tuple("abc"), omega, zeta, slide, base, slide, mass, damping=damping if coupled else None)
+    prop = propagator(modes, drive, 37)
+    table, at, motion = prop.tables(drive, 0, 37), 5, rng.normal(size=(2, n)) * np.array([[1e-3], [0.3]])
+
+    def pull(t, z, v):
+        return -base * float(drive.values(np.array([t]))[0]) - omega**2 * z - damping @ v
+
+    def rates(t, state):
+        return np.concatenate([state[n:], pull(t, state[:n], state[n:]) - slide * used / mass])
+
+    end = (at + 1) * prop.dt
+    done = solve_ivp(rates, (at * prop.dt, end), motion.ravel(), "DOP853", rtol=1e-12, atol=1e-16)
+    z, v = done.y[:, -1].reshape(2, n)
+    v -= slide * (slide @ v) / (slide @ slide)
+    need = slide @ pull(end, z, v) * mass / (slide @ slide)
+    plant, room = plant_of(modes, prop), np.zeros((3, n))
+    assert loop_kernels.held_force(motion, plant, table, at, used, room[0]) == pytest.approx(need, rel=1e-9)
+    there = float(drive.values(np.array([end]))[0])
+    assert loop_kernels.holding(np.array([z, v]), plant, there, room[0], room[1:]) == pytest.approx(need, rel=1e-12)
