@@ -42,6 +42,8 @@ CAMPAIGNS = {
     "inp": Campaign(1000, "meshes.inp", "decks of Abaqus and CalculiX"),
     "unv": Campaign(1000, "meshes.unv", "meshes as universal files"),
     "energy": Campaign(1000, "physics.energy", "books of energy of laws and engines"),
+    "hard": Campaign(60, "hard.physics", "hard physics with known answers"),
+    "wear": Campaign(200, "hard.wear", "worn volumes"),
     "hostile": Campaign(240, "hostile.files", "files made to harm, twelve kinds"),
     "kills": Campaign(250, "ends.kills", "signals at random times"),
     "disks": Campaign(50, "ends.disks", "full disks and limits of size"),

@@ -50,8 +50,9 @@ def passive(found, tables: dict) -> None:
         raise Wrong(f"a loop of {area.value:.3g} ± {area.error or 0.0:.2g} J")
 
 
-def solved(trial: Trial, tables: dict, most: float = 3.0):
-    """The Result of a scene, None where it is refused, found no end or is announced as longer than `most` seconds."""
+def solved(trial: Trial, tables: dict, most: float = 3.0, valid: bool = False):
+    """The Result of a scene, None where it is refused, found no end or is announced as longer than `most` seconds;
+    valid: Wrong where it is refused."""
     from ..api import NotConverged, PatchfemError, load, plan, run
 
     text = text_of(tables)
@@ -64,9 +65,10 @@ def solved(trial: Trial, tables: dict, most: float = 3.0):
             return None
         trial.limit(seconds + 10.0)
         return run(read, say=lambda text: None)
-    except (NotConverged, PatchfemError):
+    except NotConverged:
         return None
     except Exception as error:
-        if hasattr(error, "mistakes"):
+        refused = isinstance(error, PatchfemError) or hasattr(error, "mistakes")
+        if refused and not valid:
             return None
         raise Wrong(f"{type(error).__name__}: {error}") from None
