@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core import ModalBasis, PatchfemError, Start, frozen_array
 from ..effects import module_of
+from ..scene.keys.same import once
 from ..structure import starts
 from ..structure.modes import basis
 
@@ -21,7 +22,7 @@ def modes_of(scene) -> ModalBasis:
     on drive.mass (structure.output_mass unless given), at the output of [[structure.mode]] and of a file without a
     force of its own. PatchfemError names what a file lacks.
     """
-    found = _over_strips(scene, _instrumented(scene.structure.mode, _unbonded(scene)))
+    found = _over_strips(scene, _unbonded(scene))
     if found.faces is not None and not len(found.faces):
         found = replace(found, faces=None)  # nothing rubs: the output stands for a slide without friction
     bonded = scene.structure.bonded
@@ -37,7 +38,7 @@ def _instrumented(modes, found: ModalBasis) -> ModalBasis:
     """The basis with the accelerometer as its output and the gauge beside it, where [[structure.mode]] tells them
     apart."""
     felt, seen = (np.array([getattr(mode, key) for mode in modes], float) for key in ("accelerometer", "gauge"))
-    if not modes or (np.array_equal(felt, found.output) and np.array_equal(seen, found.output)):
+    if (np.array_equal(felt, found.output) and np.array_equal(seen, found.output)):
         return found
     return replace(found, output=frozen_array(felt), gauge=None if np.array_equal(felt, seen) else frozen_array(seen))
 
@@ -55,10 +56,7 @@ def _unbonded(scene) -> ModalBasis:
     structure, drive = scene.structure, scene.drive
     forced = drive.kind == "force"
     if structure.mode:
-        found = basis(structure.mode, structure.moving_mass)
-        if not forced:
-            return found
-        return replace(found, base=frozen_array(-found.output))
+        return _of_modes(structure, forced)
     if structure.masses:
         from ..structure import masses
 
@@ -67,6 +65,15 @@ def _unbonded(scene) -> ModalBasis:
                             [i.between for i in structure.interface], structure.output_mass or 1,
                             pushed_mass(structure, drive) if forced else None)
     return _read(scene)[0]
+
+
+@once
+def _of_modes(structure, forced: bool) -> ModalBasis:
+    """The basis of [[structure.mode]] under a force or a moving base."""
+    found = basis(structure.mode, structure.moving_mass)
+    if forced:
+        found = replace(found, base=frozen_array(-found.output))
+    return _instrumented(structure.mode, found)
 
 
 def notes_of(scene) -> list:

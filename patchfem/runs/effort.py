@@ -34,7 +34,7 @@ def steps_wanted(model: Model) -> int:
 
 def steps_per_cycle(model: Model) -> int:
     """Steps per cycle of a march: those of the scene, else what the tolerance asks for, within its bounds."""
-    return model.accuracy.steps_per_cycle or int(np.clip(steps_wanted(model), 100, MOST_STEPS))
+    return model.accuracy.steps_per_cycle or min(max(steps_wanted(model), 100), MOST_STEPS)
 
 
 def _decay(modes, inside) -> float:

@@ -17,6 +17,7 @@ from typing import Any
 
 from ..effects import MOST_COORDINATES, takes
 from .keys import tables
+from .keys.same import once
 from .keys.types import keys as keys_of
 from .lines import DEEPEST, TooDeep, key_lines
 from .reader import Draft, apply_set
@@ -76,7 +77,7 @@ class Scene:
 
     def named(self) -> list[str]:
         """The effects the scene names: a table, or ``table.key=value`` for the selectors of a table that has them."""
-        return effects(self.tables()) + ["sweep"] * bool(self.sweep)
+        return effects(self) + ["sweep"] * bool(self.sweep)
 
     def where(self, key: str) -> str:
         """``FILE:LINE: key`` for a message about a key; the line of its table where it is not written itself."""
@@ -196,7 +197,8 @@ def scene_of(draft: Draft, path: str | Path, text: str, sets: tuple[str, ...], m
     if draft.mistakes:
         raise SceneError(draft.lines_of_mistakes())
     values = {name: getattr(found, name) for name in tables.Tables.model_fields}
-    return Scene(path=Path(path), text=text, kind=kind, remarks=draft.remarks, sets=sets, **values)
+    path = path if isinstance(path, Path) else Path(path)
+    return Scene(path=path, text=text, kind=kind, remarks=draft.remarks, sets=sets, **values)
 
 
 def axes_of(text: str, path: str | Path) -> tuple[list, list[str]]:
@@ -261,27 +263,48 @@ def _finish(found: tables.Tables, kind: str) -> tables.Tables:
     if found.contact:
         new["contact"] = _contact(found.contact)
     if found.accuracy.method in method_unused(kind):
-        new["accuracy"] = _without(found.accuracy, ["method"])
+        new["accuracy"] = _pinned(found.accuracy)
     if found.friction:
         new["friction"] = _law(found.friction)
-    if slide := found.slide:
-        slide = _without(slide, unused(slide, "kind", SLIDES))
-        fill = {"sine": {"cycles": 1.0}, "triangle": {"cycles": 1.0, "distance": 0.0}, "dwell": {"distance_after": 0.0}}
-        new["slide"] = _filled(slide, fill.get(slide.kind, {}))
-    if structure := found.structure:
-        update: dict[str, Any] = {"mode": tuple(_mode(mode, not index) for index, mode in enumerate(structure.mode))}
-        update["interface"] = tuple(map(_law, structure.interface))
-        if structure.masses and structure.output_mass is None:
-            update["output_mass"] = 1
-        new["structure"] = structure.model_copy(update=update)
-    if drive := found.drive:
-        keys = set(drive_unused(drive))
-        if drive.kind != "free":
-            keys |= waveform_unused(drive)
-        new["drive"] = _without(drive, keys)
+    if found.slide:
+        new["slide"] = _slide(found.slide)
+    if found.structure:
+        new["structure"] = _structure(found.structure)
+    if found.drive:
+        new["drive"] = _drive(found.drive)
     return found.model_copy(update=new)
 
 
+@once
+def _pinned(accuracy: tables.Accuracy) -> tables.Accuracy:
+    return _without(accuracy, ["method"])
+
+
+@once
+def _slide(slide: tables.Slide) -> tables.Slide:
+    slide = _without(slide, unused(slide, "kind", SLIDES))
+    fill = {"sine": {"cycles": 1.0}, "triangle": {"cycles": 1.0, "distance": 0.0}, "dwell": {"distance_after": 0.0}}
+    return _filled(slide, fill.get(slide.kind, {}))
+
+
+@once
+def _structure(structure: tables.Structure) -> tables.Structure:
+    update: dict[str, Any] = {"mode": tuple(_mode(mode, not index) for index, mode in enumerate(structure.mode))}
+    update["interface"] = tuple(map(_law, structure.interface))
+    if structure.masses and structure.output_mass is None:
+        update["output_mass"] = 1
+    return structure.model_copy(update=update)
+
+
+@once
+def _drive(drive: tables.Drive) -> tables.Drive:
+    keys = set(drive_unused(drive))
+    if drive.kind != "free":
+        keys |= waveform_unused(drive)
+    return _without(drive, keys)
+
+
+@once
 def _contact(contact: tables.Contact) -> tables.Contact:
     if contact.asperities:
         asperities = _without(contact.asperities, unused(contact.asperities, "law", ASPERITIES))
@@ -289,6 +312,7 @@ def _contact(contact: tables.Contact) -> tables.Contact:
     return _without(contact, ["element_size"]) if contact.mesh else contact
 
 
+@once
 def _law(law: tables.Friction) -> tables.Friction:
     idle = {"kinetic": kinetic_unused(law), "temperature": temperature_unused(law)}
     law = _without(law, unused(law, "law", LAWS) | {key for key, without in idle.items() if without})

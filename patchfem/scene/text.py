@@ -9,7 +9,8 @@ from typing import Any
 
 from .keys.contact import Asperities, Material, OnePiece
 from .keys.quantities import format_si
-from .keys.tables import Accuracy, Drive, Friction, Measured, Slide
+from .keys.same import once
+from .keys.tables import Accuracy, Drive, Friction, Measured, Slide, Tables
 from .keys.types import Table, keys, kind_of, model_of
 from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
 from .rules.drive import drive_unused, waveform_unused
@@ -22,10 +23,19 @@ def toml(table: Table) -> str:
     return "\n".join(_lines(table, "")).strip("\n") + "\n"
 
 
-def effects(root: Table) -> list[str]:
-    """Effects in contract naming: ``contact.tilt``, ``friction.law=nonlocal``, ``slide.kind=sine``."""
-    tables = ((name, getattr(root, name)) for name in type(root).model_fields)
-    return [effect for name, table in tables if table is not None for effect in _effects(table, name)]
+def effects(root: Any) -> list[str]:
+    """Effects in contract naming: ``contact.tilt``, ``friction.law=nonlocal``, ``slide.kind=sine``.
+
+    root: Tables, or what has their attributes.
+    """
+    tables = ((name, getattr(root, name)) for name in Tables.model_fields)
+    return [effect for name, table in tables if table is not None for effect in _named(table, name)]
+
+
+@once
+def _named(table: Any, at: str) -> tuple[str, ...]:
+    """The effects of a table of the scene."""
+    return tuple(_effects(table, at))
 
 
 def _effects(table: Any, at: str) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 from ...effects import WAVEFORMS, waves
@@ -85,11 +86,16 @@ def drive_unused(drive: Any) -> list[str]:
     return without.get(drive.kind, [])
 
 
-def waveform_unused(drive: Any) -> set[str]:
+def waveform_unused(drive: Any) -> frozenset[str]:
     """Keys of [drive] that its waveform gives no meaning, among those that depend on it."""
-    needs, can = WAVEFORMS[drive.waveform].keys
+    return _unused(drive.waveform)
+
+
+@cache
+def _unused(waveform: str) -> frozenset[str]:
+    needs, can = WAVEFORMS[waveform].keys
     dependent = {key for one in WAVEFORMS.values() for keys in one.keys for key in keys.split()}
-    return dependent - set(needs.split()) - set(can.split())
+    return frozenset(dependent - set(needs.split()) - set(can.split()))
 
 
 def check_length(draft: Draft, kind: str) -> None:

@@ -1,6 +1,8 @@
 """The batch of lumped cases: which models it takes, which stand together, and their answers."""
 
 from collections.abc import Sequence
+from functools import lru_cache
+from importlib import import_module
 from time import perf_counter
 
 import numpy as np
@@ -9,10 +11,9 @@ from ....core import BaseSine
 from ....model.model import Model
 from .. import one_by_one
 from ..answers import Answers
-from . import coulomb, pieces, smooth
 from .columns import answered
 
-KINDS = coulomb, pieces, smooth
+KINDS = "coulomb", "pieces", "smooth"  # modules of this folder, each imported when the ones before it refuse a model
 TOGETHER = 1024  # cases of one compiled call, so that their histories of cycles stay small
 
 
@@ -30,13 +31,17 @@ def refuses(model: Model) -> str:
         return "it is not one mode under one sine"
     if rig.cycles != int(rig.cycles) or not rig.modes.base[0] or not rig.modes.slide[0] or not rig.modes.output[0]:
         return "it has no whole cycles, or no push, slide or output"
-    kind = _kind(model)
-    return coulomb.refuses(model) if kind is None else ""
+    return "" if _kind(model) is not None else _named(KINDS[0]).refuses(model)
 
 
+@lru_cache(8)
 def _kind(model: Model):
     """The kind of cases that takes a model, None where there is none."""
-    return next((one for one in KINDS if not one.refuses(model)), None)
+    return next((one for one in map(_named, KINDS) if not one.refuses(model)), None)
+
+
+def _named(kind: str):
+    return import_module(f"{__package__}.{kind}")
 
 
 def group(model: Model) -> tuple:
