@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..core import PatchfemError
-from ..scene.lines import key_lines
+from ..scene.lines import counted, key_lines
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -37,7 +37,7 @@ class Source:
         """
         lines = key_lines(self.text)
         line = lines.get(key) or lines.get(key.rpartition(".")[0])
-        return f"{self.path}:{line}: {key}" if line else f"{self.path}: {key}"
+        return f"{self.path}:{line}: {counted(key)}" if line else f"{self.path}: {counted(key)}"
 
 
 @contextmanager
@@ -49,4 +49,4 @@ def placed(source: Source) -> Iterator[None]:
         if error.key is None:
             raise
         where = source.where(error.key) if error.key else str(source.path)
-        raise type(error)(f"{where}: {error}") from None
+        raise type(error)(f"{where}: {counted(str(error))}") from None

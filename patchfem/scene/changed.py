@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Iterable
 from typing import Any
 
-from .lines import key_lines
+from .lines import key_lines, pieces_of
 from .reader import Draft, apply_set
 from .scene import Scene, scene_of, with_files
 
@@ -81,8 +81,7 @@ def _table_of(key: str) -> str:
 def _open(raw: dict[str, Any], key: str) -> None:
     """Put copies in place of the tables above a key, so that it can be set in them alone; items by name or number."""
     place: Any = raw
-    for piece in key.split(".")[:-1]:
-        piece = piece.strip()
+    for piece in pieces_of(key)[:-1]:
         inner = _inside(place, piece)
         if isinstance(place, dict) and isinstance(inner, dict):
             inner = place[piece] = dict(inner)

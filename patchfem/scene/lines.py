@@ -7,6 +7,8 @@ from functools import lru_cache
 
 DEEPEST = 50  # parts of a dotted key; no key of a scene has more than five
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+_ITEM = re.compile(r"(.+)\[([1-9][0-9]{0,8})\]")
+_PLACE = re.compile(r"\b((?:structure|drive)(?:\.[a-z_]+(?:\[[0-9]+\])?)+)\.([0-9]{1,9})(?![0-9a-zA-Z_])")
 _BLANK = re.compile(r"(?:[ \t]+|\r?\n|#[^\n]*)*")
 _SCALAR = re.compile(r"[^,\]}\n#]*")
 _STRINGS = (
@@ -17,13 +19,30 @@ _STRINGS = (
 )
 
 
+def pieces_of(key: str) -> list[str]:
+    """The parts of a dotted key; an item that counts from one, ``structure.mode[1]``, has its place from 0 as a part of
+    its own, as in ``structure.mode.0``."""
+    out = []
+    for piece in key.split("."):
+        found = _ITEM.fullmatch(piece.strip())
+        out += [found[1], str(int(found[2]) - 1)] if found else [piece.strip()]
+    return out
+
+
+def counted(text: str) -> str:
+    """A message whose keys name items of a list as people count them: ``structure.mode.0`` is ``structure.mode[1]``."""
+    found = _PLACE.sub(lambda found: f"{found[1]}[{int(found[2]) + 1}]", text)
+    return found if found == text else counted(found)  # an item of a list in an item
+
+
 @lru_cache(16)
 def key_lines(text: str) -> dict[str, int]:
     """Dotted key path -> line (from 1) in a valid TOML text; a table has the line of its header.
 
-    Items of an array of tables count from 0 (``structure.mode.0.name``); a table that only its sub-tables or dotted
-    keys create has the line of the first of these. A text that is not TOML gives what was found before the fault.
-    TooDeep for a key of more than DEEPEST parts: the paths of all of them would take the square of their number.
+    Items of an array of tables count from 0 here (``structure.mode.0.name``, of which `counted` makes what people
+    read); a table that only its sub-tables or dotted keys create has the line of the first of these. A text that is not
+    TOML gives what was found before the fault. TooDeep for a key of more than DEEPEST parts: the paths of all of them
+    would take the square of their number.
     """
     scan = _Scan(text)
     try:

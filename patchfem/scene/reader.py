@@ -13,6 +13,7 @@ from .keys import quantities
 from .keys.contact import Material
 from .keys.tables import Tables
 from .keys.types import Table, choices, keys, kind_of, model_of, parts
+from .lines import counted, pieces_of
 
 _PLAIN_TEXT = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')  # a text in quotes without escapes
 _LONG_WORD = re.compile(r"[^\s/\\:]{200,}")  # no key, unit or name of a file is as long
@@ -55,7 +56,7 @@ class Draft:
 
     def say(self, key: str, message: str) -> None:
         """Note a mistake at a key: at its line, or that of the nearest table above."""
-        self._note(*self._where(key), f"{self.shown(key)}: {message}")
+        self._note(*self._where(key), counted(f"{self.shown(key)}: {message}"))
 
     def lacks(self, key: str, reason: str) -> None:
         """Note a missing key, at the line of its table."""
@@ -69,6 +70,7 @@ class Draft:
 
     def remark(self, sentence: str) -> None:
         """Keep a sentence for the user that is not a mistake."""
+        sentence = counted(sentence)
         if sentence not in self.remarks:
             self.remarks.append(sentence)
 
@@ -77,12 +79,12 @@ class Draft:
         return [text for _, text in sorted(self.mistakes, key=lambda mistake: mistake[0])]
 
     def shown(self, key: str) -> str:
-        """The key as a user writes it: a mode by its name where it has one."""
+        """The key as a user writes it: a mode by its name where it has one that is no number."""
         pieces = key.split(".")
         if pieces[:2] == ["structure", "mode"] and len(pieces) > 2:
             mode = self.value(".".join(pieces[:3]))
             name = mode.get("name") if isinstance(mode, dict) else None
-            if isinstance(name, str) and name and len(pieces) > 3 and pieces[3] != "name":
+            if isinstance(name, str) and name and not name.isdecimal() and len(pieces) > 3 and pieces[3] != "name":
                 pieces[2] = name
         return ".".join(pieces)
 
@@ -113,7 +115,7 @@ def apply_set(draft: Draft, assignment: str) -> None:
         draft.refuse_set(f"{shown}: holds bytes that are no UTF-8 text; write it in UTF-8")
         return
     key, equals, text = assignment.partition("=")
-    pieces = [piece.strip() for piece in key.split(".")]
+    pieces = pieces_of(key)
     if not equals or not all(pieces):
         draft.refuse_set(f"{assignment}: table.key=value is wanted, such as contact.load=26 lbf")
         return
@@ -145,8 +147,10 @@ def _item(draft: Draft, items: list[Any], wanted: str, key: str) -> str:
         return str(names.index(wanted))
     if wanted.isdecimal() and int(wanted) < len(items):
         return str(int(wanted))
-    known = [name for name in names if isinstance(name, str)] or map(str, range(len(items)))
-    draft.refuse_set(f"{key}: no '{wanted}' here; {choices(wanted, known)}")
+    known, table = [name for name in names if isinstance(name, str)], key.rpartition(".")[0]
+    there = "such item" if wanted.isdecimal() else f"'{wanted}'"
+    draft.refuse_set(f"{counted(key)}: no {there} here; " + (choices(wanted, known) if known else
+                     f"{table} has {len(items)}, counted from one as in {table}[1]"))
     return ""
 
 
@@ -188,7 +192,7 @@ def owner_of(key: str) -> tuple[type[Table] | None, str]:
     """Model and attribute a dotted key belongs to, items of an array by number or name; None for a key no table has."""
     model: type[Table] | None = Tables
     name, items = "", False
-    for piece in key.split("."):
+    for piece in pieces_of(key):
         if piece.isdigit() or items:
             items = False
             continue

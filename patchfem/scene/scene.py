@@ -19,7 +19,7 @@ from ..effects import MOST_COORDINATES, takes
 from .keys import tables
 from .keys.same import once
 from .keys.types import keys as keys_of
-from .lines import DEEPEST, TooDeep, key_lines
+from .lines import DEEPEST, TooDeep, counted, key_lines
 from .reader import Draft, apply_set
 from .rules.check import check
 from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
@@ -83,7 +83,7 @@ class Scene:
         """``FILE:LINE: key`` for a message about a key; the line of its table where it is not written itself."""
         lines = key_lines(self.text)
         line = lines.get(key) or lines.get(key.rpartition(".")[0])
-        return f"{self.path}:{line}: {key}" if line else f"{self.path}: {key}"
+        return f"{self.path}:{line}: {counted(key)}" if line else f"{self.path}: {counted(key)}"
 
     def beside(self, name: str) -> Path:
         """A path written in the scene, which is relative to the scene's own folder."""

@@ -49,7 +49,7 @@ def test_refuses_numbers_that_overflow_what_is_made_of_them(text, sets, says):
 def test_refuses_signs_that_no_file_can_hold():
     found = mistakes('title = "a\\u0000b"\n' + POINT + COULOMB + STRUCTURE.replace("axial", "ax\\u0007ial"))
     assert [one.split(", which")[0] for one in found] == ["a.toml:1: title: holds the sign U+0000",
-                                                          "a.toml:10: structure.mode.0.name: holds the sign U+0007"]
+                                                          "a.toml:10: structure.mode[1].name: holds the sign U+0007"]
 
 
 def test_refuses_words_of_set_that_are_no_text():

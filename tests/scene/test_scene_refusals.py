@@ -85,7 +85,7 @@ BAD_SETS = [
     ("contact.tilt.on=both", "contact.tilt.on", "one of upper, lower"),
     ("structure.mode.axal.frequency=1 Hz", "structure.mode.axal", "did you mean 'axial'?"),
     ("structure.mode.second.base=0.7", "structure.mode.axial.slide", "sum of base^2"),
-    ("structure.mode.second.name=axial", "structure.mode.1.name", "names two modes"),
+    ("structure.mode.second.name=axial", "structure.mode[2].name", "names two modes"),
     ("structure.travel=-1 mm", "structure.travel", "must be > 0"),
     ("drive.displacement=1 mm", "drive.displacement", "acceleration and displacement exclude each other"),
     ("drive.duration=1 s", "drive.duration", "cycles and duration exclude each other"),
@@ -356,7 +356,7 @@ frequency = "1 Hz"
 acceleration = "1 g"
 cycles = 2
 """
-    assert "structure.interface.0.kinetic: 0.4 is larger" in only(text)
+    assert "structure.interface[1].kinetic: 0.4 is larger" in only(text)
     scene = loads(text.replace("0.4", "0.2"))
     assert scene.kind == "rig" and scene.structure.masses == (1.0, 2.0) and scene.structure.output_mass == 1
     assert (scene.structure.interface[0].between, scene.structure.interface[0].kinetic) == ((2, 0), 0.2)

@@ -8,9 +8,11 @@ from scene_texts import COULOMB, LINEAR, STRUCTURE, line_of, only
 
 from patchfem.core import PatchfemError
 from patchfem.model.model import build
+from patchfem.model.source import placed
 from patchfem.model.structure import modes_of, motions, start_state
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
+from patchfem.scene.changed import Base
 from patchfem.scene.scene import SceneError, load, loads
 
 MASSES = """\
@@ -152,16 +154,16 @@ def test_exact_starts_of_a_scene():
 
 
 @pytest.mark.parametrize("sets, key, says", [
-    (["structure.spring.0.between=[3, 0]"], "structure.spring.0.between", "there is no mass 3: masses has 2"),
-    (["structure.spring.0.between=[1, 1]"], "structure.spring.0.between", "joins mass 1 to itself"),
-    (["structure.damper.0.between=[0, 0]"], "structure.damper.0.between", "joins the base to itself"),
-    (["structure.interface.0.between=[2, 2]"], "structure.interface.0.between", "joins mass 2 to itself"),
-    (["structure.interface.0.between=[0, 9]"], "structure.interface.0.between", "there is no mass 9"),
-    (["structure.interface.0.load=-1 N"], "structure.interface.0.load", "must be >= 0"),
+    (["structure.spring.0.between=[3, 0]"], "structure.spring[1].between", "there is no mass 3: masses has 2"),
+    (["structure.spring.0.between=[1, 1]"], "structure.spring[1].between", "joins mass 1 to itself"),
+    (["structure.damper.0.between=[0, 0]"], "structure.damper[1].between", "joins the base to itself"),
+    (["structure.interface.0.between=[2, 2]"], "structure.interface[1].between", "joins mass 2 to itself"),
+    (["structure.interface.0.between=[0, 9]"], "structure.interface[1].between", "there is no mass 9"),
+    (["structure.interface.0.load=-1 N"], "structure.interface[1].load", "must be >= 0"),
     (["structure.output_mass=3"], "structure.output_mass", "there is no mass 3"),
     (["structure.masses=[]"], "structure.masses", "at least one mass is wanted"),
-    (["structure.masses=['1 kg', '0 kg']"], "structure.masses.1", "must be > 0"),
-    (["structure.spring.0.stiffness=-1 N/m"], "structure.spring.0.stiffness", "must be >= 0"),
+    (["structure.masses=['1 kg', '0 kg']"], "structure.masses[2]", "must be > 0"),
+    (["structure.spring.0.stiffness=-1 N/m"], "structure.spring[1].stiffness", "must be >= 0"),
     (["structure.start.displacement=['1 mm']"], "structure.start.displacement", "1 value for 2 masses; one for each"),
     (["structure.start={}"], "structure.start.displacement", "or structure.start.velocity"),
     (["structure.slide_at=12:+x"], "structure.slide_at", "names a place in a file"),
@@ -176,7 +178,7 @@ def test_refuses_masses_that_are_not_there(sets, key, says):
 
 def test_refuses_at_the_line_of_the_file():
     text = (RUB + MASSES).replace("between = [2, 0]", "between = [2, 5]")
-    assert only(text).startswith(f"a.toml:{line_of(text, 'between = [2, 5]')}: structure.interface.0.between: ")
+    assert only(text).startswith(f"a.toml:{line_of(text, 'between = [2, 5]')}: structure.interface[1].between: ")
 
 
 @pytest.mark.parametrize("text, key, says", [
@@ -280,3 +282,31 @@ def test_refuses_files_at_the_line_of_the_scene(tmp_path):
         with pytest.raises(SceneError) as caught:
             loads(text)
         assert says in str(caught.value)
+
+
+MODES = STRUCTURE + '[[structure.mode]]\nname = "3"\nfrequency = "160 Hz"\ndamping = 0.003\nslide = 0.0\n'
+
+
+@pytest.mark.parametrize("key, message, text", [
+    ("structure.spring[2].stiffness", "structure.spring[2].stiffness: a bare number", MASSES),
+    ("structure.mode[1].frequency", "structure.mode.axial.frequency: a bare number", MODES),
+    ("structure.mode[2].frequency", "structure.mode[2].frequency: a bare number", MODES),  # its name is "3"
+    ("structure.spring[9].stiffness", "structure.spring[9]: no such item here; structure.spring has 2, counted from "
+     "one as in structure.spring[1]", MASSES),
+    ("structure.mode[9].damping", "structure.mode[9]: no such item here; one of axial, 3", MODES),
+    ("structure.mode.axil.damping", "structure.mode.axil: no 'axil' here; did you mean 'axial'?", MODES)])
+def test_exact_items_count_from_one_where_people_read_and_write(key, message, text):
+    text = POINT + text if text is MODES else text
+    assert only(text, f"{key}=-1").startswith(f"--set: {message}")
+
+
+def test_exact_an_item_by_its_number_from_one_is_the_one_that_python_counts_from_zero():
+    scene = loads(MASSES, sets=["structure.spring[2].stiffness=3 N/mm", "structure.masses[1]=5 kg"])
+    assert scene.structure.spring[1].stiffness == 3e3 and scene.structure.masses[0] == 5.0
+    from_zero = ["structure.spring.1.stiffness=3 N/mm", "structure.masses.0=5 kg"]
+    from_one = ["structure.spring[2].stiffness=3 N/mm", "structure.masses[1]=5 kg"]
+    assert scene.tables() == loads(MASSES, sets=from_zero).tables()
+    assert scene.tables() == Base(loads(MASSES)).changed(from_one).tables()
+    with pytest.raises(PatchfemError, match=r"structure\.interface\[2\]\.law: as structure\.masses\[1\] has$"), \
+            placed(build(scene).source):
+        raise PatchfemError("as structure.masses.0 has", "structure.interface.1.law")
