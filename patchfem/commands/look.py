@@ -56,14 +56,16 @@ def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif
     show(folder, out, frame, magnify, say)
 
 
-def report(*folders: Path, out: out_in("page.html, by default report.html here") = None):
+def report(*folders: Path, out: out_in("page.html, by default report.html here") = None,
+           measured: Annotated[Path | None, Parameter(help="file of a laboratory, or the table that `import` made of "
+                                                           "it: laid over the pictures of runs")] = None):
     """Lay the results folders of several runs, or of several sweeps over the same keys, side by side on one page for a
     browser; of one sweep its own page is made again.
 
-    Example: patchfem report out/rig out/six -o both.html
+    Example: patchfem report out/rig out/six --measured loop.csv -o both.html
     """
     from ..export.reports import report_of
 
     if not folders:
         raise Refused("report: name at least one results folder")
-    print(report_of(list(folders), out))
+    print(report_of(list(folders), out, measured))

@@ -164,8 +164,10 @@ def _loop(data: dict) -> Picture | None:
     count = 0.0 if whole else (own["time"][-1] - own["time"][0]) / own["period"]
     span = "the whole run" if whole else f"the last {count:.3g} cycles" if count > 1 + 1e-6 else "one cycle"
     title = "Friction force against slide" if part_of_cycle(data) or data.get("cycles") is None else "Friction loop"
-    return Picture(pictures.loop, (own["slide"], own["force"], title),
-                   f"Resultant friction force against the slide of the interface, over {span}.{_under(data)}")
+    read = data.get("recorded")
+    beside = "" if read is None else f" Grey: the force measured in {read['file']}."
+    return Picture(pictures.loop, (own["slide"], own["force"], title, read and (read["slide"], read["force"])),
+                   f"Resultant friction force against the slide of the interface, over {span}.{_under(data)}{beside}")
 
 
 def _histories(data: dict) -> Picture | None:
@@ -174,7 +176,8 @@ def _histories(data: dict) -> Picture | None:
     history, period, window, title = data["history"], data["loop"].get("period"), None, ""
     if "window" not in data:
         force = " and friction force" if np.any(history["force"]) else ""
-        return Picture(pictures.histories, (history, None, None), f"Slide{force} over the whole run.{_under(data)}")
+        return Picture(pictures.histories, (history, None, None), f"Slide{force} over the whole run.{_under(data)}"
+                       + (" Grey: the measured force." if "measured" in history else ""))
     w = data["window"]
     late = w["time"] >= w["time"][-1] - 3 * period * (1 + 1e-9)
     window = {k: v[late] for k, v in w.items()}

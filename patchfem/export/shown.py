@@ -1,8 +1,11 @@
 """What a finished run is shown by: the plain data of its page, its page and its pictures."""
 
 import tomllib
+from pathlib import Path
 
-from ..core import BaseSine
+import numpy as np
+
+from ..core import BaseSine, PatchfemError
 from ..runs.results.result import Result
 from ..structure.drive_sizes import largest
 from .histories import largest_multiplier
@@ -40,6 +43,9 @@ def report_data(result: Result) -> dict:
         slow = result.plan.kind == "bench"
         data["history"] = {"time": r.time, "displacement": r.slide if slow else r.output, "force": r.force}
         data["loop"] = {"slide": w.slide, "force": w.force, "time": w.time}
+        if slow and (read := _recorded(source.path.parent, scene["slide"], r)) is not None:
+            data["recorded"] = {"file": Path(scene["slide"]["file"]).name, "slide": read[1], "force": read[2]}
+            data["history"]["measured"] = read[::2]
         if not slow:
             data["window"] = {"time": w.time, "displacement": w.output, "acceleration": w.acceleration,
                               "base": w.base_acceleration, "force": w.force, "slide": w.slide}
@@ -59,6 +65,22 @@ def report_data(result: Result) -> dict:
                 peak = result.measures["absolute_acceleration_peak"].value
                 data["measured"] |= {"reading": kind, "share": reading(w, rig.drive, peak, kind, cutoff) / peak}
     return data
+
+
+def _recorded(folder: Path, slide: dict, response) -> tuple | None:
+    """Times [s], slides [m] and forces [N] that the file of a slide holds beside it; None where it holds no force."""
+    if slide["kind"] != "file":
+        return None
+    from ..inputs.loops import read_loop
+
+    try:
+        read = read_loop(folder / slide["file"])
+    except PatchfemError:  # a path alone; its own faults were found when it was read as one
+        return None
+    if read.time is None:
+        return None
+    load = 1.0 if read.quantity == "force" else np.interp(read.time, response.time, response.load)
+    return read.time, read.displacement, read.reading * load
 
 
 def page_of(result: Result, bodies: dict, film: dict | None = None) -> str:

@@ -189,11 +189,14 @@ def bodies(x, depths, mises, sigma):
 
 
 @styled
-def loop(slide, force, title: str, onto=None):
-    """Draw the friction force (k,) [N] against the slide (k,) [m], with a title."""
+def loop(slide, force, title: str, measured: tuple | None = None, onto=None):
+    """Draw the friction force (k,) [N] against the slide (k,) [m], with a title, over a measured pair (m,) of both."""
     figure, (axis,) = drawing(1, 3.6, onto)
     along, um = axis_unit(slide, "m")
     up, scale = axis_unit(force, "N")
+    if measured is not None:
+        axis.plot(measured[0] * um, measured[1] * scale, ".", color=GREY, ms=3, mew=0, label="measured")
+        axis.legend(frameon=False)
     axis.plot(slide * um, force * scale, color=BLUE, lw=1.0)
     axis.set(xlabel=f"slide [{along}]", ylabel=f"friction force [{up}]", title=title)
     return figure
@@ -204,7 +207,7 @@ def histories(history: dict, window: dict | None, period: float | None, title: s
     """The whole run beside its last cycles (a rig) or beside its friction force (a bench); onto Axes the first alone.
 
     history: time, displacement, force; window: the last cycles alone, with base and block acceleration;
-    period [s] of the drive, None where every sample was kept.
+    period [s] of the drive, None where every sample was kept. `measured` in history: times [s] and forces [N] read.
     """
     forced = onto is None and window is None and bool(np.any(history["force"]))
     figure, axes = drawing(2 if window or forced else 1, 3.6, onto)
@@ -214,6 +217,10 @@ def histories(history: dict, window: dict | None, period: float | None, title: s
     axes[0].set(xlabel=f"time [{name}]", title="Whole run")
     if forced:
         up, scale = axis_unit(history["force"], "N")
+        if "measured" in history:
+            time, force = history["measured"]
+            axes[1].plot(time * per, force * scale, ".", color=GREY, ms=3, mew=0, label="measured")
+            axes[1].legend(frameon=False)
         axes[1].plot(history["time"] * per, history["force"] * scale, color=ORANGE, lw=1.0)
         axes[1].set(xlabel=f"time [{name}]", ylabel=f"friction force [{up}]", title="Friction force")
     if window and onto is None:

@@ -17,6 +17,11 @@ from .sweep import NUMBER, label
 from .words import linked, meaning, pair, units
 
 POINTS = 4000  # of one line in a picture
+KNOWN = {"time": "time", "displacement": "relative_displacement", "acceleration": "absolute_acceleration",
+         "force": "friction_force"}  # columns of a measurement that are shown
+UNITS = {"time": "s", "displacement": "m", "acceleration": "m s-2", "force": "N"}
+IN_PHASE = ("relative_displacement", "absolute_acceleration")
+MEASURED = "measured"
 CYCLES = 2.0  # of the last motion that are shown: result.nc keeps so many whole
 CHARTS = (  # title, x: (variable, label), y: (variable, label); only the last cycles of what stands on time
     ("Pressure", ("x", "place"), ("normal_stress", "normal stress")),
@@ -72,10 +77,47 @@ def _arrays(path: Path) -> dict:
     return out
 
 
-def page(runs: list) -> str:
-    """The whole HTML page of several `Run`s, in their order; differences are from the first."""
+def measured(name: str, values: dict, like: Run) -> Run:
+    """A measurement as a Run without measures, shown beside runs like `like`.
+
+    values: name -> (k,) in SI as `inputs.lab` reads them: time, displacement, acceleration, force. Where both move
+    under a sine its time is shifted until the first harmonics of both displacements, or accelerations, agree in phase.
+    """
+    arrays = {KNOWN[key]: (np.asarray(rows, float), UNITS[key]) for key, rows in values.items() if key in KNOWN}
+    one = Run(name, {"kind": like.summary["kind"], "measures": {}, "outcome": MEASURED}, like.resolved, arrays)
+    if "time" in arrays:
+        end = like.arrays["time"][0][-1] if "time" in like.arrays else arrays["time"][0][-1]
+        one.arrays["time"] = (arrays["time"][0] + _lag(one, like) - end, "s")  # 0 is the end of the run
+    return one
+
+
+def _lag(one: Run, like: Run) -> float:
+    """Time [s] that a measurement is shifted by: its end to that of the run, then on to the same phase."""
+    shift = like.arrays["time"][0][-1] - one.arrays["time"][0][-1] if "time" in like.arrays else 0.0
+    period = _period(like)
+    both = next((key for key in IN_PHASE if key in one.arrays and key in like.arrays), None)
+    if period is None or both is None or like.summary["kind"] == "bench":
+        return shift
+    turns = []
+    for run, more in ((one, shift), (like, 0.0)):
+        late = _late(run)
+        angle = 2 * np.pi * (run.arrays["time"][0][late] + more) / period
+        parts = np.linalg.lstsq(np.stack([np.cos(angle), np.sin(angle), np.ones(angle.size)], axis=1),
+                                run.arrays[both][0][late], rcond=None)[0]
+        turns.append(math.atan2(parts[0], parts[1]) / (2 * np.pi))
+    return shift + ((turns[0] - turns[1] + 0.5) % 1.0 - 0.5) * period
+
+
+def page(runs: list, read: Run | None = None) -> str:
+    """The whole HTML page of several `Run`s, in their order; differences are from the first.
+
+    read: a measurement, of `measured`, laid over their pictures.
+    """
     names = distinct([run.name for run in runs])
-    charts = [one for one in (_chart(number, *chart, runs, names) for number, chart in enumerate(CHARTS)) if one]
+    told, shown = (names, runs) if read is None else ([f"measured: {read.name}", *names], [read, *runs])
+    charts = [one for one in (_chart(number, *chart, shown, told) for number, chart in enumerate(CHARTS)) if one]
+    if read is not None:
+        charts = [_over(one) for one in charts if any(mark["name"] in names for mark in one["marks"])]
     outcomes = "; ".join(f"{escape(name)}: {escape(run.summary['outcome'])}" for name, run in zip(names, runs))
     sections = [Section("scenes", "What differs in the scenes", _differences(runs, names)),
                 Section("measures", "Measures side by side", _measures(runs, names))]
@@ -89,6 +131,15 @@ def page(runs: list) -> str:
     title = " and ".join(names) if len(names) < 4 else f"{len(names)} runs side by side"
     return document(title, f"<p class=verdict>{outcomes}.</p>", sections, {"charts": charts} if charts else None,
                     ("figures.js", "curves.js") if charts else ())
+
+
+def _over(chart: dict) -> dict:
+    """A chart whose first line, where it is the measured one, lies broad and grey under the others."""
+    first, *rest = chart["marks"]
+    if not first["name"].startswith("measured: "):
+        return chart
+    marks = [mark | {"colour": colour} for mark, colour in zip(rest, COLOURS * len(rest))]
+    return chart | {"marks": [first | {"colour": "soft", "width": 3, "alpha": 0.55}, *marks]}
 
 
 def distinct(names: list) -> list:
@@ -108,7 +159,7 @@ def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list)
         if "time" in run.arrays and run.arrays["time"][0].shape == a.shape:
             late = _late(run)
             a, b = a[late], b[late]
-            a = a - a[-1] if x[0] == "time" else a
+            a = a - a[-1] if x[0] == "time" and run.summary["outcome"] != MEASURED else a
         step = -(-a.size // POINTS)
         lines.append((name, a[::step], b[::step]))
     if not lines:
@@ -125,11 +176,16 @@ def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list)
                       for colour, (name, a, b) in zip(COLOURS * len(lines), lines)]}
 
 
+def _period(run: Run) -> float | None:
+    """Period [s] of the sine that drives a run; None where none does."""
+    written = NUMBER.match(str(run.resolved.get("drive", {}).get("frequency", "")))
+    return 1 / float(written[1]) if written and float(written[1]) > 0 else None
+
+
 def _late(run: Run) -> np.ndarray:
     """Which samples lie in the last CYCLES cycles of a sine, or in the last tenth of a run without one."""
-    time = run.arrays["time"][0]
-    written = NUMBER.match(str(run.resolved.get("drive", {}).get("frequency", "")))
-    span = CYCLES / float(written[1]) if written and float(written[1]) > 0 else np.ptp(time) / 10
+    time, period = run.arrays["time"][0], _period(run)
+    span = CYCLES * period if period else np.ptp(time) / 10
     if run.summary["kind"] == "bench":
         span = np.ptp(time)
     return time >= time[-1] - span * (1 + 1e-9)

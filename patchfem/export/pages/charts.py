@@ -143,11 +143,13 @@ def _frame(ratio: float) -> list:
     return [round(TALL * ratio), TALL] if TALL * ratio <= WIDEST else [WIDEST, round(WIDEST / ratio)]
 
 
-def loop(slide, force, title: str) -> list:
-    """The friction force against the slide."""
+def loop(slide, force, title: str, measured: tuple | None = None) -> list:
+    """The friction force against the slide, over the measured one where there is one."""
     (along, size), (up, scale) = axis_unit(slide, "m"), axis_unit(force, "N")
+    read = None if measured is None else line(measured[0] * size, measured[1] * scale, "soft", "measured", width=3,
+                                              alpha=0.55)
     return [chart(title, axis("slide", along), axis("friction force", up),
-                  [line(slide * size, force * scale, "accent")])]
+                  [read, line(slide * size, force * scale, "accent", "computed" if read else "")])]
 
 
 def histories(history: dict, window: dict | None, period: float | None, title: str = "Last cycles") -> list:
@@ -164,8 +166,10 @@ def histories(history: dict, window: dict | None, period: float | None, title: s
     if window is None:
         if np.any(history["force"]):
             up, size = axis_unit(history["force"], "N")
+            read = history.get("measured")
+            read = read and line(read[0] * per, read[1] * size, "soft", "measured", width=3, alpha=0.55)
             out.append(chart("Friction force", axis("time", name), axis("friction force", up),
-                             [line(time * per, history["force"] * size, "warm")]))
+                             [read, line(time * per, history["force"] * size, "warm", "computed" if read else "")]))
         return out
     since = window["time"] - window["time"][0]
     (name, per), (unit, scale) = axis_unit(since, "s"), axis_unit(window["displacement"], "m")

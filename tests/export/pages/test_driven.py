@@ -3,7 +3,9 @@
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
+from page_data import charts_of
 
 import patchfem as pf
 from patchfem.export.pages.driven import command, driven
@@ -73,3 +75,23 @@ def test_exact_the_page_says_what_drives_how_to_repeat_it_and_links_its_files_an
     assert "<pre>patchfem run swing.toml --set &#x27;drive.force=31 N&#x27;</pre>" in text
     assert "href='#measure-relative_displacement_amplitude'" in text and "fields.vtkhdf" not in text.split("<script")[0]
     assert str(tmp_path) not in text
+
+
+@pytest.mark.parametrize("column, share", [("force [N]", 1.0), ("friction_ratio [1]", 0.1)])
+def test_exact_the_page_of_a_recorded_slide_shows_the_force_measured_with_it(tmp_path, column, share):
+    time = np.linspace(0.0, 1.0, 201)
+    slide, force = 10 * np.sin(4 * np.pi * time), 2.5 * np.cos(4 * np.pi * time)
+    (tmp_path / "loop.csv").write_text(f"time [s],displacement [um],{column}\n" + "\n".join(
+        f"{t},{a!r},{b * share!r}" for t, a, b in zip(time, slide.tolist(), force.tolist())), "utf-8")
+    (tmp_path / "a.toml").write_text(BENCH + '[slide]\nkind = "file"\nfile = "loop.csv"', "utf-8")
+    pf.run(tmp_path / "a.toml").save(tmp_path / "out")
+    text = (tmp_path / "out" / "report.html").read_text("utf-8")
+    found = {name: one["marks"] for (name, _), one in charts_of(text).items()}
+    title = next(name for name in found if name.startswith("Friction loop") or "against" in name)
+    for name, x in ((title, slide), ("Friction force", time)):
+        measured, computed = found[name]
+        assert (measured["name"], computed["name"]) == ("measured", "computed")
+        scale = 1e3 if name == "Friction force" and np.max(np.abs(measured["x"])) > 1 else 1.0
+        np.testing.assert_allclose(measured["x"], x * scale, atol=1e-6)
+        np.testing.assert_allclose(measured["y"], force, atol=1e-6)
+    assert "Grey: the force measured in loop.csv." in text
