@@ -123,17 +123,23 @@ def _smooth_at(size, top: int) -> bool:
     return bool(bends.min() * SMOOTH >= bends.max())
 
 
-def peaks_between(window: Response) -> dict:
+def peaks_between(window: Response, climbs: bool = False) -> dict:
     """What sampled peaks may lie above their samples, by name, beside what fewer steps show.
 
     Where the acceleration jumps at its largest sample, its change over a step on the smooth side; of a normal load that
-    changes, an eighth of its second difference at either end of its range.
+    changes, an eighth of its second difference at either end of its range. climbs: over grooves the force has its peak
+    between samples, which fewer steps need not show as they fall on some of the same instants: what it changes to the
+    sample beside it.
     """
     size, out = np.abs(window.acceleration), {}
     top = int(np.argmax(size))
     if 0 < top < len(size) - 1:
         if not _smooth_at(size, top):
             out["absolute_acceleration_peak"] = float(size[top] - max(size[top - 1], size[top + 1]))
+    if climbs and len(window.force) > 2:
+        force = np.abs(window.force)
+        top = min(max(int(np.argmax(force)), 1), len(force) - 2)
+        out["friction_force_peak"] = float(force[top] - max(force[top - 1], force[top + 1]))
     load = window.extra.get("normal_load")
     if load is not None and len(load) > 2:
         for name, at in (("normal_load_least", int(np.argmin(load))), ("normal_load_peak", int(np.argmax(load)))):

@@ -230,14 +230,9 @@ def test_exact_the_plan_prints_stiffness_and_capacity():
     (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "which lock with static = 2"),
     (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "= 6.3662e-06 m is wanted"),
     (RIG, ["accuracy.method=exact"], "accuracy.method", "no exact solution exists beside [normal.grooves]"),
-    (RIG, ["accuracy.method=harmonic"], "accuracy.method", "beside [normal.grooves]"),
     (RIG, ["accuracy.method=newmark"], "accuracy.method", "beside [normal.grooves]"),
     (RIG, ["friction.law=convolution", "friction.bond_length=1 um"], "friction.law",
      "beside [normal.grooves]: use law 'coulomb'"),
-    (RIG, [*LATER["iwan"], "accuracy.method=harmonic"], "accuracy.method",
-     "'harmonic' with law 'iwan' beside [normal.grooves]"),
-    (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "accuracy.method=harmonic"], "accuracy.method",
-     "'harmonic' with law 'nonlocal' beside [normal.grooves]"),
     (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.order=2"], "friction.order",
      "beside [normal.grooves]"),
     (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "accuracy.quadrature=direct"], "accuracy.quadrature",
@@ -274,9 +269,6 @@ substrate = "Ti-8Al-1Mo-1V"
         loads(soft + '\n[contact.holder]\ntangential_stiffness = "1e7 N/m"')
     with pytest.raises(SceneError, match=r"wear: beside \[contact\.grooves\] and \[contact\.shear\]"):
         loads(soft + '\n[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 10')
-    rig = soft.split("[slide]")[0] + "[structure]" + RIG.split("[structure]")[1]
-    with pytest.raises(SceneError, match=r"'harmonic' with law 'elastic-plastic' beside \[contact\.grooves\] and"):
-        loads(rig, sets=["accuracy.method=harmonic"])
 
 
 def test_always_a_lifted_mass_of_a_bench_is_remarked_and_not_used():

@@ -124,6 +124,11 @@ class FlankRun(Run):
         at[RISE], at[BEFORE], at[NORMAL] = steep * v, normal, normal
         self.ledger[0] += self.strained()
 
+    def placed(self, place, rate) -> None:
+        """As of a Run; what rises has the speed of the flank there."""
+        super().placed(place, rate)
+        self.contact.now_at[RISE] = float(self.model.grooves.slope(self.modes.slide @ place)) * self.modes.slide @ rate
+
     def _pressed(self, share: float) -> None:
         """Bring the memory to a normal force that is `share` of that at the slide 0, for which it was built."""
 

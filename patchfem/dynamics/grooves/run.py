@@ -118,6 +118,9 @@ class GroovesRun(Run):
         twin._driven()
         return twin
 
+    def _slid(self, path) -> None:
+        """Nothing: there is no memory."""
+
     def _steps(self, count: int, rows) -> tuple:
         return self.loop.march(self.climb, self.wave.ends, self.done, count, float(self.prop.dt), self.state, TOLERANCE,
                                float(self.travel), self.ledger, rows)

@@ -121,18 +121,18 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
             samples += len(pick)
         last.append((first, rows, work))
         if whole:
-            extremes.append(_extremes(rows, modes, run.prop.dt))
+            extremes.append(extremes_of(rows, modes, run.prop.dt))
             phasors.append(_phasor(rows, modes, first, steps_per_cycle))
         if run.done in asked:
-            found.append(replace(_mark(run, list(last)[-window:], extremes[-window:]), after=run.fork(run.drive)))
+            found.append(replace(mark_of(run, list(last)[-window:], extremes[-window:]), after=run.fork(run.drive)))
         size = steps_per_cycle
         if progress is not None:
             progress(run.done / total)
     run.check()
     if not whole:
-        extremes = [_extremes(rows, modes, run.prop.dt) for _, rows, _ in last]
+        extremes = [extremes_of(rows, modes, run.prop.dt) for _, rows, _ in last]
         phasors = [_phasor(rows, modes, first, steps_per_cycle) for first, rows, _ in last]
-    end = _mark(run, list(last)[-window:], extremes)
+    end = mark_of(run, list(last)[-window:], extremes)
     rows, start = _joined(list(last))
     number = np.concatenate([*kept_at, start + np.arange(len(rows))])
     full = run.response(np.concatenate([*kept, rows]), number)
@@ -140,7 +140,7 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
                        snapshots, end.work, run.done / steps_per_cycle, run.message, tuple(found))
 
 
-def _mark(run, cycles, extremes) -> Mark:
+def mark_of(run, cycles, extremes) -> Mark:
     """The Mark of the cycles (first step, rows, work) that end here."""
     rows, first = _joined(cycles)
     return Mark(run.response(rows, first + np.arange(len(rows))), rows[:-1, 2 * run.modes.omega.size + 4].copy(),
@@ -179,6 +179,24 @@ class Run:
         twin.contact = type(self.contact)(*(array.copy() for array in self.contact))
         return twin
 
+    def placed(self, place, rate) -> None:
+        """Go on from the coordinates place and rates (n,) at the start of a cycle of a drive that repeats, the contact
+        slid there slowly."""
+        path = np.array([self.modes.slide @ self.state[0], self.modes.slide @ place])
+        if path[0] != path[1]:
+            self._slid(path)
+        self.state[:], self.done = (place, rate), 0
+
+    def _slid(self, path) -> None:
+        """Move the memory of the contact along a slide, path (2,) [m], in a second."""
+        self.hub.follow_path(path, 1.0, self.model.kind, self.contact, None, GOAL * self.model.limit, np.zeros((2, 2)),
+                             np.zeros((2, 3)))
+
+    def books_anew(self) -> None:
+        """Begin the books here, with the energies that are there, at the start of a cycle of a drive that repeats."""
+        self.ledger[:], self.totals[:], self.second[:], self.done = 0.0, 0.0, 0.0, 0
+        self.ledger[0] = self.motion() + self.strained()
+
     def mark(self, cycles: int, window: int) -> Mark:
         """The Mark of the last `window` of `cycles` more cycles."""
         parts = deque(maxlen=window)
@@ -186,7 +204,7 @@ class Run:
             parts.append(self.cycle(self.prop.steps, 0, []))
             if self.outcome is not None:
                 break
-        return _mark(self, list(parts), [_extremes(rows, self.modes, self.prop.dt) for _, rows, _ in parts])
+        return mark_of(self, list(parts), [extremes_of(rows, self.modes, self.prop.dt) for _, rows, _ in parts])
 
     def table(self, count: int) -> tuple:
         """(table of `propagator.tables`, row of the next step in it) for `count` steps from here."""
@@ -332,7 +350,7 @@ def _thinned(rows, run) -> np.ndarray:
     kept[0] = True
     return np.flatnonzero(kept)[:MOST_TURNS]
 
-def _extremes(rows, modes, dt) -> tuple:
+def extremes_of(rows, modes, dt) -> tuple:
     """(smallest, largest) output of a cycle, found between the samples by the cubic through values and rates."""
     n = modes.omega.size
     y, v = rows[:, :n] @ modes.output, rows[:, n:2 * n] @ modes.output

@@ -53,7 +53,7 @@ def _finer_mesh(result, name: str, times: float) -> str:
 
 def _finer_motion(result, times: float) -> str:
     """What cures the errors of a motion that are `times` as large as allowed."""
-    if result.extra.get("engine") == "harmonic":
+    if result.extra.get("engine") == "harmonic" and result.extra.get("map") != "march":
         return "raise accuracy.harmonics"
     steps = result.extra.get("steps_per_cycle") or result.extra.get("steps")
     if steps is None:

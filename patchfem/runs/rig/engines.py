@@ -89,13 +89,15 @@ def _met(model: Model, steady: bool = False) -> tuple:
 
 
 def steady_by(model: Model) -> str:
-    """How the steady motion of a model is found: by the map of "events" or of "yields", which are exact, or by a
-    "balance" of harmonics.
+    """How the steady motion of a model is found: by the map of "events" or of "yields", which are exact, by a "balance"
+    of harmonics, or, over grooves where no balance knows the law, by a "march" that is brought to repeat.
 
     A scene that names its harmonics has its balance. So has one whose springs ring without end between yields.
     """
     if not no_closed_form(model, steady=True):
         return "events"
+    if model.grooves is not None and (model.soft or not methods.balances_over_grooves(model.friction)):
+        return "march"
     named = model.accuracy.harmonics is not None
     return "balance" if named or no_pieces(model) or pieces(model) > MOST_PIECES else "yields"
 

@@ -80,7 +80,7 @@ class Read:
 
     def between(self, window) -> dict:
         """What the peaks of a run may lie above its samples, and what its end at a sample leaves open, by name."""
-        found, steps = peaks_between(window), self.numerics.cycles * self.numerics.steps
+        found, steps = peaks_between(window, self.model.grooves is not None), self.numerics.cycles * self.numerics.steps
         late = end_error(window, self.model.rig.drive.period, steps - round(steps))
         late = {name: LATE * error for name, error in late.items()}
         return late | {name: error + late.get(name, 0.0) for name, error in found.items()}

@@ -13,7 +13,7 @@ from .pieces.costs import pieces, seconds_of_pieces, words
 from .smooth.choice import smooth_cost
 
 STEADY = {"events": "the map from event to event, exact", "yields": "the map from yield to yield, exact",
-          "balance": "harmonic balance"}
+          "balance": "harmonic balance", "march": "a march that is brought to repeat"}
 CLIMB = 3e-6  # seconds of a sample over grooves
 
 

@@ -133,6 +133,11 @@ def no_pieces(laws: list, soft: str, varies: str, apart: bool, waveform: str, sp
     return f"beside {spring}" if spring else ""
 
 
+def balances_over_grooves(law) -> bool:
+    """Whether the harmonic balance takes the law of a [friction] table along the flanks of grooves."""
+    return carries(law, "varying-load") and carries(law, "harmonic") and not has(law.law, "bonds")
+
+
 def _exact(m: Motion, method: str) -> str:
     waveform = m.drive.waveform if m.drive is not None and m.drive.kind != "free" else ""
     laws = [one.law for one in m.laws]
@@ -164,6 +169,8 @@ def _harmonic(m: Motion, method: str) -> str:
         return reason
     if not m.laws or not no_closed_form([one.law for one in m.laws], m.soft, "", False, "", m.spring):
         return ""
+    if m.spring.endswith("grooves]"):  # by a balance, or a march that is brought to repeat
+        return ""
     law = m.laws[0]
     if len(m.laws) > 1:
         if not no_pieces([one.law for one in m.laws], m.soft, "", False, "", m.spring):
@@ -174,10 +181,6 @@ def _harmonic(m: Motion, method: str) -> str:
         return unbuilt(f"'harmonic' with a law that jumps beside {m.spring}", "march or stiff")
     if not has(law.law, "set-valued") and not carries(law, "harmonic"):
         return f"'harmonic' with {named(law)}: use 'march', or {refusal('harmonic')}"
-    if m.spring.endswith("grooves]") and (has(law.law, "bonds") or not carries(law, "varying-load")):
-        return unbuilt(f"'harmonic' with law '{law.law}' beside {m.spring}", "march or stiff")
-    if m.spring.endswith("grooves]") and m.soft:
-        return unbuilt(f"'harmonic' with law '{law.law}' beside {m.spring} and {m.soft}", "march")
     beside = next((key for key in ("rest_growth", "breakaway") if getattr(law, key)), "")
     beside = f"friction.{beside}" if beside else m.soft or m.lower
     return unbuilt(f"'harmonic' with law '{law.law}' beside {beside}", "march") if has(law.law, "bonds") and beside \

@@ -1,5 +1,6 @@
 """The steady motion of laws with memory and of springs that bend, by harmonic balance; its curve through folds."""
 
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -24,6 +25,7 @@ from ..interface import contact_model, flank_of, model_of
 from ..solution import Solution, sampled_loop, seen
 from ..strips import other_measures
 from .curves import LAST, SHOWN, Shown, unlasting
+from .marched import disturbed, lasts
 
 ADRIFT = ("the steady motion that the balance found over the grooves does not last: another one is reached from rest; "
           'use accuracy.method = "march"')
@@ -75,7 +77,7 @@ class Balance:
         others = 2 * found.harmonics if self.climbing is not None else max(1, found.harmonics // 2)
         other = periodic_point(self.modes, drive, self.group, others, self.tolerance,
                                start=found if near is not None else None)
-        stable, notes = with_stability(found, self.modes), ()
+        stable, notes = self._judged(found, drive), ()
         if self.climbing is None and not stable.stable:
             found, stable, other, notes = self._lasting(drive, found, stable, other)
         values, response, book = self._measured(found, drive)
@@ -125,7 +127,16 @@ class Balance:
         """A point of a curve, its errors unknown."""
         found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance,
                                start=self._near(drive, near))
-        return self._shown(with_stability(found, self.modes))
+        return self._shown(self._judged(found, drive))
+
+    def _judged(self, found, drive):
+        """The Periodic with its multipliers; over grooves those of a march that begins in it, which leaves nothing of
+        the changing normal force out."""
+        if self.climbing is None:
+            return with_stability(found, self.modes)
+        sine = BaseSine(found.level, found.omega, drive.moving)
+        there = disturbed(self.modes, sine, self.climbing, found.modal)
+        return replace(found, multipliers=there, stable=lasts(there))
 
     def _shown(self, found) -> Shown:
         """What a Periodic with its multipliers shows."""
@@ -171,7 +182,8 @@ class Balance:
         first = BaseSine(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
         branch = branches.response(self.modes, first, self.group, (drive.low, drive.high), self.harmonics,
                                    self.tolerance, True)
-        points = [self._shown(one)._replace(regime="stable" if one.stable else "unstable") for one in branch.points]
+        found = branch.points if self.climbing is None else [self._judged(one, first) for one in branch.points]
+        points = [self._shown(one)._replace(regime="stable" if one.stable else "unstable") for one in found]
         return self._with_errors(points), branch.folds
 
     def _with_errors(self, points) -> list:

@@ -1,8 +1,8 @@
 """The engine `harmonic`: the steady motion of a scene found directly, and its curve over frequency or level.
 
 Coulomb interfaces by shooting on the map of their events (`events`), elastic-plastic elements on that of their yields
-(`yields`), other laws by harmonic balance (`balance`). What is found is a motion that repeats with the drive; its
-regime, multipliers and stability are named.
+(`yields`), other laws by harmonic balance (`balance`), some over grooves by a march (`marched`). What is found is a
+motion that repeats with the drive; its regime, multipliers and stability are named.
 """
 
 from dataclasses import replace
@@ -31,6 +31,10 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
         except NotConverged:
             if len(model.rig.interfaces) > 1:
                 raise
+    if by == "march":
+        from .marched import Marched
+
+        return _found(Marched(model, numerics, patch, frames, say), model)
     from .balance import Balance
 
     return _found(Balance(model, numerics, patch, say), model)

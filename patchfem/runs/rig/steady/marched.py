@@ -1,0 +1,137 @@
+"""The steady motion over grooves of laws that no balance takes: a march that is brought to repeat; its curve."""
+
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from ....core import NotConverged, Outcome, Start
+from ....dynamics.grooves.run import GroovesModel
+from ....dynamics.harmonic import orbits
+from ....dynamics.harmonic.floquet import is_stable
+from ....dynamics.harmonic.laws import synthesis
+from ....dynamics.march import march as hub
+from ....response.measures import peaks_between
+from ..interface import model_of
+from ..march import Read
+from ..solution import Solution
+from .curves import Shown, shown_of, traced, unlasting
+
+STEPS, MOST = 256, 4096  # of a cycle, at first and at most
+FINE = 512  # of a cycle of marches that a balance is disturbed in
+EXACT = 1024  # of a law without memory, whose steps their error chooses: samples
+READ = 1e-9  # relative error of a step's end
+LEFT = 0.1  # of the size of a motion: a march that is so far from it has left it
+LOOSE = 1e-6  # change from cycle to cycle, over the size of a motion, up to which it repeats
+ROUGH = 1e-2  # change of the multipliers beyond 1 that the steps of a march leave open
+
+
+class Marched:
+    """Laws over grooves by a march that is brought to repeat."""
+
+    tries_another = True
+
+    def __init__(self, model, numerics, patch, frames: int = 0, say=None):
+        self.model, self.patch, self.frames = model, patch, frames
+        self.contact = model_of(model, numerics, patch)
+        exact = self.contact.set_valued
+        self.steps = model.accuracy.steps_per_cycle or (EXACT if exact else STEPS)
+        self.numerics = replace(numerics, cycles=1.0, window=1)
+        hub.warm_up(model.rig.modes, model.rig.drive, self.contact, say)
+
+    def _run(self, drive, near, steps: int):
+        """A Run that repeats, from the Run `near` as it stands or from rest."""
+        run = hub.fresh(self.model.rig.modes, drive, self.contact, steps, self.model.rig.travel)
+        if near is not None:
+            run.contact = type(near.contact)(*(array.copy() for array in near.contact))
+            run.state[:] = near.state
+            run.placed(*near.state)
+        left = orbits.settled(run)
+        if run.outcome is not None and run.outcome is not Outcome.EXCEEDS_TRAVEL:
+            raise NotConverged(run.message)
+        if run.outcome is None and left > LOOSE:
+            raise NotConverged(f"no motion repeats within {orbits.MOST} cycles: from one to the next it changes by "
+                               f"{left:.2g} of its size; use accuracy.method = \"march\"")
+        return run, left
+
+    def _read(self, run, steps: int, frames: int = 0) -> tuple:
+        """(measures by name, Mark of a cycle, snapshots, whether it sticks)."""
+        mark, snapshots = orbits.shown(run, frames)
+        read = Read(self.model, replace(self.numerics, steps=steps), self.patch, self.contact)
+        stuck = bool(np.ptp(mark.window.slip) <= read.held) and not read.creeps
+        values = read.values(mark, mark.amplitudes, None, stuck, drive=run.drive)
+        return values | {"drift_per_cycle": 0.0}, mark, snapshots, stuck
+
+    def point(self, drive, near=None) -> tuple:
+        """The steady motion as a cycle of it, and the Run that goes on in it; steps are doubled until half of them
+        change its amplitude by less than the tolerance, which is the error of every measure."""
+        begin, name = perf_counter(), "relative_displacement_amplitude"
+        run, left = self._run(drive, near, self.steps)
+        half = self._read(self._run(drive, run, self.steps // 2)[0], self.steps // 2)[0]
+        steps, read = self.steps, self._read(run, self.steps, self.frames)
+        while self._rough(read[0][name], half[name]) and run.outcome is None:
+            if 2 * steps > MOST or self.model.accuracy.steps_per_cycle is not None:
+                break
+            steps, half = 2 * steps, read[0]
+            run, left = self._run(drive, run, steps)
+            read = self._read(run, steps, self.frames)
+        values, mark, snapshots, stuck = read
+        between = peaks_between(mark.window, True)
+        found = orbits.multipliers(run) if run.outcome is None else np.zeros(0)
+        regime = "stuck" if stuck else "stick-slip" if values.get("stick_fraction") else "sliding"
+        outcome, message = run.outcome or (Outcome.STUCK if stuck else Outcome.STEADY), run.message
+        if not stuck and np.abs(found).max(initial=0.0) > 1 + ROUGH:
+            outcome, message, regime = Outcome.NOT_CONVERGED, unlasting(found), f"{regime}, unstable"
+        errors = {key: abs(v - half.get(key, v)) + abs(v) * (left + READ) + between.get(key, 0.0)
+                  for key, v in values.items() if v is not None}
+        if "slip_start_phase" in errors:
+            errors["slip_start_phase"] = min(errors["slip_start_phase"], np.pi / 2) + 2 * np.pi / steps
+        extra = {"regime": regime, "multipliers": found, "residual": left, "map": "march", "steps_per_cycle": steps}
+        return Solution(values, mark.window, mark.window, np.array([values[name]]), (None, None), outcome, snapshots,
+                        mark.ledger, perf_counter() - begin, self.contact, message=message, errors=errors,
+                        extra=extra), run
+
+    def _rough(self, value: float, half: float) -> bool:
+        return abs(value - half) > self.model.accuracy.tolerance * abs(value)
+
+    def shown(self, drive, near=None) -> Shown:
+        """A point of a curve."""
+        try:
+            return shown_of(drive, *self.point(drive, near))
+        except NotConverged:
+            if near is None:
+                raise
+        return shown_of(drive, *self.point(drive))
+
+    def curve(self, drive) -> tuple:
+        """(points of the curve over the frequency, each found from the one before it, no folds)."""
+        return traced(self.model.rig.modes, drive, self.shown), ()
+
+
+def disturbed(modes, drive, contact, motion) -> np.ndarray:
+    """Multipliers of a motion that repeats with the drive, by marches of a contact that begin in it.
+
+    motion: harmonics (H + 1, n) of the modal coordinates [m]. The contact is slid along it for two cycles. Where a
+    march leaves the motion, by LEFT of its size, only the pace is told at which it does so, (1,): what it misses after
+    a cycle over what it missed before.
+    """
+    turn = 1j * np.arange(len(motion)) * drive.omega
+    run = hub.fresh(modes, drive, contact, FINE, start=Start(motion.sum(axis=0).real, (turn @ motion).real))
+    slide = synthesis(motion.T, FINE).T @ modes.slide
+    before = np.concatenate([np.linspace(0.0, slide[0], FINE // 8, endpoint=False), slide, slide, slide[:1]])
+    if not isinstance(contact, GroovesModel):
+        run.contact = contact.build(run.hub)[0]
+        run.hub.follow_path(before, drive.period / FINE, contact.kind, run.contact, None, hub.GOAL * contact.limit,
+                            np.zeros((before.size, 2)), np.zeros((before.size, 3)))
+    run.placed(*run.state)
+    gone = orbits.departures(run)
+    size = np.abs(motion[1:]).sum(axis=0).max()
+    if gone.max() > LEFT * size:
+        last = int(np.argmax(gone > LEFT * size))
+        return np.array([(gone[last] / gone[0])**(1 / last) if last > 0 else gone[0] / (LEFT * size)])
+    return orbits.multipliers(run)
+
+
+def lasts(found) -> bool:
+    """Whether no disturbance grows, but for what the steps of a march leave open."""
+    return is_stable(found / (1 + ROUGH)) if found.size else True
