@@ -1,9 +1,11 @@
 """The reference of keys, effects and measures: it agrees with the records it is made from, and leaves nothing out."""
 
 import pytest
+from scene_texts import SMALL_PATCH, STRUCTURE
 
-from patchfem.effects import EFFECTS
-from patchfem.export.reference import FILE, tables, text
+from patchfem.effects import EFFECTS, LAWS
+from patchfem.export.reference import limits, records
+from patchfem.export.reference.keys import FILE, tables, text
 from patchfem.response.rows import TABLE as MOTION
 from patchfem.runs.results.patch_rows import TABLE as STATIC
 from patchfem.scene.keys import meanings
@@ -12,6 +14,7 @@ from patchfem.scene.keys.meanings import CONDITIONS, MEANINGS, meaning
 from patchfem.scene.keys.quantities import KINDS, parse
 from patchfem.scene.keys.types import keys, kind_of, model_of
 from patchfem.scene.reader import is_value, owner_of
+from patchfem.scene.scene import SceneError, loads
 
 PAGE = text()
 
@@ -30,6 +33,8 @@ def section(header: str) -> list:
 
 
 def test_exact_the_committed_file_is_what_the_records_say():
+    for page in (records.Measures, records.Materials, limits):
+        assert page.FILE.read_text("utf-8") == page.text(), "run python -m patchfem.export.reference"
     assert FILE.read_text("utf-8") == PAGE, "run python -m patchfem.export.reference"
 
 
@@ -54,8 +59,10 @@ def test_refuses_a_key_without_a_sentence(monkeypatch):
 def test_exact_nothing_is_left_out():
     for header, _ in tables():
         assert not header or f"`{header}`" in PAGE, header
-    for name in (*MATERIALS, *STATIC, *MOTION, *(name for name in EFFECTS if "structure.interface." not in name)):
-        assert f"| `{name}` |" in PAGE, name
+    for page, names in ((PAGE, [name for name in EFFECTS if "structure.interface." not in name]),
+                        (records.Materials.text(), MATERIALS), (records.Measures.text(), [*STATIC, *MOTION])):
+        for name in names:
+            assert f"| `{name}` |" in page, name
     for kind, units in KINDS.items():
         row = next(line for line in PAGE.splitlines() if line.startswith(f"| {kind} | `"))
         assert all(f"`{unit}`" in row for unit in units)
@@ -89,3 +96,43 @@ def test_exact_items_of_an_array_go_by_number_or_name():
         assert kind_of(*owner_of(path)) == "frequency"
     assert kind_of(*owner_of("drive.levels.2")) == kind_of(*owner_of("drive.levels")) == "acceleration"
     assert owner_of("structure.mode.axial.frequenzy")[0] is None and owner_of("contact.tillt")[0] is None
+
+
+def limits_at(title: str) -> dict:
+    """(law, heading) -> cell of a table of the page of limits."""
+    lines = limits.FILE.read_text("utf-8").split(f"\n## {title}\n")[1].split("\n#")[0].splitlines()
+    head, _, *rows = [[cell.strip() for cell in line[1:-1].split(" | ")] for line in lines if line.startswith("|")]
+    return {(row[0], name): cell for row in rows for name, cell in zip(head[1:], row[1:], strict=True)}
+
+
+def test_exact_the_page_of_limits_says_what_a_scene_is_answered():
+    """Of scenes written here anew: what it calls "no" is refused with its sentence, what it calls "yes" is not."""
+    cells = limits_at("Laws in a rig") | limits_at("Laws in a rig, further") | limits_at("Methods")
+    assert {law.partition(",")[0] for law, _ in cells} == set(LAWS)
+    said = limits.FILE.read_text("utf-8")
+    lugre, lower = 'stiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"\n', "shapes on the lower piece"
+    for law, keys_of, beside, sets, more in (
+            ("coulomb", "", "`[contact.shear]`", [], "[contact.shear]\n"),
+            ("lugre", lugre, "`[contact.shear]`", [], "[contact.shear]\n"),
+            ("tanh", 'reference_speed = "1 mm/s"\n', lower, ["contact.tilt.on=lower"], ""),
+            ("nonlocal", 'bond_length = "1 um"\n', lower, ["contact.tilt.on=lower"], "")):
+        text = f'{SMALL_PATCH}{more}[friction]\nlaw = "{law}"\nstatic = 0.3\n{keys_of}{STRUCTURE}'
+        cell = cells[law, beside]
+        try:
+            loads(text, sets=sets)
+            assert cell == "yes"
+        except SceneError as error:
+            words, number = cell.split()
+            line = said.split(f"\n{number}. ")[1].split("\n")[0]
+            assert words == "no" and line.rpartition(": ")[2] == str(error).rpartition(": ")[2]
+    assert cells["coulomb", "`exact`"] == "yes" and cells["tanh", "`exact`"].startswith("no")
+
+
+def test_always_the_page_of_limits_has_every_bound_of_whole_numbers():
+    page = limits.FILE.read_text("utf-8")
+    for header, model in tables():
+        for key, name in keys(model).items():
+            if model.model_fields[name].annotation is int:
+                assert f"| `{header.strip('[]')}.{key}` | whole number, >= " in page, key
+    for number, line in enumerate(page.split("### What is said\n\n")[1].split("\n\n")[0].splitlines(), 1):
+        assert line.startswith(f"{number}. ") and " law law" not in line and "law use" not in line

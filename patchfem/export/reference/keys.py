@@ -1,57 +1,41 @@
-"""The reference of what a scene may say and a run may answer, generated from the records that the program itself reads.
-
-`python -m patchfem.export.reference` writes patchfem/scene/README.md anew.
-"""
+"""The reference of what a scene may say: tables, keys, effects and units."""
 
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, get_args, get_origin
 
-from ..effects import EFFECTS, WAVEFORMS
-from ..response.rows import ROWS as MOTION
-from ..runs.results.patch_rows import ROWS as STATIC
-from ..scene.keys.contact import Coating, Material
-from ..scene.keys.materials import MATERIALS
-from ..scene.keys.meanings import CONDITIONS, meaning
-from ..scene.keys.quantities import EXAMPLES, KINDS
-from ..scene.keys.tables import Tables
-from ..scene.keys.types import keys, kind_of, model_of, parts
-from ..scene.reader import is_value
-from ..scene.rules.draft import ASPERITIES, LAWS, SLIDES
-from ..scene.rules.limits import NOT_YET_BUILT
+from ...effects import EFFECTS, WAVEFORMS
+from ...scene.keys.contact import Coating, Material
+from ...scene.keys.meanings import CONDITIONS, meaning
+from ...scene.keys.quantities import EXAMPLES, KINDS
+from ...scene.keys.tables import Tables
+from ...scene.keys.types import keys, kind_of, model_of, parts
+from ...scene.reader import is_value
+from ...scene.rules.draft import ASPERITIES, LAWS, SLIDES
+from ...scene.rules.limits import NOT_YET_BUILT
 
-FILE = Path(__file__).parents[1] / "scene" / "README.md"
+FOLDER = Path(__file__).parents[2] / "scene"
+FILE = FOLDER / "README.md"
 NEEDS = {"friction.law": LAWS, "slide.kind": SLIDES, "contact.asperities.law": ASPERITIES,
          "drive.waveform": {name: one.keys for name, one in WAVEFORMS.items()}}
 SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 HEAD = """\
-# What a scene may say, and what a run answers
+# What a scene may say
 
 Generated from the program's own records by `python -m patchfem.export.reference`; a test holds the two together.
 A quantity is a text of one number and one unit, `"12.7 mm"`; the units of each kind stand below. A table named in a
 scene acts, one left out does not exist. A key that only some values of a selector need names them under "required".
-"""
-MEASURED = """\
-Values are in SI. The error is an estimated half-width; it is to stay below tolerance × |value| + floor, else a warning
-says so. Measures of a motion are those of the last cycles, the last ten or the last tenth of a shorter run. A number
-behind a name counts the interfaces (strips, where strips slide apart): `slip_amplitude_2` is that of the second. Of a
-displacement the floor is 1e-5 of what the drive itself moves, a/omega^2, where that is less.
+
+[The guide](GUIDE.md) explains; [what a run answers](MEASURES.md), [materials by name](MATERIALS.md) and
+[what it cannot do](LIMITS.md) have pages of their own.
 """
 
 
 def text() -> str:
     """The whole page of patchfem/scene/README.md, from the records that the program reads."""
     units = [(kind, ", ".join(f"`{unit}`" for unit in units), f'`"{EXAMPLES[kind]}"`') for kind, units in KINDS.items()]
-    stuff = [(f"`{name}`", *(f"{value:g}" for value in (m.young / 1e9, *m[1:3])), m.source)
-             for name, m in MATERIALS.items()]
-    still, moving = ([(f"`{one.name}`", one.unit, f"{one.floor:g}", one.text) for one in rows]
-                     for rows in (STATIC, MOTION))
-    head = ("measure", "unit", "floor", "meaning")
     sections = [HEAD, "## Tables and keys", *_keys(), "## Effects", _effects(),
-                "## Units", _table(("kind", "units, the first in SI", "example"), units),
-                "## Materials", _table(("name", "young [GPa]", "poisson", "density [kg/m^3]", "source"), stuff),
-                "## Measures", MEASURED, "### Of a pressed patch", _table(head, still),
-                "### Of a motion", _table(head, moving)]
+                "## Units", grid(("kind", "units, the first in SI", "example"), units)]
     return "\n\n".join(section.strip("\n") for section in sections) + "\n"
 
 
@@ -86,7 +70,7 @@ def _keys() -> list:
             about += " Not yet built."
         out += ["### " + (", ".join(f"`{header}`" for header in named) if model is not Tables else "At the top"), about]
         if own:
-            out.append(_table(("key", "kind", "default", "required", "meaning"),
+            out.append(grid(("key", "kind", "default", "required", "meaning"),
                               [_row(model, key, named[0].strip("[]")) for key in own]))
     return out
 
@@ -129,11 +113,27 @@ def _kind(model: type, name: str) -> str:
         words.append("number" if float in types else "whole number" if int in types else "text")
     arrays = [get_args(part) for part in types if get_origin(part) is tuple]
     many = "" if not arrays else "list of " if ... in arrays[0] else "pair of "
-    marks = [inner for mark in (*model.model_fields[name].metadata, *types)
+    return ", ".join([many + ", ".join(dict.fromkeys(words)), *_limits(model, name)])
+
+
+def _limits(model: type, name: str) -> list:
+    """Bounds of a key, as ">= 1"."""
+    annotation = model.model_fields[name].annotation
+    marks = [inner for mark in (*model.model_fields[name].metadata, annotation, *parts(annotation))
              for inner in (mark, *getattr(mark, "metadata", ()))]
-    limits = [f"{sign} {getattr(mark, word):.15g}" for mark in marks for word, sign in SIGNS.items()
-              if isinstance(getattr(mark, word, None), int | float)]
-    return ", ".join([many + ", ".join(dict.fromkeys(words)), *dict.fromkeys(limits)])
+    return list(dict.fromkeys(f"{sign} {getattr(mark, word):.15g}" for mark in marks for word, sign in SIGNS.items()
+                              if isinstance(getattr(mark, word, None), int | float)))
+
+
+def bounds() -> Iterator[tuple]:
+    """(dotted key, kind with its bounds) of every key that is a whole number or has an upper bound."""
+    for header, model in tables():
+        for key, name in keys(model).items():
+            if _is_table(model, name):
+                continue
+            said, bound = _kind(model, name), _limits(model, name)
+            if bound and ("whole number" in said or any(one.startswith("<") for one in bound)):
+                yield f"{header.strip('[]')}.{key}".strip("."), said
 
 
 def _effects() -> str:
@@ -142,14 +142,10 @@ def _effects() -> str:
         selector, _, value = name.partition("=")
         used = [words.replace(" ", ", ") for words in NEEDS.get(selector, {}).get(value, ("", ""))]
         rows += [(f"`{name}`", *used, effect.equations)] if not name.startswith("structure.interface.") else []
-    return _table(("effect", "needs", "may have", "equations"), rows)
+    return grid(("effect", "needs", "may have", "equations"), rows)
 
 
-def _table(head: tuple, rows: list) -> str:
+def grid(head: tuple, rows: list) -> str:
+    """A table of Markdown: its head and rows of texts."""
     lines = [head, ("---",) * len(head), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-if __name__ == "__main__":
-    FILE.write_text(text(), encoding="utf-8")
-    print(FILE)

@@ -1,0 +1,58 @@
+"""The pages of measures and of materials."""
+
+from ...response.rows import ROWS as MOTION
+from ...runs.results.patch_rows import ROWS as STATIC
+from ...scene.keys.materials import MATERIALS, THERMAL
+from .keys import FOLDER, grid
+
+MADE = "Generated from the program's own records by `python -m patchfem.export.reference`; a test compares the two."
+
+
+class Measures:
+    """What a run answers: every measure of `response.rows` and `runs.results.patch_rows`."""
+
+    FILE = FOLDER / "MEASURES.md"
+    HEAD = f"""\
+# What a run answers
+
+{MADE}
+Values are in SI. The error is an estimated half-width; it is to stay below tolerance × |value| + floor, else a warning
+says so. Measures of a motion are those of the last cycles, the last ten or the last tenth of a shorter run. A number
+behind a name counts the interfaces (strips, where strips slide apart): `slip_amplitude_2` is that of the second. Of a
+displacement the floor is 1e-5 of what the drive itself moves, a/omega^2, where that is less.
+"""
+
+    @classmethod
+    def text(cls) -> str:
+        """The whole page."""
+        still, moving = ([(f"`{one.name}`", one.unit, f"{one.floor:g}", one.text) for one in rows]
+                         for rows in (STATIC, MOTION))
+        head = ("measure", "unit", "floor", "meaning")
+        return "\n\n".join([cls.HEAD.strip(), "## Of a pressed patch", grid(head, still), "## Of a motion",
+                            grid(head, moving)]) + "\n"
+
+
+class Materials:
+    """The materials that a scene may name."""
+
+    FILE = FOLDER / "MATERIALS.md"
+    HEAD = f"""\
+# Materials by name
+
+{MADE}
+A name stands in `contact.substrate` and in a coating's `material`; a table
+`{{young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"}}` in its place is a material of your own. Elastic
+constants of one alloy differ by a few per cent between handbooks and by far more in a sprayed coating: where a number
+decides, measure it.
+"""
+
+    @classmethod
+    def text(cls) -> str:
+        """The whole page."""
+        rows = [(f"`{name}`", *(f"{value:g}" for value in (m.young / 1e9, *m[1:3])), m.source)
+                for name, m in MATERIALS.items()]
+        warm = [(f"`{name}`", f"{t.conductivity:g}", f"{t.heat_capacity:g}", t.source) for name, t in THERMAL.items()]
+        heads = (("name", "young [GPa]", "poisson", "density [kg/m^3]", "source"),
+                 ("name", "conductivity [W/(m K)]", "heat capacity [J/(kg K)]", "source"))
+        return "\n\n".join([cls.HEAD.strip(), grid(heads[0], rows), "## Heat", "For the note on how far friction warms "
+                            "the faces, beside `[friction.temperature]`.", grid(heads[1], warm)]) + "\n"

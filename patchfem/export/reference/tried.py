@@ -1,0 +1,124 @@
+"""What stands together, by asking: scenes are put together from a law and what may stand beside it, and read."""
+
+import re
+from functools import cache
+from typing import NamedTuple
+
+from ...effects import LAWS
+from ...scene.rules.limits import sideways
+from ...scene.scene import SceneError, loads
+
+PATCH = """\
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "26 lbf"
+substrate = "steel"
+[contact.crown]
+radius = "1 m"
+"""
+POINT = '[normal]\nload = "26 lbf"\n'
+RIG = """\
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 20
+"""
+BENCH = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\n'
+MASSES = """\
+[structure]
+masses = ["1 kg", "1 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "1e6 N/m"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "1e6 N/m"
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 20
+"""
+GROOVES = '[{}.grooves]\nwavelength = "80 um"\namplitude = "2 um"\n'
+STRIPS = "[contact.strips]\ncount = 4\n"
+VALUES = {"reference_speed": '"1 mm/s"', "stiffness": '"1e7 N/m"', "chi": "-0.5", "beta": "0.5", "exponent": "1.0",
+          "stribeck_speed": '"1 mm/s"', "bond_length": '"1 um"'}
+FORMS = {"nonlocal": {"nonlocal": "", "nonlocal, order 2": "order = 2\n",
+                      "nonlocal, as printed": 'reading = "report"\n', "nonlocal, breakaway": "breakaway = 0.2\n"}}
+METHODS = ("auto", "exact", "march", "harmonic", "duhamel", "newmark", "euler")
+
+
+class Beside(NamedTuple):
+    """A heading; the text of a scene without its law, and what is set in it."""
+
+    words: str
+    text: str
+    sets: tuple = ()
+
+
+RIGS = (Beside("one point", POINT + RIG), Beside("a patch", PATCH + RIG),
+        Beside("`[contact.shear]`", PATCH + "[contact.shear]\n" + RIG),
+        Beside("`[contact.strips]`", PATCH + STRIPS + RIG),
+        Beside("strips and shear", PATCH + STRIPS + "[contact.shear]\n" + RIG),
+        Beside("strips that yaw", PATCH + STRIPS + RIG, ("structure.mode.axial.yaw=2 rad/m",)),
+        Beside("shapes on the lower piece", PATCH + RIG, ("contact.crown.on=lower",)),
+        Beside("a load that changes", POINT + RIG, ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
+        Beside("heave or pitch", PATCH + RIG, ("structure.mode.axial.pitch=1 rad/m",)),
+        Beside("pitch and shear", PATCH + "[contact.shear]\n" + RIG, ("structure.mode.axial.pitch=1 rad/m",)))
+MORE = (Beside("grooves of a point", POINT + GROOVES.format("normal") + RIG),
+        Beside("grooves and shear", PATCH + GROOVES.format("contact") + "[contact.shear]\n" + RIG),
+        Beside("a cubic spring", POINT + RIG, ("structure.stiffening.cubic=1e10 N/m^3",)),
+        Beside("an interlocking spring", POINT + RIG, ("structure.bonded.stiffness=1e5 N/m",
+                                                       "structure.bonded.wavelength=80 um")),
+        Beside("several interfaces", MASSES), Beside("`[wear]`", PATCH + RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\n'
+                                                     "cycles = 1000\n"))
+BENCHES = (Beside("one point", POINT + BENCH), Beside("a patch", PATCH + BENCH),
+           Beside("`[contact.shear]`", PATCH + "[contact.shear]\n" + BENCH),
+           Beside("`[contact.strips]`", PATCH + STRIPS + BENCH),
+           Beside("shapes on the lower piece", PATCH + BENCH, ("contact.crown.on=lower",)),
+           Beside("a load that changes", POINT + BENCH, ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
+           Beside("grooves", POINT + GROOVES.format("normal") + BENCH),
+           Beside("grooves and shear", PATCH + GROOVES.format("contact") + "[contact.shear]\n" + BENCH),
+           Beside("`[wear]`", PATCH + BENCH + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'))
+
+
+def laws() -> dict:
+    """Name of a form of a law -> the keys that a table of it holds."""
+    out = {}
+    for law, effect in LAWS.items():
+        needed = "".join(f"{key} = {VALUES[key]}\n" for key in effect.keys[0].split() if key in VALUES)
+        for name, more in FORMS.get(law, {law: ""}).items():
+            out[name] = f'law = "{law}"\nstatic = 0.3\n{needed}{more}'
+    return out
+
+
+@cache
+def refused(keys: str, beside: Beside, method: str = "") -> tuple:
+    """Sentences with which a scene is refused, without their places; () where it is read without a mistake."""
+    if "masses" in beside.text:
+        text = beside.text + "".join(f'[[structure.interface]]\nbetween = [{k}, 0]\nload = "100 N"\n{keys}'
+                                     for k in (1, 2))
+    else:
+        text = beside.text + f"[friction]\n{keys}"
+    sets = (*beside.sets, *([f"accuracy.method={method}"] if method else ()))
+    try:
+        loads(text, sets=sets)
+    except SceneError as error:
+        return tuple(re.sub(r"^[^:]*(?::\d+)?: ", "", line) for line in error.mistakes)
+    return ()
+
+
+def across(keys: str) -> tuple:
+    """Why a bench of one point with this law does not slide in two directions; () where it does."""
+    reason = sideways(loads(POINT + BENCH + f"[friction]\n{keys}").tables())
+    return (f"slide.file: {reason}",) if reason else ()
