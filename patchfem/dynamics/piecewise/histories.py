@@ -22,6 +22,9 @@ SLIPS = 0.5  # share of the slide that is irreversible from which an interface s
 # largest piece times rate for which g Gauss points, g = 0 to 12, integrate a product of two motions to 1e-14
 GAUSS = np.array([0.0] + [0.5 * (1e-14 * (2 * g + 1) * factorial(2 * g)**3 / factorial(g)**4)**(1 / (2 * g))
                           for g in range(1, 13)])
+PLACE, WEIGHT = np.zeros((2, GAUSS.size, GAUSS.size))  # of g Gauss points on [-1, 1], in row g
+for _g in range(1, GAUSS.size):
+    PLACE[_g, :_g], WEIGHT[_g, :_g] = np.polynomial.legendre.leggauss(_g)
 
 
 class Loop(NamedTuple):
@@ -323,11 +326,8 @@ class _Run:
         count = np.minimum(np.searchsorted(GAUSS, rate * rows[:, 1]), GAUSS.size - 1).clip(2)
         owner = np.repeat(np.arange(len(rows)), count)
         each = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
-        place, weight = np.zeros((2, GAUSS.size, GAUSS.size))
-        for g in set(count.tolist()):
-            place[g, :g], weight[g, :g] = np.polynomial.legendre.leggauss(g)
         half = rows[owner, 1] / 2
-        return owner, half * (1 + place[count[owner], each]), half * weight[count[owner], each]
+        return owner, half * (1 + PLACE[count[owner], each]), half * WEIGHT[count[owner], each]
 
     def _drift(self, time, weight, slide, start: float, end: float, ends) -> float:
         """Mean of a slide in the last cycle of [start, end] less that in the first, per cycle between them [m]; in

@@ -26,7 +26,8 @@ class Cluster:
         if not address:
             import dask
 
-            dask.config.set({"distributed.scheduler.allowed-failures": 0})  # tries are counted by the sweep
+            # tries are counted by the sweep; a profile of the workers, which nobody sees, is a third of a chunk's way
+            dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.worker.profile.enabled": False})
             self.own = distributed.LocalCluster(workers or os.cpu_count() or 1, threads_per_worker=1, processes=True,
                                                 dashboard_address=":0", silence_logs="CRITICAL")
         try:
