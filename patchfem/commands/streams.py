@@ -1,8 +1,11 @@
 """The streams of a process, made fit for whatever the command line is started with: closed, full, or of few signs."""
 
 import os
+import re
 import sys
 import warnings
+
+LONG = re.compile(r"\S{401,}")  # longer than any path that a person reads; a key or a value may have megabytes
 
 
 def ready() -> None:
@@ -30,5 +33,7 @@ def ready() -> None:
 
 
 def plain(text: str) -> str:
-    """One line of a text in which no sign moves the cursor: what cannot be printed is a question mark."""
-    return "".join(sign if sign.isprintable() else "?" for sign in text)
+    """One line of a text in which no sign moves the cursor: what cannot be printed is a question mark, and of a word
+    beyond 400 letters the first and the last are shown."""
+    shown = LONG.sub(lambda found: f"{found[0][:60]}...{found[0][-20:]} ({len(found[0])} letters)", text)
+    return "".join(sign if sign.isprintable() else "?" for sign in shown)

@@ -36,6 +36,8 @@ def whole(path, need: int | None = None) -> Iterator[Path]:
     cannot be written; for a full disk, a quota or a limit on file sizes it names the path, the need and the room.
     """
     path = Path(path)
+    if path.is_dir():
+        raise Unwritten(f"{shown(path)}: cannot be written (it is a folder; name a file)")
     if _direct(path):
         try:
             yield path

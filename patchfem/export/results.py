@@ -33,7 +33,7 @@ class Folder:
         self.target = Path(os.path.abspath(target)).resolve()
         self.path = self.target.parent / (self.target.name + ".partial")
         self.shown, self.resume = target, resume
-        self.claim = Claim(self.target.with_name(f".{self.target.name}{LOCK}"), target, "run")
+        self.claim = Claim(self.target.parent / f".{self.target.name}{LOCK}", target, "run")
 
     def __enter__(self) -> "Folder":
         if not self.target.name:

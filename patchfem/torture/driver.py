@@ -28,6 +28,7 @@ class Campaign(NamedTuple):
 CAMPAIGNS = {
     "grammar": Campaign(7000, "scenes.by_grammar", "scenes with wrong keys and values"),
     "bytes": Campaign(3000, "scenes.by_bytes", "scenes with wrong bytes"),
+    "words": Campaign(1000, "words.lines", "command lines with odd words"),
     "profiles": Campaign(1000, "tables.profiles", "traces of a surface"),
     "instruments": Campaign(1000, "tables.instruments", "scans as instruments write them"),
     "signals": Campaign(1000, "tables.signals", "recorded drives"),
