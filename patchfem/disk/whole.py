@@ -36,7 +36,7 @@ def whole(path, need: int | None = None) -> Iterator[Path]:
     cannot be written; for a full disk, a quota or a limit on file sizes it names the path, the need and the room.
     """
     path = Path(path)
-    if path.is_dir():
+    if os.path.isdir(path):
         raise Unwritten(f"{shown(path)}: cannot be written (it is a folder; name a file)")
     if _direct(path):
         try:
