@@ -9,7 +9,7 @@ from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, 
 
 
 def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False,
-        resume: flag("go on with an interrupted run that has [wear]") = False,
+        resume: flag("go on with an interrupted run that has [wear] or marches in time") = False,
         fresh: flag("condense the pieces anew, whatever is kept of them") = False,
         no_page: NoPage = False, quiet: Quiet = False,
         verbose: flag("where the seconds go, beside the answer", "-v", "--verbose") = False):
@@ -17,13 +17,14 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
 
     Example: patchfem run rig.toml --set "drive.acceleration=6 g" -o out/six
     """
-    from ..export.folder import run_into
+    from ..export.folder import keeps, run_into
     from ..runs.plan import plan as make
 
     talk = (lambda text: None) if quiet else say
     what = make(scene_of(scene, set_))
-    if resume and (what.model.wear is None or what.model.patch is None):
-        raise Refused("run --resume: only a run with [wear] on a patch keeps its state; run the scene again")
+    if resume and not keeps(what):
+        raise Refused("run --resume: only a run with [wear] on a patch or a march in time keeps its state; run the "
+                      "scene again")
     if verbose:
         talk(f"about {what.seconds:.1f} s, {what.steps} steps, engine {what.engine}")
     target = out if out is not None else Path("out") / what.model.source.path.stem

@@ -9,7 +9,7 @@ from .. import __version__
 from ..core import Missing
 from ..disk.whole import write_text
 from ..runs.results.result import Result
-from ..runs.run import Kept, run
+from ..runs.run import Kept, marches, run
 from . import netcdf
 from .histories import contents
 from .results import PAGE, STATE, Folder
@@ -33,13 +33,18 @@ def run_into(what, target: Path, say=None, progress=None, fresh: bool = False, r
     """Run a plan into the results folder `target`; its page is left to `write_page`.
 
     The folder is claimed first. An older folder of results is replaced only when the new one is whole, and a folder
-    with other files is refused before anything runs. A run with [wear] keeps its state in the folder, from which it
-    goes on with `resume`; PatchfemError where there is none.
+    with other files is refused before anything runs. A run with [wear] and a long march keep their state in the folder,
+    from which they go on with `resume`; PatchfemError where there is none.
     """
     with Folder(target, resume) as folder:
-        kept = Kept(folder.path / STATE, __version__, resume) if what.model.wear is not None else None
+        kept = Kept(folder.path / STATE, __version__, resume) if keeps(what) else None
         result = run(what, say, progress, fresh=fresh, kept=kept)
         return write(result, folder.path)
+
+
+def keeps(what) -> bool:
+    """Whether the run of a plan keeps its state on the way."""
+    return (what.model.wear is not None and what.model.patch is not None) or marches(what)
 
 
 def write(result: Result, path: Path) -> Written:

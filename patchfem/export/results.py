@@ -4,6 +4,7 @@ Only folders that hold nothing but patchfem results are ever replaced; anything 
 """
 
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -18,7 +19,7 @@ FILES = ("summary.json", "result.nc", "fields.vtkhdf", PAGE, "scene.resolved.tom
          "starts.json", "compare.json", "surface_before.csv", "surface_after.csv", "profile.json")
 LOCK = ".writer"
 STATE, STARTS = "wear.npz", "starts.json"
-STATES = (STATE, STARTS)  # of an interrupted run or fit, from which it goes on
+STATES = re.compile(r"wear\.npz|starts\.json|march_\d+\.npz")  # of an interrupted run or fit, from which it goes on
 
 
 class Folder:
@@ -65,8 +66,9 @@ class Folder:
                 if kind is not None:
                     self._abandon()
                     return
-                for state in (*STATES, LOCK):
-                    (self.path / state).unlink(missing_ok=True)
+                for part in self.path.iterdir():
+                    if is_state(part.name) or part.name == LOCK:
+                        part.unlink()
                 put(self.path, self.target)
             except OSError as error:
                 raise Missing(f"{self.shown}: the results cannot be put in place ({error.strerror}); they are in "
@@ -80,13 +82,18 @@ class Folder:
 
     def _abandon(self) -> None:
         """Remove everything but a kept state; the folder too where there is none."""
-        if not any((self.path / state).is_file() for state in STATES):
+        if not any(is_state(part.name) for part in self.path.iterdir()):
             shutil.rmtree(self.path, ignore_errors=True)
             return
         KEPT.append(self.path)
         for part in self.path.iterdir():
-            if part.name not in STATES:
+            if not is_state(part.name):
                 shutil.rmtree(part, ignore_errors=True) if part.is_dir() else part.unlink(missing_ok=True)
+
+
+def is_state(name: str) -> bool:
+    """Whether a file of this name is the state of an interrupted run."""
+    return STATES.fullmatch(name) is not None
 
 
 def refuse_others(place: Path, shown, known, kind: str, dots: bool = False) -> None:
@@ -100,7 +107,7 @@ def refuse_others(place: Path, shown, known, kind: str, dots: bool = False) -> N
     if not place.is_dir():
         raise PatchfemError(f"{shown}: {place.name} is a file, a folder is wanted; name another -o")
     others = sorted(one.name for one in place.iterdir() if one.name.removesuffix(".partial") not in known
-                    and not unfinished(one.name) and not (dots and one.name.startswith(".")))
+                    and not (unfinished(one.name) or is_state(one.name)) and not (dots and one.name.startswith(".")))
     if others:
         raise PatchfemError(f"{shown}: {place.name} holds files that are not {kind} ({', '.join(others[:3])}"
                             f"{', ...' if len(others) > 3 else ''}); name another -o")

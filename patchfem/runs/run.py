@@ -6,7 +6,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
-from ..core import Measure, Outcome
+from ..core import Measure, Outcome, PatchfemError
+from ..dynamics.resume import Keeper, keeping
 from ..model.model import Model
 from ..model.source import placed
 from .plan import Plan, plan, refuse_size
@@ -32,9 +33,8 @@ def run(what, say=None, progress=None, per_point: bool = False, estimate: bool =
 
     say: called with one line when compiled code has to be made; progress: called with the share of the main pass that
     is done. per_point forces the path of every interface point where one lumped point would do; estimate=False skips
-    the coarser runs and leaves the errors None; fresh condenses the pieces anew; kept: where the state of a
-    run with [wear] is kept on the way. NotConverged and Missing as named by
-    the stages.
+    the coarser runs and leaves the errors None; fresh condenses the pieces anew; kept: where the state of a run with
+    [wear] or of a long march is kept on the way. NotConverged and Missing as named by the stages.
     """
     what = what if isinstance(what, Plan) else plan(what, per_point)
     with placed(what.model.source):
@@ -76,7 +76,8 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
                 here = replace(what, model=lowered(model, patch, evolved.state.depth))
         module, function = KINDS[what.kind].split()
         solve = getattr(import_module(f"patchfem.runs.{module}"), function)
-        result = solve(here, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
+        with keeping(_keeper(kept, what, patch)):
+            result = solve(here, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
         if patch is not None and what.kind != "patch":
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
             result = replace(result, measures=of_patch.measured(model, patch, coarse) | found)
@@ -88,6 +89,27 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
     apart = "strip" if model.patch is not None else "interface"
     return replace(result, measures=worded(result.measures, apart), warnings=result.warnings + loose(result),
                    extra=result.extra | {"notes": [*notes, *result.extra.get("notes", [])]})
+
+
+def _keeper(kept: Kept | None, what: Plan, patch):
+    """Where the marches of a run keep their states; None where nothing is kept. PatchfemError where there is none to go
+    on from."""
+    model = what.model
+    if kept is None or not marches(what):
+        return None
+    from .wear.keep import key_of
+
+    def path(number: int) -> Path:
+        return kept.path.parent / f"march_{number}.npz"
+
+    if kept.resume and model.wear is None and not path(1).is_file():
+        raise PatchfemError(f"{kept.path.parent.name}: no interrupted run is kept there; run without --resume")
+    return Keeper(path, key_of(model, patch, kept.version), kept.resume)
+
+
+def marches(what: Plan) -> bool:
+    """Whether a run is a march in time that keeps its state on the way; one with levels is not."""
+    return what.engine == "march" and what.model.rig is not None and not what.model.rig.levels
 
 
 def _unloaded(model: Model) -> bool:

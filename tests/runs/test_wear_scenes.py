@@ -1,5 +1,6 @@
 """Scenes with [wear]: volumes in closed form, the patch after wear, shakedown, what is refused and what is written."""
 
+import io
 import json
 
 import h5py
@@ -286,8 +287,12 @@ def test_refuses_to_go_on_where_nothing_is_kept(tmp_path):
     answer = cli("run", scene, "-o", tmp_path / "out", "--resume")
     assert answer.code == 2 and "no interrupted run" in answer.err
     (tmp_path / "out.partial").mkdir(exist_ok=True)
-    (tmp_path / "out.partial" / "wear.npz").write_bytes(b"PK nothing")
-    answer = cli("run", scene, "-o", tmp_path / "out", "--resume")
+    whole = io.BytesIO()
+    np.savez(whole, key=np.zeros(1000))
+    for damaged in (whole.getvalue()[:-200], b"", b"PK nothing"):
+        (tmp_path / "out.partial" / "wear.npz").write_bytes(damaged)
+        answer = cli("run", scene, "-o", tmp_path / "out", "--resume")
+        assert answer.code == 2 and "cannot be read" in answer.err
     assert answer.code == 2 and "cannot be read" in answer.err and "Traceback" not in answer.err
     scene.write_text(TILTED + COULOMB + SINE)
     assert cli("run", scene, "-o", tmp_path / "out", "--resume").code == 2

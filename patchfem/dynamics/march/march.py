@@ -9,6 +9,7 @@ import numpy as np
 from ...core import STICK, BaseSine, ModalBasis, Outcome, Response
 from ..plant import Plant
 from ..propagator import propagator
+from ..resume import Samples, Slot, slot_of
 from ..second_book import sampled_work
 from .models import ContactModel, load_kernels
 from .room import keep, lengthened
@@ -104,21 +105,27 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
 
     run = _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(say), start)
     total = round(cycles * steps_per_cycle)
-    if not whole and not marks and not run.passed(total - max(window, 2) * steps_per_cycle):
-        run = fresh(modes, drive, model, steps_per_cycle, travel, start)  # it ends before: once more, cycle by cycle
-    last, kept, kept_at, extremes, phasors, snapshots, samples = deque(maxlen=max(window, 2)), [], [], [], [], [], 0
+    samples = Samples(deque(maxlen=max(window, 2)))
+    last, snapshots = samples.last, []
     asked, found = {round(mark * steps_per_cycle) for mark in marks}, []
+    slot = slot_of(run, (total, steps_per_cycle, window, frames, whole), samples) if not asked else Slot(None, "")
+    behind = total - max(window, 2) * steps_per_cycle
+    if not (whole or asked or samples.again or run.passed(behind, lambda: slot.offer(run, samples))):
+        run = fresh(modes, drive, model, steps_per_cycle, travel, start)  # it ends before: once more, cycle by cycle
+        samples.again = True
+    kept, kept_at, extremes, phasors = samples.kept, samples.kept_at, samples.extremes, samples.phasors
+    count = sum(map(len, kept_at))
     whole = whole or bool(asked)
     # a fraction of a cycle comes first, the window is whole
     size = (total - run.done) % steps_per_cycle or steps_per_cycle
     while run.done < total and run.outcome is None:
         final = run.done + size >= total
         first, rows, work = run.cycle(size, frames if final else 0, snapshots)
-        if whole and len(last) == last.maxlen and samples < MOST_KEPT:
+        if whole and len(last) == last.maxlen and count < MOST_KEPT:
             pick = _thinned(last[0][1], run)
             kept.append(last[0][1][pick])
             kept_at.append(last[0][0] + pick)
-            samples += len(pick)
+            count += len(pick)
         last.append((first, rows, work))
         if whole:
             extremes.append(extremes_of(rows, modes, run.prop.dt))
@@ -126,6 +133,8 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
         if run.done in asked:
             found.append(replace(mark_of(run, list(last)[-window:], extremes[-window:]), after=run.fork(run.drive)))
         size = steps_per_cycle
+        if run.done < total:
+            slot.offer(run, samples)
         if progress is not None:
             progress(run.done / total)
     run.check()
@@ -216,10 +225,13 @@ class Run:
         """Histories of the samples with step numbers `number` (k,)."""
         return _response(rows, number, self.prop.dt, self.modes, self.drive)
 
-    def passed(self, steps: int) -> bool:
-        """March to the step of this number in long pieces, of which nothing is kept; whether the run went on so far."""
+    def passed(self, steps: int, tell=None) -> bool:
+        """March to the step of this number in long pieces, of which nothing is kept; whether the run went on so far.
+        tell: called after each."""
         while self.done < steps and self.outcome is None:
             self.cycle(min(steps - self.done, AT_ONCE, PIECES * self.prop.steps), 0, [])
+            if tell is not None:
+                tell()
         return self.outcome is None
 
     def cycle(self, size: int, frames: int, snapshots: list) -> tuple:

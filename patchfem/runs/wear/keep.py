@@ -27,7 +27,8 @@ def evolved_with(kept, model, patch, coarse, progress=None) -> Evolved:
 def key_of(model, patch, version: str) -> str:
     """What a kept state belongs to: the scene in SI, the unworn gap on its nodes, a slide from a file, the version."""
     corners = () if model.slide is None or model.slide.corners is None else model.slide.corners
-    parts = (f"{version}\n{model.source.resolved}".encode(), patch.x, patch.gap, *corners)
+    of_patch = () if patch is None else (patch.x, patch.gap)
+    parts = (f"{version}\n{model.source.resolved}".encode(), *of_patch, *corners)
     return hashlib.sha256(b"".join(one if isinstance(one, bytes) else np.asarray(one).tobytes()
                                    for one in parts)).hexdigest()
 
@@ -60,7 +61,9 @@ def load(path: Path, key: str) -> tuple:
                         for *row, values in zip(*columns, found["values"], strict=True))
     except FileNotFoundError:
         raise PatchfemError(f"{path.parent.name}: no interrupted run is kept there; run without --resume") from None
-    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+    except PatchfemError:
+        raise
+    except Exception as error:  # a damaged archive has many ways to fail
         raise PatchfemError(f"{path.parent.name}: the kept state cannot be read ({error}); run without "
                             "--resume") from None
     return state, moments

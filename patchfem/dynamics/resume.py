@@ -1,0 +1,189 @@
+"""A march that takes long keeps its state on disk from time to time, from which it goes on to the same bits.
+
+`keeping` says where for all marches within it, one file each by the order in which they begin. A march that ends sooner
+than the first SECONDS writes nothing. What is kept are the arrays and numbers of the Run, which a fresh one takes over,
+and the samples so far.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from ..core import Missing, PatchfemError
+from ..disk.whole import whole
+
+SECONDS = 20.0  # between two states on disk
+SHARE = 0.02  # of the time, at most, for writing them
+CONSTANT = "periodic", "room"  # arrays that a fresh Run makes again, and room for a step
+UNSET = "sets",  # arrays that a fresh Run has not filled yet
+WITHOUT = "run without --resume"
+_KEEPER = ContextVar("keeper", default=None)
+
+
+class Keeper:
+    """Where the marches of a run keep their states.
+
+    path: number of a march -> its file; key: of what the run computes; resume: whether files that are there count.
+    """
+
+    def __init__(self, path, key: str, resume: bool):
+        self.path, self.key, self.resume, self.begun = path, key, resume, 0
+
+
+@contextmanager
+def keeping(keeper: Keeper | None) -> Iterator[None]:
+    """Marches within keep their states as `keeper` says; None: they keep nothing."""
+    token = _KEEPER.set(keeper)
+    try:
+        yield
+    finally:
+        _KEEPER.reset(token)
+
+
+class Samples:
+    """What a march collects: last cycles, samples kept before them, their step numbers, extremes and phasors.
+
+    again: the march has begun a second time, cycle by cycle.
+    """
+
+    def __init__(self, last):
+        self.last, self.kept, self.kept_at, self.extremes, self.phasors, self.again = last, [], [], [], [], False
+
+    def arrays(self) -> dict:
+        """All of it as arrays by name."""
+        out = {f"last_{k}": rows for k, (_, rows, _) in enumerate(self.last)}
+        if self.kept:
+            out |= {"kept": np.concatenate(self.kept), "kept_at": np.concatenate(self.kept_at)}
+        return out | {"first": np.array([one[0] for one in self.last], np.int64),
+                      "work": np.array([one[2] for one in self.last], float),
+                      "extremes": np.array(self.extremes, float).reshape(-1, 2),
+                      "phasors": np.array(self.phasors, complex), "again": np.array(self.again)}
+
+    def take(self, found: dict) -> None:
+        """Take over what `arrays` gave."""
+        self.last.extend((first, found[f"last_{k}"], work) for k, (first, work) in
+                         enumerate(zip(found["first"].tolist(), found["work"].tolist())))
+        if "kept" in found:
+            self.kept, self.kept_at = [found["kept"]], [found["kept_at"]]
+        self.extremes = [tuple(one) for one in found["extremes"].tolist()]
+        self.phasors, self.again = found["phasors"].tolist(), bool(found["again"])
+
+
+class Slot:
+    """The file of one march; without a path nothing is kept."""
+
+    def __init__(self, path: Path | None, key: str):
+        self.path, self.key, self.next, self.cost = path, key, perf_counter() + SECONDS, 0.0
+
+    def offer(self, run, samples: Samples) -> None:
+        """Write the state between two cycles where it is time to; where there is no room nothing is kept any more."""
+        if self.path is None or perf_counter() < self.next or run.outcome is not None:
+            return
+        begin = perf_counter()
+        try:
+            save(self.path, self.key, run, samples)
+        except Missing:
+            with suppress(OSError):
+                self.path.unlink(missing_ok=True)
+            self.path = None
+        end = perf_counter()
+        self.next = end + max(SECONDS, (end - begin) / SHARE)
+
+
+def slot_of(run, asked: tuple, samples: Samples) -> Slot:
+    """The Slot of a march that begins, which takes over a state that is there.
+
+    run: fresh; asked: numbers that say what is marched. PatchfemError for the state of another march.
+    """
+    keeper = _KEEPER.get()
+    if keeper is None:
+        return Slot(None, "")
+    keeper.begun += 1
+    path, key = keeper.path(keeper.begun), _key_of(keeper.key, run, asked)
+    if keeper.resume and path.is_file():
+        load(path, key, run, samples)
+    return Slot(path, key)
+
+
+def _key_of(key: str, run, asked: tuple) -> str:
+    """What the state of a march belongs to: all numbers of the fresh Run, its drive and what is asked."""
+    digest = hashlib.sha256(f"{key} {type(run).__name__} {asked}".encode())
+    for name, array in _arrays(run, UNSET).items():
+        digest.update(f"{name} {array.shape} ".encode() + array.tobytes())
+    time = np.linspace(0, asked[0] * run.prop.dt, 1000)
+    digest.update(np.asarray(run.drive.values(time)).tobytes())
+    return digest.hexdigest()
+
+
+def _arrays(run, besides=()) -> dict:
+    """Arrays of a Run by name, those in its tuples too, but for attributes of these names."""
+    out = {}
+
+    def walk(name: str, value) -> None:
+        if isinstance(value, np.ndarray):
+            out[name] = value
+        elif isinstance(value, tuple):
+            for k, one in enumerate(value):
+                walk(f"{name}.{k}", one)
+
+    for name, value in vars(run).items():
+        if name not in CONSTANT and name not in besides:
+            walk(name, value)
+    return out
+
+
+def _numbers(run) -> dict:
+    return {name: value for name, value in vars(run).items() if type(value) in (int, float, bool, str)}
+
+
+def save(path: Path, key: str, run, samples: Samples) -> None:
+    """Write the state of a march; Missing where it cannot be written."""
+    arrays = {f"run.{name}": array for name, array in _arrays(run).items()}
+    arrays |= {f"samples.{name}": array for name, array in samples.arrays().items()}
+    need = sum(one.nbytes for one in arrays.values())
+    with whole(path, need) as partial, open(partial, "wb") as file:
+        np.savez(file, key=np.array(key), numbers=np.array(json.dumps(_numbers(run))), **arrays)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def load(path: Path, key: str, run, samples: Samples) -> None:
+    """Put a kept state into a fresh Run and fresh Samples. PatchfemError where it is not theirs or cannot be read."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            found = {name: file[name] for name in file.files}
+        if str(found["key"]) != key:
+            raise PatchfemError(f"{path.parent.name}: what is kept there belongs to another scene or version; "
+                                f"{WITHOUT}")
+        numbers = json.loads(str(found["numbers"]))
+        for name in vars(run):
+            if name not in CONSTANT:
+                setattr(run, name, _taken(getattr(run, name), f"run.{name}", found, numbers.get(name)))
+        samples.take({name.removeprefix("samples."): array for name, array in found.items()
+                      if name.startswith("samples.")})
+    except PatchfemError:
+        raise
+    except Exception as error:  # a damaged archive has many ways to fail
+        raise PatchfemError(f"{path.parent.name}: the kept state cannot be read ({error}); {WITHOUT}") from None
+
+
+def _taken(value, name: str, found: dict, number):
+    """A value of a fresh Run with what was kept under its name, in place where it fits: others may look at it."""
+    if isinstance(value, np.ndarray):
+        new = found[name]
+        if new.shape != value.shape or new.dtype != value.dtype:
+            return new
+        if value.flags.writeable:
+            value[...] = new
+        return value
+    if isinstance(value, tuple):
+        parts = [_taken(one, f"{name}.{k}", found, None) for k, one in enumerate(value)]
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    return value if number is None or type(value) is not type(number) else number

@@ -1,0 +1,143 @@
+"""A march that is interrupted goes on to the same bits: every kind of run, at its first state and on the way."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import cli
+from limits import limited
+from scene_texts import BENCH, COATED, DRIVE, FORCED, GROWING, MODE, NONLOCAL, PAIR, PLASTIC, POINT, SECOND
+
+from patchfem.dynamics import resume
+from patchfem.export.results import is_state
+
+MARCH = '[accuracy]\nmethod = "march"\nsteps_per_cycle = 60\n'
+FAST = DRIVE.replace("cycles = 30", "cycles = 16.3")
+RIGS = {
+    "one slide": POINT + PLASTIC + MODE + SECOND + FAST + MARCH,
+    "a list of bonds": POINT + NONLOCAL + "order = 0.5\n" + MODE + FAST + MARCH,
+    "bonds that grow": POINT + GROWING + MODE + FAST + MARCH,
+    "joints": PAIR + FORCED.replace("cycles = 25", "cycles = 14") + MARCH,
+    "a load that swings": POINT + 'amplitude = "20 N"\nfrequency = "50 Hz"\n' + PLASTIC + MODE + FAST + MARCH,
+    "a patch that pitches": COATED.replace("0.5 mm", "1.5 mm") + '[contact.crown]\nradius = "100 m"\n' + PLASTIC + MODE
+                            + 'pitch = "1 rad/m"\n' + FAST.replace("16.3", "12") + MARCH,
+}
+
+
+@pytest.fixture
+def often(monkeypatch):
+    """Marches keep their state after every cycle; the list has a number per state."""
+    saved, save = [], resume.save
+
+    def counted(*of):
+        saved.append(1)
+        save(*of)
+        if len(saved) == often.stop:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(resume, "SECONDS", 0.0)
+    monkeypatch.setattr(resume, "SHARE", np.inf)
+    monkeypatch.setattr(resume, "save", counted)
+    often = type("Often", (), {"saved": saved, "stop": 0})()
+    return often
+
+
+def same(one, two) -> None:
+    with xr.open_dataset(one / "result.nc", engine="h5netcdf") as a, \
+            xr.open_dataset(two / "result.nc", engine="h5netcdf") as b:
+        assert a.sizes["time"] > 100
+        xr.testing.assert_identical(a, b)
+
+
+@pytest.mark.parametrize("kind", RIGS)
+def test_exact_an_interrupted_march_goes_on_to_the_same_bits(tmp_path, often, kind):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(RIGS[kind], "utf-8")
+    words = ("run", scene, "--no-page", "-o")
+    assert cli(*words, tmp_path / "whole").code == 0
+    count = len(often.saved)
+    assert count >= 15 and sorted(one.name for one in tmp_path.iterdir()) == ["scene.toml", "whole"]
+    out, partial = tmp_path / "out", tmp_path / "out.partial"
+    for stop in (1, count // 3, 1, count // 4):  # each counts from where the one before it stopped
+        often.saved.clear()
+        often.stop = stop
+        answer = cli(*words, out, *["--resume"] * partial.is_dir())
+        assert answer.code == 130 and "out.partial goes on with --resume" in answer.err, answer.err
+        assert partial.is_dir() and all(is_state(one.name) for one in partial.iterdir())
+    often.saved.clear()
+    often.stop = 0
+    assert cli(*words, out, "--resume").code == 0 and 0 < len(often.saved) < count
+    same(out, tmp_path / "whole")
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["out", "scene.toml", "whole"]
+    assert not any(is_state(one.name) for one in out.iterdir())
+
+
+def test_refuses_the_state_of_another_march(tmp_path, often):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(RIGS["one slide"], "utf-8")
+    words = ("run", scene, "--no-page", "-o", tmp_path / "out", "--resume")
+    answer = cli(*words)
+    assert answer.code == 2 and "no interrupted run is kept there; run without --resume" in answer.err
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["scene.toml"]
+    often.stop = 5
+    assert cli(*words[:-1]).code == 130
+    often.stop = 0
+    state = tmp_path / "out.partial" / "march_1.npz"
+    for change in ("friction.static=0.31", "drive.cycles=20", "accuracy.steps_per_cycle=80"):
+        answer = cli(*words, "--set", change)
+        assert answer.code == 2 and "belongs to another scene or version" in answer.err
+    data = state.read_bytes()
+    for harm in (data[:-100], b"", b"PK nothing", data[:2000]):
+        state.write_bytes(harm)
+        answer = cli(*words)
+        assert answer.code == 2 and "cannot be read" in answer.err and "without --resume" in answer.err
+    state.write_bytes(data)
+    assert cli(*words).code == 0
+    scene.write_text(BENCH, "utf-8")
+    answer = cli(*words)
+    assert answer.code == 2 and "a march in time" in answer.err
+
+
+def test_always_a_march_goes_on_where_its_state_has_no_room(tmp_path, often):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(RIGS["one slide"], "utf-8")
+    often.stop = 5
+    with limited(5000):
+        answer = cli("run", scene, "--no-page", "-o", tmp_path / "out")
+    assert answer.code == 4 and "result.nc: no room" in answer.err  # not for its state, which it does without
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["scene.toml"]
+
+
+def test_always_a_short_march_keeps_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(resume, "save", lambda *of: 1 / 0)
+    (tmp_path / "scene.toml").write_text(RIGS["one slide"], "utf-8")
+    assert cli("run", tmp_path / "scene.toml", "--no-page", "-o", tmp_path / "out").code == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT, signal.SIGKILL])
+def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):
+    """In a process of its own; one that is killed says nothing and leaves its state too."""
+    scene, out = tmp_path / "scene.toml", tmp_path / "out"
+    scene.write_text(RIGS["one slide"].replace("cycles = 16.3", "cycles = 4000"), "utf-8")
+    code = "from patchfem.dynamics import resume; resume.SECONDS = 0.05; resume.SHARE = 1.0; " \
+           "from patchfem.__main__ import main; main()"
+    words = [sys.executable, "-c", code, "run", scene, "--no-page", "-q", "-o", out]
+    run = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    while not (tmp_path / "out.partial" / "march_1.npz").is_file() and run.poll() is None:
+        pass
+    run.send_signal(number)
+    said = run.communicate()[1]
+    left = {one.name for one in tmp_path.iterdir()} - {"scene.toml"}
+    if number == signal.SIGKILL:
+        assert run.returncode == -9 and left == {"out.partial", ".out.writer"}
+    else:
+        assert run.returncode == 130 and left == {"out.partial"}
+        assert said.strip().startswith("interrupted; nothing was replaced; what is kept in ")
+        assert said.strip().endswith("out.partial goes on with --resume") and len(said.splitlines()) == 1
+    assert cli("run", scene, "--no-page", "-q", "-o", out, "--resume").code == 0
+    assert {one.name for one in tmp_path.iterdir()} == {"scene.toml", "out"}
+    assert os.path.getsize(out / "result.nc") > 10_000
