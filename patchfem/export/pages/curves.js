@@ -68,7 +68,7 @@
   const BESIDE = 215;                            // pixels that axis, scale of colours and tools take beside a frame
   function framed([wide, tall], place) {         // a frame as large as its place lets it be
     const share = Math.min(1, (place.clientWidth - BESIDE) / wide);
-    return {sizing_mode: "fixed", frame_width: Math.round(share * wide), frame_height: Math.round(share * tall)};
+    return {sizing_mode: "fixed", width: place.clientWidth, frame_width: Math.round(share * wide), frame_height: Math.round(share * tall)};
   }
 
   function draw(chart) {

@@ -30,11 +30,12 @@
   };
   const hull = (boxes) => [0, 1, 2, 3].map((k) => (k % 2 ? Math.max : Math.min)(...boxes.map((one) => one[k])));
   const whole = hull(pieces.map(reach));
+  let narrow = false;
   const close = (() => {                         // around the contact of all frames, or its most pressed quarter
     const sigma = curves[0].values, n = x.length, touching = [...x].filter((_, k) => range(count).some((f) => sigma[f * n + k] > 0));
     const length = x[n - 1] - x[0], cell = length / n, top = sigma.reduce((best, v, k) => v > sigma[best] ? k : best, 0) % n;
     const wide = touching.length ? touching.at(-1) - touching[0] : length;
-    const narrow = touching.length && wide <= length / 4;
+    narrow = touching.length > 0 && wide <= length / 4;
     const half = narrow ? Math.max(wide, 4 * cell) : length / 8;
     const middle = narrow ? (touching[0] + touching.at(-1)) / 2 : x[top];
     const left = Math.max(x[0], Math.min(middle - half, x[n - 1] - 2 * half)), right = Math.min(x[n - 1], left + 2 * half);
@@ -73,9 +74,9 @@
   }
 
   function drawPieces() {
-    const narrow = innerWidth < 600, view = window_(), look = state.shown.look, {palette, low, top, number} = look;
+    const small = innerWidth < 600, view = window_(), look = state.shown.look, {palette, low, top, number} = look;
     const everywhere = view === close ? view : hull(range(count).flatMap((f) => pieces.map((one, k) => reach({points: placed(one, k, f)})))).map((v, k, [l, r, b, t]) => v + [-1, 1][k % 2] * 0.02 * Math.max(r - l, t - b));
-    const on = state.plane = plane(at("stage-pieces"), everywhere, narrow ? 320 : 400, true, 58), {pen} = on;
+    const on = state.plane = plane(at("stage-pieces"), everywhere, small ? 320 : 400, true, 58), {pen} = on;
     state.places = pieces.map((one, k) => placed(one, k, state.frame));
     on.inside(() => {
       pieces.forEach((piece, k) => {
@@ -212,6 +213,7 @@
     if (event.key === " ") play(!state.timer); else if (to !== undefined) { play(false); show(to); } else return;
     event.preventDefault();
   };
+  at("play-view").value = narrow ? "close" : "whole";
   suited();
   chosen();
   let width = innerWidth;

@@ -14,7 +14,7 @@ from ..fields.vtkhdf import NAME
 from ..scales import axis_unit
 from .document import Section
 from .library import own
-from .thinned import corners, thinned
+from .thinned import corners, spread, thinned
 
 FRAMES, CELLS, PLACES = 24, 5000, 400  # at most: frames, cells of a piece, places along the interface
 BYTES = 520_000  # of all frames together, before they are written as text
@@ -22,6 +22,7 @@ COLOURS = (("von Mises stress", False), ("stress along x", True), ("stress acros
            ("shear stress", True))  # of a cell; whether it has a sign
 CURVES = (("normal_stress", "pressure"), ("shear_stress", "shear traction"), ("gap", "gap"), ("slip", "slide"))
 ROUND_OFF = 1e-5  # of the largest motion: it is kept in single precision
+NARROW = 0.25  # share of the length below which the contact gets half of what is shown
 MM = 1e3
 
 
@@ -51,16 +52,18 @@ def reel(folder: Path) -> dict | None:
         cycle = np.array(moving(series.times))
         numbers = cycle[np.linspace(0, cycle.size - 1, min(FRAMES, cycle.size)).round().astype(int)].tolist()
         x = series.points("interface")[:, 0]
-        places = np.linspace(0, x.size - 1, min(PLACES, x.size)).round().astype(int)
-        most = min(int((BYTES / len(numbers) - 10 * places.size) / 24), CELLS)
+        most = min(int((BYTES / len(numbers) - 10 * min(PLACES, x.size)) / 24), CELLS)
         line = {name: series.stack("interface", "PointData", name, numbers)
                 for name in ("displacement", *(name for name, _ in CURVES), "status")
                 if name in series.names("interface", "PointData")}
-        lower = _piece(series, "lower", numbers, most)
-        upper = _piece(series, "upper", numbers, most)
+        near = _contact(x, line["normal_stress"])
+        places = spread(x, min(PLACES, x.size) - 1, near)
+        lower = _piece(series, "lower", numbers, most, near)
+        upper = _piece(series, "upper", numbers, most, near)
         slide = _open(series, numbers, upper, x, line)
         times = series.times[numbers]
     unit, scale = axis_unit(np.concatenate([piece["colours"].ravel() for piece in (lower, upper)]), "Pa")
+    shear = np.any(line.get("shear_stress", 0.0))
     curves = [_curve(line[name][:, places], label, "Pa" if name.endswith("stress") else "m")
               for name, label in CURVES if name in line and (name == "normal_stress" or np.any(line[name]))]
     force = np.abs(line["shear_stress"] @ np.gradient(x)) if "shear_stress" in line else np.zeros(1)
@@ -70,15 +73,24 @@ def reel(folder: Path) -> dict | None:
                                                 (lower["mesh"], upper["mesh"])))],
             "colours": [{"label": label, "signed": signed, "unit": unit} for label, signed in COLOURS],
             "x": packed(x[places] * MM), "curves": curves} | (
-                {"status": packed(line["status"][:, places])} if np.any(line.get("status", 0)) else {})
+                {"status": packed(line["status"][:, places])} if "status" in line and shear else {})
 
 
-def _piece(series: Series, side: str, numbers: list, most: int) -> dict:
+def _contact(x, sigma) -> tuple | None:
+    """Twice the part of x (n,) that touches in some frame of sigma (f, n), where that is short; None elsewhere."""
+    touching = x[np.any(sigma > 0, axis=0)]
+    if not touching.size or np.ptp(touching) > NARROW * np.ptp(x):
+        return None
+    more = np.ptp(touching) / 2 + 4 * np.ptp(x) / x.size
+    return touching[0] - more, touching[-1] + more
+
+
+def _piece(series: Series, side: str, numbers: list, most: int, near: tuple | None) -> dict:
     """A piece thinned to `most` cells: its mesh, all its points [m], its moves (f, n, 2) [m] and colours [Pa]."""
     points = series.points(side)[:, :2]
     cells = corners(*series.cells(side))
     coated = series.stack(side, "CellData", "material", [0])[0] > 0
-    mesh = thinned(points, cells, coated, most)
+    mesh = thinned(points, cells, coated, most, near)
     moves = series.stack(side, "PointData", "displacement", numbers)[..., :2].astype(float)
     stress = series.stack(side, "CellData", "stress", numbers)
     rows = np.stack([series.stack(side, "CellData", "von_mises", numbers), *(stress[..., k] for k in (0, 1, 3))])
@@ -128,6 +140,7 @@ def section(film: dict) -> Section:
                  f"{cells} cells")
     less = [f"{film['of']} frames"] * (film["of"] > frames) + [f"{fine} cells"] * (fine > cells)
     sample = f"; a sample of {' and '.join(less)}, each cell with the mean of those it covers" if less else ""
-    text = (f"{still}{sample}. Motion and gap are drawn with one factor, the slide of the upper piece as a whole with "
-            "another; colours and scales are the same in every frame. Keys on the picture: space plays, arrows step.")
+    text = f"{still}{sample}. Motion and gap are drawn with one factor"
+    text += (", the slide of the upper piece as a whole with another; colours and scales are the same in every frame. "
+             "Keys on the picture: space plays, arrows step.") if frames > 1 else "."
     return Section("player", "The pieces, frame by frame", own("player.html").replace("CAPTION", text))

@@ -42,9 +42,10 @@ def areas(points, cells) -> np.ndarray:
     return np.abs((corner[..., 0] * after[..., 1] - corner[..., 1] * after[..., 0]).sum(axis=1)) / 2
 
 
-def thinned(points, cells, material, most: int) -> Thinned:
+def thinned(points, cells, material, most: int, near: tuple | None = None) -> Thinned:
     """The mesh of points (n, 2) [m], cells (m, 4) and material (m,) with about `most` cells at most.
 
+    near: x (left, right) [m] where half of the columns stand, if there are as many.
     Of a grid every so manieth line stays, the outer ones and those between two materials among them; so stays the
     outline. In any other mesh all points of a box between such lines become one of them. Without need nothing changes.
     """
@@ -52,7 +53,7 @@ def thinned(points, cells, material, most: int) -> Thinned:
     if count <= most:
         every = np.arange(count)
         return Thinned(np.arange(len(points)), cells, every, every, every, size)
-    bins, heights = _bins(points, cells, material, most)
+    bins, heights = _bins(points, cells, material, most, near)
     key = bins[0] * heights + bins[1]
     away = np.abs(points[:, 0] - points[:, 0].min()) + np.abs(points[:, 1])
     by_key = np.lexsort((away, key))  # the first of a box lies nearest to its corner; of a grid it is that corner
@@ -71,7 +72,7 @@ def thinned(points, cells, material, most: int) -> Thinned:
     return Thinned(by_key[first], moved[whole], order, starts, of_cell[whole], size[order])
 
 
-def _bins(points, cells, material, most: int) -> tuple:
+def _bins(points, cells, material, most: int, near: tuple | None) -> tuple:
     """Number of the kept line at or before each point, (along x, in depth), and how many lines there are in depth."""
     x, depth = points[:, 0], np.abs(points[:, 1])
     columns, rows = (np.unique(one) for one in (x, depth))
@@ -82,11 +83,21 @@ def _bins(points, cells, material, most: int) -> tuple:
     for kind in (0, 1):
         coat[kind][cells[(material > 0) == kind]] = True
     border = np.unique(depth[coat.all(axis=0)])
-    kept = np.union1d(_every(rows, down), border if border.size < down / 2 else [])
-    across = _every(columns, min(columns.size - 1, max(most // (kept.size - 1), 2)))
+    kept = np.union1d(rows[spread(rows, down)], border if border.size < down / 2 else [])
+    across = columns[spread(columns, min(columns.size - 1, max(most // (kept.size - 1), 2)), near)]
     return [np.searchsorted(lines, values, "right") - 1 for lines, values in ((across, x), (kept, depth))], kept.size
 
 
-def _every(lines, count: int) -> np.ndarray:
-    """`count` + 1 of the sorted lines, the first and the last among them."""
-    return lines[np.linspace(0, lines.size - 1, count + 1).round().astype(int)]
+def spread(lines, count: int, near: tuple | None = None) -> np.ndarray:
+    """Numbers of at most `count` + 1 of the sorted lines (n,), the first and the last among them, evenly many of them.
+
+    near: (left, right) between which half of them lie, if there are as many.
+    """
+    weight = np.ones(lines.size - 1)
+    if near is not None:
+        inside = (lines[1:] > near[0]) & (lines[:-1] < near[1])
+        share = min(inside.sum() / count, 0.5)  # of all that are kept
+        if 0 < share < 1 and inside.sum() < share * inside.size:
+            weight[inside] = share * (~inside).sum() / ((1 - share) * inside.sum())
+    place = np.concatenate([[0.0], np.cumsum(weight)])
+    return np.unique(np.searchsorted(place, np.linspace(0, place[-1], count + 1) * (1 - 1e-12)).clip(0, lines.size - 1))

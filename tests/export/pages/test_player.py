@@ -12,7 +12,7 @@ from patchfem.export import report
 from patchfem.export.drawing.panels import panels
 from patchfem.export.fields.series import Series, moving
 from patchfem.export.pages import player
-from patchfem.export.pages.thinned import areas, corners, thinned
+from patchfem.export.pages.thinned import areas, corners, spread, thinned
 
 SIDES = ("lower", "upper")
 
@@ -76,6 +76,17 @@ def test_always_any_mesh_is_thinned_to_whole_cells_of_the_same_outline():
     kept = points[mesh.nodes]
     assert (kept.min(axis=0) == points.min(axis=0)).all() and (kept.max(axis=0) == points.max(axis=0)).all()
     np.testing.assert_allclose(mesh.means(np.full((len(triangles), 1), 7.0)), 7.0, rtol=1e-14)
+
+
+def test_exact_lines_are_spread_evenly_and_half_of_them_where_they_are_wanted():
+    lines = np.linspace(-1, 1, 1001)
+    even = spread(lines, 40)
+    assert np.array_equal(even, np.arange(41) * 25)
+    half = lines[spread(lines, 40, (-0.05, 0.05))]
+    assert np.sum(np.abs(half) <= 0.0501) in (20, 21, 22) and (half[0], half[-1]) == (-1, 1)
+    few = lines[spread(lines, 300, (-0.01, 0.01))]  # 10 lines are all there are
+    assert np.sum(np.abs(few) <= 0.0101) == 11 and few.size <= 301
+    assert np.array_equal(spread(lines, 1000, (-0.05, 0.05)), np.arange(1001))
 
 
 def test_exact_a_small_mesh_stays_as_it_is():
