@@ -83,12 +83,12 @@ def draw(path: Path, rows: list, parts) -> None:
     """Peaks of the stretch reading against the rest, below the closed form of the bond length."""
     time = 10.0 ** np.linspace(-2, 1, 121)
     with drawing(path, (6.4, 3.6)) as (_, axis):
-        axis.semilogx(time, aged(time, parts[-1]), color="0.2", label="ε_d/ε₀ (2.10 at rest)")
+        axis.semilogx(time, aged(time, parts[-1]), color="0.2", label="bond length over ε₀ (2.10 at rest)")
         for part, colour in zip(parts, (GREY, ORANGE, BLUE)):
             mine = [row for row in rows if row["part"] == part]
             axis.semilogx([row["hold"] for row in mine], [row["peak"] for row in mine], "o-", color=colour, ms=4,
-                          label=f"peak, l_k = {part:g} ε₀")
-        axis.set(xlabel="rest [s]", ylabel="friction over μ_s N", title="Breakaway after a rest", ylim=(0.45, 1.05))
+                          label=f"peak, slip growth {part:g} ε₀")
+        axis.set(xlabel="rest [s]", ylabel="friction over μₛ N", title="Breakaway after a rest", ylim=(0.45, 1.05))
         axis.legend()
 
 

@@ -92,8 +92,8 @@ def draw(path: Path, rows: list, slips) -> None:
             for order, colour in ((1, ORANGE), (0, GREY)):
                 axis.semilogx(fine, [grown(v, slip, order) for v in speeds], color=colour, label=f"2.18 G, p = {order}")
                 axis.semilogx(at, [row[order][0] for row in mine], "s", color=colour, ms=4, label="as printed")
-            axis.set(xlabel="speed over √(a_s l_k)", title=f"l_k = {part:g} ε₀", ylim=(0, 0.65))
-        axis.legend(fontsize=7)
+            axis.set(xlabel="speed over √(rest growth × slip growth)", title=f"slip growth {part:g} ε₀", ylim=(0, 0.65))
+        axis.legend(fontsize=8.5)
         axes[0, 0].set_ylabel("friction over load")
 
 

@@ -40,7 +40,8 @@ def main(path: Path = HERE / "drift.svg", marched=MARCHED) -> Path:
     with drawing(path, (9.6, 3.4), 1, 2) as (_, (left, right)):
         for colour, b in zip(COLOURS, SHARES):
             left.plot(swing, [dither_drift(0.5 - s, 0.5 + s, b) for s in swing], color=colour, label=f"b = {b:g}")
-            left.plot(marched, [growing(b, s) for s in marched], "o--", ms=3, lw=0.8, color=colour)
+            left.plot(marched, [growing(b, s) for s in marched], "o--", ms=3, lw=0.8, color=colour,
+                      label="marched, growing bonds" if b == SHARES[0] else None)
             right.semilogx(amplitude, stretch_loop(amplitude, 1.0, 1.0, b)[0] / (4 * amplitude), color=colour,
                            label=f"b = {b:g}")
         right.semilogx(amplitude, np.maximum(amplitude - 1, 0) / amplitude, ":", color=GREY, label="elastic-plastic")

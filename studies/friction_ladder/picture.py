@@ -20,7 +20,7 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 HERE = Path(__file__).parent
 AMPLITUDES = 10.0 ** np.linspace(-1, 1.75, 12)
 OFF = {"report p = 1": ("report", BLUE, "-"), "elastic-plastic": ("elastic-plastic", "#4f9bd9", "-"),
-       "Coulomb": ("Coulomb", ORANGE, "-"), "tanh, best v_0": ("tanh, best $v_0$", "#e0975f", "-"),
+       "Coulomb": ("Coulomb", ORANGE, "-"), "tanh, best v_0": ("tanh, best speed", "#e0975f", "-"),
        "Bouc-Wen n = 2": ("Bouc-Wen, n = 2", GREY, "--"), "Iwan 20, virgin curve": ("Iwan 20, virgin curve", GREY, "-"),
        "Iwan 20, reversal curve": ("Iwan 20, reversals", GREY, ":")}
 ON = {"report p = 1": ("report", BLUE, "-"), "LuGre": ("LuGre", "#4f9bd9", "--"),
@@ -43,7 +43,7 @@ def main(path: Path = HERE / "ladder.svg", amplitudes=AMPLITUDES, times=None) ->
     times = costs.compiled() if times is None else times
     rows = {(row.growth, row.rung, row.amplitude): row for a in (*amplitudes, 3.0)
             for row in ladder.constant(a, 200 if a < 1 else 400) + ladder.growing(a, 200 if a < 1 else 400)}
-    with drawing(path, (9.6, 3.9), 1, 3, {"bbox_inches": "tight"}, sharey=True) as (_, panels):
+    with drawing(path, (9.6, 4.2), 1, 3, {"bbox_inches": "tight"}, sharey=True) as (_, panels):
         for axis, growth, curves, title in ((panels[0], "off", OFF, "constant bond length"),
                                             (panels[1], "on", ON, "growing bond length")):
             for rung, (text, colour, line) in curves.items():
@@ -54,11 +54,12 @@ def main(path: Path = HERE / "ladder.svg", amplitudes=AMPLITUDES, times=None) ->
             error = rows[growth, rung, 3.0].top[1]
             panels[2].loglog(1e9 * times[name], error, "o" if growth == "off" else "D", ms=5,
                              color=BLUE if growth == "off" else ORANGE)
-            panels[2].annotate(text, (1e9 * times[name], error), place, textcoords="offset points", fontsize=6.5)
+            panels[2].annotate(text, (1e9 * times[name], error), place, textcoords="offset points", fontsize=8)
         panels[2].set(xlabel="cost of a step [ns]", title="constant (●), growing (◆), A = 3", xlim=(0.05, 2e5))
         panels[0].set(ylabel="rms force error [share of μs N]", ylim=(2e-4, 2))
         for axis in panels[:2]:
-            axis.legend(fontsize=6.5, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
+            axis.legend(fontsize=8.5, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2,
+                        columnspacing=0.8, handlelength=1.5)
     return path
 
 

@@ -45,31 +45,35 @@ DRAWN = {"Fig 17, 18: displacement 1e-2": "displacement", "Fig 19, 20: velocity 
 def picture(rows: list, curves: dict, path: Path = HERE / "failure.svg") -> Path:
     """x2 and force of four ways beside the exact ones, and the error of Newmark against the step."""
     truth = exact("two", np.linspace(0, 20, 2001))
-    with drawing(path, (11.5, 4.6), 2, 5) as (_, axes):
+    with drawing(path, (9.6, 6.6), 3, 4) as (figure, axes):
         for column, (name, title) in enumerate(DRAWN.items()):
             found = next(r for r in rows if r.name == name).run
             upper, lower = axes[0, column], axes[1, column]
-            upper.set_title(title, fontsize=9)
+            upper.set_title(title, fontsize=10)
             for axis, mine, other in ((upper, found.slide(TWO)[0], truth.slide), (lower, found.force[0], truth.force)):
-                axis.plot(truth.time, other, color=GREY, lw=2.2, alpha=0.5)
-                axis.plot(found.time, mine, color=BLUE, lw=0.8)
-                axis.axvline(SLIDES, color=ORANGE, lw=0.8, ls=":")
+                axis.plot(truth.time, other, color=GREY, lw=2.2, alpha=0.5, label="exact")
+                axis.plot(found.time, mine, color=BLUE, lw=0.8, label="accepted by the criterion above it")
+                axis.axvline(SLIDES, color=ORANGE, lw=0.8, ls=":", label="friction is overcome")
                 axis.set_xlim(0, 20)
             upper.set_ylim(-1, 1.1)
             lower.set(ylim=(-3.4, 3.4), xlabel="t")
         axes[0, 0].set_ylabel("x2 [P0/k]")
         axes[1, 0].set_ylabel("friction [P0]")
-        titles = {False: "Newmark, stick speed v", True: "stopped by force as well"}
-        for axis, (by_force, title) in zip(axes[:, 4], titles.items()):
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=9)
+        places = axes[2, 0].get_gridspec()
+        for axis in axes[2]:
+            axis.remove()
+        titles = {False: "Newmark, stopped by its stick speed v", True: "stopped by force as well"}
+        last = [figure.add_subplot(places[2, :2]), figure.add_subplot(places[2, 2:])]
+        for axis, (by_force, title) in zip(last, titles.items()):
             for (speed, forced), errors in curves.items():
                 if forced == by_force:
                     axis.loglog(STEPS[:len(errors)], np.abs(errors), "o-", ms=3, label=f"{speed:g}",
                                 color=BLUE if speed > 5e-4 else ORANGE)
-            axis.set(ylim=(1e-6, 3), title=title)
-            axis.title.set_fontsize(9)
-            axis.legend(title="v", fontsize=7, title_fontsize=7)
-        axes[0, 4].set_ylabel("|error of the peak|")
-        axes[1, 4].set(xlabel="steps per cycle", ylabel="|error of the peak|")
+            axis.set(ylim=(1e-6, 3), xlabel="steps per cycle")
+            axis.set_title(title, fontsize=10)
+            axis.legend(title="v", fontsize=9, title_fontsize=9)
+        last[0].set_ylabel("|error of the peak|")
     return path
 
 

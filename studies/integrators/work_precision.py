@@ -57,7 +57,7 @@ STYLES = {"exact": ("*", BLUE), "exact, one mode": ("*", "#8b1a1a"), "march": ("
 def picture(table: dict, path: Path = HERE / "work_precision.svg") -> Path:
     """Error against CPU time, one panel per problem."""
     rows = table["rows"]
-    with drawing(path, (11.5, 4.4), 1, len(SHOWN), sharey=True) as (figure, axes):
+    with drawing(path, (9.6, 4.6), 1, len(SHOWN), sharey=True) as (figure, axes):
         names = list(dict.fromkeys(r["engine"] for r in rows))
         for axis, where in zip(axes, SHOWN):
             for name in names:
@@ -69,7 +69,7 @@ def picture(table: dict, path: Path = HERE / "work_precision.svg") -> Path:
             axis.set(title=TITLES[where], xlabel="CPU time [ms]", ylim=(FLOOR / 3, 10))
         axes[0].set_ylabel("largest error of the slide, last 5 cycles")
         handles = {label: handle for axis in axes for handle, label in zip(*axis.get_legend_handles_labels())}
-        figure.legend(handles.values(), handles.keys(), loc="outside right center", fontsize=8)
+        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=9)
     return path
 
 

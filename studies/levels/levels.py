@@ -33,7 +33,7 @@ MEASURED = (3.8, 4.2)  # onset on the rig [g]
 
 def picture(rows: list, path: Path = HERE / "levels.svg") -> Path:
     """Slip over the level, raised and lowered."""
-    with drawing(path, (10.5, 5.0), 2, 4) as (_, axes):
+    with drawing(path, (9.6, 5.4), 2, 4) as (figure, axes):
         axes = axes.ravel()
         for axis, r in zip(axes, rows):
             top = int(r.levels.argmax())
@@ -42,17 +42,18 @@ def picture(rows: list, path: Path = HERE / "levels.svg") -> Path:
             axis.semilogy(r.levels[top:], slip[top:], "v-", color=ORANGE, ms=3.5, lw=1, label="lowered")
             if r.folds:
                 for fold in r.folds:
-                    axis.axvline(fold, color=GREY, lw=0.8, ls=":")
+                    axis.axvline(fold, color=GREY, lw=0.8, ls=":", label="fold")
             else:
-                axis.axvspan(*MEASURED, color="#dddddd", zorder=0)
-                axis.axvline(r.limit, color=GREY, lw=0.8, ls="--")
-            axis.axhline(FLOOR, color=GREY, lw=0.6)
-            axis.set_title(r.case, fontsize=9)
+                axis.axvspan(*MEASURED, color="#dddddd", zorder=0, label="onset on the rig")
+                axis.axvline(r.limit, color=GREY, lw=0.8, ls="--", label="μ N/m")
+            axis.axhline(FLOOR, color=GREY, lw=0.6, label="least that Table 1 reads")
+            axis.set_title(r.case, fontsize=10)
         for axis in axes[4:]:
             axis.set_xlabel("level [g]")
         for axis in axes[::4]:
             axis.set_ylabel("slip [mil]")
-        axes[0].legend(fontsize=8)
+        named = {text: line for axis in axes for line, text in zip(*axis.get_legend_handles_labels())}
+        figure.legend(named.values(), named.keys(), loc="outside upper center", ncols=6, fontsize=9)
     return path
 
 

@@ -81,19 +81,26 @@ def table(rows) -> str:
 def draw(rows, path: Path = HERE / "error_cost.svg") -> Path:
     """Error against time per step, one panel per amplitude."""
     amplitudes = sorted({r.amplitude for r in rows})
-    with drawing(path, (2.4 * len(amplitudes), 2.7), 1, len(amplitudes), sharex=True, sharey=True) as (_, axes):
-        axes = np.atleast_1d(axes)
+    wide = min(len(amplitudes) + 1, 3)  # the last place is that of the legend
+    tall = -(-(len(amplitudes) + 1) // wide)
+    with drawing(path, (9.6, 2.9 * tall), tall, wide, sharex=True, sharey=True, squeeze=False) as (_, axes):
+        axes = axes.ravel()
         for ax, amplitude in zip(axes, amplitudes):
             for engine, color, mark in (("truncated", ORANGE, "o"), ("merged", BLUE, "s"),
                                         ("steps", GREY, "^")):
                 part = [r for r in rows if r.amplitude == amplitude and r.engine == engine]
-                ax.loglog([r.micro for r in part], [max(r.error, 1e-12) for r in part], mark + "-", color=color, ms=3,
-                          lw=0.8, label=engine)
+                ax.loglog([r.micro for r in part], [max(r.error, 1e-12) for r in part], mark + "-", color=color, ms=4,
+                          lw=1.0, label=engine)
             whole = next(r for r in rows if r.amplitude == amplitude and r.engine == "direct")
-            ax.axvline(whole.micro, color=GREY, lw=0.6, ls=":")
-            ax.set(title=f"A = {amplitude:g} ε₀", xlabel="µs per step")
-        axes[0].set_ylabel("error [share of μ_s N]")
-        axes[-1].legend(frameon=False, fontsize=6, loc="lower right")
+            ax.axvline(whole.micro, color=GREY, lw=1.0, ls=":", label="every bond kept")
+            ax.set(title=f"A = {amplitude:g} ε₀")
+            ax.set_xlabel("µs per step")
+            ax.xaxis.set_tick_params(labelbottom=True)
+        for ax in axes[:len(amplitudes):wide]:
+            ax.set_ylabel("error [share of μₛ N]")
+        for ax in axes[len(amplitudes):]:
+            ax.axis("off")
+        axes[-1].legend(*axes[0].get_legend_handles_labels(), frameon=False, loc="center")
     return path
 
 

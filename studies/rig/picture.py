@@ -38,7 +38,7 @@ def main(path: Path = HERE / "rig.svg") -> Path:
         peak = found.measures["absolute_acceleration_peak"].value / G_N
         d.plot([5], [peak], "D", color=BLUE, ms=5, label="computed")
         d.set(title="acceleration [g], 143 Hz", xlabel="input [g]", ylim=(0, 14))
-        d.legend(frameon=False, fontsize=7)
+        d.legend(frameon=False, fontsize=8.5)
     assert np.isfinite(peak)
     return path
 

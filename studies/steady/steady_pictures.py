@@ -14,8 +14,11 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 def against_march(table: dict, measure: str, path: Path) -> Path:
     """Amplitude over frequency, found directly and by the march, and their difference below."""
     names = list(table)
-    with drawing(path, (2.6 * len(names), 4.6), 2, len(names), sharex=True, sharey="row", squeeze=False) as (_, axes):
-        for (top, low), name in zip(axes.T, names):
+    wide = min(len(names) + 1, 3)  # the last place is that of the legend
+    tall = -(-(len(names) + 1) // wide)
+    with drawing(path, (9.6, 4.2 * tall), 2 * tall, wide, sharex=True, squeeze=False) as (_, axes):
+        pairs = [(axes[2 * row, column], axes[2 * row + 1, column]) for row in range(tall) for column in range(wide)]
+        for (top, low), name in zip(pairs, names):
             rows = table[name]
             f = [r.frequency for r in rows]
             top.semilogy(f, [1e6 * r.steady[measure] for r in rows], "-", color=BLUE, label="steady")
@@ -25,12 +28,16 @@ def against_march(table: dict, measure: str, path: Path) -> Path:
             if rows[0].run is not None:
                 low.semilogy(f, [max(r.miss(measure, "run"), 1e-16) for r in rows], "s-", color=GREY, ms=3, lw=0.7,
                              label="long exact run")
-            top.set_title(name, fontsize=9)
-            low.set(xlabel="frequency [Hz]")
-        axes[0, 0].set_ylabel("amplitude [um]")
-        axes[1, 0].set_ylabel("difference / amplitude")
-        axes[0, -1].legend(fontsize=7)
-        axes[1, 0].legend(fontsize=7)
+            top.set(title=name, ylim=(4, 200))
+            low.set(xlabel="frequency [Hz]", ylim=(1e-16, 1e-2))
+            low.xaxis.set_tick_params(labelbottom=True)
+        for top, low in pairs[:len(names):wide]:
+            top.set_ylabel("amplitude [um]")
+            low.set_ylabel("difference / amplitude")
+        for axis in (one for pair in pairs[len(names):] for one in pair):
+            axis.axis("off")
+        named = {text: line for pair in pairs for one in pair for line, text in zip(*one.get_legend_handles_labels())}
+        pairs[-1][0].legend(named.values(), named.keys(), loc="center", fontsize=10)
     return path
 
 
@@ -44,7 +51,8 @@ def backbone(rows: list, path: Path) -> Path:
         for axis, name in zip(axes, ("frequency [Hz]", "damping ratio")):
             axis.set(xlabel="amplitude [um]", ylabel=name)
         axes[0].axhline(143, color="#bbbbbb", lw=0.8, zorder=0)
-        axes[1].legend(fontsize=8, title="lines: free balance, marks: bench", title_fontsize=7)
+        axes[0].text(0.04, 146, "143 Hz, the mode by itself", color="#777777", fontsize=9, va="bottom")
+        axes[0].legend(fontsize=9, title="lines: free balance, marks: bench", title_fontsize=9, loc="upper right")
     return path
 
 

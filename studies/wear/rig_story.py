@@ -93,7 +93,7 @@ def picture(rows: list, path: Path) -> Path:
         a.set(title="pressure [MPa]", xlabel="x [mm]", ylim=(0, 8))
         b.set(title="contact [% of the length]", xlabel="thousand cycles", ylim=(0, 105))
         c.set(title="friction loop, change [%]", xlabel="thousand cycles")
-        a.legend(frameon=False, fontsize=7)
+        a.legend(frameon=False, fontsize=8.5)
     return path
 
 
