@@ -63,7 +63,7 @@ def picture(rows: list, curves: dict, path: Path = HERE / "failure.svg") -> Path
         places = axes[2, 0].get_gridspec()
         for axis in axes[2]:
             axis.remove()
-        titles = {False: "Newmark, stopped by its stick speed v", True: "stopped by force as well"}
+        titles = {False: "Newmark, stick speed v", True: "stopped by force as well"}
         last = [figure.add_subplot(places[2, :2]), figure.add_subplot(places[2, 2:])]
         for axis, (by_force, title) in zip(last, titles.items()):
             for (speed, forced), errors in curves.items():
