@@ -301,7 +301,7 @@ def went_on(m):
     return fresh
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, nogil=True, **LEAN)
 def advance(m, k, until, edge, tolerance, travel):
     """Move on to the time `until` [s], or to the edge [s] of the piece of the drive: how it ended.
 

@@ -16,6 +16,7 @@ from .tableau_kernels import BEFORE, FIFTH, INSIDE, PLACES, SHARES, STAGES, THIR
 
 TIME, STEP, TURNED, ORIGIN, LEFT, CREST, CREST_SPEED, PACE, BEGUN, STOOD, MASS, KIND, PIECE, MOVES = range(14)  # of now
 OMEGA, DAMP, SLIDE, BASE, OUTPUT = range(5)  # of Moving.rows
+MEANS = np.array([1 / 2, 1 / 6, 1 / 12, 1 / 30, 1 / 60, 1 / 140, 1 / 280])  # of s, s (1 - s), s^2 (1 - s), ...
 EXTENSION, SIZES, TRIAL = 16, 24, 25  # of Moving.work, whose first rows are the slopes
 LEAST = 1e-30  # of a size: at rest everything is as large as this
 SINES, SWEEP, ROWS = range(3)  # of now[KIND]: sines one after the other, a sweep, straight between rows
@@ -151,3 +152,12 @@ def between(m, share, out, size):
         for k in range(5, -1, -1):
             value = (value + m.work[EXTENSION + k, c]) * (share if k % 2 == 0 else 1 - share)
         out[c] = m.y[c] + value
+
+
+@njit(error_model="numpy", fastmath=FAST, **INNER)
+def meant(m, out, size):
+    """Write the mean of the first `size` entries of the state over the whole step into out, by its extension."""
+    for c in range(size):
+        out[c] = m.y[c]
+        for k in range(7):
+            out[c] += m.work[EXTENSION + k, c] * MEANS[k]

@@ -15,7 +15,8 @@ from . import step_kernels as steps
 
 PLACES, SHARES = np.polynomial.legendre.leggauss(4)  # of the part of a step in a cycle, for its phasor
 PARTS = 8  # of a step, among which its peaks are looked for
-ROUGHLY = 1.0  # of what a number changes by in a step, by which its peak may lie above both ends and the middle
+ROUGHLY = 0.15  # of what a number changes by in a step, by which its peak may lie above the parabola
+BULGES = 2.0  # times what a parabola through ends and middle rises above them: what its number may
 HALVES = 2  # of a step, in each of which sticking may begin or end once
 FLAT = 1e-11  # of a peak, that is not looked for
 STEEP = 0.25  # of the slope beside the end of a step: where its end is as steep, a peak lies in another step
@@ -27,6 +28,7 @@ PEAKS, WAVES, POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, WANTED, PERIOD 
 HELD, START, STARTS, SIDE, OUTPUTS, MEANS, BEGIN, END = 19, 20, 22, 23, 24, 28, 30, 31
 SHARE = 0.5  # irreversible part of the slide from which an interface slips, as `response.measures` has it
 BESIDE = 1e-3  # of a step, over which the share is taken
+CROSSED = 1e-9  # of a step, to which the place is known where it begins to slip or ends
 STILL = 1e-14  # of the slide, below which it does not slide
 
 
@@ -166,31 +168,37 @@ def marks(m, h, k):
 
 
 @njit(error_model="numpy", **INNER)
-def sizes(m, t, y, k, out):
-    """Write the six numbers whose largest values are `Kept.peaks` into out."""
+def sizes(m, t, y, slopes, out):
+    """Write the six numbers whose largest values are `Kept.peaks` of a state with its slopes into out."""
     n = m.rows.shape[1]
     _, _, force, _, slip = state_of(m, y)
     x = output_of(m, y)[0]
-    steps.slope(m, t, y, k.room[1])
     gain = m.now[steps.MOVES] * steps.push(m, t)
     for i in range(n):
-        gain += m.rows[steps.OUTPUT, i] * k.room[1][n + i]
+        gain += m.rows[steps.OUTPUT, i] * slopes[n + i]
     out[ACCELERATION], out[FORCE], out[SLIP], out[SLIP_LEAST] = abs(gain), abs(force), slip, -slip
     out[OUTPUT], out[OUTPUT_LEAST] = x, -x
+
+
+@njit(error_model="numpy", **INNER)
+def sizes_at(m, h, share, k, out):
+    """Write the six numbers at a share of the step of h [s] into out."""
+    t = m.now[steps.TIME] + share * h
+    steps.between(m, share, k.room[0], m.y.size - 3)
+    steps.slope(m, t, k.room[0], k.room[1])
+    sizes(m, t, k.room[0], k.room[1], out)
 
 
 @njit(error_model="numpy", **INNER)
 def sharpened(m, h, k, which, at, near):
     """Largest value of one of the six numbers near the share `at` of the step, by parabolas through places `near`
     apart."""
-    t, best, out = m.now[steps.TIME], -np.inf, k.table[PARTS + 1]
+    best, out = -np.inf, k.table[PARTS + 1]
     for _ in range(4):
         a, b, c = 0.0, 0.0, 0.0
         at = min(max(at, near), 1 - near)
         for side in range(-1, 2):
-            share = at + side * near
-            steps.between(m, share, k.room[0], m.y.size - 3)
-            sizes(m, t + share * h, k.room[0], k, out)
+            sizes_at(m, h, at + side * near, k, out)
             a, b, c = b, c, out[which]
             best = max(best, c)
         bend = a - 2 * b + c
@@ -201,21 +209,26 @@ def sharpened(m, h, k, which, at, near):
 
 
 @njit(error_model="numpy", **INNER)
-def looked(m, h, k, part):
-    """Write the six numbers at a part of the step of h [s] into the table."""
-    steps.between(m, part / PARTS, k.room[0], m.y.size - 3)
-    sizes(m, m.now[steps.TIME] + part / PARTS * h, k.room[0], k, k.table[part])
+def slots(m):
+    """How many of the six numbers may have a peak inside a step: with one mode the output turns at its ends alone."""
+    return OUTPUT if m.rows.shape[1] == 1 else SLOTS
 
 
 @njit(error_model="numpy", **INNER)
 def may_peak(m, h, k):
     """Whether one of the six numbers may have its largest value of all inside the step of h [s], by its ends and
-    middle."""
-    for part in (0, PARTS // 2, PARTS):
-        looked(m, h, k, part)
-    for which in range(SLOTS):
+    middle; takes in the ends of the others."""
+    t = m.now[steps.TIME]
+    sizes(m, t, m.y, m.work[0], k.table[0])
+    sizes(m, t + h, m.work[steps.TRIAL], m.work[12], k.table[PARTS])
+    sizes_at(m, h, 0.5, k, k.table[PARTS // 2])
+    for which in range(slots(m), SLOTS):
+        k.tally[PEAKS + which] = max(k.tally[PEAKS + which], k.table[0, which], k.table[PARTS, which])
+    for which in range(slots(m)):
         a, b, c = k.table[0, which], k.table[PARTS // 2, which], k.table[PARTS, which]
-        top, least = max(a, b, c), min(a, b, c)
+        top, least, bend, lean = max(a, b, c), min(a, b, c), a - 2 * b + c, c - a
+        if bend < 0 and abs(lean) < -2 * bend:  # its vertex lies in the step
+            top += BULGES * (b - top - 0.125 * lean * lean / bend)
         if not top + ROUGHLY * (top - least) <= k.tally[PEAKS + which] + FLAT * abs(k.tally[PEAKS + which]):
             return True
     return False
@@ -239,10 +252,10 @@ def peaks(m, h, k):
         return
     for part in range(PARTS + 1):
         if part % (PARTS // 2) != 0:
-            looked(m, h, k, part)
-        for which in range(SLOTS):
+            sizes_at(m, h, part / PARTS, k, k.table[part])
+        for which in range(slots(m)):
             k.tally[PEAKS + which] = max(k.tally[PEAKS + which], k.table[part, which])
-    for which in range(SLOTS):
+    for which in range(slots(m)):
         at, least, peak = 0, k.table[0, which], k.tally[PEAKS + which]
         for part in range(1, PARTS + 1):
             least = min(least, k.table[part, which])
@@ -255,14 +268,15 @@ def peaks(m, h, k):
 @njit(error_model="numpy", **INNER)
 def harmonics(m, h, k):
     """Take the step of h [s] into the harmonics of the last cycles."""
-    t = m.now[steps.TIME]
-    omega = 2 * pi / k.tally[PERIOD]
+    t, n = m.now[steps.TIME], m.rows.shape[1]
+    omega, own = 2 * pi / k.tally[PERIOD], m.y.size - 3
     for j in range(NODES.size):
         share, weight = 0.5 * (1 + NODES[j]), 0.5 * h * WEIGHTS[j]
-        steps.between(m, share, k.room[0], m.y.size - 3)
-        q, _, force, _, _ = state_of(m, k.room[0])
+        steps.between(m, share, k.room[0], own)
+        q, v = steps.slide_of(m, k.room[0])
+        force = law.rate(m.num, m.mem, m.turn, q - m.now[steps.ORIGIN], v, k.room[0][2 * n:own], k.room[1][2 * n:own])
         turn, x = omega * (t + share * h), output_of(m, k.room[0])[0]
-        c, s = cos(turn), sin(turn)
+        c, s = sine(turn + 0.5 * pi), sine(turn)
         k.tally[WAVES + 0] += weight * q * c
         k.tally[WAVES + 1] -= weight * q * s
         k.tally[WAVES + 2] += weight * force * c
@@ -279,6 +293,10 @@ def mean_of(m, h, k, begin, which):
     t = m.now[steps.TIME]
     low, high = max(t, begin), min(t + h, begin + k.tally[PERIOD])
     if high <= low:
+        return
+    if high - low == h:  # the whole of the extension: integrals of s^a (1 - s)^b
+        steps.meant(m, k.room[0], m.rows.shape[1])
+        k.tally[which] += h * steps.slide_of(m, k.room[0])[0]
         return
     for j in range(NODES.size):
         steps.between(m, (low + 0.5 * (1 + NODES[j]) * (high - low) - t) / h, k.room[0], m.y.size - 3)
@@ -302,36 +320,51 @@ def slipping(m, k, at):
 @njit(error_model="numpy", **INNER)
 def starts(m, k, time):
     """Take in that slip starts at a time [s]; slips that mean the same modulo pi count alike."""
-    turn = 4 * pi * time / k.tally[PERIOD]
-    k.tally[START] += cos(turn)
-    k.tally[START + 1] += sin(turn)
+    k.tally[START] += cos(4 * pi * time / k.tally[PERIOD])
+    k.tally[START + 1] += sin(4 * pi * time / k.tally[PERIOD])
     k.tally[STARTS] += 1
+
+
+@njit(error_model="numpy", **INNER)
+def crossed(m, k, a, b, before, after):
+    """Share of the step between a and b at which `slipping`, of opposite signs there, passes zero: the Pegasus method
+    (Dowell and Jarratt 1972)."""
+    last = a
+    for _ in range(60):
+        at = b - after * (b - a) / (after - before)
+        value = slipping(m, k, at)
+        if np.isnan(value) or abs(at - last) < CROSSED or b - a < CROSSED:
+            return at
+        if (value < 0) == (after < 0):
+            before *= after / (after + value)
+            b, after = at, value
+        else:
+            after *= before / (before + value)
+            a, before = at, value
+        last = at
+    return last
 
 
 @njit(error_model="numpy", **INNER)
 def holds(m, h, k):
     """Take the step of h [s] into the time for which the interface sticks, and into the starts of slip after it."""
-    t, before = m.now[steps.TIME], slipping(m, k, 0.0)
-    if np.isnan(before):
-        before = k.tally[SIDE] if k.tally[SIDE] != 0 else -SHARE
-    if before >= 0 and k.tally[SIDE] < 0:  # it starts between two steps, where the slide turns
-        starts(m, k, t)
+    t, before = m.now[steps.TIME], k.tally[SIDE]
+    if before == 0 or steps.slide_of(m, m.y)[0] == m.now[steps.ORIGIN]:  # beside a reversal it may jump
+        before = slipping(m, k, 0.0)
+        if np.isnan(before):
+            before = k.tally[SIDE] if k.tally[SIDE] != 0 else -SHARE
+        if before >= 0 and k.tally[SIDE] < 0:  # it starts between two steps, where the slide turns
+            starts(m, k, t)
     for part in range(1, HALVES + 1):
         after, low, high = slipping(m, k, part / HALVES), (part - 1) / HALVES, part / HALVES
         after = before if np.isnan(after) else after
         if (before < 0) == (after < 0):
             k.tally[HELD] += h / HALVES if after < 0 else 0.0
         else:
-            a, b = low, high
-            while b - a > 1e-9:
-                middle = 0.5 * (a + b)
-                if (slipping(m, k, middle) < 0) == (before < 0):
-                    a = middle
-                else:
-                    b = middle
-            k.tally[HELD] += h * (a - low if before < 0 else high - a)
+            at = crossed(m, k, low, high, before, after)
+            k.tally[HELD] += h * (at - low if before < 0 else high - at)
             if after >= 0:
-                starts(m, k, t + a * h)
+                starts(m, k, t + at * h)
         before = after
     k.tally[SIDE] = before
 

@@ -65,7 +65,8 @@ class Read:
         rig, window = self.model.rig, self.numerics.window
         rubs, stuck, rings, own = self.model.friction is not None, False, {}, {}
         if rubs:
-            rings, own = run_events.rings(done.window, rig.modes, rig.drive, None, self.held)
+            if not self.creeps:
+                rings, own = run_events.rings(done.window, rig.modes, rig.drive, None, self.held)
             stuck = run_events.all_stick(done.window, self.held) and not self.creeps
         own = own | self.between(done.window)
         last = min(window, len(done.amplitudes))

@@ -142,14 +142,15 @@ def _numbers(model) -> tuple:
 
 
 def _ringing(models, cases, done, numbers) -> list:
-    """(measures of what rings in a stick, their errors) of every motion; most rest too shortly for any."""
+    """(measures of what rings in a stick, their errors) of every motion; most rest too shortly for any, and a law that
+    creeps never holds."""
     out = []
     for k in range(len(numbers)):
         model, (modes, drive, element, _) = models[k % len(models)], cases[k % len(models)]
-        if done.lost[k] or numbers[k, read.REST] + 3 < LEAST_SAMPLES:
+        creeps = has(model.friction.law, "creeps")
+        if creeps or done.lost[k] or numbers[k, read.REST] + 3 < LEAST_SAMPLES:
             out.append(({}, {}))
             continue
         window = hub.response_of(modes, drive, done.kept.samples[k], float(done.kept.tally[k, hub.STORED]))
-        held = 0.0 if has(model.friction.law, "creeps") else 1e-3 * element.length
-        out.append(rings(window, modes, drive, None, held))
+        out.append(rings(window, modes, drive, None, 1e-3 * element.length))
     return out
