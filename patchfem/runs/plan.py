@@ -6,14 +6,17 @@ from ..core import Missing, say
 from ..effects import EFFECTS
 from ..model.model import Model, build
 from ..model.source import placed
+from . import memory
 
+START = 0.75  # seconds of CPU until a run begins, and of its files and its page
+LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Plan:
     """A model with the engine that will run it, its sizes and its cost.
 
     effects: names in the scene; steps: of the time loop, all passes; seconds, bytes: estimates; chain: link ->
-    stiffness [N/m] or "rigid"; groups: name -> value; verdict: sentences.
+    stiffness [N/m] or "rigid"; groups: name -> value; verdict: sentences; parts: of the memory, as `memory.needs`.
     """
 
     model: Model
@@ -28,6 +31,7 @@ class Plan:
     chain: dict
     groups: dict
     verdict: tuple
+    parts: tuple = ()
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{count} {name.removesuffix('_about').replace('_', ' ')}"
@@ -41,7 +45,8 @@ class Plan:
         return {"kind": self.kind, "effects": [{"effect": e, "equations": EFFECTS[e].equations} for e in self.effects],
                 "not_in_scene": list(self.not_in_scene), "engine": self.engine, "unknowns": self.unknowns,
                 "steps": self.steps, "seconds": self.seconds, "bytes": self.bytes, "stiffness_chain": self.chain,
-                "groups": self.groups, "verdict": list(self.verdict)}
+                "groups": self.groups, "verdict": list(self.verdict),
+                "memory": {part.what: int(part.bytes) for part in self.parts}}
 
 
 def plan(asked, per_point: bool = False) -> Plan:
@@ -61,9 +66,11 @@ def _planned(model: Model, per_point: bool) -> Plan:
 
         read_table(model.measured[0])  # a broken table is named before anything runs
     unknowns, chain, groups = {}, {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}, {}
-    engine, steps, seconds, more, said = "static", 0, 0.25, 0.0, [[], [], []]
+    engine, steps, seconds, more, said = "static", 0, 0.0, 0.0, [[], [], []]
+    numerics, pressed = None, 0.0
     if model.rig is not None:
         from .rig import plan as of_rig
+        from .rig.numerics import choose
 
         unknowns["modes"], chain = len(model.rig.frequencies), of_rig.chain(model.rig) | chain
         groups |= of_rig.groups(model) if model.kind == "rig" else {}
@@ -73,12 +80,12 @@ def _planned(model: Model, per_point: bool) -> Plan:
         from .patch import plan as of_patch
 
         unknowns, chain = of_patch.sizes(model.patch) | unknowns, chain | of_patch.chain(model.patch)
-        seconds = 0.6 + 2.5e-6 * unknowns["interface_points"]**2 * 1.25
+        seconds, pressed = of_patch.effort(model.patch, model.kind == "patch", model.accuracy.tolerance)
         groups |= of_patch.groups(model)
         said[1] = of_patch.verdict(groups)
     if model.rig is not None:
         engine, steps, more = of_rig.cost(model, per_point, unknowns)
-        seconds += more
+        seconds, numerics = seconds + more, choose(model, per_point)
     elif model.kind == "bench":
         from .bench import plan as of_bench
 
@@ -89,27 +96,24 @@ def _planned(model: Model, per_point: bool) -> Plan:
 
         seconds += of_wear.cost(model, unknowns["interface_points"], more)
         said[2] = [*said[2], of_wear.verdict(model)]
-    seconds += 1.5  # files and report
-    size = int(2.5e8 + 8 * 4 * unknowns.get("interface_points", 0)**2 * 2 + 200 * min(steps, 500_000))
-    if "bond_list_about" in unknowns:
-        from ..dynamics.march.room import most_bytes
-
-        size += int(most_bytes(unknowns["bond_list_about"]))
+    seconds += START + (0.0 if engine in memory.PLAIN else memory.LOADED)
+    parts = memory.needs(model, engine, steps, unknowns, numerics, pressed)
     if model.friction is not None:
         from . import law
 
         chain |= law.link(model)
         groups |= law.groups(model)
         said[2] = [*said[2], *law.words(model)]
-    return Plan(model, model.kind, model.source.effects, model.absent, engine, unknowns, steps, round(seconds, 2), size,
-                chain, groups, tuple(_verdict(model, groups, size, said)))
+    return Plan(model, model.kind, model.source.effects, model.absent, engine, unknowns, steps, round(seconds, 2),
+                int(sum(part.bytes for part in parts)), chain, groups, tuple(_verdict(model, groups, parts, said)),
+                parts)
 
 
-def _verdict(model: Model, groups: dict, size: int, said: list) -> list:
+def _verdict(model: Model, groups: dict, parts: tuple, said: list) -> list:
     """Sentences on what the groups say; said: those of the motion, the patch and the sum over bonds."""
     out = list(said[0])
-    if size > free_bytes():
-        out.append(f"run will refuse: about {size / 1e9:.3g} GB are needed, {free_bytes() / 1e9:.3g} GB are free")
+    if text := memory.refusal(parts):
+        out.append(f"run will refuse: {text}")
     out += [*said[1], *said[2]]
     if "slip_length" in groups:
         out.append(f"the pieces shear elastically by about {say(groups['slip_length'], 3)} before the patch slips")
@@ -119,19 +123,12 @@ def _verdict(model: Model, groups: dict, size: int, said: list) -> list:
     return out
 
 
-def free_bytes() -> float:
-    """Memory [bytes] that a run may still take; infinite where the system does not tell."""
-    try:
-        with open("/proc/meminfo", encoding="ascii") as file:
-            known = dict(line.split(":", 1) for line in file)
-        return 1024.0 * int(known["MemAvailable"].split()[0])
-    except (OSError, KeyError, ValueError):
-        return float("inf")
-
-
 def refuse_size(what: Plan) -> None:
-    """Raise Missing where a run would need more memory than there is."""
-    free = free_bytes()
-    if what.bytes > free:
-        raise Missing(f"about {what.bytes / 1e9:.3g} GB are needed, {free / 1e9:.3g} GB are free; make "
-                      "contact.element_size larger or the run shorter", "")
+    """Raise Missing where a run would need more memory than there is, or longer than LONGEST seconds."""
+    memory.refuse(what.parts)
+    if what.seconds > LONGEST:
+        pinned = what.model.accuracy.steps_per_cycle is not None
+        key = "accuracy.steps_per_cycle or " if pinned else ""
+        key += "slide.cycles" if what.kind == "bench" else "drive.cycles" if what.model.rig is not None else ""
+        raise Missing(f"the run would take about {what.seconds:.2g} s ({what.steps:.2g} steps), more than "
+                      f"{LONGEST:.0e} s; lower {key or 'the number of elements'}", "")

@@ -9,7 +9,7 @@ from .asked import Asked
 from .cases import Cases
 
 LOOKED = 9  # cases that are planned, spread over the sweep
-ONCE = 1.75  # seconds of a plan that a sweep spends once: its start, its files and its page
+ONCE = 0.75  # seconds of a plan that a sweep spends once: its start, its files and its page
 TOGETHER = 2e-3  # seconds of a case of a batch from its values to its folder (1.9 ms of 2000 lumped cases)
 DISK = 6000  # bytes of a case in its folder and in the tables
 

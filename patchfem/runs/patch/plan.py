@@ -5,11 +5,34 @@ from math import sqrt
 from ...model.model import Model
 from ...model.patch import CHOSEN_POINTS, bars, block_shear
 
+PRESSED, SQUARE = 0.15, 1.5e-6  # seconds of a patch, and per pair of nodes
+NODE, PAIR, PACKAGES = 5.5e4, 133.0, 1.6e7  # bytes per node, per pair of nodes: flexibilities, factors; of packages
+MOVING, FRAMES = 0.35, 2.5e7  # seconds and bytes of the frames of a patch whose contact moves
+
 
 def sizes(asked) -> dict:
     """Sizes of a `PatchModel` by name: interface points, and about how many elastic unknowns."""
     points = CHOSEN_POINTS if asked.chosen else round(asked.length / asked.size) + 1
     return {"interface_points": points, "elastic_unknowns_about": int(points * 2 * 33)}
+
+
+def effort(asked, still: bool, tolerance: float) -> tuple:
+    """(seconds, bytes) of pressing a `PatchModel` and of its fields, besides the program itself; still: nothing moves.
+
+    Measured over random patches: the square of the nodes, and what outlines, steps, unlike pieces and a mesh that has
+    to follow the edge of the contact to a fine tolerance take besides.
+    """
+    points = sizes(asked)["interface_points"]
+    seconds, size = PRESSED + SQUARE * points**2, PACKAGES + NODE * points + PAIR * points**2
+    unlike = asked.lower != asked.upper
+    if asked.outlined or asked.gap.jumps:
+        seconds, size = seconds + 1.3, size + 1.2e8
+    if asked.chosen and (asked.outlined or asked.gap.jumps):
+        seconds, size = seconds + 0.7, size + 5e7
+    ends = bool(asked.gap.shapes) or asked.offset or asked.line_moment
+    if asked.chosen and ends and not still and tolerance < 2e-3:
+        seconds, size = seconds + 2.5, size + 2.8e8
+    return seconds + (0.0 if still else MOVING) + 0.3 * unlike, size + (0.0 if still else FRAMES)
 
 
 def chain(asked) -> dict:

@@ -14,6 +14,8 @@ from .smooth.choice import smooth_cost
 
 STEADY = {"events": "the map from event to event, exact", "yields": "the map from yield to yield, exact",
           "balance": "harmonic balance", "march": "a march that is brought to repeat"}
+STEP, STEP_MODE = 7e-7, 1e-7  # seconds of a step of one mode, and of each further one
+GROWS, JOINT = 3.0, 2.5  # times that where bonds grow, and for each of several interfaces
 CLIMB = 3e-6  # seconds of a sample over grooves
 
 
@@ -33,9 +35,10 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
         return "smooth", *smooth_cost(model)
     if numerics.engine == "harmonic":
         points = 1 if rig.waveform == "sine" else 120
-        return "harmonic", points, 0.3 + 0.05 * points
+        sizes = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.interfaces))
+        return "harmonic", points, 0.1 + 0.05 * points + 8e-10 * sizes**3
     steps = int(numerics.cycles * numerics.steps)
-    each, points = 1e-6, unknowns.get("interface_points", 1)
+    each, points = _step(rig, f), unknowns.get("interface_points", 1)
     if model.grooves is not None:
         each = CLIMB + (4 * _of_modes(numerics, points, unknowns) if soft else 0.0)  # the normal force is searched
     elif f is not None and has(f.law, "bonds"):
@@ -51,6 +54,14 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
     elif soft:
         each = 3e-9 * points + 5e-7
     return numerics.engine, int(steps * 1.75), steps * 1.75 * each
+
+
+def _step(rig, f) -> float:
+    """Seconds of a step of a march: of one mode and interface, more where bonds grow or interfaces move each other."""
+    faces = len(rig.interfaces)
+    grows = f is not None and f.slip_growth is not None and has(f.law, "bonds")
+    return (STEP + STEP_MODE * (len(rig.frequencies) - 1)) * (GROWS if grows else 1.0) * (JOINT * faces if faces > 1
+                                                                                          else 1.0)
 
 
 def _of_modes(numerics, points: int, unknowns: dict) -> float:

@@ -1,0 +1,171 @@
+"""Memory of a run, foreseen from its sizes by what takes it, and the memory that the process may still take."""
+
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+from ..core import Missing
+from ..model.model import Model
+
+PACKAGES, COMPILED = 76e6, 62e6  # bytes of what every run imports, and of what runs compiled code
+FULL = 125.0  # per pair of coordinates: matrices, shapes and what diagonalises them
+WAVE = 94.0  # per pair of sines and cosines of harmonic balance: its Jacobian and the factors of its error
+KEPT = 32.0  # per number of a kept sample: the window, the response, what is read off it
+GRID = 24.0  # per number of a step of the comparison methods, which keep all of them
+SLIDE = 250.0  # per sample of a bench
+ROW = 400.0  # per row of a recorded drive
+LOADED = 0.4  # seconds of CPU until the first compiled code runs
+MAPPED, CODE = 60e6, 200e6  # of address space beside what is used: packages, and the compiler's library
+PLAIN = ("static", "exact", "harmonic", "bench, closed form", "bench, law step by step", "bench, two directions")
+CODE_PART = "compiled code"
+CURES = {"contact.element_size": "make contact.element_size larger", "contact.mesh": "give contact.mesh fewer nodes on "
+         "its interface", "accuracy.tail": "loosen accuracy.tail or accuracy.merge", "structure": "give fewer modes",
+         "slide.file": "keep every few rows of slide.file", "drive.file": "keep every few rows of drive.file"}
+COMPARED = ("duhamel", "newmark", "euler")
+
+
+class Need(NamedTuple):
+    """A part of the memory of a run: bytes, what for in words, and the key of the scene that drives it, or ""."""
+
+    bytes: float
+    what: str
+    key: str
+
+
+def needs(model: Model, engine: str, steps: int, unknowns: dict, numerics=None, pressed: float = 0.0) -> tuple:
+    """The parts of the memory of a run at its peak, the largest first.
+
+    engine, steps, unknowns: of its `Plan`; numerics: the choices of a coupled run; pressed: bytes of its patch.
+
+    The numbers above were measured on runs of one kind each, with 2001 nodes, 5000 cycles, 1000 harmonics and 2000
+    masses as the largest; files and page take less than what they show.
+    """
+    points = unknowns.get("interface_points", 0)
+    parts = [Need(PACKAGES, "packages", ""), Need(0 if engine in PLAIN else COMPILED, CODE_PART, "")]
+    if points:
+        key = "contact.mesh" if model.patch.mesh else "contact.element_size"
+        parts.append(Need(pressed, f"{points} nodes of the interface", key))
+        strips = model.patch.strips[0] if model.patch.strips else 1
+        parts.append(Need(3000.0 * strips * points, f"{strips} strips of them", "contact.strips.count"))
+        modes = unknowns.get("shear_modes", 0)
+        parts.append(Need(24.0 * modes * points, f"{modes} shear modes", "accuracy.shear_modes"))
+    if engine.startswith("bench"):
+        parts.append(Need(SLIDE * steps / 2, f"{steps // 2} samples of the slide", _samples_key(model)))
+    if model.rig is not None:
+        parts += _of_rig(model, engine, steps, numerics)
+    if "bond_list_about" in unknowns:
+        from ..dynamics.march.room import most_bytes
+
+        parts.append(Need(most_bytes(unknowns["bond_list_about"]), "the list of bonds", "accuracy.tail"))
+    return tuple(sorted((part for part in parts if part.bytes > 0), reverse=True))
+
+
+def _samples_key(model: Model) -> str:
+    if model.slide.kind == "file":
+        return "slide.file"
+    return "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else "slide.cycles"
+
+
+def _of_rig(model: Model, engine: str, steps: int, numerics) -> list:
+    rig, n = model.rig, len(model.rig.frequencies)
+    width = 2.0 * n + 12 + 6 * len(rig.interfaces)
+    parts = [Need(FULL * n**2, f"{n} modes", "structure")]
+    if engine in COMPARED:
+        parts.append(Need(GRID * width * steps / 1.75, f"{steps} steps, all of them kept", "drive.cycles"))
+    elif engine == "harmonic":
+        if model.accuracy.harmonics:
+            size = 2.0 * model.accuracy.harmonics * max(1, len(rig.interfaces))
+            parts.append(Need(WAVE * size**2, f"{model.accuracy.harmonics} harmonics", "accuracy.harmonics"))
+    elif numerics is not None:
+        window = max(2, numerics.window) * numerics.steps
+        parts.append(Need(KEPT * width * window, f"{window} samples of the last cycles", "accuracy.steps_per_cycle"))
+    rows = len(getattr(rig.drive, "breaks", ())) if not rig.drive.segments else 0
+    parts.append(Need(ROW * rows, f"{rows} rows of the drive", "drive.file"))
+    return parts
+
+
+def free_bytes(compiled: bool = False) -> float:
+    """Memory [bytes] that this process may take in all, by the system, its group and its own limits; infinite where
+    none of them tells. compiled: a compiler's library is mapped besides, which only the last counts."""
+    used, mapped = own()
+    beside = mapped - used + MAPPED + (CODE if compiled else 0.0)
+    return min(_available() + used, _of_group(used), *(limit - beside for limit in _limits()))
+
+
+def own(status: Path = Path("/proc/self/statm")) -> tuple:
+    """(memory in use, address space) of this process [bytes]; zeros where the system does not tell."""
+    try:
+        size, resident = map(int, status.read_text("ascii").split()[:2])
+    except (OSError, ValueError):
+        return 0.0, 0.0
+    page = os.sysconf("SC_PAGE_SIZE")
+    return float(resident * page), float(size * page)
+
+
+def _available() -> float:
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            known = dict(line.split(":", 1) for line in file)
+        return 1024.0 * int(known["MemAvailable"].split()[0])
+    except (OSError, KeyError, ValueError):
+        return float("inf")
+
+
+def _limits() -> list:
+    """Limits of the address space and of the data of this process [bytes], infinite where none is set."""
+    try:
+        import resource
+    except ImportError:
+        return [float("inf")]
+    found = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA))
+    return [float("inf") if limit == resource.RLIM_INFINITY else float(limit) for limit in found]
+
+
+def _of_group(used: float, groups: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")) -> float:
+    """What the control group of this process and those above it leave [bytes], with what the process uses of it."""
+    try:
+        lines = [line.split(":", 2) for line in groups.read_text("utf-8", "replace").splitlines()]
+    except OSError:
+        return float("inf")
+    free = float("inf")
+    for _, kinds, path in (line for line in lines if len(line) == 3):
+        old = "memory" in kinds.split(",")
+        if not old and kinds:
+            continue
+        base = root / "memory" if old else root
+        names = ("memory.limit_in_bytes", "memory.usage_in_bytes") if old else ("memory.max", "memory.current")
+        place = base / path.strip("/")
+        for folder in (place, *place.parents):
+            free = min(free, _left(folder, *names) + used)
+            if folder == base:
+                break
+    return free
+
+
+def _left(folder: Path, limit: str, usage: str) -> float:
+    """Limit less usage of one group, whose files that were read long ago count as free; infinite without a limit."""
+    try:
+        most, taken = int((folder / limit).read_text("ascii")), int((folder / usage).read_text("ascii"))
+        known = dict(line.split() for line in (folder / "memory.stat").read_text("ascii").splitlines())
+    except (OSError, ValueError):  # "max"
+        return float("inf")
+    return float(most - taken + int(known.get("total_inactive_file", known.get("inactive_file", 0))))
+
+
+def refusal(parts: tuple, free: float | None = None) -> str:
+    """Why a run of these parts cannot be: what it needs, what there is, what takes most and its key; or nothing."""
+    free = free_bytes(any(part.what == CODE_PART for part in parts)) if free is None else free
+    total = sum(part.bytes for part in parts)
+    if total <= free:
+        return ""
+    most = next((part for part in parts if part.key), None)
+    text = f"about {total / 1e9:.3g} GB are needed, {max(free, 0.0) / 1e9:.3g} GB are free"
+    if most is None or most.bytes < 0.1 * total:
+        return f"{text}; give the process more memory"
+    return f"{text}; {most.bytes / 1e9:.3g} GB are for {most.what}: {CURES.get(most.key, f'lower {most.key}')}"
+
+
+def refuse(parts: tuple) -> None:
+    """Raise Missing where a run would need more memory than there is."""
+    if text := refusal(parts):
+        raise Missing(text, "")

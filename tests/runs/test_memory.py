@@ -1,0 +1,111 @@
+"""Memory and time foreseen: what takes them, the limits that are seen, and refusals before anything is made."""
+
+import resource
+import subprocess
+import sys
+import tracemalloc
+
+import plan_trial
+import pytest
+from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
+
+from patchfem.core import Missing
+from patchfem.runs import memory
+from patchfem.runs.plan import plan, refuse_size
+from patchfem.scene.scene import loads
+
+TANH = COULOMB.replace("coulomb", "tanh") + 'reference_speed = "1 mm/s"\n'
+RIG = POINT + TANH + STRUCTURE
+MARCH, GIGABYTE = "accuracy.method=march", 10**9
+
+
+def planned(text, *sets):
+    return plan(loads(text, "a.toml", sets))
+
+
+@pytest.mark.parametrize("text, sets, key", [
+    (PATCH, ["contact.element_size=0.5 um"], "make contact.element_size larger"),
+    (RIG, [MARCH, "accuracy.steps_per_cycle=10000000"], "lower accuracy.steps_per_cycle"),
+    (RIG, ["accuracy.method=harmonic", "accuracy.harmonics=10000"], "lower accuracy.harmonics"),
+    (RIG, ["accuracy.method=newmark", "drive.cycles=1e5"], "lower drive.cycles"),
+    (BENCH, ["slide.cycles=15000", "slide.kind=sine", "slide.frequency=1 Hz", "accuracy.steps_per_cycle=1000"],
+     "lower accuracy.steps_per_cycle"),
+    (PATCH, ["contact.strips.count=10000", "contact.element_size=50 um"], "lower contact.strips.count")])
+def test_refuses_before_anything_is_made_with_the_key_that_drives_it(text, sets, key):
+    tracemalloc.start()
+    found = planned(text, *sets)
+    said = memory.refusal(found.parts, GIGABYTE)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert said.startswith("about ") and f"{key}" in said and "1 GB are free" in said
+    assert peak < (7e8 if found.kind == "bench" else 3e7)  # a bench counts its samples by making them
+
+
+def test_exact_the_parts_are_the_whole_and_the_largest_stands_first():
+    found = planned(PATCH, "contact.element_size=10 um")
+    sizes = [part.bytes for part in found.parts]
+    assert sizes == sorted(sizes, reverse=True) and found.bytes == int(sum(sizes))
+    assert found.as_json()["memory"][found.parts[0].what] == int(sizes[0])
+
+
+def test_exact_memory_grows_with_the_square_of_the_nodes_and_with_the_steps_of_the_window():
+    few, many = (planned(PATCH, f"contact.element_size={size} um").bytes for size in (2, 1))
+    assert 3.6 < many / few < 4.0
+    few, many = (planned(RIG, MARCH, f"accuracy.steps_per_cycle={n}00000").bytes for n in (2, 4))
+    assert many - few == pytest.approx(memory.KEPT * 20 * 3 * 2e5, rel=0.01)  # 30 cycles keep the last 3
+
+
+def test_exact_a_run_of_centuries_is_refused_with_its_key():
+    with pytest.raises(Missing, match=r"would take about .* s .*; lower drive\.cycles$"):
+        refuse_size(planned(RIG, MARCH, "drive.cycles=1e15"))
+
+
+def test_exact_a_group_with_a_limit_leaves_what_it_has_not_used(tmp_path):
+    groups, root = tmp_path / "cgroup", tmp_path / "fs"
+    for place, most, used, old in (("a", 9000, 5000, 600), ("a/b", "max", 4000, 0)):
+        (root / place).mkdir(parents=True)
+        (root / place / "memory.max").write_text(f"{most}\n")
+        (root / place / "memory.current").write_text(f"{used}\n")
+        (root / place / "memory.stat").write_text(f"anon 1\ninactive_file {old}\n")
+    groups.write_text("0::/a/b\n")
+    assert memory._of_group(50.0, groups, root) == 9000 - 5000 + 600 + 50
+    groups.write_text("5:cpu:/a\n4:memory:/c\n0::/\n")
+    place = root / "memory" / "c"
+    place.mkdir(parents=True)
+    for name, text in (("limit_in_bytes", "700"), ("usage_in_bytes", "300"), ("stat", "total_inactive_file 20")):
+        (place / f"memory.{name}").write_text(text + "\n")
+    assert memory._of_group(50.0, groups, root) == 700 - 300 + 20 + 50
+    assert memory._of_group(50.0, tmp_path / "none", root) == float("inf")
+
+
+def test_exact_a_limit_of_the_process_is_seen(monkeypatch):
+    used, mapped = memory.own()
+    assert 2e7 < used < mapped
+    limits = {resource.RLIMIT_AS: 4 * GIGABYTE, resource.RLIMIT_DATA: resource.RLIM_INFINITY}
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: (limits[kind], resource.RLIM_INFINITY))
+    bare, compiled = memory.free_bytes(), memory.free_bytes(True)
+    assert bare == pytest.approx(4 * GIGABYTE - (mapped - used) - memory.MAPPED, abs=5e7)
+    assert bare - compiled == pytest.approx(memory.CODE, abs=1e7)
+
+
+@pytest.mark.parametrize("law, least", [(COULOMB, 150), (TANH, 200), (TANH, 300)])
+def test_refuses_in_one_line_what_the_process_may_not_take(tmp_path, law, least):
+    path = tmp_path / "a.toml"
+    path.write_text(POINT + law + MODE + STRUCTURE[len(MODE):])
+    done = subprocess.run([sys.executable, "-m", "patchfem", "run", path, "-o", tmp_path / "out"], timeout=120,
+                          capture_output=True, text=True,
+                          preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (least << 20, least << 20)))
+    assert done.returncode == 4 and done.stderr.count("\n") == 1, done.stderr
+    assert "GB are free; give the process more memory" in done.stderr or "out of memory" in done.stderr
+
+
+@pytest.mark.slow
+def test_always_plans_hold_in_nine_of_ten_scenes(tmp_path):
+    """Time within 1.5, memory within 1.3, of 80 scenes of all kinds."""
+    scores = [one.within() for one in plan_trial.told(5000, 80, tmp_path)]
+    time, memory_ = (sum(column) / len(scores) for column in zip(*scores))
+    assert time >= 0.8 and memory_ >= 0.9
+
+
+def test_always_plans_of_a_few_scenes_hold_in_memory(tmp_path):
+    assert [one.within(4.0, 1.5)[1] for one in plan_trial.told(1001, 1, tmp_path)] == [True]

@@ -1,0 +1,114 @@
+"""Scenes of all kinds by a seed, each run once as a command, its CPU seconds and peak memory beside those of its plan.
+
+A scene is one of `torture.grammar`, with more cycles, finer patches and finer tolerances, so that more than the start
+of the program counts. A scene that the program refuses, or plans at more than MOST seconds, gives way to the next seed.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from patchfem.core import Missing, PatchfemError
+from patchfem.runs.plan import plan
+from patchfem.scene.scene import SceneError, loads
+from patchfem.torture import grammar
+from patchfem.torture.toml import text_of
+from patchfem.torture.trial import Trial
+
+MOST = 60.0  # seconds
+# a process starts with the memory of the one that it is forked from as its peak: a small one stands in between
+SMALL = """\
+import resource, subprocess, sys
+code = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(code, used.ru_utime + used.ru_stime, used.ru_maxrss)
+"""
+
+
+class Told(NamedTuple):
+    """A scene: its seed, kind and engine, seconds and bytes as planned and as measured."""
+
+    seed: int
+    kind: str
+    engine: str
+    planned: tuple
+    measured: tuple
+
+    def within(self, time: float = 1.5, memory: float = 1.3) -> tuple:
+        """Whether the plan holds in time and in memory, by these factors either way."""
+        ratios = [a / b for a, b in zip(self.planned, self.measured)]
+        return tuple(1 / most <= ratio <= most for ratio, most in zip(ratios, (time, memory)))
+
+
+def text(seed: int) -> str:
+    """The scene of a seed."""
+    trial = Trial(np.random.default_rng(seed), None, None, None)
+    out = grammar.scene(trial)
+    contact = out.get("contact")
+    if contact:
+        elements = trial.draw(0, 0, 0, 100, 200, 400)
+        contact.pop("element_size", None)
+        if elements:
+            contact["element_size"] = f"{float(contact['length'].split()[0]) / elements:.4g} m"
+    for table in ("slide", "drive"):
+        if "cycles" in out.get(table, {}):
+            out[table]["cycles"] = int(out[table]["cycles"] * trial.wide(1, 100))
+    out["accuracy"]["tolerance"] = trial.draw(1e-2, 3e-3, 1e-3)
+    return text_of(out)
+
+
+def planned(seed: int):
+    """The plan of a seed, None where it is refused or long."""
+    try:
+        found = plan(loads(text(seed), "a.toml"))
+    except (SceneError, PatchfemError, Missing):
+        return None
+    return found if found.seconds <= MOST else None
+
+
+def told(first: int, count: int, folder: Path, twice: bool = True):
+    """`count` scenes from a seed on, as `Told`; one that ends with a refusal is left out.
+
+    twice: a scene whose plan does not hold is run once more and the smaller numbers are taken: the first time may have
+    compiled code.
+    """
+    seed = first - 1
+    while count:
+        seed += 1
+        found = planned(seed)
+        if found is None:
+            continue
+        path = folder / f"{seed}.toml"
+        path.write_text(text(seed), encoding="utf-8")
+        numbers = _measured(path, folder / str(seed))
+        if numbers is None:
+            continue
+        one = Told(seed, found.kind, found.engine, (found.seconds, float(found.bytes)), numbers)
+        if twice and not all(one.within()):
+            again = _measured(path, folder / str(seed))
+            one = one._replace(measured=tuple(map(min, numbers, again)))
+        count -= 1
+        yield one
+
+
+def _measured(path: Path, out: Path) -> tuple | None:
+    """CPU seconds and peak memory [bytes] of `patchfem run`; None of a run that has no results."""
+    words = [sys.executable, "-c", SMALL, sys.executable, "-m", "patchfem", "run", path, "-o", out, "-q"]
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True)
+    code, seconds, size = done.stdout.split()
+    return (float(seconds), 1024.0 * float(size)) if code in ("0", "3") else None
+
+
+if __name__ == "__main__":
+    import tempfile
+
+    scores = []
+    with tempfile.TemporaryDirectory() as place:
+        for one in told(int(sys.argv[1]), int(sys.argv[2]), Path(place)):
+            scores.append(one.within())
+            print(*one[:3], *(f"{value:.4g}" for pair in one[3:] for value in pair), *scores[-1], flush=True)
+    time, memory = (sum(column) for column in zip(*scores))
+    print(f"{len(scores)} scenes: time within 1.5 in {time}, memory within 1.3 in {memory}")
