@@ -159,7 +159,7 @@ def refusal(parts: tuple, free: float | None = None) -> str:
     if total <= free:
         return ""
     most = next((part for part in parts if part.key), None)
-    text = f"about {total / 1e9:.3g} GB are needed, {max(free, 0.0) / 1e9:.3g} GB are free"
+    text = f"about {total / 1e9:.3g} GB are needed, {max(free, 0.0) / 1e9:.2g} GB are free"
     if most is None or most.bytes < 0.1 * total:
         return f"{text}; give the process more memory"
     return f"{text}; {most.bytes / 1e9:.3g} GB are for {most.what}: {CURES.get(most.key, f'lower {most.key}')}"

@@ -167,7 +167,7 @@ def test_exact_another_law_is_the_scene_with_that_set():
 
 # ---- messages
 
-TINY = SMALL_PATCH.replace('"0.5 mm"', '"1 nm"')
+TINY = SMALL_PATCH.replace('"0.5 mm"', '"0.2 um"')
 STILL = STRUCTURE.replace("slide = 1.0", "slide = 1.0\nbase = 0.0")
 
 
