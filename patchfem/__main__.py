@@ -77,6 +77,8 @@ def _leave(code: int) -> None:
 
 
 def _guarded(words: list) -> int:
+    if there := sys.modules.get(f"{__package__}.disk.whole"):
+        there.begun()
     try:
         app(words, exit_on_error=False, print_error=False)
         sys.stdout.flush()
@@ -125,7 +127,7 @@ def _interrupted() -> str:
     text = "interrupted; nothing was replaced"
     if placed:
         text = f"interrupted; whole and in place: {', '.join(placed[-3:])}" + \
-            f" and {len(placed) - 3} more" * (len(placed) > 3)
+            " and more" * (len(placed) > 3)
     return text + "".join(f"; what is kept in {there.shown(one)} goes on with --resume" for one in kept)
 
 

@@ -10,6 +10,7 @@ import os
 import re
 import shutil
 import stat
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,7 +20,7 @@ from .claim import HOST, alive
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NARROW = 65536  # bytes of room below which a fault without a number is one of room: numpy and HDF5 name none
-PLACED = []  # paths put in place by this process, so that an interrupted one says truly what it has replaced
+PLACED = deque(maxlen=100)  # last paths put in place, so that who is interrupted says truly what it has replaced
 KEPT = []  # folders in which this process has left a state to go on from
 LONGEST = 150  # letters of a name that its partial keeps: file systems hold 255 bytes
 
@@ -68,6 +69,12 @@ def write_bytes(path, data) -> None:
     """Write bytes as a whole file; Missing as `whole`."""
     with whole(path, len(data)) as partial:
         partial.write_bytes(data)
+
+
+def begun() -> None:
+    """Forget what this process has put in place and kept: a command begins."""
+    PLACED.clear()
+    KEPT.clear()
 
 
 def replaced() -> list[str]:

@@ -163,3 +163,19 @@ def test_exact_a_sweep_without_room_keeps_its_cases(tmp_path):
     assert len(list((tmp_path / "out" / "cases").iterdir())) == 2
     assert not [one for one in (tmp_path / "out").rglob("*") if one.name.startswith(".")]
     assert cli(*words, "--resume").code == 0
+
+
+@pytest.mark.parametrize("after", [False, True], ids=["before", "behind"])
+def test_exact_who_is_interrupted_says_what_was_replaced(tmp_path, monkeypatch, after):
+    monkeypatch.chdir(tmp_path)
+    Path("a.json").write_text("older")
+
+    def interrupt(*words, **how):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(*("builtins.print", interrupt) if after else (os, "replace", interrupt))
+    said = []
+    monkeypatch.setattr("patchfem.__main__.say", said.append)
+    assert cli("schema", "-o", "a.json").code == 130
+    assert said == ["interrupted; whole and in place: a.json" if after else "interrupted; nothing was replaced"]
+    assert (Path("a.json").read_text() == "older") != after and [one.name for one in tmp_path.iterdir()] == ["a.json"]

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from limits import limited
 
 from patchfem.elasticity import cache
 from patchfem.elasticity.elasticity import Layers
@@ -92,3 +93,16 @@ def test_exact_an_unwritable_folder_is_no_error(tmp_path, monkeypatch):
     monkeypatch.setenv("PATCHFEM_CACHE", str(blocked))
     cache.keep("k", PARTS)
     assert cache.fetch("k", 7) is None
+
+
+def test_always_a_folder_without_room_or_of_others_is_done_without(place):
+    key = cache.key_of(X, DEPTH, 1, LAYERS)
+    with limited(500):
+        cache.keep(key, PARTS)
+    assert cache.fetch(key, 7) is None and list(place.iterdir()) == []  # a cut file would stay for ever
+    cache.keep(key, PARTS)
+    assert cache.fetch(key, 7) is not None
+    place.chmod(0o777)  # anybody could have put numbers there
+    assert cache.fetch(key, 7) is None
+    cache.keep(cache.key_of(X, DEPTH, 2, LAYERS), PARTS)
+    assert len(list(place.iterdir())) == 1

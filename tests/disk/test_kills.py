@@ -1,0 +1,114 @@
+"""Killed at any step that touches the disk, and at random times: older or newer results are there, whole, and the next
+run leaves nothing else."""
+
+import json
+import random
+import subprocess
+import sys
+import time
+
+import pytest
+from command_line import cli
+from scene_texts import BENCH
+
+from patchfem.export.netcdf import h5netcdf
+
+# a child per number of steps: it is killed at that step of putting new results in the place of older ones
+STEPS = """\
+import os, signal, sys
+from pathlib import Path
+from patchfem.disk import exchange
+from patchfem.disk.whole import write_text
+from patchfem.export.results import Folder
+
+place, kind = Path(sys.argv[1]), sys.argv[2]
+if kind == "in two":
+    exchange.exchanged = lambda *both: False
+SEEN, left, armed = ("os.rename", "os.remove", "os.rmdir", "os.mkdir", "os.truncate", "open", "shutil.rmtree"), [0], [0]
+
+def hook(event, arguments):
+    if armed[0] and event in SEEN:
+        left[0] -= 1
+        if left[0] < 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+def new(folder, text):
+    for name in ("summary.json", "scene.resolved.toml"):
+        write_text(folder / name, text)
+
+def names():
+    return {one.name for one in place.iterdir()}
+
+out, number, kills = place / "out", 0, 0
+with Folder(out) as folder:
+    new(folder.path, "0")
+while True:
+    number += 1
+    before = (out / "summary.json").read_text()
+    child = os.fork()
+    if not child:
+        left[0] = number - 1
+        sys.addaudithook(hook)
+        armed[0] = 1
+        with Folder(out) as folder:
+            new(folder.path, str(number))
+        os._exit(0)
+    killed = os.waitpid(child, 0)[1] != 0
+    assert names() <= {"out", "out.partial", ".out.old", ".out.writer"}, names()
+    if kind == "in one" or not killed:
+        texts = {one.read_text() for one in out.iterdir()}
+        assert len(list(out.iterdir())) == 2 and texts in ({before}, {str(number)}), (number, texts)
+    try:
+        with Folder(out) as folder:  # the next run, which fails: what was there is there again
+            texts = {one.read_text() for one in out.iterdir()}
+            assert len(list(out.iterdir())) == 2 and texts in ({before}, {str(number)}), (number, texts)
+            raise ZeroDivisionError
+    except ZeroDivisionError:
+        pass
+    assert names() == {"out"}, (number, names())
+    if not killed:
+        assert texts == {str(number)}
+        break
+    kills += 1
+print(kills)
+"""
+
+
+@pytest.mark.parametrize("kind", ["in one", "in two"])
+def test_always_a_kill_at_any_step_leaves_older_or_newer_results_whole(tmp_path, kind):
+    done = subprocess.run([sys.executable, "-c", STEPS, tmp_path, kind], text=True, capture_output=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) >= 15
+
+
+@pytest.mark.slow
+def test_always_runs_killed_at_random_times_leave_whole_results(tmp_path):
+    """Fifty runs into a folder of older results, killed anywhere from their start to behind their end."""
+    scene, out, chance = tmp_path / "scene.toml", tmp_path / "out", random.Random(17)
+    scene.write_text(BENCH, "utf-8")
+    assert cli("run", scene, "-o", out).code == 0
+    words = [sys.executable, "-m", "patchfem", "run", scene, "-q", "-o", out]
+    begin = time.perf_counter()
+    assert subprocess.run(words, check=True).returncode == 0
+    span, killed = time.perf_counter() - begin, 0
+    for _ in range(50):
+        run = subprocess.Popen(words)
+        time.sleep(chance.uniform(0.2, 1.1) * span)
+        run.kill()
+        killed += run.wait() == -9
+        assert {one.name for one in tmp_path.iterdir()} <= {"scene.toml", "out", "out.partial", ".out.old",
+                                                            ".out.writer"}
+        whole(out)
+    assert killed > 20
+    assert cli("run", scene, "-q", "-o", out).code == 0
+    assert {one.name for one in tmp_path.iterdir()} == {"scene.toml", "out"}
+    whole(out)
+
+
+def whole(out) -> None:
+    """A results folder can be read, every file of it."""
+    assert json.loads((out / "summary.json").read_text("utf-8"))["outcome"] == "done"
+    with h5netcdf.File(out / "result.nc", "r") as file:
+        assert file.dimensions["time"].size > 10
+    page = out / "report.html"
+    assert not page.is_file() or page.read_text("utf-8").endswith("</html>\n")
