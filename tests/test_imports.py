@@ -8,7 +8,7 @@ from resource import RUSAGE_CHILDREN, getrusage
 
 import pytest
 from command_line import FROM_PYTHON, MODULES, absent, loaded
-from scene_texts import BENCH, COATED, COULOMB, POINT, STRUCTURE
+from scene_texts import BENCH, COATED, COULOMB, PLASTIC, POINT, STRUCTURE
 
 RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
 PATCH = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
@@ -158,3 +158,14 @@ def test_exact_a_sweep_over_a_point_needs_no_mesh_and_no_pictures(scene, tmp_pat
     modules = loaded(FROM_SHELL, "sweep", scene(BENCH), "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a", "-q")
     absent(modules, "contact", "mesh", "export.report", "export.drawing", "export.fields")
     assert not {"matplotlib", "pandas", "xarray", "dask", "distributed"} & modules
+
+
+@pytest.mark.parametrize("law, others", [(COULOMB, "pieces smooth"), (PLASTIC, "smooth")], ids=["coulomb", "plastic"])
+def test_exact_a_batch_brings_the_kind_of_its_cases_alone(scene, law, others):
+    """Nor numba, where its code is kept, nor Dask for a Dataset of numbers."""
+    code = f"import sys, patchfem\npatchfem.sweep(sys.argv[1], {{'friction.static': [0.1, 0.2]}})\n{MODULES}"
+    path = scene(POINT + law + STRUCTURE.replace("cycles = 30", "cycles = 20"))
+    loaded(code, path)  # keeps the code
+    modules = loaded(code, path)
+    absent(modules, "dynamics.smooth", *(f"runs.many.lumped.{one}" for one in others.split()))
+    assert "xarray" in modules and "dask.array" not in modules
