@@ -180,6 +180,30 @@ def test_exact_what_is_known_too_little_is_warned_of_within_the_batch(monkeypatc
     held_against(cases, ones, batch(cases))
 
 
+def test_exact_elements_of_all_cases_are_those_of_each():
+    """Sums and numbers of pieces that are made for all cases at once, beside those of one after the other."""
+    from patchfem.dynamics.piecewise.elements import elements_of, table_of
+    from patchfem.runs.many.lumped import pieces
+    from patchfem.runs.rig.pieces import costs
+
+    rng = np.random.default_rng(4)
+    groups = [elements_of(rng.uniform(1, 2, count), rng.uniform(1, 2, count)) for count in (1, 5, 3, 0, 5)]
+    counts, sorts = pieces.tables_of(groups)
+    for group, count, columns in zip(groups, counts, sorts):
+        one = table_of([group])
+        assert count == one.count[0] == group.stiffness.size
+        for column, part in zip(columns, (one.reach, one.stiff, one.limit, one.twice)):
+            np.testing.assert_array_equal(column[:count + 1], part[0])
+            np.testing.assert_array_equal(column[count + 1:], part[0, -1])
+    for case in (one for law in ("elastic-plastic", "iwan") for one in models(law, 6, 5)):
+        rig, *_, group, _ = pieces.row_of(case)
+        all_of = group.stiffness.size
+        for _ in range(pieces.coarsened(case)):
+            group = pieces.paired(group)
+        told = costs.pieces(case) + 2 * (group.stiffness.size - (all_of >> pieces.coarsened(case)))  # an odd one stays
+        assert pieces.most_pieces(np.array([rig]), [case.rig.drive], [group]) == pytest.approx(told, rel=1e-12)
+
+
 def test_always_few_cells_are_told_from_many():
     """Cells of a density that a tolerance asks for: the answers of all 769 lie within the bars, where small cycles
     slip too, for which the first cells are too few."""

@@ -6,7 +6,7 @@ from math import ceil
 import numpy as np
 
 from ....compiled import load
-from ....dynamics.piecewise.elements import paired, table_of
+from ....dynamics.piecewise.elements import paired
 from ....dynamics.piecewise.plant import clock_of
 from ....dynamics.piecewise_one import names_kernels as read
 from ....dynamics.piecewise_one import room as made
@@ -19,7 +19,7 @@ from ....response.measures import ROUND, energy_balance
 from ....response.ringing import FAINT
 from ....response.spectrum import distorted
 from ...rig.engines import PIECES, engine_of
-from ...rig.pieces.costs import pairs_of, pieces
+from ...rig.pieces.costs import REACH, pairs_of
 from ...rig.pieces.run import group_of, settled_of, stuck_share
 from .columns import MAIN, Runs
 from .threads import in_threads
@@ -59,7 +59,7 @@ def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     for _ in range(pairs):
         groups = [paired(one) for one in groups]
     yields = 2 * max(one.stiffness.size for one in groups)
-    most = ceil(ROOM * window * (max(map(pieces, models)) + yields)) + 256
+    most = ceil(ROOM * window * (most_pieces(rigs, [one.rig.drive for one in models], groups) + yields)) + 256
     found = _solved(kernels, (rigs, starts, segments), groups, (cycles, window), most)
     out = _read(found, others, cycles, window)
     if has(models[0].friction.law, "cells"):
@@ -68,6 +68,31 @@ def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
         half = _solved(kernels, (rigs, starts, segments), [paired(one) for one in groups], (cycles, window), most)
         return _with_cells(out, _read(half, others, cycles, window))
     return out
+
+
+def most_pieces(rigs, drives: list, groups: list) -> float:
+    """Largest number of pieces in a cycle of n cases: `costs.pieces` of numbers that are there already."""
+    stiff, damping = np.array([one.stiffness.sum() for one in groups]), rigs[:, read.DAMPING]
+    square = rigs[:, read.SQUARE] + stiff * rigs[:, read.FACE]**2 / rigs[:, read.MASS]
+    turned = (damping / 2 + np.sqrt(damping**2 / 4 + square)) * np.array([one.period for one in drives])
+    turned = np.maximum(turned, 2 * np.pi)
+    return float((turned / REACH + 2 * np.array([one.stiffness.size for one in groups]) + 2).max())
+
+
+def tables_of(groups) -> tuple:
+    """(counts (n,), sorts (n, 4, t + 1)) of the elements of n cases, t of the longest list: of each what `table_of` has
+    as count, and as reach, stiff, limit and twice."""
+    counts = np.array([one.stiffness.size for one in groups], np.int64)
+    wide = int(counts.max(initial=0))
+    there = np.arange(wide) < counts[:, None]
+    k, y = np.zeros((2, len(groups), wide))
+    k[there], y[there] = (np.concatenate(part) for part in zip(*((one.stiffness, one.yield_slide) for one in groups)))
+    sorts = np.zeros((len(groups), 4, wide + 1))
+    sorts[:, 0] = np.inf
+    sorts[:, 0, :wide][there] = y[there]
+    for column, part in zip((1, 2, 3), (k, k * y, k * y * y)):
+        sorts[:, column, 1:] = np.cumsum(part, axis=1)
+    return counts, sorts
 
 
 class _Found:
@@ -84,12 +109,8 @@ class _Found:
 
 def _solved(kernels, given, groups: list, shape: tuple, most: int) -> _Found:
     """The compiled call for elements of every case."""
-    table = [table_of([one]) for one in groups]
-    wide, (cycles, window) = max(one.reach.shape[1] for one in table), shape
-    counts, sorts = np.array([one.count[0] for one in table]), np.empty((len(table), 4, wide))
-    for k, one in enumerate(table):
-        for column, part in zip(sorts[k], (one.reach, one.stiff, one.limit, one.twice)):
-            column[:part.shape[1]], column[part.shape[1]:] = part[0], part[0, -1]
+    (counts, sorts), (cycles, window) = tables_of(groups), shape
+    wide = sorts.shape[2]
     found = _Found(given, counts, sorts, cycles, window)
     wanted = np.zeros(cycles)
     wanted[cycles - 1::-window] = 1.0
