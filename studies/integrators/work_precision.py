@@ -21,7 +21,8 @@ at 2 % of the block, which is the error of the law. Cured (stop by speed and for
 of second order and, on few modes, the fastest for 1e-2 to 1e-4; a reversal without stick (free decay) leaves it of
 first order, where Siconos stays of second.
 
-Run: python studies/integrators/work_precision.py            (measures, with the peers that are installed)
+Run: python studies/integrators/work_precision.py            (the block once, with the peers that are installed)
+     python studies/integrators/work_precision.py --full     (all, three turns; writes the table and the picture)
      python studies/integrators/work_precision.py draw       (the picture again from the measured table)
 """
 
@@ -90,12 +91,13 @@ def report(table: dict) -> None:
             print(f"  {name:24} " + "  ".join(f"{found[error]:>9}" for error in EQUAL))
 
 
-def main(names=ALL, ours=OURS, peers=PEERS, repeats: int = 3, path: Path = TABLE) -> dict:
-    """Measure, save, print; the table {rows, versions, absent}."""
+def main(names=ALL, ours=OURS, peers=PEERS, repeats: int = 3, path: Path | None = TABLE) -> dict:
+    """Measure, save where a path is given, print; the table {rows, versions, absent}."""
     with threadpool_limits(1):
         rows, versions, absent = measure(names, ours, peers, repeats)
     table = {"rows": rows, "versions": versions, "absent": absent}
-    path.write_text(json.dumps(table, indent=0) + "\n")
+    if path is not None:
+        path.write_text(json.dumps(table, indent=0) + "\n")
     report(table)
     return table
 
@@ -104,4 +106,5 @@ if __name__ == "__main__":
     if sys.argv[1:] == ["draw"]:
         picture(json.loads(TABLE.read_text()))
         raise SystemExit(0)
-    raise SystemExit(run(lambda: picture(main())))
+    full = "--full" in sys.argv[1:]
+    raise SystemExit(run(lambda: picture(main()) if full else main(("block",), repeats=1, path=None)))

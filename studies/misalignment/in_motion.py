@@ -20,7 +20,7 @@ forbids larger tilts is the pressure, 790 MPa at 1e-2 rad (`fixtures.py`): the m
 and at 10 g at any tilt, the slide is over a tenth of the length in contact: the overhang, which no number here has,
 counts.
 
-Run: python studies/misalignment/in_motion.py
+Run: python studies/misalignment/in_motion.py [--full]      (4 of the 9 tilts; --full: all, and the maps)
 """
 
 import sys
@@ -130,7 +130,11 @@ def main(tilts=TILTS, loads=LOADS, levels=LEVELS):
 
 
 if __name__ == "__main__":
-    picture(main())
+    full = "--full" in sys.argv[1:]
+    asked = TILTS if full else tuple(TILTS[k] for k in (0, 3, 4, 8))
+    swept_over = main(asked)
+    if full:
+        picture(swept_over)
     for lbf in LOADS:
-        print(f"{lbf:.0f} lbf: onset " + ", ".join(f"{a:.3f} ± {b:.3f}" for a, b in zip(*onsets(lbf))) + " g")
-    print("yaw " + ", ".join(f"{1e6 * one:.2f}" for one in yaws()) + " um")
+        print(f"{lbf:.0f} lbf: onset " + ", ".join(f"{a:.3f} ± {b:.3f}" for a, b in zip(*onsets(lbf, asked))) + " g")
+    print("yaw " + ", ".join(f"{1e6 * one:.2f}" for one in yaws(asked)) + " um")

@@ -13,7 +13,7 @@ That table is of version 0.4, whose stiffness took 2 s a piece; the peak pressur
 stiffness takes .6 s and the fronts 6.9 s and 1.45 GB, where 0.4 took 10.9 s and 1.83 GB minutes before on the same
 machine. Of the 3.4 s of a piece the order takes .8, the factors 1.6.
 
-Run: python studies/speed/large_pair.py [fronts superlu cholmod pardiso]
+Run: python studies/speed/large_pair.py [fronts superlu cholmod pardiso]      (fronts; --full: all four)
 """
 
 import json
@@ -99,4 +99,4 @@ if __name__ == "__main__":
     if sys.argv[-1] == "--once":
         print(json.dumps(once(sys.argv[1], *map(int, sys.argv[2:4]))))
     else:
-        main(sys.argv[1:] or NAMES)
+        main(NAMES if "--full" in sys.argv else sys.argv[1:] or NAMES[:1])

@@ -22,6 +22,7 @@ Run: python studies/targets/dynamics.py [--alone]      (--alone: without the pee
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -91,7 +92,7 @@ def main(targets=TARGETS) -> dict:
             value, ratio, words = one.number(), None, ""
             if one.other is not None:
                 try:
-                    ratio = one.other() / value
+                    ratio = one.other() / value if value > 0 else inf  # below what the clock of the process tells
                     words = f"{ratio:9.3g}  {one.beside}" + (f" (wanted {one.ratio:g})" if one.ratio else "")
                 except Missing as missing:
                     words = f"        -  {one.beside}: {missing}"

@@ -138,3 +138,29 @@ def test_always_a_curve_over_frequency_passes_the_points_of_single_runs():
 def test_always_the_plan_says_how():
     assert "steady motion by a march that is brought to repeat" in pf.plan(scene("coulomb")).verdict
     assert "steady motion by harmonic balance" in pf.plan(scene("elastic-plastic")).verdict
+
+
+def test_always_pieces_that_give_way_move_as_a_march_has_them():
+    """Points behind the shear modes of a patch: the march at the same steps."""
+    pieces = """
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6 mm"
+load = "115 N"
+substrate = "Ti-8Al-1Mo-1V"
+element_size = "2 mm"
+grooves = {wavelength = "80 um", amplitude = "7.5 um"}
+[contact.shear]
+"""
+    text = pieces + RIG[RIG.index("[friction]"):].replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"')
+    steps = ["accuracy.steps_per_cycle=100"]
+    balanced = pf.run(loads(text, sets=steps))
+    marched = pf.run(loads(text, sets=[*steps, "accuracy.method=march", "drive.cycles=40"]))
+    assert balanced.extra["map"] == "march" and balanced.outcome is Outcome.STEADY
+    for name in SHOWN[:2]:
+        assert balanced.measures[name].value == pytest.approx(marched.measures[name].value, rel=1e-5)
+    area = balanced.patch.pieces.interface.weight
+    fields, time = balanced.fields["shear_stress"], balanced.fields["time"]
+    force = np.interp(time, balanced.response.time, balanced.response.force)
+    np.testing.assert_allclose(fields[1:] @ area, force[1:], rtol=1e-6, atol=1e-6 * 115)

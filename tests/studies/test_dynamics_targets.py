@@ -47,6 +47,8 @@ def test_always_the_table_says_what_is_missed(targets, capsys):
     assert [met for _, _, met in found.values()] == [True, False, False, True]
     said = capsys.readouterr().out.splitlines()
     assert "4  other (wanted 3)" in said[1] and "NO" in said[2] and "nothing there" in said[4]
+    at_once = targets.main((targets.Target("at once", lambda: 0.0, 1.0, "s", "other", lambda: 1e-3, 3),))
+    assert at_once["at once", "other"] == (0.0, np.inf, True)  # a busy clock may tell no time at all
     assert [targets.text_of(v, "s") for v in (2e-9, 3e-6, 0.5)] == ["2 ns", "3 us", "500 ms"]
 
 
