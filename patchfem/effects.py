@@ -225,6 +225,11 @@ def takes(law: str | None, key: str) -> bool:
     return law not in LAWS or key in " ".join(LAWS[law].keys).split()
 
 
+def shown_absent(names, engine: str | None) -> list:
+    """Effects that a scene does not name, as people read them: without the method that the program chose itself."""
+    return [name for name in names if name != f"accuracy.method={engine}"]
+
+
 def using(key: str) -> str:
     """The laws that have a key, as words: "coulomb and nonlocal"."""
     return in_words((name for name in LAWS if takes(name, key)), "and")

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..effects import shown_absent
 from .shared import Json, Refused, Sets, flag, model_of, say, scene_of
 from .sweep import Over
 
@@ -92,7 +93,7 @@ def _print_plan(answer: dict, probe: bool) -> None:
     print(f"kind     {answer['kind']}, engine {answer['engine']}")
     for effect in answer["effects"]:
         print(f"  runs   {effect['effect']:<28} {effect['equations']}")
-    print(f"  not    {', '.join(answer['not_in_scene'])}")
+    print(f"  not    {', '.join(shown_absent(answer['not_in_scene'], answer['engine']))}")
     print("sizes    " + ", ".join(f"{k} {v}" for k, v in answer["unknowns"].items()) + f", steps {answer['steps']}")
     print(f"cost     about {answer['seconds']:.1f} s and {answer['bytes'] / 1e6:.0f} MB")
     print("chain    " + " -> ".join(f"{k} {v:.4g} N/m" if not isinstance(v, str) else f"{k} {v}"

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import rounded
+from ..effects import shown_absent
 from . import scales
 from .drawing import curves, pictures
 from .pages import charts, player
@@ -319,10 +320,11 @@ def _cost(data: dict) -> Section:
                    f"<td class=n>{e['seconds']:.3f}</td></tr>" for e in summary["effects"])
     parts = ", ".join(f"{k} {v:.3f} s" for k, v in summary["seconds"].items())
     shared = " The law and the modes share one loop; its time stands with the law." if summary["kind"] == "rig" else ""
+    absent = shown_absent(summary["not_in_scene"], summary.get("numerics", {}).get("engine"))
     text = (f"<div class=across><table><tr><th>effect<th>equations<th class=n>seconds</tr>{rows}"
             f"</table></div><p class=soft>{escape(parts)}.{shared}</p>"
             f"<details><summary>Not in the scene, so neither imported nor computed</summary><p class=soft>"
-            f"{escape(', '.join(summary['not_in_scene']))}.</p></details>")
+            f"{escape(', '.join(absent))}.</p></details>")
     return Section("cost", "What ran and what it cost", text)
 
 

@@ -13,22 +13,29 @@ NEAR = 0.6  # of difflib, from which two names are alike
 SELECTORS = {"friction": ("law", LAWS), "slide": ("kind", SLIDES), "contact.asperities": ("law", ASPERITIES)}
 
 
-def key_meant(model: type[Table], at: str, written: dict, key: str) -> str:
+def key_meant(model: type[Table], at: str, written: dict, key: str, there: bool = False) -> str:
     """The key of the table `at` that `key` stands for, "" where nothing tells.
 
     written: the table as it stands; a key that is there already is hardly meant. A name that is like it, or that shares
-    a word with it, comes before a key that the table lacks, as far as its kind fits the value.
+    a word with it, comes before a key that the table lacks, as far as its kind fits the value. there: the other keys
+    of the table stand elsewhere, and the key may stand for one of them: among those that every such table has, where
+    one alone fits.
     """
     free = [one for one in keys(model) if one not in written]
     fit = [one for one in free if _fits(model, one, written[key])]
     words = set(key.lower().split("_"))
     for found in (get_close_matches(key, fit, 1, NEAR), [one for one in fit if words & set(one.split("_"))],
                   [one for one in fit if one.startswith(key.lower())],
-                  [one for one in fit if one in _lacking(model, at, written)], get_close_matches(key, free, 1, NEAR),
-                  get_close_matches(key, keys(model), 1, NEAR)):
+                  _needed(model, fit) if there else [one for one in fit if one in _lacking(model, at, written)],
+                  get_close_matches(key, free, 1, NEAR), get_close_matches(key, keys(model), 1, NEAR)):
         if found:
             return found[0]
     return ""
+
+
+def _needed(model: type[Table], fit: list) -> list:
+    found = [key for key, name in keys(model).items() if key in fit and model.model_fields[name].is_required()]
+    return found if len(found) == 1 else []
 
 
 def table_meant(model: type[Table], written: dict, key: str) -> str:

@@ -288,7 +288,11 @@ def _unknown(draft: Draft, model: type[Table], raw: dict[str, Any], key: str, pa
     tables = [name for name, at in keys(model).items() if model_of(model, at) and not is_value(model, at)]
     is_table = isinstance(value, dict) or (isinstance(value, list) and value and isinstance(value[0], dict))
     known = tables if is_table and tables else list(keys(model))
-    near = table_meant(model, raw, key) if is_table else key_meant(model, path.rpartition(".")[0], raw, key)
+    at = path.rpartition(".")[0]
+    # a key of the file is not what someone means who writes another there, but may be what --set wants to change
+    there = path in draft.sets
+    written = {name: one for name, one in raw.items() if not there or f"{at}.{name}".strip(".") in draft.sets}
+    near = table_meant(model, written, key) if is_table else key_meant(model, at, written, key, there)
     help = f"did you mean '{near}'?" if near else f"known here: {', '.join(known)}" if known else \
         "this table has no keys"
     draft.say(path, f"unknown {'table' if is_table else 'key'}; {help}")

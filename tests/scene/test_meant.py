@@ -33,6 +33,19 @@ def test_exact_the_key_that_was_meant(kind, right, wrong, meant):
     assert len(said) == 1 and re.search(rf"; did you mean '{meant}'\?$", said[0]), refused.value.mistakes
 
 
+@pytest.mark.parametrize("wrong, meant", [
+    ("structure.mass=1 kg", "moving_mass"), ("friction.mu=0.3", "static"),
+    ("drive.freq=3 Hz", "frequency"), ("normal.force=3 N", "load")])
+def test_exact_a_set_means_a_key_that_the_file_has(wrong, meant):
+    with pytest.raises(SceneError, match=rf"^--set: \S+: unknown key; did you mean '{meant}'\?$"):
+        loads(text_of("rig"), sets=[wrong])
+
+
+def test_always_of_several_lengths_none_is_meant():
+    with pytest.raises(SceneError, match="unknown key; known here: length, width, height"):
+        loads(text_of("patch"), sets=["contact.thicknes=1 mm"])
+
+
 @pytest.mark.parametrize("wrong", ["qqq = true", 'qqq = "blue"', "qqq = {a = 1}"])
 def test_always_what_nothing_tells_is_answered_by_all_that_is_known(wrong):
     with pytest.raises(SceneError) as refused:

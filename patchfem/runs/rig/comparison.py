@@ -76,7 +76,7 @@ def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=N
     ends = window_ends(extremes, phasors, window)
     return Solution(values, response, kept, window_amplitudes(extremes, window),
                steady_of(drive, *ends), outcome or (Outcome.STUCK if stuck else None), [], book,
-               perf_counter() - begin, None, {"reduce": 0.0, "load": 0.0}, notes=done.warnings, own=own,
+               perf_counter() - begin, None, {"reduce": 0.0, "compiled_code": 0.0}, notes=done.warnings, own=own,
                extremes=extremes)
 
 

@@ -44,7 +44,7 @@ def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) ->
                      frames, say, progress, rig.start, rig_levels.ends(rig), numerics.whole)
     seconds = perf_counter() - begin
     done = joined(done, patch) if rig.strips_slide_apart else done
-    return contact, done, seconds, {"reduce": reduced, "load": loaded}
+    return contact, done, seconds, {"reduce": reduced, "compiled_code": loaded}
 
 
 class Read:

@@ -42,7 +42,7 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
                                   progress, rig.start)
         levels, probe, done = (), None, whole_cycles(done)
     return solution_of(model, numerics, patch, drive, found, done, perf_counter() - begin, levels=levels, probe=probe,
-                       prepare={"reduce": reduced, "load": loaded})
+                       prepare={"reduce": reduced, "compiled_code": loaded})
 
 
 def solution_of(model, numerics, patch, drive, found, done, seconds: float, **more) -> Solution:

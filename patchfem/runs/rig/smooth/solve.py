@@ -33,7 +33,7 @@ def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None)
     done = hub.simulate(rig.modes, rig.drive, contact.element, numerics.cycles, numerics.local, numerics.window,
                         rig.travel, frames, rig.start, progress)
     reader = _Smooth(model, replace(numerics, steps=hub.SAMPLES), patch, contact)
-    found = reader.solution(done, perf_counter() - begin, {"load": loaded})
+    found = reader.solution(done, perf_counter() - begin, {"compiled_code": loaded})
     return replace(found, errors=reader.sampling(done), extra={"step_tolerance": numerics.local,
                                                                "steps_taken": int(done.ledger["steps"])})
 
