@@ -16,7 +16,7 @@ class Estimate:
 
     segment: word("length of the segments of the estimate, such as \"2 s\" [the whole record where it begins and ends "
                   "in rest, else an eighth]") = ""
-    window: word("hann or none [hann where the record is cut into segments]") = ""
+    window: word("hann or none, such as none [hann where the record is cut into segments]") = ""
     band: word("where modes are sought, such as \"20 Hz..400 Hz\"") = ""
     decay: flag("the record is a free decay: frequency and damping without an input") = False
     begin: word("where the free decay begins, such as \"0.2 s\" [at its largest value]") = ""

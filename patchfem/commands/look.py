@@ -7,7 +7,8 @@ from cyclopts import Parameter
 
 from .shared import Refused, flag, out_in, say
 
-Frame = Annotated[int | None, Parameter(help="number of the frame, from 0; the last one unless given")]
+Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0, the pressed state; the last one unless "
+                                             "given")]
 
 
 def export(folder: Path, /, *, out: Annotated[Path, Parameter(

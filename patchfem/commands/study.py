@@ -60,13 +60,15 @@ def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle,
 class Rows:
     """Options of a fit of a rig to rows."""
 
-    leave_out: word("frequency, input or run: a fit without each value of it, scored on what it did not see") = ""
-    starts: Annotated[int, Parameter(help="random starts inside the ranges; the best training score is taken")] = 8
+    leave_out: word("a column such as frequency, input or run: a fit without each value of it, scored on what it did "
+                    "not see") = ""
+    starts: Annotated[int, Parameter(help="random starts inside the ranges, such as 20; the best training score is "
+                                          "taken")] = 8
     seed: Annotated[int, Parameter(help="of the random starts, such as 1")] = 0
     unstable: Annotated[Literal["bound", "out", "read"], Parameter(
-        help="what rows flagged U count as in the fit: lower bounds, nothing, or as read")] = "bound"
-    placebo: texts("table.key=value,...: a whole fit with each value, to see whether the rows prefer the scene's "
-                   "own") = ()
+        help="what rows flagged U count as in the fit: lower bounds, nothing, or as read, such as out")] = "bound"
+    placebo: texts('a whole fit with each value, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to see '
+                   "whether the rows prefer the scene's own") = ()
     resume: flag("go on from the starts that an interrupted fit has finished") = False
 
 
@@ -75,8 +77,8 @@ def fit(scene: Path, /, *, to: Annotated[str, Parameter(
                  'um..3.5 um" of a scene with [wear]')],
         free: texts('a key to find and its range, such as "friction.static=0.1..0.6"; may be repeated'),
         hold: texts('rows that are only predicted, such as "frequency=135 Hz,150 Hz"') = (),
-        offset: texts("of a loop, free besides: force (what the record adds to it), displacement (how far its first "
-                      "row lies from the unstressed place)") = (),
+        offset: texts("of a loop, free besides, such as force (what the record adds to it), displacement (how far its "
+                      "first row lies from the unstressed place)") = (),
         warm_up: flag("of a loop: its whole cycles are driven once before it, unscored") = False,
         rows: Annotated[Rows, Parameter(name="*")] = Rows(),
         out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):

@@ -21,8 +21,8 @@ class Over:
     """Which cases."""
 
     over: texts("table.key=v1,v2,... or table.key=1 mm..9 mm:9 (:9log, :9lin), may be repeated", "--over") = ()
-    cases: Annotated[Path | None, Parameter(name="--cases", help="file.csv with a column `table.key [unit]` per key, a "
-                                            "case per row")] = None
+    cases: Annotated[Path | None, Parameter(name="--cases", help="a file such as cases.csv with a column `table.key "
+                                            "[unit]` per key, a case per row")] = None
     random: Annotated[int, Parameter(name="--random", show_default=False, help="draw so many cases, such as "
                                             "200; a range is then 1 mm..9 mm")] = 0
     sobol: Annotated[int, Parameter(name="--sobol", show_default=False, help="the same by Sobol's sequence, "
@@ -52,7 +52,8 @@ class By:
     """Who works, and on which part."""
 
     jobs: Annotated[int, Parameter(name=["-j", "--jobs"], help="processes of this machine, such as 4")] = 1
-    executor: word("dask (a cluster on this machine) or dask:ADDRESS", "--executor") = ""
+    executor: word("dask (a cluster on this machine) or dask:ADDRESS, such as dask:tcp://10.0.0.2:8786",
+                   "--executor") = ""
     shard: word("such as 3/40: the third of 40 parts only, into a folder that all parts share", "--shard") = ""
     collect: flag("only write the tables of a sweep whose shards are done", "--collect") = False
 
@@ -69,7 +70,8 @@ class By:
 def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out: Out = None, set_: Sets = (),
           resume: flag("go on with what the folder holds") = False,
           keep: Annotated[Literal["summaries", "results", "pages"], Parameter(
-              help="of each case its summary.json, its results folder, or that with its report.html")] = "summaries",
+              help="of each case its summary.json, its results folder, or that with its report.html, such as "
+                   "results")] = "summaries",
           no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
     """Run SCENE for all combinations of the values of --over, or of its table [sweep]: a folder per case, sweep.csv,
     sweep.nc and report.html of them all, by default in out/<scene name>-sweep.

@@ -105,6 +105,10 @@ def test_always_help_says_what_each_option_does_by_an_example(verb):
     about = app[verb].help.partition("Example: ")
     assert about[0].strip() and all(one.parameter.help for one in app[verb].assemble_argument_collection()
                                     if one.parameter.name and any(name.startswith("-") for name in one.names))
+    for one in app[verb].assemble_argument_collection():
+        named = [name for name in one.names if name.startswith("-")]
+        if one.parameter.name and named and one.hint is not bool:
+            assert "such as" in one.parameter.help or set(named) & set(about[2].split()), named
     words = shlex.split(" ".join(about[2].split()))
     assert words[:2] == ["patchfem", verb]
     assert app.parse_args(words[1:], exit_on_error=False, print_error=False)[0].__name__.rstrip("_") == verb
