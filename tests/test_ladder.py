@@ -200,3 +200,9 @@ def test_exact_effects_name_modules_that_exist():
 if __name__ == "__main__":
     found = faults(sources(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE))
     print(*found, f"{len(found)} faults", sep="\n")
+
+
+def test_always_no_two_files_of_tests_share_a_name():
+    """Else pytest takes one for the other and collects none of it."""
+    names = [one.name for one in Path(__file__).parent.rglob("test_*.py")]
+    assert sorted(names) == sorted(set(names))

@@ -13,7 +13,8 @@ from patchfem.friction.bonds.quadrature import cutoff
 from patchfem.friction.laws.stretch import growth_numbers
 
 for kernel in (list_kernels.list_mean, list_kernels.list_force, list_kernels.list_step):
-    kernel.enable_caching()  # called from Python here alone: compiled once for all workers and runs
+    if hasattr(kernel, "enable_caching"):  # not where numba is told to compile nothing
+        kernel.enable_caching()  # called from Python here alone: compiled once for all workers and runs
 
 
 class Listed(NamedTuple):
