@@ -16,6 +16,7 @@ from .document import Section, document
 from .sweep import NUMBER, label
 from .words import linked, meaning, pair, units
 
+TALL = 410  # pixels of a picture
 POINTS = 4000  # of one line in a picture
 KNOWN = {"time": "time", "displacement": "relative_displacement", "acceleration": "absolute_acceleration",
          "force": "friction_force"}  # columns of a measurement that are shown
@@ -169,8 +170,8 @@ def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list)
         for k, unit in ((1, unit_a), (2, unit_b)))
     peaks = ", ".join(f"{name} from {np.nanmin(b) * scale_b:.4g} to {np.nanmax(b) * scale_b:.4g}"
                       for name, _, b in lines)
-    return {"anchor": f"chart{number}", "title": title, "x": {"label": x[1], "unit": unit_a, "log": False},
-            "y": {"label": y[1], "unit": unit_b, "log": False},
+    return {"anchor": f"chart{number}", "title": title, "height": TALL,
+            "x": {"label": x[1], "unit": unit_a, "log": False}, "y": {"label": y[1], "unit": unit_b, "log": False},
             "told": f"{y[1].capitalize()} [{unit_b}] over {x[1]}: {peaks}.",
             "marks": [mark("dots" if x[0] == "level_drive" else "line", colour, name, x=a * scale_a, y=b * scale_b)
                       for colour, (name, a, b) in zip(COLOURS * len(lines), lines)]}

@@ -5,7 +5,7 @@
 "use strict";
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
-  const {ink, named, figure, legend, bar, put} = pictures;
+  const {ink, named, figure, legend, bar, put, themed} = pictures;
   const whole = (values) => values.map((v) => v ?? NaN);
   const shade = (name) => name.startsWith("#") ? name : ink(`--${name}`);
   const label = (mark) => mark.name ? {legend_label: mark.name} : {};
@@ -92,7 +92,5 @@
     put(fig, place);
   }
 
-  const all = () => data.charts.forEach(draw);
-  all();
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", all);
+  themed(() => data.charts.forEach(draw));
 })();

@@ -216,6 +216,5 @@
   }
 
   fill();
-  draw();
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  pictures.themed(draw);
 })();

@@ -47,5 +47,16 @@ const pictures = (() => {
     queue = queue.then(() => { place.replaceChildren(); return Bokeh.Plotting.show(fig, place); });
   }
 
-  return {ink, colours, number, within, named, figure, legend, bar, put};
+  function themed(draw) {                        // now, and when the reader's theme changes
+    const dark = matchMedia("(prefers-color-scheme: dark)");
+    const all = () => {
+      if (matchMedia("print").matches) return;   // paper takes what stands: a dark picture is inverted by its style
+      document.documentElement.dataset.drawn = dark.matches ? "dark" : "light";
+      draw();
+    };
+    all();
+    dark.addEventListener("change", all);
+  }
+
+  return {ink, colours, number, within, named, figure, legend, bar, put, themed};
 })();

@@ -226,10 +226,14 @@ def test_exact_in_a_browser_both_themes_a_narrow_window_and_paper(opened):
 
     light, dark = shown(False), shown(True)
     assert light[0] == "rgb(28, 36, 48)" and dark[0] == "rgb(228, 233, 239)" and dark[1] > light[1] + 20
+    drawn = opened.js("document.documentElement.dataset.drawn")
     paper = shown(True, "print")  # dark inks on white paper, whatever the reader's theme is
+    assert drawn == "dark" == opened.js("document.documentElement.dataset.drawn")
+    assert "invert" in opened.js("getComputedStyle(document.querySelector('.chart')).filter")
     assert paper[0] == light[0] and abs(paper[1] - light[1]) < 10, (light, dark, paper)
     assert opened.printed().startswith(b"%PDF")
     assert shown(False) == light
+    assert opened.js("getComputedStyle(document.querySelector('.chart')).filter") == "none"
     opened.sized(420, 900)
     try:
         wide = opened.js("new Promise(done => setTimeout(() => done(document.documentElement.scrollWidth), 100))")
