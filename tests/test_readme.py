@@ -76,6 +76,15 @@ def test_exact_the_map_of_the_guide():
     assert (fraction[:, 1:] <= fraction[:, :-1]).all() and fraction[1, 2] == pytest.approx(0.2225, abs=1e-3)
 
 
+def test_always_the_python_of_the_guide_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(re.search(r"## From Python\n```python\n(.*?)```", text("patchfem/scene/GUIDE.md"), re.S)[1], names)
+    assert names["result"].measures.friction_ratio_peak.value == pytest.approx(0.4, rel=1e-6)
+    assert {path.name for path in tmp_path.iterdir()} == {"loop.png", "out"}
+    assert len(names["axes"].lines) == 2 and (tmp_path / "out" / "mine" / "summary.json").is_file()
+
+
 def test_always_the_recipes_of_the_readme_run(tmp_path, monkeypatch):
     """As they stand, in an empty folder that holds a trace before and one after; each shows its answer."""
     monkeypatch.chdir(tmp_path)
