@@ -108,7 +108,7 @@ def tried(command: Callable, name: str, seed: int, index: int, place: Path) -> s
         return alone(work, trial, campaign.clock * patience)
 
     text = attempt(1.0)
-    if text.startswith("hang") and not attempt(20.0).startswith("hang"):
+    if text.startswith("hang") and not attempt(6.0).startswith("hang"):
         text = attempt(1.0)
     return text
 
