@@ -50,30 +50,49 @@ def keeping(keeper: Keeper | None) -> Iterator[None]:
 class Samples:
     """What a march collects: last cycles, samples kept before them, their step numbers, extremes and phasors.
 
-    again: the march has begun a second time, cycle by cycle.
+    again: the march has begun a second time, cycle by cycle; marks: of each mark passed the march as it stood, the
+    cycles (first step, rows, work) and their extremes before it.
     """
 
     def __init__(self, last):
         self.last, self.kept, self.kept_at, self.extremes, self.phasors, self.again = last, [], [], [], [], False
+        self.marks = []
 
     def arrays(self) -> dict:
         """All of it as arrays by name."""
-        out = {f"last_{k}": rows for k, (_, rows, _) in enumerate(self.last)}
+        out = _of_cycles("last", self.last, self.extremes)
         if self.kept:
             out |= {"kept": np.concatenate(self.kept), "kept_at": np.concatenate(self.kept_at)}
-        return out | {"first": np.array([one[0] for one in self.last], np.int64),
-                      "work": np.array([one[2] for one in self.last], float),
-                      "extremes": np.array(self.extremes, float).reshape(-1, 2),
-                      "phasors": np.array(self.phasors, complex), "again": np.array(self.again)}
+        for k, (run, cycles, extremes) in enumerate(self.marks):
+            out |= _of_run(f"mark{k}.run", run) | _of_cycles(f"mark{k}", cycles, extremes)
+        return out | {"phasors": np.array(self.phasors, complex), "again": np.array(self.again)}
 
-    def take(self, found: dict) -> None:
-        """Take over what `arrays` gave."""
-        self.last.extend((first, found[f"last_{k}"], work) for k, (first, work) in
-                         enumerate(zip(found["first"].tolist(), found["work"].tolist())))
+    def take(self, found: dict, fresh) -> None:
+        """Take over what `arrays` gave; fresh(): a march at its start."""
+        cycles, self.extremes = _cycles("last", found)
+        self.last.extend(cycles)
         if "kept" in found:
             self.kept, self.kept_at = [found["kept"]], [found["kept_at"]]
-        self.extremes = [tuple(one) for one in found["extremes"].tolist()]
         self.phasors, self.again = found["phasors"].tolist(), bool(found["again"])
+        while f"mark{len(self.marks)}.first" in found:
+            name, run = f"mark{len(self.marks)}", fresh()
+            _into(run, f"{name}.run", found)
+            self.marks.append((run.fork(run.drive), *_cycles(name, found)))
+
+
+def _of_cycles(name: str, cycles, extremes) -> dict:
+    """Cycles (first step, rows, work) and extremes as arrays by name."""
+    return {f"{name}.{k}": rows for k, (_, rows, _) in enumerate(cycles)} | {
+        f"{name}.first": np.array([one[0] for one in cycles], np.int64),
+        f"{name}.work": np.array([one[2] for one in cycles], float),
+        f"{name}.extremes": np.array(extremes, float).reshape(-1, 2)}
+
+
+def _cycles(name: str, found: dict) -> tuple:
+    """(cycles, extremes) as they were."""
+    firsts, works = found[f"{name}.first"].tolist(), found[f"{name}.work"].tolist()
+    return [(first, found[f"{name}.{k}"], work) for k, (first, work) in enumerate(zip(firsts, works))], \
+        [tuple(one) for one in found[f"{name}.extremes"].tolist()]
 
 
 class Slot:
@@ -97,10 +116,11 @@ class Slot:
         self.next = end + max(SECONDS, (end - begin) / SHARE)
 
 
-def slot_of(run, asked: tuple, samples: Samples) -> Slot:
+def slot_of(run, asked: tuple, samples: Samples, fresh) -> Slot:
     """The Slot of a march that begins, which takes over a state that is there.
 
-    run: fresh; asked: numbers that say what is marched. PatchfemError for the state of another march.
+    run: fresh, as fresh() makes another; asked: numbers that say what is marched. PatchfemError for the state of
+    another march.
     """
     keeper = _KEEPER.get()
     if keeper is None:
@@ -108,7 +128,7 @@ def slot_of(run, asked: tuple, samples: Samples) -> Slot:
     keeper.begun += 1
     path, key = keeper.path(keeper.begun), _key_of(keeper.key, run, asked)
     if keeper.resume and path.is_file():
-        load(path, key, run, samples)
+        load(path, key, run, samples, fresh)
     return Slot(path, key)
 
 
@@ -139,22 +159,32 @@ def _arrays(run, besides=()) -> dict:
     return out
 
 
-def _numbers(run) -> dict:
-    return {name: value for name, value in vars(run).items() if type(value) in (int, float, bool, str)}
+def _of_run(name: str, run) -> dict:
+    """Arrays and numbers of a Run by name."""
+    numbers = {each: value for each, value in vars(run).items() if type(value) in (int, float, bool, str)}
+    return {f"{name}.{each}": array for each, array in _arrays(run).items()} | {
+        f"{name}:": np.array(json.dumps(numbers))}
+
+
+def _into(run, name: str, found: dict) -> None:
+    """Put what `_of_run` gave into a fresh Run."""
+    numbers = json.loads(str(found[f"{name}:"]))
+    for each in vars(run):
+        if each not in CONSTANT:
+            setattr(run, each, _taken(getattr(run, each), f"{name}.{each}", found, numbers.get(each)))
 
 
 def save(path: Path, key: str, run, samples: Samples) -> None:
     """Write the state of a march; Missing where it cannot be written."""
-    arrays = {f"run.{name}": array for name, array in _arrays(run).items()}
-    arrays |= {f"samples.{name}": array for name, array in samples.arrays().items()}
+    arrays = _of_run("run", run) | samples.arrays()
     need = sum(one.nbytes for one in arrays.values())
     with whole(path, need) as partial, open(partial, "wb") as file:
-        np.savez(file, key=np.array(key), numbers=np.array(json.dumps(_numbers(run))), **arrays)
+        np.savez(file, key=np.array(key), **arrays)
         file.flush()
         os.fsync(file.fileno())
 
 
-def load(path: Path, key: str, run, samples: Samples) -> None:
+def load(path: Path, key: str, run, samples: Samples, fresh) -> None:
     """Put a kept state into a fresh Run and fresh Samples. PatchfemError where it is not theirs or cannot be read."""
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -162,12 +192,8 @@ def load(path: Path, key: str, run, samples: Samples) -> None:
         if str(found["key"]) != key:
             raise PatchfemError(f"{path.parent.name}: what is kept there belongs to another scene or version; "
                                 f"{WITHOUT}")
-        numbers = json.loads(str(found["numbers"]))
-        for name in vars(run):
-            if name not in CONSTANT:
-                setattr(run, name, _taken(getattr(run, name), f"run.{name}", found, numbers.get(name)))
-        samples.take({name.removeprefix("samples."): array for name, array in found.items()
-                      if name.startswith("samples.")})
+        _into(run, "run", found)
+        samples.take(found, fresh)
     except PatchfemError:
         raise
     except Exception as error:  # a damaged archive has many ways to fail

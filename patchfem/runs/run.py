@@ -108,8 +108,8 @@ def _keeper(kept: Kept | None, what: Plan, patch):
 
 
 def marches(what: Plan) -> bool:
-    """Whether a run is a march in time that keeps its state on the way; one with levels is not."""
-    return what.engine == "march" and what.model.rig is not None and not what.model.rig.levels
+    """Whether a run is a march in time, which keeps its state on the way."""
+    return what.engine == "march" and what.model.rig is not None
 
 
 def _unloaded(model: Model) -> bool:

@@ -23,6 +23,8 @@ RIGS = {
     "bonds that grow": POINT + GROWING + MODE + FAST + MARCH,
     "joints": PAIR + FORCED.replace("cycles = 25", "cycles = 14") + MARCH,
     "a load that swings": POINT + 'amplitude = "20 N"\nfrequency = "50 Hz"\n' + PLASTIC + MODE + FAST + MARCH,
+    "levels": POINT + PLASTIC + MODE + DRIVE.replace("cycles = 30", 'cycles = 8').replace(
+        'acceleration = "5 g"', 'waveform = "levels"\nlevels = ["3 g", "6 g", "4 g"]') + MARCH,
     "a patch that pitches": COATED.replace("0.5 mm", "1.5 mm") + '[contact.crown]\nradius = "100 m"\n' + PLASTIC + MODE
                             + 'pitch = "1 rad/m"\n' + FAST.replace("16.3", "12") + MARCH,
 }
@@ -53,7 +55,8 @@ def same(one, two) -> None:
         xr.testing.assert_identical(a, b)
 
 
-@pytest.mark.parametrize("kind", RIGS)
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "bonds that grow"))
+                                  for kind in RIGS])
 def test_exact_an_interrupted_march_goes_on_to_the_same_bits(tmp_path, often, kind):
     scene = tmp_path / "scene.toml"
     scene.write_text(RIGS[kind], "utf-8")
@@ -118,7 +121,8 @@ def test_always_a_short_march_keeps_nothing(tmp_path, monkeypatch):
     assert cli("run", tmp_path / "scene.toml", "--no-page", "-o", tmp_path / "out").code == 0
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL, *(
+    pytest.param(one, marks=pytest.mark.slow) for one in (signal.SIGHUP, signal.SIGINT))])
 def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):
     """In a process of its own; one that is killed says nothing and leaves its state too."""
     scene, out = tmp_path / "scene.toml", tmp_path / "out"

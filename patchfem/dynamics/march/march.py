@@ -2,14 +2,14 @@
 
 from collections import deque
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...core import STICK, BaseSine, ModalBasis, Outcome, Response
 from ..plant import Plant
 from ..propagator import propagator
-from ..resume import Samples, Slot, slot_of
+from ..resume import Samples, slot_of
 from ..second_book import sampled_work
 from .models import ContactModel, load_kernels
 from .room import keep, lengthened
@@ -107,8 +107,10 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
     total = round(cycles * steps_per_cycle)
     samples = Samples(deque(maxlen=max(window, 2)))
     last, snapshots = samples.last, []
-    asked, found = {round(mark * steps_per_cycle) for mark in marks}, []
-    slot = slot_of(run, (total, steps_per_cycle, window, frames, whole), samples) if not asked else Slot(None, "")
+    asked = {round(mark * steps_per_cycle) for mark in marks}
+    slot = slot_of(run, (total, steps_per_cycle, window, frames, whole, *sorted(asked)), samples, lambda: fresh(
+        modes, drive, model, steps_per_cycle, travel, start))
+    found = [mark_of(*one, one[0]) for one in samples.marks]
     behind = total - max(window, 2) * steps_per_cycle
     if not (whole or asked or samples.again or run.passed(behind, lambda: slot.offer(run, samples))):
         run = fresh(modes, drive, model, steps_per_cycle, travel, start)  # it ends before: once more, cycle by cycle
@@ -131,7 +133,8 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
             extremes.append(extremes_of(rows, modes, run.prop.dt))
             phasors.append(_phasor(rows, modes, first, steps_per_cycle))
         if run.done in asked:
-            found.append(replace(mark_of(run, list(last)[-window:], extremes[-window:]), after=run.fork(run.drive)))
+            samples.marks.append((run.fork(run.drive), list(last)[-window:], extremes[-window:]))
+            found.append(mark_of(*samples.marks[-1], samples.marks[-1][0]))
         size = steps_per_cycle
         if run.done < total:
             slot.offer(run, samples)
@@ -149,11 +152,11 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
                        snapshots, end.work, run.done / steps_per_cycle, run.message, tuple(found))
 
 
-def mark_of(run, cycles, extremes) -> Mark:
-    """The Mark of the cycles (first step, rows, work) that end here."""
+def mark_of(run, cycles, extremes, after=None) -> Mark:
+    """The Mark of the cycles (first step, rows, work) that end here; after: the march to go on with."""
     rows, first = _joined(cycles)
     return Mark(run.response(rows, first + np.arange(len(rows))), rows[:-1, 2 * run.modes.omega.size + 4].copy(),
-                sum(work for _, _, work in cycles), np.array(extremes), run.book())
+                sum(work for _, _, work in cycles), np.array(extremes), run.book(), after)
 
 
 def _joined(parts) -> tuple:
