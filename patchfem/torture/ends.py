@@ -11,6 +11,7 @@ from pathlib import Path
 from . import grammar
 from .hostile import device
 from .results import left_over, whole
+from .scenes import damage
 from .toml import text_of
 from .trial import Trial, Wrong, process
 
@@ -103,7 +104,7 @@ def disks(trial: Trial) -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 
     cache = trial.folder / "cache"
-    options = {"env": {"NUMBA_CACHE_DIR": str(cache)}} if trial.chance(0.2) else {}
+    options = {"env": {"PATCHFEM_CACHE": str(cache)}, "seconds": 600.0} if trial.chance(0.1) else {}
     if trial.chance(0.2):
         limited = None
         device("full", 7)
@@ -136,17 +137,31 @@ def together(trial: Trial) -> None:
     """Two commands at one instant on one folder, or on one cold cache of compiled code: one at least holds, both in
     words."""
     _scene(trial, BENCH)
-    shared = {"NUMBA_CACHE_DIR": str(trial.folder / "cache")} if trial.chance(0.3) else {}
+    cache = trial.folder / "cache"
+    shared = {"PATCHFEM_CACHE": str(cache)} if trial.chance(0.3) else {}
     same = trial.chance(0.6)
     trial.tell("patchfem run scene.toml, twice at one instant" + (", cold cache" if shared else ""))
     runs = [subprocess.Popen(process("run", "scene.toml", "-o", "out" if same else f"out{k}", "--no-page"),
                              stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=os.environ | shared)
             for k in range(2)]
-    ends = [(one.communicate(timeout=300)[1].decode("utf-8", "replace"), one.returncode) for one in runs]
+    ends = [(one.communicate(timeout=500)[1].decode("utf-8", "replace"), one.returncode) for one in runs]
     codes = sorted(code for _, code in ends)
     if codes not in ([0, 0], [0, 4]) or (codes != [0, 0] and not same) or any("Traceback" in said for said, _ in ends):
         raise Wrong(f"exit codes {codes}: {' | '.join(said[-200:] for said, _ in ends)}")
     for name in ("out",) if same else ("out0", "out1"):
         whole(trial.folder / name)
-    shutil.rmtree(trial.folder / "cache", ignore_errors=True)
+    if shared:
+        _damaged(trial, cache)
+        trial.spawn("run", "scene.toml", "-o", "again", "--no-page", seconds=500.0, allowed=(0,), env=shared)
+        whole(trial.folder / "again")
+        shutil.rmtree(cache)
     _clean(trial.folder)
+
+
+def _damaged(trial: Trial, cache: Path) -> None:
+    """Half of the files of a cache cut, emptied or with bytes turned."""
+    for path in sorted(one for one in cache.rglob("*") if one.is_file()):
+        if trial.chance(0.5):
+            data = bytearray(path.read_bytes())
+            damage(trial, data)
+            path.write_bytes(data)
