@@ -42,6 +42,8 @@ for one in ENDINGS:
 VERBS = (new, demo, check, plan, run, sweep, profile, compare, cost, fit, mesh, import_, export, view, report, schema,
          doctor, cite)
 
+OUT_OF_MEMORY = "out of memory; `patchfem plan` names what takes most of it and the key that drives it"
+
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
           help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem demo; "
                "for a scene of your own: patchfem new.")
@@ -92,7 +94,7 @@ def _guarded(words: list) -> int:
         say(_interrupted())
         return 130
     except MemoryError:
-        say("out of memory; make contact.element_size larger or the run shorter")
+        say(OUT_OF_MEMORY)
         return 4
     except SystemExit as end:  # what shows help ends so where nobody reads on
         if isinstance(end.__context__, BrokenPipeError):
@@ -105,6 +107,9 @@ def _guarded(words: list) -> int:
         say(plain(f"{error.filename or 'patchfem'}: {error.strerror or error}"))
         return 4
     except Exception as error:
+        if isinstance(error, ImportError) and "failed to map" in str(error):  # a library that finds no room
+            say(OUT_OF_MEMORY)
+            return 4
         if hasattr(error, "mistakes"):  # SceneError, which is not named: words are read 20 ms faster before pydantic is
             for line in error.mistakes:
                 say(plain(line))

@@ -61,8 +61,8 @@ def whole(path, need: int | None = None) -> Iterator[Path]:
 
 
 def write_text(path, text: str, encoding: str = "utf-8") -> None:
-    """Write a text as a whole file; Missing as `whole`."""
-    write_bytes(path, text.encode(encoding))
+    """Write a text as a whole file, with ? for what no encoding has: bytes of a file's name; Missing as `whole`."""
+    write_bytes(path, text.encode(encoding, errors="replace"))
 
 
 def write_bytes(path, data) -> None:

@@ -12,6 +12,7 @@ from ..model.model import Model
 from ..model.source import placed
 from .plan import Plan, plan, refuse_size
 from .results.loose import loose
+from .results.places import placeless
 from .results.result import Result, worded
 
 __all__ = ["Kept", "Plan", "Result", "plan", "run"]
@@ -87,8 +88,9 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             result = replace(worn(result, evolved, estimate), plan=what)
     seconds["total"] = perf_counter() - begin
     apart = "strip" if model.patch is not None else "interface"
-    return replace(result, measures=worded(result.measures, apart), warnings=result.warnings + loose(result),
-                   extra=result.extra | {"notes": [*notes, *result.extra.get("notes", [])]})
+    warned, noted = result.warnings + loose(result), [*notes, *result.extra.get("notes", [])]
+    return replace(result, measures=worded(result.measures, apart), warnings=placeless(warned, model.source.path),
+                   extra=result.extra | {"notes": placeless(noted, model.source.path)})
 
 
 def _keeper(kept: Kept | None, what: Plan, patch):

@@ -6,10 +6,12 @@ import sys
 
 import pytest
 from command_line import cli
-from scene_texts import COULOMB, POINT, STRUCTURE
+from scene_texts import COULOMB, PIECE, POINT, STRUCTURE
 
 from patchfem.commands.streams import plain
+from patchfem.runs.results.places import placeless
 
+PATCH = PIECE + 'load = "26 lbf"\nelement_size = "0.1 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
 SCENE = 'title = "ü ± µ"\n' + POINT + COULOMB + STRUCTURE
 
 
@@ -56,3 +58,23 @@ def test_exact_a_name_is_shown_on_one_line_without_moving_the_cursor(tmp_path):
     assert answer.code == 2 and answer.err.count("\n") == 1
     assert "a?[31m?b.toml: cannot be read" in answer.err
     assert plain("a\udcffü") == "a?ü"
+
+
+def test_exact_results_name_no_folder_of_this_machine(tmp_path):
+    """A trace that is centred and levelled is told of in the results, by its name."""
+    rows = "".join(f"{13 * k},{abs(k % 400 - 200) / 400 + 1e-4 * k:.4f}\n" for k in range(1100))
+    (tmp_path / "trace.csv").write_text("x [um],z [um]\n" + rows)
+    (tmp_path / "a.toml").write_text(PATCH + '[contact.profile]\nfile = "trace.csv"\n')
+    answer, out = cli("run", tmp_path / "a.toml", "-o", tmp_path / "out"), tmp_path / "out"
+    assert answer.code == 0 and "trace.csv: x from" in (out / "summary.json").read_text()
+    assert {one.name for one in out.iterdir() if str(tmp_path).encode() in one.read_bytes()} == set()
+    assert placeless(["/a/b c/t.csv: x is 3 m/s", "3 m/s: as it is"], tmp_path / "a.toml") == \
+        ["t.csv: x is 3 m/s", "3 m/s: as it is"]
+
+
+def test_exact_a_name_of_any_bytes_is_run_and_shown(tmp_path):
+    path = tmp_path / os.fsdecode(b"b\xff\xfe.toml")
+    path.write_text(SCENE, encoding="utf-8")
+    assert cli("run", path, "-o", tmp_path / os.fsdecode(b"o\xff"), "-q").code == 0
+    page = (tmp_path / os.fsdecode(b"o\xff") / "report.html").read_text("utf-8")
+    assert "b??" in page and "ü ± µ" in page

@@ -39,6 +39,7 @@ def test_refuses_whole_numbers_that_nothing_can_hold(text, key, size):
 
 
 @pytest.mark.parametrize("text, sets, says", [
+    (PATCH, "contact.height=1e3 m", "contact.height: 1000 m is more than 10000 times contact.length"),
     (PATCH, "contact.element_size=1e-300 m", "contact.element_size: 1e-300 m makes more than 100000 elements"),
     (RIG, "friction.order=1e50", "friction.order: must be <= 100, not 1e+50"),
     (RIG, "accuracy.tail=1e49", "accuracy.tail: must be <= 1, not 1e+49")])

@@ -5,6 +5,7 @@ from .draft import ASPERITIES, Draft, _needs
 from .limits import NOT_YET_BUILT
 from .outlines import flat_of, outlines
 
+TALLEST = 10_000  # times the length: at 80 000 the stiffness of a piece is lost in its round-off
 MOST_ELEMENTS = 100_000  # over the interface; the patch of a tenth of them takes gigabytes
 
 
@@ -18,6 +19,10 @@ def _contact(draft: Draft) -> None:
     if not load and not approach:
         draft.lacks("contact.load", "" if "contact.approach" in NOT_YET_BUILT else "or [contact.approach] instead")
     outlines(draft)
+    if contact.height and contact.length and contact.height > TALLEST * contact.length:
+        draft.say("contact.height", f"{contact.height:g} m is more than {TALLEST} times contact.length, and the "
+                                    f"pressure is felt over some lengths only; at most "
+                                    f"{TALLEST * contact.length:.3g} m, the rest as a spring of the structure")
     flat = flat_of(contact)
     if contact.element_size and flat and contact.element_size > flat:
         name = "contact.length" if flat == contact.length else "the interface,"
