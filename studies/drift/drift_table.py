@@ -12,7 +12,7 @@ What the elastic range costs against b = 0: from A = 3 on the loop is b (1 - b) 
 has no area. b = .1 costs 3 % of 4 A mu_s N at A = 3 and less than 1 % from A = 12.5 on. So b = 0, the law as it stands,
 is the default, and b > 0 serves where a mean force and a dither act together and the mean position matters.
 
-Run: python studies/drift/drift_table.py
+Run: python studies/drift/drift_table.py [--full]      (without growing bonds; --full: with them)
 """
 
 import sys
@@ -77,7 +77,7 @@ def _cell(found) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    main(growing="--full" in sys.argv[1:])
     print("\nbreakaway b against b = 0: area over 4 A mu_s N (rms force), virgin curve")
     cost = breakaway_cost()
     for b in SHARES:

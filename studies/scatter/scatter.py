@@ -7,7 +7,7 @@ just above the onset of slip, where a little more friction stops much motion, an
 makes 0.7 of that variance, the load 0.2, the tilt 0.01: how much of the patch touches hardly matters while the whole of
 it slips. What makes the repeats differ is not among the three.
 
-Run: python studies/scatter/scatter.py [cases] [processes]      (500; the numbers above are of 2000)
+Run: python studies/scatter/scatter.py [cases] [processes]      (300; the numbers above are of 2000)
 """
 
 import sys
@@ -92,4 +92,4 @@ def repeats() -> float:
 
 
 if __name__ == "__main__":
-    main(*([int(word) for word in sys.argv[1:]] or [500]))
+    main(*([int(word) for word in sys.argv[1:]] or [300]))
