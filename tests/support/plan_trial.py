@@ -22,6 +22,7 @@ MOST = 60.0  # seconds
 # a process starts with the memory of the one that it is forked from as its peak: a small one stands in between
 SMALL = """\
 import resource, subprocess, sys
+resource.setrlimit(resource.RLIMIT_CPU, (120, 120))
 code = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode
 used = resource.getrusage(resource.RUSAGE_CHILDREN)
 print(code, used.ru_utime + used.ru_stime, used.ru_maxrss)
@@ -95,11 +96,11 @@ def told(first: int, count: int, folder: Path, twice: bool = True):
 
 
 def _measured(path: Path, out: Path) -> tuple | None:
-    """CPU seconds and peak memory [bytes] of `patchfem run`; None of a run that has no results."""
+    """CPU seconds, 120 at most, and peak memory [bytes] of `patchfem run`; None of a run that is refused."""
     words = [sys.executable, "-c", SMALL, sys.executable, "-m", "patchfem", "run", path, "-o", out, "-q"]
     done = subprocess.run(list(map(str, words)), capture_output=True, text=True)
     code, seconds, size = done.stdout.split()
-    return (float(seconds), 1024.0 * float(size)) if code in ("0", "3") else None
+    return None if code in ("2", "4") else (float(seconds), 1024.0 * float(size))
 
 
 if __name__ == "__main__":
