@@ -1,5 +1,6 @@
 """A run from its plan to its result: plan(scene) says what would run, run(plan) runs it."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -7,7 +8,6 @@ from time import perf_counter
 from typing import NamedTuple
 
 from ..core import Measure, Outcome, PatchfemError
-from ..dynamics.resume import Keeper, keeping
 from ..model.model import Model
 from ..model.source import placed
 from .plan import Plan, plan, refuse_size
@@ -77,7 +77,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
                 here = replace(what, model=lowered(model, patch, evolved.state.depth))
         module, function = KINDS[what.kind].split()
         solve = getattr(import_module(f"patchfem.runs.{module}"), function)
-        with keeping(_keeper(kept, what, patch)):
+        with _keeping(kept, what, patch):
             result = solve(here, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
         if patch is not None and what.kind != "patch":
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
@@ -93,12 +93,13 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
                    extra=result.extra | {"notes": placeless(noted, model.source.path)})
 
 
-def _keeper(kept: Kept | None, what: Plan, patch):
-    """Where the marches of a run keep their states; None where nothing is kept. PatchfemError where there is none to go
-    on from."""
+def _keeping(kept: Kept | None, what: Plan, patch):
+    """A context in which marches keep their states, or nothing where none is to be kept. PatchfemError where there is
+    none to go on from."""
     model = what.model
     if kept is None or not marches(what):
-        return None
+        return nullcontext()
+    from ..dynamics.resume import Keeper, keeping
     from .wear.keep import key_of
 
     def path(number: int) -> Path:
@@ -106,7 +107,7 @@ def _keeper(kept: Kept | None, what: Plan, patch):
 
     if kept.resume and model.wear is None and not path(1).is_file():
         raise PatchfemError(f"{kept.path.parent.name}: no interrupted run is kept there; run without --resume")
-    return Keeper(path, key_of(model, patch, kept.version), kept.resume)
+    return keeping(Keeper(path, key_of(model, patch, kept.version), kept.resume))
 
 
 def marches(what: Plan) -> bool:
