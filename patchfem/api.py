@@ -303,10 +303,11 @@ class Result(found.Result):
 
     def _repr_html_(self) -> str:
         """The answer as a notebook shows it: outcome, headline, every measure in its group, warnings."""
-        from .export.pages.words import fragment
+        from .export.pages.words import fragment, verdict
         from .export.summary import cycles_of, summary_of
 
-        return fragment(summary_of(self), self.outcome.sentence, cycles_of(self))
+        summary = summary_of(self)
+        return fragment(summary, verdict(summary), cycles_of(self))
 
     @property
     def notes(self) -> list[str]:

@@ -40,7 +40,7 @@ class Outcome(StrEnum):
 _SENTENCES = {
     Outcome.DONE: "Finished as asked.",
     Outcome.STEADY: "The motion repeats from window to window within the tolerance.",
-    Outcome.STUCK: "The interface holds: no slip in the last cycles.",
+    Outcome.STUCK: "The interface holds as a whole in the last cycles.",
     Outcome.TRANSIENT: "The run ended before the motion settled; ask for more cycles or read the *_steady estimates.",
     Outcome.GROWS: "The motion still rises and no bounded steady motion was found; friction does not limit it.",
     Outcome.EXCEEDS_TRAVEL: "The motion passed the stop of the flexure; the run ended there.",

@@ -65,14 +65,13 @@ def _draw(written, target: Path) -> None:
 
 def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     """The verdict first, then what is known least well, every measure in its group, and where all of it is."""
-    from ..core import Outcome
-    from ..export.pages.words import headline, least_known, table_of
+    from ..export.pages.words import headline, least_known, table_of, verdict
     from ..export.summary import cycles_of
 
     answer = written.summary
     if answer["title"]:
         print(answer["title"])
-    print(f"{answer['outcome']}: {Outcome(answer['outcome']).sentence}")
+    print(f"{answer['outcome']}: {verdict(answer)}")
     if text := headline(answer, cycles_of(written.result)):
         print(text)
     sys.stdout.flush()

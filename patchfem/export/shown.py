@@ -10,6 +10,7 @@ from ..runs.results.result import Result
 from ..structure.drive_sizes import largest
 from .histories import largest_multiplier
 from .pages.driven import command, driven
+from .pages.words import verdict
 from .report import page, picture
 from .summary import cycles_of, summary_of, versions
 
@@ -19,9 +20,10 @@ def report_data(result: Result) -> dict:
     model, r, w = result.plan.model, result.response, result.window
     source, resolved = model.source, model.source.resolved
     scene = tomllib.loads(resolved)
-    data = {"name": source.path.stem, "summary": summary_of(result), "scene": source.text, "resolved": resolved,
+    summary = summary_of(result)
+    data = {"name": source.path.stem, "summary": summary, "scene": source.text, "resolved": resolved,
             "driven": driven(scene), "command": command(source.path, source.sets),
-            "sentence": result.outcome.sentence, "cycles": cycles_of(result), "engine": result.extra.get("engine", ""),
+            "sentence": verdict(summary), "cycles": cycles_of(result), "engine": result.extra.get("engine", ""),
             "fields": result.fields,
             "x": None if result.patch is None else result.patch.x, "versions": versions(),
             "means": {name: one.text for name, one in result.measures.items()}}

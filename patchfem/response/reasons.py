@@ -6,7 +6,7 @@ from .rows import TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
 CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
-HOLDS = "the interface holds throughout the last cycles"
+HOLDS = "the interface holds as a whole throughout the last cycles"
 
 
 def without_value(values, window, drive, rubs: bool) -> dict:

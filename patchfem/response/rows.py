@@ -113,7 +113,8 @@ ROWS = (
         "half peak-to-peak of the irreversible part of the slide, weighted by the pressure",
         lambda s: s.slip.get("slip_amplitude"), group="friction"),
     Row("stick_fraction", "1", 1e-3,
-        "share of the time of the last cycles in which less than half of the slide is irreversible",
+        "share of the time of the last cycles in which the interface as a whole sticks: less than half of its slide, "
+        "weighted by the pressure, is irreversible; part of a patch may slip meanwhile",
         lambda s: s.slip.get("stick_fraction"), group="friction"),
     Row("slip_start_phase", "rad", 1e-3, "phase of the base displacement at which slip starts after a stick, modulo pi",
         lambda s: s.slip.get("slip_start_phase"), group="friction"),

@@ -8,7 +8,7 @@ from command_line import cli
 
 from patchfem.commands import shared
 from patchfem.core import Outcome
-from patchfem.export.pages.words import GROUPS, group_of, headline, pair, table_of
+from patchfem.export.pages.words import GROUPS, group_of, headline, pair, table_of, verdict
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
 from patchfem.scene.keys.quantities import KINDS
@@ -26,7 +26,7 @@ def run(tmp_path, kind, *words, **keys):
 
 def in_si(text: str) -> float:
     """The value of a text such as 14.80 ± 0.05 um."""
-    number, _, unit = re.fullmatch(r"(\S+)( ± \S+)?(?: (\S.*))?", text).groups()
+    number, _, unit = re.fullmatch(r"(\S+)( ± \S+)?(?: (\S.*))?", text.split(", ")[0]).groups()
     known = {name: scale for units in KINDS.values() for name, scale in units.items() if name != "g"} | UNIT
     return float(number) * known.get(unit, {"mJ": 1e-3, "uJ": 1e-6, "J": 1.0, "mN": 1e-3, None: 1.0}.get(unit, 1.0))
 
@@ -88,3 +88,65 @@ def test_exact_a_headline(cycles, text):
     measures = {"friction_ratio_peak": {"value": 0.3, "unit": "1", "error": None},
                 "loop_area": {"value": 2e-3, "unit": "J", "error": 1e-4}}
     assert headline({"kind": "bench", "outcome": "done", "measures": measures}, cycles) == text
+
+
+@pytest.mark.parametrize("more, part", [({}, "part of it slips"), ({"contact_fraction": (1.0, 0.0, "1")},
+                                                                  "part of the patch slips")])
+def test_always_what_slips_while_the_interface_holds_is_said(more, part):
+    """By its work per cycle beyond what the run leaves open and beyond round-off, else by its slip."""
+    def said(loop, slip):
+        found = {"loop_area": (*loop, "J"), "slip_amplitude": (*slip, "m"), "friction_force_peak": (100.0, 0.0, "N"),
+                 "relative_displacement_amplitude": (4e-7, 0.0, "m"), **more}
+        return verdict({"outcome": "stuck", "measures": {
+            name: {"value": value, "error": error, "unit": unit, "floor": 1e-10}
+            for name, (value, error, unit) in found.items()}})
+
+    holds = "The interface holds: no slip in the last cycles."
+    assert said((1.6583e-6, 1.6e-9), (1e-9, 1e-12)) == \
+        f"The interface holds as a whole; {part} (1.6583 ± 0.0016 uJ per cycle)."
+    assert said((1e-9, 2e-9), (1e-9, 1e-12)) == f"The interface holds as a whole; {part} (by 1.0000 ± 0.0010 nm)."
+    assert said((1e-9, 2e-9), (1e-9, 2e-9)) == holds
+    assert said((1e-18, 0.0), (0.0, 0.0)) == holds  # round-off of 100 N over 400 nm
+    assert said((-3e-12, 1e-12), (None, None)) == holds
+    assert said((1e-9, None), (0.0, None)) == f"The interface holds as a whole; {part} (1 nJ per cycle)."
+
+
+def test_always_a_joint_that_slips_in_part_does_not_say_that_it_holds(tmp_path):
+    """A tilted joint bears on a hundredth of its length, and slips in a part of that."""
+    scene = tmp_path / "joint.toml"
+    scene.write_text("""
+[contact]
+length = "20 mm"
+width = "20 mm"
+height = "6 mm"
+load = "2 kN"
+substrate = "steel"
+[contact.shear]
+[contact.tilt]
+angle = "10 mrad"
+[friction]
+law = "coulomb"
+static = 0.2
+kinetic = 0.2
+[structure]
+moving_mass = "0.5 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "200 Hz"
+damping = 0.01
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "120 Hz"
+acceleration = "20 g"
+cycles = 20
+""", "utf-8")
+    answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
+    lines = answer.out.splitlines()
+    assert re.match(r"stuck: The interface holds as a whole; part of the patch slips \(1\.6\S+ ± \S+ uJ per cycle\)\.",
+                    lines[0])
+    shown = dict(line.split(None, 1) for line in lines if line.startswith("  "))
+    assert shown["stick_fraction"].endswith("of the interface as a whole")
+    assert shown["loop_area"].endswith("uJ, per cycle")
+    assert shown["energy_dissipated"].endswith("uJ, over the whole run")
+    assert "as a whole" in shown["slip_start_phase"]

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from html import escape
 from math import isfinite, pi
 
-from ...core import rounded
+from ...core import Outcome, rounded
 from ...response.rows import TABLE as MOTION
 from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.result import Result
@@ -19,6 +19,11 @@ WORKSHOP = {  # as scales.LADDERS
     "Pa": (("psi", INCH**2 / LBF), ("ksi", 1e-3 * INCH**2 / LBF)),
     "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF))}
 GROUPS = ("motion", "friction", "energy", "patch", "wear")
+WHOLE_RUN = "over the whole run"
+OF_WHAT = {  # said behind a value that would otherwise be taken for another, or for more than it says
+    "loop_area": "per cycle", "friction_work": WHOLE_RUN, "energy_dissipated": WHOLE_RUN, "energy_created": WHOLE_RUN,
+    "stick_fraction": "of the interface as a whole"}
+ROUND = 1e-12  # of the friction force times the motion: work that is round-off
 
 
 def units(name: str, value: float, unit: str) -> list:
@@ -60,6 +65,32 @@ def others(name: str, measure: dict) -> str:
         text = f"{value * scale:.5g}" if sharp else rounded(value * scale, error * scale)[0]
         out.append(f"{text} {unit}")
     return " = ".join(out)
+
+
+def verdict(summary: dict) -> str:
+    """The sentence on how a run ended, from its summary as summary.json holds it.
+
+    `stuck` speaks of the interface as a whole. Where its last cycles dissipate, or slip, more than their error, part of
+    it slips, and the sentence says how much.
+    """
+    outcome, measures = Outcome(summary["outcome"]), summary["measures"]
+    if outcome is not Outcome.STUCK or not {"loop_area", "slip_amplitude"} & measures.keys():
+        return outcome.sentence
+    force, motion = (measures.get(name, {}).get("value") or 0.0 for name in
+                     ("friction_force_peak", "relative_displacement_amplitude"))
+    part = "part of the patch slips" if "contact_fraction" in measures else "part of it slips"
+    for first, least, form in (("loop_area", ROUND * abs(force * motion), "{} per cycle"),
+                               ("slip_amplitude", 0.0, "by {}")):
+        found = {name: one for name, one in measures.items() if re.sub(r"_\d+$", "", name) == first and one["value"]}
+        name = max(found, key=lambda each: found[each]["value"], default="")
+        if name and found[name]["value"] > max(_open(found[name]), least):
+            return f"The interface holds as a whole; {part} ({form.format(pair(name, found[name]))})."
+    return "The interface holds: no slip in the last cycles."
+
+
+def _open(one: dict) -> float:
+    """What a measure leaves open, in its unit: its error, or its floor where none was estimated."""
+    return one["floor"] if one["error"] is None else one["error"]
 
 
 def headline(summary: dict, cycles: float | None, number: Callable[[str, str], str] | None = None) -> str:
@@ -158,4 +189,7 @@ def fragment(summary: dict, sentence: str, cycles: float | None) -> str:
 
 
 def _value(name: str, one: dict) -> str:
-    return f"- ({one['reason']})" if one.get("reason") else pair(name, one)
+    if one.get("reason"):
+        return f"- ({one['reason']})"
+    of_what = OF_WHAT.get(re.sub(r"_\d+$", "", name))
+    return f"{pair(name, one)}, {of_what}" if of_what else pair(name, one)
