@@ -101,7 +101,8 @@ def tolerance_error(fine: dict, coarse: dict, moved: float = np.inf) -> dict:
     scene in 82 %, at a median of four to twelve times the error of most measures. moved [m]: size of `floor_of`.
     """
     gaps = change(fine, coarse)
-    typical = typical_change(fine, gaps)
+    # what has come to rest has lost its digits, and tells nothing of what is still large
+    typical = typical_change(fine, {name: gap for name, gap in gaps.items() if abs(fine[name]) > floor_of(name, moved)})
     size = abs(fine.get("relative_displacement_amplitude", 0.0))
     least = {name: OF_TYPICAL * typical * (size if name == "drift_per_cycle" else abs(fine[name])) for name in gaps}
     return {name: max(OF_CHANGE * gap, least[name], 0.0 if name in GAPS else OF_FLOOR**2 * float(floor_of(name, moved)))

@@ -202,6 +202,14 @@ def test_always_steps_that_meet_a_tolerance_claim_no_digit_far_below_the_floor()
     assert tolerance_error({NAME: 1e-3}, {NAME: 1e-3 + 1e-9})[NAME] == pytest.approx(0.15e-9)
 
 
+def test_always_what_has_come_to_rest_does_not_widen_the_bars_of_what_is_known():
+    """Of a decayed motion 1e-32 m and 2e-31 m are both at rest; its load and its friction work are known to 1e-9."""
+    fine = {NAME: 1e-32, "absolute_acceleration_peak": 1e-20, "friction_work": 1e-3, "normal_load": 15.0}
+    coarse = {NAME: 2e-31, "absolute_acceleration_peak": 5e-19, "friction_work": 1e-3 + 1e-12, "normal_load": 15.0}
+    found = tolerance_error(fine, coarse)
+    assert found["normal_load"] < 1e-7 and found["friction_work"] < 1e-11
+
+
 @pytest.mark.parametrize("name", ["energy_balance", "work_check"])
 def test_exact_bars_of_what_is_an_error_itself_have_no_share_of_its_floor(name):
     """A balance of 2e-13 is told as such, not as 2e-13 +- 1e-9."""

@@ -16,10 +16,12 @@ from . import step_kernels as steps
 from . import watch_kernels as watching
 
 NOTHING, STOP, KINK, KNEE, TRAVEL = range(5)  # what ends a step
-FINISHED, TRAVELLED, FULL, WILD, ENDLESS = range(5)  # how a call ends
+FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED = range(6)  # how a call ends
 SLOWER, FASTER = 0.2, 8.0  # bounds of the change of a step
 TURNING = 2.0  # of now[BEGUN]: the motion was left at a reversal
 FORGET = 3.0  # cycles over which a largest value is forgotten
+CALL = 50_000  # tries of a call, a tenth of a second: no signal is heard inside compiled code
+GETS_ON = 1e-3  # of the time of the fastest motion: what CALL tries must come on by at least
 INSTANT = 1e-13  # of a period: what lies nearer together happens at once
 STANDS, FLIPPED = 1, 2  # of a motion that has not moved on from a stop: it is there, it was found to go the other way
 
@@ -111,7 +113,9 @@ def located(m, h, what, share, travel):
         else:
             high = at
         new = at - value / rate if rate < 0 else 0.5 * (low + high)
-        if abs(value) <= noise or abs(new - at) <= 2e-16 * (m.now[steps.TIME] + at) or high - low <= 1e-15 * h:
+        # what leaves its rest is within round-off of it too, but does not end there: it would stand for ever
+        there = abs(value) <= noise and rate < 0
+        if there or abs(new - at) <= 2e-16 * (m.now[steps.TIME] + at) or high - low <= 1e-15 * h:
             break
         at = new if low < new < high and turn < 20 else 0.5 * (low + high)
     return at
@@ -305,7 +309,8 @@ def went_on(m):
 def advance(m, k, until, edge, tolerance, travel):
     """Move on to the time `until` [s], or to the edge [s] of the piece of the drive: how it ended.
 
-    tolerance: of a step, relative; travel [m] of the output. FULL: the room for reversals is used up.
+    tolerance: of a step, relative; travel [m] of the output. FULL: the room for reversals is used up; PAUSED: CALL
+    tries are made. The motion goes on from either to the last bit as if it had not been left.
     """
     if m.now[steps.BEGUN] == 0:
         begin(m, k)
@@ -314,15 +319,19 @@ def advance(m, k, until, edge, tolerance, travel):
         steps.slope(m, m.now[steps.TIME], m.y, m.work[0])
         m.now[steps.STOOD] = m.now[steps.PIECE]
     sampled(m, k)
-    limit = k.tally[watching.DONE] + 1e9
+    begun, tried = m.now[steps.TIME], k.tally[watching.DONE] + k.tally[watching.REFUSED]
     while m.now[steps.TIME] < end:
-        if k.tally[watching.TURNS] >= k.turns.shape[0]:
+        full = k.tally[watching.TURNS] >= k.turns.shape[0]
+        spent = k.tally[watching.DONE] + k.tally[watching.REFUSED] - tried > CALL and fresh != FLIPPED
+        if spent and m.now[steps.TIME] - begun < GETS_ON / m.now[steps.PACE]:
+            return ENDLESS
+        if full or spent:
             m.now[steps.BEGUN] = TURNING if fresh > 0 else 1.0
-            return FULL
+            return FULL if full else PAUSED
         room = end - m.now[steps.TIME]
         whole = m.now[steps.STEP] >= room * (1 - 1e-9)
         h, wanted = try_step(m, room if whole else m.now[steps.STEP], tolerance, k)
-        if h <= 1e-16 * end or k.tally[watching.DONE] > limit:
+        if h <= 1e-16 * end:
             return ENDLESS
         taken = h
         what, share = first_end(m, h, travel, NOTHING)

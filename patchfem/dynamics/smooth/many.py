@@ -13,6 +13,7 @@ from .run import (
     FINISHED,
     FULL,
     HELD,
+    PAUSED,
     POWER,
     SAMPLE,
     SAMPLES,
@@ -84,8 +85,8 @@ def together(cases, cycles: int, window: int, tolerances) -> Motions:
     for j in range(number):
         m, k = _one(moving, kept, j, samples[j])
         code = loops.advance(m, k, until[j], np.inf, CLOSER * tolerance[j], np.inf)
-        while code == FULL:
-            kept = _wider(kept)
+        while code in (FULL, PAUSED):
+            kept = _wider(kept) if code == FULL else kept
             m, k = _one(moving, kept, j, samples[j])
             code = loops.advance(m, k, until[j], np.inf, CLOSER * tolerance[j], np.inf)
         lost[j] |= code != FINISHED

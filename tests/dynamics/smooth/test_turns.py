@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
-from march_paths import OMEGA
+from march_paths import OMEGA, one_mode
 from test_smooth import ONE, element
 
-from patchfem.core import BaseSine
+from patchfem.core import BaseSine, Outcome, Start
 from patchfem.dynamics.smooth.run import Run
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.stretch import points_element
+from patchfem.friction.laws.tanh import Rate
+from patchfem.structure import drives
 
 RINGS = Bonds(0.3, 1e-6)
 PERIOD = 2 * np.pi / OMEGA
@@ -46,3 +48,32 @@ def test_exact_a_motion_that_touches_its_rest_is_that_which_turns_there_twice(fe
     assert times.size == count + 2 and np.diff(times).min() > 0
     size = [1e-6, 1e-6 * OMEGA]  # of the motion and its rate
     assert abs(one.moving.y[:2] - other.moving.y[:2]) / size == pytest.approx(0, abs=1e-8)
+
+
+def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
+    """104 cycles of a rate law far above critical damping: z falls by 1e31. A state within round-off of rest that
+    sets off is no stop; it was taken for one at a 1e-12 of each step, for ever (hundreds of steps are enough)."""
+    omega = 2 * np.pi * 162.4
+    free, law = drives.release(1 / 162.4), Rate(0.671, 1.569e-3).element(15.46)
+    run = Run(one_mode(omega, 0.05, 0.7626), free, law, 104, 1e-9, start=Start(np.array([4.631e-5]), np.zeros(1)))
+    for cycle in range(105):
+        run.until(cycle / 162.4)
+    z, v, done = abs(run.moving.y[0]), abs(run.moving.y[1]), run.kept.tally[13:15].sum()
+    assert run.outcome is None and done < 2000
+    assert z < 1e-25 * 4.631e-5 and v < 1e-25 * 4.631e-5 * omega
+    # what friction and damping took is the energy of the start
+    assert run.moving.y[3] + run.moving.y[4] == pytest.approx(0.5 * 0.7626 * (omega * 4.631e-5)**2, rel=1e-8)
+
+
+def test_exact_a_long_call_is_left_now_and_then_and_goes_on_to_the_last_bit():
+    """So a signal is heard. The room for turns ends calls elsewhere; neither changes the motion."""
+    law, told = element(Bonds(0.3, 5e-6)), []
+    often, long = (Run(ONE, BaseSine(49.0, OMEGA), law, 2500, 1e-9) for _ in range(2))
+    long.kept = long.kept._replace(turns=np.zeros((9000, 9)))
+    long.progress = told.append
+    for run in (often, long):
+        run.swift = False
+        run.until(2500 * PERIOD)
+    assert run.outcome is not Outcome.NOT_CONVERGED and len(told) > 1
+    np.testing.assert_array_equal(long.moving.y, often.moving.y)
+    np.testing.assert_array_equal(np.concatenate(long.turns), np.concatenate(often.turns))
