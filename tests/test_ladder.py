@@ -23,6 +23,7 @@ OUTSIDE = {"numba": ("*kernels", "compiled", "compiled.*"), "pyvista": ("export.
            "meshio": ("mesh.files", "export.*")}
 PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "dynamics", "runs"]  # must be read in this order
 MODULE_LINES, FUNCTION_LINES, FOLDER_FILES = 400, 90, 16
+KNOWING = (ast.Name, ast.Attribute, ast.alias, ast.ClassDef, ast.arg, ast.AnnAssign, *DEFS)  # nodes that name a thing
 
 
 def reading_order(tree: dict) -> list:
@@ -72,7 +73,7 @@ def of_scene(name: str, nodes) -> list:
     """The lines on which a file that should not knows a Scene: by its name, as a parameter, in an annotation."""
     if any(fnmatch(name, place) for place in (*SCENE, *SCENE_ALSO)):
         return []
-    lines = {node.lineno for node in nodes if _knows(node)}
+    lines = {node.lineno for node in nodes if isinstance(node, KNOWING) and _knows(node)}
     return [f"{name} knows a Scene (line {', '.join(map(str, sorted(lines)))})"] if lines else []
 
 

@@ -80,19 +80,22 @@ def test_exact_a_hard_piece_prints_its_envelope():
 
 
 def elastic(lower, upper, reach, worn, jumps, stiff):
-    """The same on springs, all places of a cycle at once: mean overlap worn / stiff at every place, by bisection."""
+    """The same on springs, all places of a cycle at once: mean overlap worn / stiff at every place.
+
+    The k highest points stand above the plane that leaves this overlap, with k the number of heights above which the
+    volume is less than it.
+    """
     lower, upper = lower.copy(), upper.copy()
     share = np.r_[0.5, np.ones(2 * reach - 1), 0.5] / (2 * reach)
     for _ in range(jumps):
         off_lower, off_upper = 0 * lower, 0 * upper
         for u, weight in zip(range(-reach, reach + 1), share):
             both = lower + np.roll(upper, u, 1)
-            low, high = both.min() - worn, both.max()
-            for _ in range(40):
-                middle = (low + high) / 2
-                more = np.clip(both - middle, 0, None).mean() > worn / stiff
-                low, high = (middle, high) if more else (low, middle)
-            pressed = np.clip(both - low, 0, None) * weight * stiff / jumps / 2
+            high = np.sort(both, axis=None)[::-1]
+            total = np.cumsum(high)
+            k = np.searchsorted(total - high * np.arange(1, high.size + 1), worn / stiff * high.size)
+            plane = (total[k - 1] - worn / stiff * high.size) / k
+            pressed = np.maximum(both - plane, 0) * weight * stiff / jumps / 2
             off_lower += pressed
             off_upper += np.roll(pressed, -u, 1)
         lower, upper = lower - off_lower, upper - off_upper

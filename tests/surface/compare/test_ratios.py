@@ -16,21 +16,24 @@ from patchfem.surface.synthetic import report_area
 MANY = pytest.param(40, marks=pytest.mark.slow)
 
 
-@pytest.mark.parametrize("count", [10, MANY])
+@pytest.mark.parametrize("count", [4, MANY])
 def test_always_unchanged_surfaces_are_called_reduced_in_5_of_100_cases_at_most(count):
+    """Of 2 count ratios at 5 %, so 2.5 % each way; of 8 ratios two or more one way have a chance of 1.6 %."""
     seeds = range(70000, 70000 + count)
     sizes = [[size_of(pair(seed + part, share=0.0).before, UM) for part in (0, 5000)] for seed in seeds]
     found = [ratio("amplitude", "", *two) for one in sizes for two in (one, one[::-1])]
     words = [changed(one) for one in found]
-    assert words.count("reduced") <= count // 10 and words.count("increased") <= count // 10  # of 2 count; 5 %
+    most = max(count // 10, 1)
+    assert words.count("reduced") <= most and words.count("increased") <= most
     values = np.quantile([one.value for one in found], (0.05, 0.95))
+    assert [a.value * b.value for a, b in zip(found[::2], found[1::2])] == pytest.approx([1.0] * count, rel=1e-12)
     if count < 40:  # too few for the ends of the distribution
-        assert (0.64 * 0.85 < values[0] < 1 < values[1] < 1.57 * 1.15) and np.prod(values) == pytest.approx(1, abs=1e-3)
+        assert 0.64 * 0.85 < values[0] < 1 < values[1] < 1.57 * 1.15
         return
     assert values == pytest.approx((0.64, 1.57), rel=0.15)  # measured on the report's surface, 1 mm
 
 
-@pytest.mark.parametrize("count", [12, MANY])
+@pytest.mark.parametrize("count", [5, MANY])
 def test_always_unchanged_surfaces_in_one_place_are_called_reduced_in_5_of_100_cases_at_most(count):
     words, widths = [], []
     for seed in range(30100, 30100 + count):
@@ -38,7 +41,7 @@ def test_always_unchanged_surfaces_in_one_place_are_called_reduced_in_5_of_100_c
         one = compared(p.before, p.after)
         words.append(changed(one.amplitude_ratio))
         widths.append(one.amplitude_ratio.high / one.amplitude_ratio.low)
-    most = 4 if count == 40 else 2  # 5 or more of 40 at 2.5 %: one in 300; 3 or more of 12: one in 300
+    most = 4 if count == 40 else 1  # 5 or more of 40 at 2.5 %: one in 300; 2 or more of 5: one in 160
     assert words.count("reduced") <= most and np.median(widths) < 1.01
 
 

@@ -36,10 +36,11 @@ def scores(count: int) -> tuple:
 
 
 def test_always_a_pair_of_one_place_is_registered_within_the_targets():
-    """Asked for: 0.05 um of shift and 0.06 um of depth, sigma 6 um, tilt 10 mrad, shift 25 um, noise 20 nm."""
-    rms, held = scores(24)
+    """Asked for: 0.05 um of shift and 0.06 um of depth, sigma 6 um, tilt 10 mrad, shift 25 um, noise 20 nm. Of eight
+    pairs at 95 % three or more misses have a chance of 0.6 %."""
+    rms, held = scores(8)
     assert rms[0] < 0.01 * UM and rms[1] < 0.003 * UM and rms[2] < 0.06 * UM, rms
-    assert (held >= 0.83).all(), held  # 20 of 24 at 95 %: 4 or more misses have a chance of 3 %
+    assert (held >= 6 / 8).all(), held
 
 
 @pytest.mark.slow
@@ -81,7 +82,7 @@ def test_always_levelling_both_traces_takes_the_wear_away():
     assert found == pytest.approx(p.worn.mean(), abs=0.005 * UM)
 
 
-@pytest.mark.parametrize("count", [8, pytest.param(24, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [5, pytest.param(24, marks=pytest.mark.slow)])
 def test_always_traces_of_two_places_have_no_depth_but_a_guess(count):
     held, guesses = [], []
     for seed in range(count):
@@ -94,8 +95,9 @@ def test_always_traces_of_two_places_have_no_depth_but_a_guess(count):
     assert 0.5 * UM < np.sqrt(np.mean(np.square(guesses))) < 2 * UM  # about 1 um, as for other programs' traces
 
 
-def test_always_unworn_traces_of_one_place_show_no_wear():
-    for seed in range(30050, 30058):
+@pytest.mark.parametrize("count", [3, pytest.param(8, marks=pytest.mark.slow)])
+def test_always_unworn_traces_of_one_place_show_no_wear(count):
+    for seed in range(30050, 30050 + count):
         p = pair(seed, share=0.0)
         found = compared(p.before, p.after)
         assert found.reference == "place"
@@ -170,7 +172,7 @@ def groove(seed: int, depth: float, rough: float) -> tuple:
             Profile(x, frozen_array(sides[1] - cut + noise[1] - 0.002 * x), "after"), depth * 4 / 3 * 0.3e-3)
 
 
-@pytest.mark.parametrize("count", [4, pytest.param(10, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [2, pytest.param(10, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("depth, rough, rms", [(10 * UM, 1 * UM, 0.1), (20 * UM, 0.5 * UM, 0.04)])
 def test_always_a_groove_between_unworn_flanks_has_its_area(depth, rough, rms, count):
     held, errors = [], []

@@ -16,29 +16,30 @@ UM = 1e-6
 LENGTH, CUTOFF = 1e-3, 250e-6
 
 
-def read(z) -> list:
-    """(record, row, value) of every parameter of a trace of 1 mm, without and with a cut-off of 0.25 mm."""
+def read(z, names=None) -> list:
+    """(record, row, value) of parameters of a trace of 1 mm, without and with a cut-off of 0.25 mm; every one, or only
+    those named."""
     trace = Profile(np.arange(z.size) * UM, z, "made")
     primary = Heights(level(trace).z, UM)
     rough = Heights(filtered(trace, CUTOFF)[1].z, UM, CUTOFF)
     found = spectrum_of(primary.z, UM)
     out = [(primary, row, amplitude_of(found, 60e-6, 110e-6) if row.of is None else row.of(primary))
-           for row in (*PRIMARY, *WAVES)]
-    return out + [(rough, row, row.of(rough)) for row in ROUGH]
+           for row in (*PRIMARY, *WAVES) if names is None or row.name in names]
+    return out + [(rough, row, row.of(rough)) for row in ROUGH if names is None or row.name in names]
 
 
-def coverage(count: int, seed: int, names=None) -> dict:
-    """Share of `count` traces whose interval holds the mean over 2000 others, by name."""
+def coverage(count: int, seed: int, names=None, others: int = 2000) -> dict:
+    """Share of `count` traces whose interval holds the mean over `others`, by name."""
     sums: dict = {}
-    for z in traces(2000, LENGTH, UM, 6e-6, seed + 1):
-        for _, row, value in read(z):
+    for z in traces(others, LENGTH, UM, 6e-6, seed + 1):
+        for _, row, value in read(z, names):
             sums.setdefault(row.name, []).append(np.nan if value is None else value)
     truth = {name: np.nanmean(values) for name, values in sums.items()}
     held: dict = {name: [] for name in truth}
     for z in traces(count, LENGTH, UM, 6e-6, seed):
         made: dict = {}
-        for heights, row, value in read(z):
-            if value is None or (names is not None and row.name not in names):
+        for heights, row, value in read(z, names):
+            if value is None:
                 continue
             one = made.setdefault(id(heights), Intervals(heights, levelled=heights.section is None))
             low, high = one.of(row, value)
@@ -56,10 +57,11 @@ def test_always_nine_of_ten_intervals_hold_the_mean():
 
 
 def test_always_intervals_by_degrees_of_freedom_hold_the_mean():
-    """The quick ones, on 300 traces: 90 % within three deviations of the count."""
+    """The quick ones, on 100 traces: 90 % within three deviations of the count, 0.09. The mean over 500 others
+    is off by 0.045 of a deviation, which takes 0.1 % off."""
     names = {"Pq", "Rq", "Pdq", "Rdq", "band_amplitude"}
-    found = coverage(300, 4000, names)
-    assert set(found) == names and all(0.85 <= share <= 0.95 for share in found.values()), found
+    found = coverage(100, 4000, names, 500)
+    assert set(found) == names and all(0.81 <= share <= 0.99 for share in found.values()), found
 
 
 def test_exact_degrees_of_freedom_of_white_noise():
