@@ -8,7 +8,7 @@ from collections.abc import Callable
 from time import perf_counter
 from typing import NamedTuple
 
-from .errors import change
+from .errors import change, orders
 
 
 class Rung(NamedTuple):
@@ -39,6 +39,17 @@ def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> t
     errors = [rung.rule(fine if rung.beside is None else values(rung.beside), *map(values, rung.runs))
               for rung in ladder]
     return errors, perf_counter() - begin
+
+
+def left_open(time, space, runs) -> dict:
+    """What leaves the measures of a run open: `steps` and `space`, errors by name, and the `orders` of the former.
+
+    time, space: errors by name, one dict per rung; runs: measures of the run, at half and at a quarter of its steps,
+    fewer where it has no steps.
+    """
+    parts = {kind: {name: sum(one.get(name, 0.0) for one in each) for name in {name for one in each for name in one}}
+             for kind, each in (("steps", time), ("space", space))}
+    return parts | {"orders": orders(*runs) if len(runs) == 3 else {}}
 
 
 def space_rung(coarser, beside=None) -> Rung:

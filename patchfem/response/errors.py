@@ -33,6 +33,8 @@ OF_CELLS = 0.3  # of runs whose cells are half as many
 OF_FLOOR = 0.1  # of the floor of a measure, and its square where steps meet a tolerance: nobody uses the digits below.
 # Not of GAPS, which are errors themselves and are read by their size
 ROUND = 1e-12  # of a value, the last digits of a long sum
+NOTHING = 1e-6  # of the floor of a measure, below which it is round-off
+FALLS = 0.5  # least order at which an error falls with the step
 GAPS = ("energy_balance", "work_check")
 LAST = 1e-13  # of the amplitude, the last digits of a mean over it
 APART = ("friction_force_peak", "friction_work", "energy_stored", "energy_dissipated")  # not of the last cycles
@@ -92,6 +94,18 @@ def _size(values: dict, name: str) -> float:
     return value
 
 
+def orders(fine: dict, half: dict, quarter: dict) -> dict:
+    """Order [1] at which measures by name were seen to change with the step, 2 at most.
+
+    From runs at some steps per cycle, half and a quarter of them. A measure whose change did not fall by the order
+    FALLS, and one that not all runs have, is left out: more steps are not known to cure it.
+    """
+    last, before = change(fine, half), change(half, quarter)
+    found = {name: float(np.log2(before[name] / last[name])) for name in last
+             if last[name] > 0 and before.get(name, 0.0) > 0}
+    return {name: min(order, 2.0) for name, order in found.items() if order >= FALLS}
+
+
 def tolerance_error(fine: dict, coarse: dict, moved: float = np.inf) -> dict:
     """Error by name of a run whose steps meet a tolerance, from one whose steps may err 30 times as much.
 
@@ -128,8 +142,17 @@ def cells_error(fine: dict, coarse: dict) -> dict:
 
 
 def typical_change(fine: dict, sizes: dict) -> float:
-    """Median relative change [1] of the main measures of a run, 0 where none changes."""
-    return median([sizes[name] / abs(fine[name]) for name in MAIN if sizes.get(name) and fine[name]] or [0.0])
+    """Median relative change [1] of the main measures of a run, 0 where none changes.
+
+    A value below its floor, such as the work of an interface that holds, changes by its own size with every step and
+    says nothing of the others; so it counts only where all are below, and then down to NOTHING of the floor.
+    """
+    changed = [name for name in MAIN if sizes.get(name) and fine[name]]
+    for share in (1.0, NOTHING):
+        told = [sizes[name] / abs(fine[name]) for name in changed if abs(fine[name]) > share * floor_of(name)]
+        if told:
+            return median(told)
+    return 0.0
 
 
 def with_errors(values: dict, *errors: dict, least: float = 0.0, size: float = np.inf) -> dict:

@@ -13,8 +13,10 @@ from patchfem.response.errors import (
     cells_error,
     change,
     jumps_error,
+    orders,
     step_error,
     tolerance_error,
+    typical_change,
     with_errors,
 )
 from patchfem.response.rows import floor_of
@@ -233,3 +235,27 @@ def test_exact_a_bar_knows_what_kind_of_number_it_belongs_to():
                      "energy_balance": 4e-9, "drift_per_cycle": pytest.approx(1e-15 + 1e-9 * 2e-3 + 1e-21, rel=1e-9)}
     least = with_errors(values, parts)["drift_per_cycle"].error
     assert least == pytest.approx(1e-15 + 1e-13 * 2e-3, rel=1e-9)
+
+
+def test_exact_the_work_of_an_interface_that_holds_tells_nothing_of_other_measures():
+    """Its work is round-off and changes by its own size; a stiffness of second order keeps the error of its order."""
+    secant = [2181498911.1374044, 2180691499.6111064, 2177462849.5403247]  # at 400, 200 and 100 steps, order 2.000
+    work = [8.470329472543003e-22, -8.470329472543003e-22, 0.0]
+    runs = [{"secant_stiffness": k, "loop_area": w, "friction_work": 3e-21 + w} for k, w in zip(secant, work)]
+    found = step_error(*runs, 400)
+    truth = secant[0] + (secant[0] - secant[1]) / 3
+    assert abs(truth - secant[0]) < found["secant_stiffness"] < 3 * abs(truth - secant[0])
+    sizes = {"relative_displacement_amplitude": 1e-9, "loop_area": 2e-12}
+    values = {"relative_displacement_amplitude": 1e-6, "loop_area": 1e-12}
+    assert typical_change(values, sizes) == pytest.approx(1e-3)  # the work is below its floor
+    small = {"loop_area": 1e-12}
+    assert typical_change(small, {"loop_area": 1e-14}) == pytest.approx(1e-2)  # nothing else tells
+
+
+def test_exact_orders_are_those_that_the_changes_show():
+    """h^p for p of 1, 2 and 4, which counts as 2; what does not fall, or does not change, has none."""
+    def at(h):
+        return {"one": 1 + h, "two": 1 + h**2, "four": 1 + h**4, "grows": 1 - np.log2(h), "none": 1.0, "slow": h**0.3}
+
+    found = orders(at(1.0), at(2.0), at(4.0))
+    assert found == {"one": pytest.approx(1.0), "two": pytest.approx(2.0), "four": pytest.approx(2.0)}

@@ -51,12 +51,16 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
         first = int(np.searchsorted(time, start))
     engine = engine_of(model, slide, 1 if patch is None else patch.x.size, watch.choice)
     out, more = _slid(model, patch, (time, slide), frames, engine, watch)
-    jumps = has(model.friction.law, "memoryless") and not model.soft
     values = _values(model, time, slide, out, first, omega) | \
-        {"work_check": work_check(out.ledger[0], [(slide, out.force), *more.pop("pairs", ())], jumps)}
+        {"work_check": work_check(out.ledger[0], [(slide, out.force), *more.pop("pairs", ())], _jumps(model))}
     span = time[-1]  # endless where a slide is endlessly slow
     rate = np.gradient(slide, time / span) / span if time.size > 2 else np.zeros(time.size)
     return BenchRun(time, slide, rate, *out, values, perf_counter() - begin, first, engine, **more)
+
+
+def _jumps(model) -> bool:
+    """Whether the force jumps where the slide turns: under a law without memory, and pieces that do not give way."""
+    return has(model.friction.law, "memoryless") and not model.soft
 
 
 def _slid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) -> tuple:
@@ -98,7 +102,7 @@ def _values(model, time, slide, out, first, omega) -> dict:
         weight[1:] += np.diff(t) / 2
         weight[:-1] += np.diff(t) / 2
         means = np.divide(np.diff(work[first:]), np.diff(q), out=(f[1:] + f[:-1]) / 2, where=np.diff(q) != 0)
-        turns = turns_of(t, q, np.zeros(t.size), f, t[-1] - t[0], has(model.friction.law, "memoryless"))
+        turns = turns_of(t, q, np.zeros(t.size), f, t[-1] - t[0], _jumps(model))
         found |= interface_loop(half_range(turns), harmonic(t, weight, q - q.mean(), omega),
                                 step_harmonic(t, means, omega), work[-1] - work[first], 0.0)
         secant = secant_stiffness(turns)

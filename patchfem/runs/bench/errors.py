@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects import listed
-from ...response.coarser import Rung, estimate, space_rung
+from ...response.coarser import Rung, estimate, left_open, space_rung
 from ...response.errors import change, step_error
 from . import bench
 from .engine import LIST, PLANE, STEPPED
@@ -26,14 +26,17 @@ class Variant(NamedTuple):
 
 
 def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
-    """([error by measure name, ...], seconds) of the pass `fine` at `steps` per cycle on the ladder of `ladder_of`;
-    coarse: the patch on the coarser mesh or None."""
+    """([error by measure name, ...], seconds, `left_open`) of the pass `fine` at `steps` per cycle on the ladder of
+    `ladder_of`; coarse: the patch on the coarser mesh or None."""
     def solve(variant: Variant):
         on = coarse if variant.rough else patch
         return bench.run(model, on, variant.steps, watch=Watch(variant.choice, say))
 
-    errors, seconds = estimate(solve, fine.values, ladder_of(model, coarse is not None, fine, steps))
-    return [*errors, *([stated(model, fine)] if sum_error(model, fine.engine) else [])], seconds
+    ladder, made = ladder_of(model, coarse is not None, fine, steps), {}
+    errors, seconds = estimate(solve, fine.values, ladder, made)
+    errors += [stated(model, fine)] if sum_error(model, fine.engine) else []
+    runs = [fine.values, *(made[one].values for one in ladder[0].runs)]
+    return errors, seconds, left_open(errors[:1], errors[1:], runs)
 
 
 def ladder_of(model, meshed: bool, fine, steps: int) -> list:

@@ -26,9 +26,9 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     frames = FRAMES if patch is not None else 0
     fine = bench.run(model, patch, steps, frames, watch=Watch(None, say, progress))
     seconds["bench"] = fine.seconds
-    others = []
+    others, left = [], None
     if estimate:
-        others, seconds["error"] = errors_of(model, patch, coarse[0], fine, steps, say)
+        others, seconds["error"], left = errors_of(model, patch, coarse[0], fine, steps, say)
     found = with_errors(fine.values, *others, least=1e-10)
     fields, created, power = {}, fine.values["energy_created"], np.abs(np.diff(fine.ledger[0])).sum()
     if f.reading == "report" and created > 1e-6 * power:
@@ -44,7 +44,7 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
         notes = of_growth(model.bonds, peak)
     notes = [*notes, *climbing_as_one(model, patch)]
     return Result(what, outcome, without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
-                  {"engine": fine.engine.name, "steps": steps, "notes": notes})
+                  {"engine": fine.engine.name, "steps": steps, "notes": notes, "left_open": left})
 
 
 def _overhang(asked, patch, fine) -> list:

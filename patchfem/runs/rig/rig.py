@@ -8,7 +8,7 @@ import numpy as np
 from ...core import Outcome, PatchfemError
 from ...effects import has, listed
 from ...friction.record import law_from
-from ...response.coarser import estimate
+from ...response.coarser import estimate, left_open
 from ...response.errors import with_errors
 from ...response.outcome import changing_note, settle
 from ...response.reasons import without_value
@@ -25,6 +25,7 @@ from .engines import ENGINES, Variant, unbalanced
 from .levels import with_errors as level_errors
 from .numerics import choose, quadrature_of, refuse_costly
 from .solution import borne, curve_measures
+from .start_ring import StartRing, start_ring
 
 FINEST = 1e-12  # error of a step below which round-off rules
 
@@ -64,13 +65,17 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     found = with_own(found, raw.own)
     outcome, found = settle(raw, without_errors(found, estimated), model.accuracy.tolerance, drive, rig.level_cycles,
                             slowest(rig.modes))
+    rings = StartRing(found, {}, [])
+    if patch is not None and not raw.levels:
+        rings = start_ring(outcome, found, raw.window, drive, numerics.cycles, model.accuracy.tolerance)
+    found, extra["still_rings"] = rings.measures, rings.remedies
     if f is not None:
         extra["events"] = events_of(raw.window, drive, raw.log, raw.held)
     fields = {}
     if patch is not None:
         fields = rig_fields(model, numerics, patch, raw)
     found |= without_value(found, raw.window, drive, f is not None)
-    extra |= {"book": raw.book, "period": drive.period, "notes": _notes(model, patch, raw)}
+    extra |= {"book": raw.book, "period": drive.period, "notes": [*_notes(model, patch, raw), *rings.notes]}
     extra |= _behind(model, numerics, raw.contact)
     warnings = [*warnings, *_said(model, patch, raw, outcome, found)]
     warnings = [*warnings, *two_books(found, numerics.engine, extra.get("steps_per_cycle"))]
@@ -185,12 +190,21 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         if _enough(model, numerics, found, measures) or not time:
             if spent:
                 seconds["error"] = spent
+            left = left_open(time, space, [found.values, *(made[one].values for one in _halved(engine, model, numerics,
+                                                                                               patch))])
+            found = replace(found, extra=found.extra | {"left_open": left})
             return found, numerics, measures | curve_measures(found.extra)
         made[Variant(numerics, patch)] = found
         spent += found.seconds
         numerics = numerics.finer()
         found = go(model, numerics, patch, frames, say, progress)
         seconds["march"] = found.seconds
+
+
+def _halved(engine, model, numerics, patch) -> tuple:
+    """Variants at half and a quarter of the steps of an engine that has steps, as `left_open` compares them."""
+    rungs = engine.in_time(model, numerics, patch)
+    return rungs[0].runs if rungs and not numerics.local else ()
 
 
 def resolved(measures, tolerance: float) -> bool:

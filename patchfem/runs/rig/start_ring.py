@@ -1,0 +1,71 @@
+"""What the ringing of the start leaves in the cycles of an interface that holds.
+
+A joint that sticks has little damping of its own, so what the drive set off at its start rings on. The interface stores
+energy of that ring and gives it back, and a window need not hold as much of either: its work per cycle is then no loss.
+"""
+
+from dataclasses import replace
+from math import ceil, log, log10, pi
+from typing import NamedTuple
+
+from ...core import Measure, Outcome
+from ...structure.drive_sizes import sinusoidal, whole
+
+LEAST_DAMPING = 1e-6  # of a ring, below which no number of cycles is named
+OF_WORK = ("loop_area", "equivalent_damping")
+
+
+class StartRing(NamedTuple):
+    """Measures with what the stored energy leaves open of them; remedies: by name of those that miss the tolerance for
+    it; notes: the sentence on it, in a list."""
+
+    measures: dict
+    remedies: dict
+    notes: list
+
+
+def start_ring(outcome, measures: dict, window, drive, cycles: float, tolerance: float) -> StartRing:
+    """StartRing of a run: the change of the stored energy per cycle belongs to the error of the work per cycle.
+
+    outcome; measures: by name; window: Response of the last cycles; drive; cycles: of the run. Only an interface that
+    holds under a sine has it: where it slips the work is mostly loss.
+    """
+    ledger, loop = window.extra.get("ledger"), measures.get("loop_area")
+    span = window.time[-1] - window.time[0]
+    if outcome is not Outcome.STUCK or ledger is None or loop is None or not loop.value or loop.error is None \
+            or not sinusoidal(drive) or not whole(span, drive):
+        return StartRing(measures, {}, [])
+    change = abs(float(ledger[1][-1] - ledger[1][0])) * drive.period / span
+    wide = {name: _wider(measures[name], change / abs(loop.value)) for name in OF_WORK if name in measures}
+    missed = {name: one for name, one in wide.items()
+              if one.error > max(_allowed(one, tolerance), 2 * measures[name].error)}  # most of it by the change
+    if not missed:
+        return StartRing(measures | wide, {}, [])
+    until = max(_until(one, measures, drive, cycles) for one in missed.values())
+    remedy = f"drive.cycles = {until:g} lets the ringing of the start decay" if until else \
+        "the start rings on; give the modes of [[structure.mode]] more damping"
+    ring = measures.get("ring_frequency")
+    pitch = f" at {ring.value:.5g} Hz (damping {measures['ring_damping'].value:.2g})" if ring is not None else ""
+    note = f"the start still rings{pitch}: loop_area holds what the interface stores and gives back, not what it " \
+           f"dissipates; {remedy}"
+    return StartRing(measures | wide, dict.fromkeys(missed, remedy), [note])
+
+
+def _wider(one: Measure, share: float) -> Measure:
+    """A Measure whose error has a share of its value more."""
+    return replace(one, error=one.error + share * abs(one.value))
+
+
+def _allowed(one: Measure, tolerance: float) -> float:
+    return tolerance * abs(one.value) + one.floor
+
+
+def _until(one: Measure, measures: dict, drive, cycles: float) -> float:
+    """Cycles, to two digits, after which the ring leaves its floor of a Measure open; 0 where it does not decay."""
+    ring, damping = (measures.get(f"ring_{name}") for name in ("frequency", "damping"))
+    if ring is None or damping.value <= LEAST_DAMPING:
+        return 0.0
+    seconds = log(2 * one.error / one.floor) / (2 * pi * ring.value * damping.value)
+    least = cycles + max(seconds, 0.0) / drive.period
+    unit = 10.0 ** max(0, ceil(log10(least)) - 2)
+    return ceil(least / unit) * unit
