@@ -23,6 +23,7 @@ KNOWN = {"time": "time", "displacement": "relative_displacement", "acceleration"
 UNITS = {"time": "s", "displacement": "m", "acceleration": "m s-2", "force": "N"}
 IN_PHASE = ("relative_displacement", "absolute_acceleration")
 MEASURED = "measured"
+MANY = 10.0  # times the first value, from which a change is told as a factor
 CYCLES = 2.0  # of the last motion that are shown: result.nc keeps so many whole
 CHARTS = (  # title, x: (variable, label), y: (variable, label); only the last cycles of what stands on time
     ("Pressure", ("x", "place"), ("normal_stress", "normal stress")),
@@ -235,7 +236,8 @@ def _measures(runs: list, names: list) -> str:
                         for number, one in enumerate(found))
         rows.append(f"<tr><td>{linked(label(name), name)}</td>{cells}</tr>")
     return ("<p class=soft>Value and estimated numerical error. Bold with its change in per cent: differs from the "
-            "first run by more than both errors together.</p><div class=across><table><thead><tr><th>measure</th>"
+            "first run by more than both errors together; a factor from ten times on, a dash where the first is 0 "
+            "within its error.</p><div class='across side'><table><thead><tr><th>measure</th>"
             f"{_heads(names)}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>")
 
 
@@ -249,5 +251,13 @@ def _cell(name: str, one: dict | None, first: dict | None) -> str:
     change = one["value"] - first["value"]
     if abs(change) <= (one["error"] or 0.0) + (first["error"] or 0.0):
         return text
-    share = f" ({change / abs(first['value']):+.2%})" if first["value"] else ""
-    return f"<b>{text}</b>{share}"
+    return f"<b class=v>{text}</b> <span class=v>({_share(one['value'], first)})</span>"
+
+
+def _share(value: float, first: dict) -> str:
+    """The change from the first value: in per cent, as a factor where it is many times as large, a dash where the first
+    is 0 within its error, so that any number would tell of that error."""
+    if abs(first["value"]) <= (first["error"] or 0.0):
+        return "&ndash;"
+    factor = value / first["value"]
+    return f"&times; {factor:.2g}" if abs(factor) >= MANY else f"{(value - first['value']) / abs(first['value']):+.2%}"

@@ -43,7 +43,7 @@ def test_exact_differences_and_the_last_two_cycles(tmp_path):
     assert "<b>heavy" not in text and "&lt;b&gt;heavy" in text
     rows = re.search(r'<section id="scenes">.*?<tbody>(.*?)</tbody>', text, re.S)[1]
     assert re.findall(r"<tr><td>(.*?)</td>", rows) == ["normal.load"]
-    assert "<b>1.0000 ± 0.0010 um</b> (-50.00%)" in text
+    assert "<b class=v>1.0000 ± 0.0010 um</b> <span class=v>(-50.00%)</span>" in text
     history = charts_of(text)["Displacement", "displacement"]
     assert history["x"]["unit"] == "ms" and history["y"]["unit"] == "um"
     assert [one["name"] for one in history["marks"]] == ["light", "<b>heavy"]
@@ -55,6 +55,15 @@ def test_exact_differences_and_the_last_two_cycles(tmp_path):
 def test_always_a_change_within_both_errors_is_not_marked(tmp_path):
     text = page([read(made(tmp_path / "a", 10.0, 2e-6, 3e-8)), read(made(tmp_path / "b", 10.0, 2.05e-6, 3e-8))])
     assert "Nothing: the resolved scenes are the same" in text and "<b>2." not in text and "(+2" not in text
+
+
+@pytest.mark.parametrize("value, first, error, told", [
+    (2.1e-6, 1e-12, 2e-12, "&ndash;"), (2.1e-6, 0.0, 0.0, "&ndash;"), (2.1e-6, 1e-12, 1e-13, "&times; 2.1e+06"),
+    (-3e-6, 1e-7, 0.0, "&times; -30"), (1.5e-6, 1e-6, 0.0, "+50.00%"), (-1.5e-6, -1e-6, 0.0, "-50.00%")])
+def test_exact_a_change_is_told_by_what_the_first_value_bears(tmp_path, value, first, error, told):
+    """In per cent, as a factor from ten times on, and not at all from a value that is 0 within its error."""
+    text = page([read(made(tmp_path / "a", 10.0, first, error)), read(made(tmp_path / "b", 10.0, value, 1e-10))])
+    assert f"</b> <span class=v>({told})</span>" in text
 
 
 def test_always_runs_of_the_same_name_are_told_apart(tmp_path):
