@@ -19,6 +19,7 @@ OMEGA, DAMP, SLIDE, BASE, OUTPUT = range(5)  # of Moving.rows
 MEANS = np.array([1 / 2, 1 / 6, 1 / 12, 1 / 30, 1 / 60, 1 / 140, 1 / 280])  # of s, s (1 - s), s^2 (1 - s), ...
 EXTENSION, SIZES, TRIAL = 16, 24, 25  # of Moving.work, whose first rows are the slopes
 LEAST = 1e-30  # of a size: at rest everything is as large as this
+NOISE = 2e-15  # of the force of a mode's stiffness: round-off of its acceleration where friction balances it
 SINES, SWEEP, ROWS = range(3)  # of now[KIND]: sines one after the other, a sweep, straight between rows
 
 
@@ -101,7 +102,8 @@ def step(m, h):
 def missed(m, h, tolerance):
     """Estimate of the error of a step of h [s] over what the tolerance allows, by its estimates of order 5 and 3.
 
-    Coordinates count relative to the largest of late, rates to the fastest, states of the law to their sizes.
+    Coordinates count relative to the largest of late, rates to the fastest, states of the law to their sizes. A rate
+    counts no less than what the step makes of round-off: held at a distance, it decays to that, and it is no error.
     """
     n, size = m.rows.shape[1], m.y.size - 3
     fifth, third = 0.0, 0.0
@@ -112,6 +114,8 @@ def missed(m, h, tolerance):
             high += FIFTH[j] * m.work[j, c]
             low += THIRD[j] * m.work[j, c]
         top = max(abs(m.y[c]), abs(m.work[TRIAL, c])) if c < 2 * n else 0.0
+        if n <= c < 2 * n:
+            top = max(top, NOISE * abs(h * m.y[c - n]) * m.rows[OMEGA, c - n]**2 / tolerance)
         scale = max(scale, top, LEAST)
         fifth += (high / scale)**2
         third += (low / scale)**2
