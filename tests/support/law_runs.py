@@ -1,6 +1,11 @@
 """One law of friction in every run that carries it: bench, rig, two masses, steady motion, fit."""
 
 import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 from scene_texts import DRIVE, MODE
@@ -56,6 +61,27 @@ def masses(law: str, interfaces: int, *sets, cycles: int = 20, steps: int = 100)
     drive = DRIVE.replace("cycles = 30", f"cycles = {cycles}")
     text = MASSES.format(damper=32) + faces + drive + f"[accuracy]\nsteps_per_cycle = {steps}\n"
     return run(loads(text, sets=sets), estimate=False)
+
+
+PLAIN = """
+import json, sys
+from law_runs import masses
+runs = [masses(sys.argv[1], count, cycles=2, steps=50) for count in (2, 1)]
+both, alone = (run.response for run in runs)
+print(json.dumps([both.extra["slides"].T.tolist(), alone.slide.tolist(),
+                  [run.measures["friction_force_peak"].value for run in runs]]))
+"""
+
+
+def plain_masses(law: str):
+    """(slides (2, t), slide of one alone (t,), peak forces of both runs) of `masses` in a process that compiles
+    nothing."""
+    where = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
+    done = subprocess.run([sys.executable, "-c", PLAIN, law], capture_output=True, text=True, timeout=300,
+                          env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": where})
+    assert done.returncode == 0, done.stderr
+    both, alone, pulls = json.loads(done.stdout)
+    return np.array(both), np.array(alone), pulls
 
 
 def fitted(folder, law: str, loop: tuple, free: str):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from law_runs import LOAD, bench_along, fitted, masses, rig, shrinking
+from law_runs import LOAD, bench_along, fitted, masses, plain_masses, rig, shrinking
 from scene_texts import COATED, DRIVE, MODE, mistakes, only
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -93,6 +93,15 @@ def test_exact_a_march_settles_on_the_harmonic_balance(exponent):
     assert marched.measures["energy_created"].value <= 1e-12 * marched.measures["energy_dissipated"].value
 
 
+def test_exact_two_alike_interfaces_move_alike_in_plain_python():
+    """The law in the loop of many interfaces without its compilation, over the first two cycles."""
+    both, alone, pulls = plain_masses(law_of(2.0, 0.7))
+    assert both[0] == pytest.approx(both[1], abs=1e-12 * np.abs(both).max())
+    assert both[0] == pytest.approx(alone, abs=1e-7 * np.abs(alone).max())
+    assert np.abs(alone).max() > 3 * EPS and max(pulls) > 0.9 * LIMIT  # it slips
+
+
+@pytest.mark.slow
 def test_exact_two_alike_interfaces_move_alike():
     law = law_of(2.0, 0.7)
     both = masses(law, 2)
