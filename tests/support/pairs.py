@@ -56,3 +56,33 @@ def pair(seed: int, share: float | None = None, noise: float = 0.02 * UM, step: 
     return Pair(Profile(frozen_array(x), frozen_array(before), "before"),
                 Profile(frozen_array(x), frozen_array(after), "after"), moved, worn,
                 float(tilts[1] - tilts[0]), float(offsets[1] - offsets[0] + tilts[0] * moved))
+
+
+KINDS = ("band", "parabola", "groove")
+
+
+def track(kind: str, seed: int, count: int = 4001, noise: float = 0.02 * UM) -> Pair:
+    """Two rough traces (0.3 um, correlated over 10 samples of 1 um), the second with a worn track of one kind in it.
+
+    band: a flat floor between walls, a tenth to four tenths of the length wide; parabola: as wide; groove: a round
+    scratch 30 um to 120 um wide. Depth 0.4 um to 2 um, place, width and shift (within 80 um) by chance.
+    """
+    random = np.random.default_rng([seed, KINDS.index(kind), 1986])
+    spare = 100
+    rough = np.convolve(random.standard_normal(count + 2 * spare + 120),
+                        np.exp(-0.5 * (np.arange(-60, 61) / 10) ** 2), "valid")
+    rough *= 0.3 * UM / rough.std()
+    depth, moved = random.uniform(0.4, 2.0) * UM, int(random.integers(-80, 81))
+    width = random.uniform(30, 120) if kind == "groove" else random.uniform(0.1, 0.4) * count
+    middle = random.uniform(0.15 * count + width / 2, 0.85 * count - width / 2)
+    x = np.arange(float(count))
+    places = x - moved  # of the samples after, in the trace before
+    t = (places - middle) / (width / 2)
+    inside = abs(t) <= 1
+    shape = {"band": np.ones(count), "parabola": 1 - t**2, "groove": np.sqrt(np.maximum(1 - t**2, 0.0))}[kind]
+    worn = np.where(inside, depth * shape, 0.0)
+    jitter = noise * random.standard_normal((2, count))
+    before, after = rough[spare:spare + count], rough[spare - moved:spare - moved + count] - worn
+    x = frozen_array(x * UM)
+    return Pair(Profile(x, frozen_array(before + jitter[0]), "before"), Profile(x, frozen_array(after + jitter[1]),
+                "after"), moved * UM, worn, 0.0, 0.0)

@@ -11,6 +11,7 @@ from ..roughness.filter import even
 from ..roughness.spectrum import BAND
 from . import depth as worn_depth
 from .depth import Worn
+from .extent import grown
 from .flanks import Flanks, flanks_of
 from .place import CLEAR, Match, matched
 from .quantity import SIDE, Quantity, around, refused
@@ -61,6 +62,9 @@ class Comparison:
         out = {"shift": self.shift, "worn_depth_max": self.worn.largest, "worn_depth_mean": self.worn.mean,
                "worn_area": self.worn.area, "amplitude_ratio": self.amplitude_ratio, "slope_ratio": self.slope_ratio,
                "tilt": self.tilt, "scale": self.stretch}
+        if self.worn.extent is not None:
+            names = (f"worn_{end}_{when}" for when in ("before", "after") for end in ("from", "to"))
+            out.update(zip(names, (*self.worn.extent.before, *self.worn.extent.after)))
         return out if self.abbott is None else {**out, "worn_depth_mean_from_abbott": self.abbott}
 
 
@@ -88,9 +92,22 @@ def same_place(before: Profile, after: Profile) -> tuple:
         found = register(before, after, match.shift)
     except PatchfemError:
         return match, None
+    return match, found if _same(found, match) else None
+
+
+def _same(found: Registration, match: Match) -> bool:
+    """Whether the unworn heights of a registration are so many and so alike that the place is the same."""
     height = float(np.std(found.first - np.polyval(np.polyfit(found.x, found.first, 1), found.x)))
     same = any(found.noise < noise * height and match.clear > clear for noise, clear in ENOUGH)
-    return match, found if same and found.used.mean() > SHARE else None
+    return same and bool(found.used.mean() > SHARE)
+
+
+def _turned(before: Profile, after: Profile, shift: float) -> Registration | None:
+    """The first trace registered on the second one."""
+    try:
+        return register(after, before, -shift)
+    except PatchfemError:
+        return None
 
 
 def _traces(before: Profile, after: Profile, direction: str, band: tuple) -> Comparison:
@@ -108,10 +125,15 @@ def _traces(before: Profile, after: Profile, direction: str, band: tuple) -> Com
         stretch = around(1 + found.stretch[0], found.stretch[1], "1", STRETCH) if np.isfinite(found.stretch[0]) \
             else refused("1", STRETCH, "too few heights are unworn")
         worn, reference = worn_depth.of_registration(found), "place"
+        notes += grown(found, _turned(before, after, found.shift), worn.area.value, worn.deposited)
     else:
         why = (f"the surface repeats itself: shifts apart from each other fit alike, {match.likeness:.3f} and "
                f"{match.second:.3f}") if match.repeats and match.clear > CLEAR else \
             f"the traces show no common place: chance brings their valleys the likeness of {match.likeness:.2f} too"
+        other = _turned(before, after, match.shift) if match.clear > CLEAR and not match.repeats else None
+        if other is not None and _same(other, match):
+            notes.append("taken the other way round, as wear of the trace after, the traces show a common place: are "
+                         "the two files in the wrong order?")
         shift, tilt, stretch = (refused(unit, text, why) for unit, text in
                                 (("m", SHIFT), ("rad", TILT), ("1", STRETCH)))
         flanks = flanks_of(before, after)

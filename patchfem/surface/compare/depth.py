@@ -9,26 +9,30 @@ from ..roughness.filter import even
 from ..roughness.intervals import made_traces
 from ..roughness.parameters import Heights
 from ..roughness.spectrum import spectrum_of
+from .extent import Extent, extent_of
 from .flanks import Flanks
+from .largest import largest
 from .quantity import LEVEL, Quantity, around, refused
-from .registration import REACH, Registration
+from .registration import REACH, Registration, together
 
-MAX, MEAN, AREA = ("largest worn depth", "mean worn depth over the common length",
+MAX, MEAN, AREA = ("largest worn depth, without what noise adds to a largest value",
+                   "mean worn depth over the common length",
                    "worn area of the section, that is worn volume per width")
 TAIL = (0.02, 0.25)  # share of the lowest heights that both Abbott curves are laid on each other over
 DEPOSIT = 4.0  # noises above the trace before from which a height is a deposit, not noise
 SLIGHT = 0.5  # noises: wear less deep than that passes for none (test_registration)
-DRAWS = 300
 
 
 @dataclass(frozen=True, eq=False)
 class Worn:
-    """Worn depth of a trace: three `Quantity`, and the area [m2] that stands above the first trace (deposits)."""
+    """Worn depth of a trace: three `Quantity`, the area [m2] that stands above the first trace (deposits), and from
+    where to where it is worn, None where that is not known."""
 
     largest: Quantity
     mean: Quantity
     area: Quantity
     deposited: float = 0.0
+    extent: Extent | None = None
 
 
 def of_registration(found: Registration) -> Worn:
@@ -37,9 +41,8 @@ def of_registration(found: Registration) -> Worn:
     All depths are added up, so that noise of both signs cancels on the unworn heights, but not what stands more than 4
     noises above the first trace: that is deposited. The interval of the sums has the noise of the worn heights, the
     uncertainty of shift, tilt and offset with what the deeper half of the unworn heights doubts of them, and the wear
-    that hides in the noise: as many heights as are worn by 2.5 to 5 noises, by half a noise each. The largest of noisy
-    depths is too large: the mean excess of `DRAWS` draws with the noise added once more is taken off; its interval has
-    the noise of a single height.
+    that hides in the noise: as many heights as are worn by 2.5 to 5 noises, by half a noise each. The largest
+    depth is that of `largest`.
     """
     width = _widths(found.x)
     length, rest = float(width.sum()), found.rest
@@ -57,7 +60,8 @@ def of_registration(found: Registration) -> Worn:
     error = max(error, 0.1 * found.noise * float(np.sqrt((width**2).sum())))  # digits, where no height is worn
     area = area if abs(area) > 1e-6 * found.noise * length else 0.0
     return Worn(_largest(found), around(area / length, error / length, "m", MEAN, 0.0),
-                around(area, error, "m2", AREA, 0.0), float(-(width[deposit] @ rest[deposit])))
+                around(area, error, "m2", AREA, 0.0), float(-(width[deposit] @ rest[deposit])),
+                extent_of(found, _neighbours(found)))
 
 
 def _widths(x) -> np.ndarray:
@@ -67,16 +71,19 @@ def _widths(x) -> np.ndarray:
 
 
 def _largest(found: Registration) -> Quantity:
-    rest, noise = found.rest, found.noise
-    top = float(rest.max())
-    near = np.flatnonzero(rest > top - 8 * noise)
-    drawn = rest[near] + noise * np.random.default_rng(0).standard_normal((DRAWS, near.size))
-    excess = float(drawn.max(axis=1).mean()) - top
-    at = found.gradient[int(np.argmax(rest))]
-    error = float(np.hypot(noise, found.error(at)))
-    if top <= 4.5 * noise:  # the largest of the noise of the whole trace
-        return Quantity(0.0, 0.0, max(top, 0.0) + noise, "m", MAX)
-    return around(top - excess, error, "m", MAX, 0.0)
+    if float(found.rest.max()) <= 4.5 * found.noise:  # the largest of the noise of the whole trace
+        return Quantity(0.0, 0.0, max(float(found.rest.max()), 0.0) + found.noise, "m", MAX)
+    return around(*largest(found, _neighbours(found)), "m", MAX, 0.0)
+
+
+def _neighbours(found: Registration) -> float:
+    """How many neighbouring heights err alike, with what interpolation between samples does to the next two."""
+    rest, used = found.rest, found.used
+    total, power = 1.0, max(float(np.mean(rest[used] ** 2)), 1e-300)
+    for lag in (1, 2):
+        both = used[lag:] & used[:-lag]
+        total += 2 * float(np.mean(rest[lag:][both] * rest[:-lag][both])) / power if both.any() else 0.0
+    return max(total, together(rest, used))
 
 
 def of_flanks(found: Flanks) -> Worn:

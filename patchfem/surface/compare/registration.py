@@ -211,7 +211,7 @@ class _Fit:
         part = gradient[used, :free]
         inverse = np.linalg.pinv(part.T @ part, rcond=1e-14, hermitian=True)
         spread = float(np.mean(rest[used] ** 2)) / KEPT
-        covariance = inverse * max(spread, self.least**2 / 100) * TRIMMED * _together(rest, used)
+        covariance = inverse * max(spread, self.least**2 / 100) * TRIMMED * together(rest, used)
         turn = np.array([1.0, 1 / self.half, 1.0, 1.0])[:free]  # slope [rad] from the height at the end
         x, at = self.x[inside], self.at(state)[inside]
         slope = float(state[1] / self.half)
@@ -226,7 +226,7 @@ class _Fit:
             frozen_array(covariance * np.outer(turn, turn)), stretch, frozen_array(doubt * turn))
 
 
-def _together(rest, used) -> float:
+def together(rest, used) -> float:
     """How many neighbouring heights err alike: 1 + 2 sum of the correlations of unworn neighbours, 1 at least."""
     total, power = 1.0, float(np.mean(rest[used] ** 2))
     if power == 0:

@@ -99,6 +99,10 @@ def _worn(one: Comparison, name: str) -> str:
     text = f"Worn{name}: {_length(mean)} in the mean {what}, {_length(one.worn.largest)} at the deepest place."
     if one.worn.deposited > 0.05 * one.worn.area.value:
         text += f" {1e12 * one.worn.deposited:.3g} um^2 stand above the surface before: deposits."
+    if one.worn.extent is not None:
+        first, last = (pair for pair in zip(one.worn.extent.before, one.worn.extent.after))
+        text += (f" Worn from x = {say(first[0].value)} to {say(last[0].value)} of the trace before, that is from "
+                 f"{say(first[1].value)} to {say(last[1].value)} of the trace after.")
     return text
 
 

@@ -53,7 +53,7 @@ def fetch(path) -> Raw:
                 return Raw(there, kind, suffix, b"")
             data = _upto(file, head, _most(kind) + 1)
     except FileNotFoundError:
-        raise Missing(f"{path}: no such profile; contact.profile.file is relative to the scene") from None
+        raise Missing(f"{path}: there is no such file") from None
     except (OSError, ValueError) as error:
         raise PatchfemError(f"{path}: the profile cannot be read ({error})") from None
     _limited(path, kind, data)

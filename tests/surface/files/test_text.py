@@ -180,7 +180,7 @@ def test_refuses_by_name(tmp_path, content):
 
 
 def test_refuses_what_is_no_file_and_what_is_too_much(tmp_path, monkeypatch):
-    with pytest.raises(Missing, match=r"no such profile; contact\.profile\.file is relative to the scene"):
+    with pytest.raises(Missing, match="there is no such file"):
         read_trace(tmp_path / "none.csv")
     with pytest.raises(PatchfemError, match="not a file; a profile is a text file with two columns"):
         read_trace(tmp_path)

@@ -1,0 +1,110 @@
+"""The largest worn depth without the noise that a largest value collects: parabolas as long as the depths allow."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from .registration import Registration
+
+LONGEST = 1025  # samples of a window
+PARTS = 8  # of a window, whose means the parabola must meet
+ALIKE = 2.5
+BLUNT = 8.0  # noises below the top within which a depth may be the largest
+DOUBT = 3.0  # deviations that a depth loses in the choice of the largest: a sharper window must show it clearly
+DRAWS = 300
+
+
+def largest(found: Registration, together: float) -> tuple:
+    """(value, standard deviation) [m] of the largest worn depth w of a registration.
+
+    Depths are w + noise, and the largest of n of them is too large by about noise * sqrt(2 log n). So each depth is
+    read from the parabola through the longest window (5 to 1025 heights) around it that shows no misfit beyond the
+    noise, neither in its mean square nor in the means of its eight parts; where no window fits, it is the height
+    itself. What is left of the excess is the mean one of `DRAWS` draws of the noise through the same windows, and is
+    taken off. The deviation has that of the draws, that excess, which the draws see by half for a flat floor, and what
+    the registration leaves open. together: how many neighbouring heights err alike (`registration.together`).
+    """
+    rest, noise = np.asarray(found.rest), found.noise
+    start, size = _windows(rest, noise, together)
+    smooth, deviation = np.empty(rest.size), np.empty(rest.size)
+    for first, length, members, rows in _shared(start, size, np.arange(rest.size)):
+        smooth[members] = rows @ (_base(length).T @ rest[first:first + length])
+        deviation[members] = noise * np.sqrt((rows**2).sum(axis=1) * _alike(length, together))
+    top = int(np.argmax(smooth - DOUBT * deviation))
+    near = np.flatnonzero(smooth + BLUNT * deviation > smooth[top] - BLUNT * deviation[top])
+    low, high = int(start[near].min()), int((start + size)[near].max())
+    drawn = noise * np.random.default_rng(0).standard_normal((DRAWS, high - low))
+    peaks, ranks = np.empty(DRAWS), np.full(DRAWS, -np.inf)
+    for first, length, members, rows in _shared(start, size, near):
+        moved = np.sqrt(_alike(length, together)) * drawn[:, first - low:first - low + length] @ _base(length) @ rows.T
+        rank = smooth[members] + moved - DOUBT * deviation[members]
+        best = np.argmax(rank, axis=1)
+        here = rank[np.arange(DRAWS), best]
+        better = here > ranks
+        peaks[better] = (here + DOUBT * deviation[members][best])[better]
+        ranks[better] = here[better]
+    excess = float(peaks.mean() - smooth[top])
+    part = slice(int(start[top]), int(start[top] + size[top]))
+    base = _base(int(size[top]))
+    pull = base[top - part.start] @ (base.T @ found.gradient[part])
+    return float(smooth[top] - excess), float(np.sqrt(peaks.var() + excess**2 / 4 + found.error(pull) ** 2))
+
+
+def _shared(start, size, heights):
+    """The windows of these heights: (first sample, length, heights read from it, their rows of its parabolas)."""
+    order = heights[np.lexsort((start[heights], size[heights]))]
+    ends = np.flatnonzero(np.diff(start[order]) | np.diff(size[order])) + 1
+    for members in np.split(order, ends):
+        first, length = int(start[members[0]]), int(size[members[0]])
+        yield first, length, members, _base(length)[members - first]
+
+
+def _alike(length: int, together: float) -> float:
+    """Variance of a parabola's height over that of independent noise: single heights know no neighbours."""
+    return together if length > 1 else 1.0
+
+
+@lru_cache(maxsize=16)
+def _base(length: int) -> np.ndarray:
+    """Orthonormal parabolas (length, 3) over a window; (1, 1) for one height."""
+    return np.linalg.qr(np.vander(np.linspace(-1, 1, length), 3))[0] if length > 1 else np.ones((1, 1))
+
+
+def _windows(rest, noise: float, together: float) -> tuple:
+    """First sample and length of the longest window around each depth that a parabola fits; 1 where none does.
+
+    Of windows of a length, the one whose middle is nearest is taken.
+    """
+    count, here = rest.size, np.arange(rest.size)
+    start, size = here.copy(), np.ones(count, int)
+    length = 5
+    while length <= min(LONGEST, count):
+        apart = max(length // PARTS, 1)
+        first = np.arange(0, count - length + 1, apart)
+        good = first[_fits(np.lib.stride_tricks.sliding_window_view(rest, length)[first], noise, together)]
+        if not good.size:
+            break
+        after = np.searchsorted(good + length // 2, here).clip(1, max(good.size - 1, 1))
+        pair = good[np.clip(np.stack([after - 1, after]), 0, good.size - 1)]
+        away = np.abs(pair + length // 2 - here)
+        nearest = np.where(away[0] <= away[1], pair[0], pair[1])
+        inside = away.min(axis=0) <= length // 2
+        start[inside], size[inside] = nearest[inside], length
+        length = 2 * length - 1
+    half = (size + 1) // 2
+    apart = np.maximum(half // PARTS, 1)
+    return np.clip((here - half // 2) // apart * apart, start, start + size - half), half
+
+
+def _fits(windows, noise: float, together: float) -> np.ndarray:
+    """Whether a parabola leaves no more than noise in each window (m, length)."""
+    length = windows.shape[1]
+    base = _base(length)
+    left = windows - (windows @ base) @ base.T
+    free = length - 3
+    good = (left**2).sum(axis=1) <= noise**2 * (free + ALIKE * np.sqrt(2 * free * together))
+    if length >= 2 * PARTS:
+        edges = np.linspace(0, length, PARTS + 1).astype(int)[:-1]
+        means = np.add.reduceat(left, edges, axis=1)
+        good &= (np.abs(means) <= ALIKE * noise * np.sqrt(together * length / PARTS)).all(axis=1)
+    return good
