@@ -1,21 +1,29 @@
 """Numerical choices of a coupled run: engine, steps per cycle, shear modes, quadrature, and what they would cost."""
 
 from dataclasses import dataclass, replace
-from math import ceil, pi, sqrt
+from math import ceil, log2, pi, sqrt
 
 import numpy as np
 
 from ...core import Missing
 from ...effects import has
+from ...friction.bonds.list_numbers import AGED, SHARES, form_of
 from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
-from ...structure.drive_sizes import omega_of, sinusoidal
+from ...structure.drive_sizes import largest, omega_of, sinusoidal
 from ..effort import steps_per_cycle
 from .engines import COMPARED, engine_of
 from .pieces.costs import pairs_of
 
 COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
 DECAYED = 1e-2  # share of the first stroke of a motion that is released, by which its bonds are summed
+HELD = 1e-4  # share of the drive's stroke that a block makes which the printed law holds (measured: 1e-2 to 1e-4)
+# seconds of a step of it per strip: each of 10 to 50 trial increments splits each strip at u = 0
+HELD_STEP = {SHARES: 5e-7, AGED: 1.5e-6}
+HELD_ANY = 7e-6  # the same of constant length with an order other than 0, 1, 2
+FAST = 2.0  # D from which a block is held fast: 0.6 and more strips per step, against 0.06 at 1.06 and 0.28 at 1.4
+TURNING = 0.1  # strokes per step from which they are those of the steps
+MOST_CROWDED = 500  # strips of its list, about one per step, from which steps are not halved again: four times the cost
 MOST_SWING = 2.0  # radians of the block on its bonds in a step
 LEAST_KEPT = 100  # samples of a run that has no cycles
 
@@ -107,17 +115,57 @@ def quadrature_of(model: Model, numerics: Numerics):
 
     The stroke is taken as four times the amplitude that the drive's speed over its frequency gives. That of a motion
     which is released shrinks, and a list of all its bonds would outgrow any room: it is taken as DECAYED times that of
-    its start.
+    its start. That of a block which the printed law holds is HELD times what the drive would give.
     """
     if numerics.choice is not None:
         return numerics.choice
     from ...friction.bonds.engines import choose as engine_for
 
     law, accuracy = model.bonds, model.accuracy
-    left = DECAYED if model.rig.kind == "free" else 1.0
+    left = DECAYED if model.rig.kind == "free" else HELD if chatters(model) else 1.0
     stroke = max(4 * left * model.speed / omega_of(model.rig.drive) / law.length, 1e-9)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
     return engine_for(law, accuracy.tolerance, stroke, numerics.steps / 2, accuracy.quadrature, tail, accuracy.merge)
+
+
+def chatters(model: Model) -> bool:
+    """Whether the printed law holds the block, D >= FAST of a drive that repeats.
+
+    Its force reaches the limit however small the stroke, so that the stiffness mu_s N/stroke has no bound: the block
+    turns back in almost every step, and its list grows by a strip with each.
+    """
+    f, rig = model.friction, model.rig
+    if f is None or not has(f.law, "bonds") or f.reading != "report" or rig.kind == "free":
+        return False
+    push = rig.force if rig.force else rig.mass * largest(rig.drive)
+    return f.static * model.nominal_load >= FAST * push
+
+
+def crowded(model: Model, numerics: Numerics, book: dict) -> bool:
+    """Whether the list of bonds of the printed law has grown too long for steps half as long: by a strip in every few
+    steps. Where bonds grow each step leaves a strip, however long the strokes: there the block has to be held."""
+    strips = book.get("strips", 0.0)
+    if strips <= MOST_CROWDED or model.bonds.reading != "report":
+        return False
+    return chatters(model) if form_of(model.bonds) == AGED else strips > TURNING * numerics.cycles * numerics.steps
+
+
+def held_cost(model: Model, numerics: Numerics) -> tuple:
+    """Strips at the end of the list of a block that the printed law holds, and the seconds of the run with it."""
+    steps = numerics.cycles * numerics.steps
+    return steps, _held_step(model.bonds) * steps**2 / 2 * (1 + _probes(model))
+
+
+def _held_step(law) -> float:
+    """Seconds of a step of a held block per strip of its list."""
+    any_order = form_of(law) == SHARES and law.order not in (0, 1, 2)
+    return HELD_ANY if any_order else HELD_STEP[form_of(law)]
+
+
+def _probes(model: Model) -> float:
+    """Runs of a level that halve the bracket of the onset down to the tolerance, over the cycles of the run."""
+    rig = model.rig
+    return max(0, ceil(log2(1 / model.accuracy.tolerance))) * rig.level_cycles / rig.cycles if rig.levels else 0.0
 
 
 def list_cost(model: Model, numerics: Numerics) -> tuple:

@@ -8,7 +8,7 @@ from ...model.model import Model
 from ...structure.drive_sizes import largest, omega_of
 from ..effort import exact_effort
 from .engines import no_pieces, steady_by
-from .numerics import choose, list_cost, quadrature_of
+from .numerics import chatters, choose, held_cost, list_cost, quadrature_of
 from .pieces.costs import pieces, seconds_of_pieces, words
 from .smooth.choice import smooth_cost
 
@@ -43,7 +43,7 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
         each = CLIMB + (4 * _of_modes(numerics, points, unknowns) if soft else 0.0)  # the normal force is searched
     elif f is not None and has(f.law, "bonds"):
         if quadrature_of(model, numerics).engine != "recursion":
-            entries, seconds = list_cost(model, numerics)
+            entries, seconds = (held_cost if chatters(model) else list_cost)(model, numerics)
             each, unknowns["bond_list_about"] = seconds / steps, int(entries)
         elif soft:
             each = _of_modes(numerics, points, unknowns)
@@ -115,6 +115,9 @@ def sum_words(model: Model) -> list:
     found = quadrature_of(model, numerics)
     seconds = 0.0 if found.engine == "recursion" else list_cost(model, numerics)[1]
     out = ["sum over bonds by " + found.said()]
+    if found.engine != "recursion" and chatters(model):
+        out.append("the printed law holds the block, however small its stroke: it turns back in almost every step, and "
+                   "the list grows by a strip with each; reading = \"stretch\" gives it a stiffness")
     if seconds > LONGEST:
         out.append(f"run will refuse: the bond list would take about {seconds:.0f} s, more than {LONGEST:.0f} s")
     return out

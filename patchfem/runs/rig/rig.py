@@ -23,7 +23,7 @@ from ..results.travel import ended, travelled
 from . import levels
 from .engines import ENGINES, Variant, unbalanced
 from .levels import with_errors as level_errors
-from .numerics import choose, quadrature_of, refuse_costly
+from .numerics import choose, crowded, quadrature_of, refuse_costly
 from .solution import borne, curve_measures
 from .start_ring import StartRing, start_ring
 
@@ -235,7 +235,7 @@ def _enough(model, numerics, found, measures) -> bool:
     if numerics.local:
         return met or numerics.local < FINEST
     return met or "steps_per_cycle" in numerics.pinned or again > MOST_STEPS or again * numerics.cycles > 1e7 \
-        or found.outcome is Outcome.EXCEEDS_TRAVEL
+        or crowded(model, numerics, found.book) or found.outcome is Outcome.EXCEEDS_TRAVEL
 
 
 def rig_fields(model, numerics, patch, raw) -> dict:
