@@ -81,6 +81,9 @@ def _leave(code: int) -> None:
 def _guarded(words: list) -> int:
     if there := sys.modules.get(f"{__package__}.disk.whole"):
         there.begun()
+    if words[:1] == ["help"]:
+        say("patchfem: no verb help; `patchfem --help` lists the verbs, `patchfem run --help` explains one")
+        return 2
     try:
         app(words, exit_on_error=False, print_error=False)
         sys.stdout.flush()

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from .keys import quantities
 from .keys.types import choices, keys, kind_of, model_of, parts
-from .reader import _message, _set_value, owner_of
+from .reader import _message, _set_value, is_value, owner_of
 
 LIMITS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 MOST = 10_000_000  # values of one range
@@ -115,6 +115,7 @@ def values_of(key: str, texts: Iterable[str], distinct: bool = True) -> Axis:
     """
     _known(key)
     texts, values, wrong = tuple(texts), [], []
+    _no_table(key, texts)
     for text in texts:
         try:
             values.append(_value(key, text))
@@ -157,6 +158,17 @@ def _flat(table: dict, at: str = "") -> list[tuple[str, Any]]:
         path = f"{at}.{key}" if at else key
         out += _flat(value, path) if isinstance(value, dict) else [(path, value)]
     return out
+
+
+def _no_table(key: str, texts: tuple) -> None:
+    """ValueError, with keys that it holds, where a table is to take plain values."""
+    model, name = owner_of(key)
+    inner = model_of(model, name)
+    if inner is None or is_value(model, name) or all(text.startswith(("{", "[", '"', "'")) for text in texts):
+        return
+    items = ".NAME" if get_origin(model.model_fields[name].annotation) is tuple else ""
+    known = sorted(keys(inner), key=lambda one: not inner.model_fields[keys(inner)[one]].is_required())
+    raise ValueError(f"a table, not a value; name a key in it: {', '.join(f'{key}{items}.{one}' for one in known[:4])}")
 
 
 def _known(key: str) -> None:

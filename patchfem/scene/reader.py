@@ -293,6 +293,10 @@ def _unknown(draft: Draft, model: type[Table], raw: dict[str, Any], key: str, pa
     there = path in draft.sets
     written = {name: one for name, one in raw.items() if not there or f"{at}.{name}".strip(".") in draft.sets}
     near = table_meant(model, written, key) if is_table else key_meant(model, at, written, key, there)
+    # one that stands outside of every table, as --set may be given it, is meant where a table has it
+    deeper = [] if at or is_table else [f"{name}.{key}" for name in tables
+                                        if key in keys(model_of(model, keys(model)[name]))]
+    near = next((one for one in deeper if one.partition(".")[0] in raw), "") or "' or '".join(deeper) or near
     help = f"did you mean '{near}'?" if near else f"known here: {', '.join(known)}" if known else \
         "this table has no keys"
     draft.say(path, f"unknown {'table' if is_table else 'key'}; {help}")

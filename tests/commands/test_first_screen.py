@@ -97,7 +97,7 @@ def test_always_what_slips_while_the_interface_holds_is_said(more, part):
     def said(loop, slip):
         found = {"loop_area": (*loop, "J"), "slip_amplitude": (*slip, "m"), "friction_force_peak": (100.0, 0.0, "N"),
                  "relative_displacement_amplitude": (4e-7, 0.0, "m"), **more}
-        return verdict({"outcome": "stuck", "measures": {
+        return verdict({"outcome": "stuck", "kind": "rig", "measures": {
             name: {"value": value, "error": error, "unit": unit, "floor": 1e-10}
             for name, (value, error, unit) in found.items()}})
 
@@ -150,3 +150,39 @@ cycles = 20
     assert shown["loop_area"].endswith("uJ, per cycle")
     assert shown["energy_dissipated"].endswith("uJ, over the whole run")
     assert "as a whole" in shown["slip_start_phase"]
+
+
+def test_always_a_bench_says_whether_it_slipped():
+    """By its mean slip, beyond what the run leaves open and the last digits of a slide."""
+    def said(value, error):
+        return verdict({"outcome": "done", "kind": "bench", "measures": {
+            "slip_amplitude": {"value": value, "error": error, "unit": "m", "floor": 1e-10}}})
+
+    done = Outcome.DONE.sentence
+    assert said(1.5e-6, 1e-9) == \
+        f"{done} The interface slips: 1.5000 ± 0.0010 um half peak-to-peak in the mean over it."
+    for holds in ((1e-12, 2e-12), (1e-23, 1e-33), (1e-11, None)):
+        assert said(*holds) == f"{done} The interface holds: no slip in the last cycle."
+    assert verdict({"outcome": "done", "kind": "bench", "measures": {}}) == done
+
+
+def test_always_a_ratio_written_as_per_cent_is_remarked(tmp_path):
+    """Half of critical and more: a mode that hardly swings."""
+    path = tmp_path / "rig.toml"
+    path.write_text(text_of("rig"), "utf-8")
+    said = [cli("check", path, "--set", f"structure.mode.axial.damping={value}") for value in ("0.49", "0.5", "1")]
+    assert [one.code for one in said] == [0, 0, 0] and said[0].err == ""
+    assert said[1].err.endswith("structure.mode.axial.damping = 0.5 is a ratio: 1 is critical, 1 % is 0.01\n")
+    assert "damping = 1 is a ratio: 1 is critical" in said[2].err
+
+
+def test_refuses_with_the_key_that_was_meant(tmp_path):
+    """A table where a key in it is wanted, a key without its table, and a verb that is an option."""
+    path = tmp_path / "rig.toml"
+    path.write_text(text_of("rig"), "utf-8")
+    swept = cli("sweep", path, "--over", "contact.tilt=1 urad,2 urad", "-o", tmp_path / "sweep")
+    assert swept.code == 2 and "contact.tilt: a table, not a value; name a key in it: contact.tilt.angle" in swept.err
+    bare = cli("check", path, "--set", "acceleration=20 g")
+    assert bare.code == 2 and "acceleration: unknown key; did you mean 'drive.acceleration'?" in bare.err
+    lost = cli("help")
+    assert lost.code == 2 and "`patchfem --help`" in lost.err and "`patchfem run --help`" in lost.err

@@ -246,11 +246,9 @@ def _cell(name: str, one: dict | None, first: dict | None) -> str:
         return "&ndash;"
     text = escape(pair(name, one)) if units(name, one["value"], one["unit"]) or one["unit"] == "1" else \
         escape(f"{one['value']:.6g} {one['unit']}")
-    if first is None or first["value"] is None:
-        return text
-    change = one["value"] - first["value"]
-    if abs(change) <= (one["error"] or 0.0) + (first["error"] or 0.0):
-        return text
+    alone = first is None or first["value"] is None
+    if alone or abs(one["value"] - first["value"]) <= (one["error"] or 0.0) + (first["error"] or 0.0):
+        return f"<span class=v>{text}</span>"
     return f"<b class=v>{text}</b> <span class=v>({_share(one['value'], first)})</span>"
 
 

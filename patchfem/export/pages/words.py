@@ -19,6 +19,7 @@ WORKSHOP = {  # as scales.LADDERS
     "Pa": (("psi", INCH**2 / LBF), ("ksi", 1e-3 * INCH**2 / LBF)),
     "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF))}
 GROUPS = ("motion", "friction", "energy", "patch", "wear")
+NO_SLIP = 1e-15  # m, the last digits of a slide
 WHOLE_RUN = "over the whole run"
 OF_WHAT = {  # said behind a value that would otherwise be taken for another, or for more than it says
     "loop_area": "per cycle", "friction_work": WHOLE_RUN, "energy_dissipated": WHOLE_RUN, "energy_created": WHOLE_RUN,
@@ -68,12 +69,14 @@ def others(name: str, measure: dict) -> str:
 
 
 def verdict(summary: dict) -> str:
-    """The sentence on how a run ended, from its summary as summary.json holds it.
+    """The sentence on how a run ended, from its summary as summary.json holds it; of a bench also whether it slipped.
 
     `stuck` speaks of the interface as a whole. Where its last cycles dissipate, or slip, more than their error, part of
     it slips, and the sentence says how much.
     """
     outcome, measures = Outcome(summary["outcome"]), summary["measures"]
+    if summary["kind"] == "bench" and outcome is Outcome.DONE:
+        return _slid(measures.get("slip_amplitude"), outcome.sentence)
     if outcome is not Outcome.STUCK or not {"loop_area", "slip_amplitude"} & measures.keys():
         return outcome.sentence
     force, motion = (measures.get(name, {}).get("value") or 0.0 for name in
@@ -86,6 +89,15 @@ def verdict(summary: dict) -> str:
         if name and found[name]["value"] > max(_open(found[name]), least):
             return f"The interface holds as a whole; {part} ({form.format(pair(name, found[name]))})."
     return "The interface holds: no slip in the last cycles."
+
+
+def _slid(slip: dict | None, done: str) -> str:
+    """The sentence of a bench: its slip, the mean weighted by the pressure, where that is more than what is open."""
+    if slip is None or slip["value"] is None:
+        return done
+    if slip["value"] <= max(_open(slip), NO_SLIP):
+        return f"{done} The interface holds: no slip in the last cycle."
+    return f"{done} The interface slips: {pair('slip_amplitude', slip)} half peak-to-peak in the mean over it."
 
 
 def _open(one: dict) -> float:

@@ -9,6 +9,7 @@ from ..keys.types import choices
 from .draft import Draft
 
 MATRICES, MEASURED = (".npz", ".mat"), (".uff", ".unv")
+HEAVY = 0.5  # damping ratio from which a mode hardly swings: seldom meant
 PLACES = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
 
 
@@ -48,6 +49,9 @@ def _modes(draft: Draft) -> None:
         if mode.name is not None and mode.name in names:
             draft.say(f"structure.mode.{index}.name", f"'{mode.name}' names two modes; each name once")
         names.add(mode.name)
+        if mode.damping is not None and mode.damping >= HEAVY:
+            draft.remark(f"structure.mode.{mode.name or index}.damping = {mode.damping:g} is a ratio: 1 is critical, "
+                         "1 % is 0.01")
     _instruments(draft, modes)
     bases = [mode.base if draft.given(f"structure.mode.{index}.base") else 0.0 if index else mode.slide
              for index, mode in enumerate(modes)]  # fmt: skip
