@@ -77,15 +77,19 @@ PAIRS = {
 }
 
 
-@pytest.mark.parametrize("law", PAIRS)
-def test_exact_one_element_is_the_contact_of_its_own_loop(law):
+@pytest.mark.parametrize("law, beside", [
+    ("coulomb", True), ("elastic-plastic", True), ("bonds", False), ("tanh", False),
+    pytest.param("bonds", True, marks=pytest.mark.slow)])
+def test_exact_one_element_is_the_contact_of_its_own_loop(law, beside):
+    """Among joints and, beside a spring of no strength, as the patch: patches of other laws differ by the law alone,
+    and each is a loop to compile."""
     model, element = PAIRS[law]
     alone = march(one(), DRIVE, model, 6, 100, window=6)
     turns = march(one(), DRIVE, JointsModel(None, (element(),), np.ones((1, 1)), 49.0, ALL), 6, 100, window=6)
     others = [turns]
-    if law in ("coulomb", "bonds"):  # patches of other laws differ by the law alone, and each is a loop to compile
-        beside = JointsModel(model, (interlock(0, 1e-9, 1.0),), np.ones((1, 1)), 49.0, ALL if law == "coulomb" else ())
-        others.append(march(one(), DRIVE, beside, 6, 100, window=6))
+    if beside:
+        patch = JointsModel(model, (interlock(0, 1e-9, 1.0),), np.ones((1, 1)), 49.0, ALL if law == "coulomb" else ())
+        others.append(march(one(), DRIVE, patch, 6, 100, window=6))
     scale = np.abs(alone.response.slide).max()
     for other in others:
         assert other.outcome is None
