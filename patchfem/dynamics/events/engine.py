@@ -168,7 +168,8 @@ class Engine:
             resting = sorted([*resting, face])
         self.idle = self.idle + 1 if piece.span < 1e-12 * self.clock.period else 0  # no progress
         if self.idle > 1000:
-            raise NotConverged(f"dynamics: events pile up at t = {self.clock.time:.9g} s")
+            raise NotConverged(f"dynamics: events pile up at t = {self.clock.time:.9g} s; lower the drive, "
+                               "or use method = \"march\"", "accuracy.method")
         self._enter(tuple(guess), resting)
 
     def _fill(self):

@@ -113,7 +113,8 @@ def _check(code: int, time: float) -> None:
     if code == sdof_kernels.LOST:
         raise NotConverged(f"dynamics: an event could not be located near t = {time:.9g} s")
     if code == sdof_kernels.PILED:
-        raise NotConverged(f"dynamics: events pile up at t = {time:.9g} s")
+        raise NotConverged(f"dynamics: events pile up at t = {time:.9g} s; lower the drive, "
+                           "or use method = \"march\"", "accuracy.method")
 
 
 class _Run:

@@ -14,11 +14,11 @@ from scipy.integrate import solve_ivp
 from patchfem import closed_forms
 from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
 from patchfem.compiled import load
-from patchfem.core import G_N, BaseSine, ModalBasis, Outcome, PatchfemError, Segment, Start
+from patchfem.core import G_N, BaseSine, ModalBasis, NotConverged, Outcome, PatchfemError, Segment, Start
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.one_mode import orbit_kernels, sdof_kernels, slip_kernels
+from patchfem.dynamics.one_mode.sdof import _check, simulate
 from patchfem.dynamics.one_mode.sdof import events as event_list
-from patchfem.dynamics.one_mode.sdof import simulate
 from patchfem.dynamics.one_mode.sdof_samples import OneMode, states
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import Piecewise, Recorded, levels, release
@@ -509,3 +509,9 @@ def test_exact_release_at_rounding_from_its_phase():
 def test_exact_release_phase_is_the_arcsine_of_the_need():
     _, rows, _, _, _ = march(sdof_kernels, 0.8, cycles=1)
     assert rows[1, 1] == pytest.approx(asin(0.8), rel=1e-15) and rows[1, 6] == 0.0
+
+
+def test_refuses_events_that_pile_up_with_the_key_and_what_to_use_instead():
+    with pytest.raises(NotConverged, match=r'pile up at t = 0.5 s; .*use method = "march"') as caught:
+        _check(sdof_kernels.PILED, 0.5)
+    assert caught.value.key == "accuracy.method"
