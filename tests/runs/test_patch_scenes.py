@@ -415,7 +415,7 @@ def test_exact_the_count_of_strips_is_in_the_bars():
 def test_refuses_a_run_that_the_memory_cannot_hold():
     from patchfem.core import Missing
 
-    found = plan(scene(keys='load = "26 lbf"\nelement_size = "1 nm"'))
+    found = plan(scene(keys='load = "26 lbf"\nelement_size = "0.2 um"'))
     assert any("run will refuse" in sentence for sentence in found.verdict)
     with pytest.raises(Missing, match="GB are needed"):
         run(found)
