@@ -116,7 +116,7 @@ def _guarded(words: list) -> int:
         if hasattr(error, "mistakes"):  # SceneError, which is not named: words are read 20 ms faster before pydantic is
             for line in error.mistakes:
                 say(plain(line))
-            return error.code
+            return 2
         code = getattr(error, "code", None)
         if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
             say(plain(str(error)))

@@ -291,7 +291,8 @@ def _unknown(draft: Draft, model: type[Table], raw: dict[str, Any], key: str, pa
     at = path.rpartition(".")[0]
     # a key of the file is not what someone means who writes another there, but may be what --set wants to change
     there = path in draft.sets
-    written = {name: one for name, one in raw.items() if not there or f"{at}.{name}".strip(".") in draft.sets}
+    written = {name: raw[name] for name in (*keys(model), key)
+               if name in raw and (not there or f"{at}.{name}".strip(".") in draft.sets)}
     near = table_meant(model, written, key) if is_table else key_meant(model, at, written, key, there)
     # one that stands outside of every table, as --set may be given it, is meant where a table has it
     deeper = [] if at or is_table else [f"{name}.{key}" for name in tables

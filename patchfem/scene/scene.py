@@ -33,13 +33,10 @@ LARGEST = 32 * 2**20  # bytes of a scene
 
 
 class SceneError(Exception):
-    """A scene that cannot be run; `mistakes` holds one whole line for each, ``FILE:LINE: table.key: message``.
+    """A scene that cannot be run; `mistakes` holds one whole line for each, ``FILE:LINE: table.key: message``."""
 
-    code: of the command's end, 2 for a mistake, 4 where the scene itself is not there.
-    """
-
-    def __init__(self, mistakes: Iterable[str], code: int = 2) -> None:
-        self.mistakes, self.code = list(mistakes), code
+    def __init__(self, mistakes: Iterable[str]) -> None:
+        self.mistakes = list(mistakes)
         super().__init__("\n".join(self.mistakes))
 
 
@@ -116,8 +113,7 @@ def text_of(path: str | Path) -> str:
             content = file.read(LARGEST + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        code = 4 if isinstance(error, FileNotFoundError) else 2
-        raise SceneError([f"{path}: cannot be read: {reason}"], code) from None
+        raise SceneError([f"{path}: cannot be read: {reason}"]) from None
     if len(content) > LARGEST:
         raise SceneError([f"{path}: more than {LARGEST >> 20} MiB, which no scene needs; put matrices into a file and "
                           "name it as structure.file"])

@@ -183,11 +183,11 @@ def test_refuses_a_folder_with_files_of_others(tmp_path, verb):
     assert all(path.read_text() == rows for path in files) and len(list((tmp_path / "data").iterdir())) == 2
 
 
-def test_refuses_what_is_not_there_with_exit_code_4(files, tmp_path):
-    """A missing trace, or a missing scene, without a word of a scene where none is given."""
+def test_refuses_what_is_not_there(files, tmp_path):
+    """A missing trace ends with 4, without a word of a scene where none is given; a missing scene with 2."""
     answer = cli("compare", files[0], tmp_path / "none.csv", "-o", tmp_path / "out")
     assert answer.code == 4 and answer.err.strip() == f"{tmp_path / 'none.csv'}: there is no such file"
     for words in (("run", tmp_path / "none.toml"), ("compare", *files[:2], "--scene", tmp_path / "none.toml")):
         answer = cli(*words, "-o", tmp_path / "out")
-        assert answer.code == 4 and "none.toml: cannot be read: No such file" in answer.err
+        assert answer.code == 2 and "none.toml: cannot be read: No such file" in answer.err
     assert not (tmp_path / "out").exists()
