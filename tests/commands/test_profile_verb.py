@@ -98,7 +98,7 @@ def test_refuses_with_exit_code_2(trace, words, says):
 
 def test_refuses_a_file_that_is_not_there(tmp_path):
     answer = cli("profile", tmp_path / "none.csv")
-    assert answer.code == 4 and "none.csv: no such" in answer.err
+    assert answer.code == 4 and "none.csv: there is no such file" in answer.err
 
 
 def test_refuses_a_text_without_units(tmp_path):
