@@ -35,11 +35,9 @@ def swept(scene):
 
 def alike(found, single, one) -> None:
     """A cell has the number of a single run to 1e-12 of it or of what it is a part of, nothing where that has none."""
-    near = 1e-12 * {"1": 1.0, "m": 1e-3}.get(one.unit, 0.0)  # a distortion is a share, a drift that of an amplitude
-    if one.text.endswith("extrapolated") and one.error > 1e-3 * abs(one.value):
-        near += 1e-6 * one.error  # farther than its digits go: rounding counts as its bar does
+    size = {"1": 1.0, "m": 1e-3}.get(one.unit, 0.0)  # a distortion is a share, a drift that of an amplitude
     assert (found == "") == (single is None)
-    assert single is None or float(found) == pytest.approx(single, rel=1e-12, abs=near)
+    assert single is None or float(found) == pytest.approx(single, rel=1e-12, abs=1e-12 * size)
 
 
 def rows(out) -> list:

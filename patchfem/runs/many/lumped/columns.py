@@ -29,7 +29,8 @@ class Runs:
     whether nothing slipped, and whether a run must be made by itself; errors: measure -> (n,) beside `least` of its
     value; closes: gap of the energy balance beyond which a run has not converged; loads: (n,) of a stuck run, whether
     what it holds still rises; steady: ((n,), (n,)) [m] amplitude and error of the motion that a run is known to settle
-    to, NaN where none is; chosen: what each run chose besides.
+    to, NaN where none is; chosen: what each run chose besides; same_bits: whether extremes are
+    those of a run by itself to the last bit.
     """
 
     cycles: int
@@ -46,6 +47,7 @@ class Runs:
     loads: np.ndarray | bool = False
     steady: tuple | None = None
     chosen: tuple = ()
+    same_bits: bool = False
 
     @property
     def amplitudes(self) -> np.ndarray:
@@ -83,7 +85,8 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
         row, floor = TABLE[name], floor_of(name, moved)
         wide = there & (errors[name] > tolerance * np.abs(value) + floor)
         loose |= wide & ~grows
-        if name == MAIN:  # a run by itself may be made again with finer steps
+        # a run by itself may be made again with finer steps; what is extrapolated far shows the last bits of extremes
+        if name == MAIN or (name.endswith("_steady") and not runs.same_bits):
             alone |= wide & ~grows
         if not name.endswith("_steady"):
             resolved &= ~wide
