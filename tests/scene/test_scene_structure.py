@@ -300,6 +300,12 @@ def test_exact_items_count_from_one_where_people_read_and_write(key, message, te
     assert only(text, f"{key}=-1").startswith(f"--set: {message}")
 
 
+def test_exact_a_remark_counts_a_mode_whose_name_is_a_number_from_one():
+    """It once named structure.mode[4] where the name is "3"."""
+    assert loads(POINT + MODES, sets=["structure.mode[2].damping=0.7"]).remarks == [
+        "structure.mode[2].damping = 0.7 is a ratio: 1 is critical, 1 % is 0.01"]
+
+
 def test_exact_an_item_by_its_number_from_one_is_the_one_that_python_counts_from_zero():
     scene = loads(MASSES, sets=["structure.spring[2].stiffness=3 N/mm", "structure.masses[1]=5 kg"])
     assert scene.structure.spring[1].stiffness == 3e3 and scene.structure.masses[0] == 5.0

@@ -50,8 +50,8 @@ def _modes(draft: Draft) -> None:
             draft.say(f"structure.mode.{index}.name", f"'{mode.name}' names two modes; each name once")
         names.add(mode.name)
         if mode.damping is not None and mode.damping >= HEAVY:
-            draft.remark(f"structure.mode.{mode.name or index}.damping = {mode.damping:g} is a ratio: 1 is critical, "
-                         "1 % is 0.01")
+            key = draft.shown(f"structure.mode.{index}.damping")
+            draft.remark(f"{key} = {mode.damping:g} is a ratio: 1 is critical, 1 % is 0.01")
     _instruments(draft, modes)
     bases = [mode.base if draft.given(f"structure.mode.{index}.base") else 0.0 if index else mode.slide
              for index, mode in enumerate(modes)]  # fmt: skip
