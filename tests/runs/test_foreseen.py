@@ -103,9 +103,12 @@ def test_refuses_in_one_line_what_the_process_may_not_take(tmp_path, law, least)
 def test_always_plans_hold_in_most_scenes(tmp_path):
     """Time within 1.5 and memory within 1.3 of scenes of all kinds; 9 of 10 are wanted in both.
 
-    Held out when the numbers of `runs.memory` and of the plans were fixed: of 81 scenes from seed 5000 time held
-    in 71 (88 %) and memory in 65 (80 %). What is missed: patches whose mesh climbs (factors .3 to 2.5),
-    masses by loops in Python, and a release under law tanh that the smooth engine does not end within 120 s.
+    The target is not met, and what is asserted lies below it. Held out when the numbers of `runs.memory` and of the
+    plans were fixed: of 81 scenes from seed 5000 time held in 71 (88 %) and memory in 65 (80 %). Asserted are 85 and
+    75 %, a few scenes below what was seen, for seconds and memory differ a little from machine to machine: so the test
+    holds what was reached, and passing it does not mean that the target is met. What is missed: patches whose mesh
+    climbs (factors .3 to 2.5), masses by loops in Python, and a release under law tanh that the smooth engine does not
+    end within 120 s.
     """
     scores = [one.within() for one in plan_trial.told(5000, 80, tmp_path)]
     time, memory_ = (sum(column) / len(scores) for column in zip(*scores))
