@@ -126,7 +126,7 @@ def memory(trial: Trial) -> None:
     tables["accuracy"]["steps_per_cycle"] = int(trial.wide(100, 1e6))
     (trial.folder / "scene.toml").write_text(text_of(tables), "utf-8")
     most = int(trial.wide(3e8, 3e9))
-    ended = trial.spawn(trial.draw("run", "run", "plan", "check"), "scene.toml", *(["-o", "out"] * 0), seconds=60,
+    ended = trial.spawn(trial.draw("run", "run", "plan", "check"), "scene.toml", seconds=60,
                         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (most, most)),
                         allowed=(0, 2, 3, 4))
     if ended.code == 0 and (trial.folder / "out" / "scene").exists():

@@ -14,8 +14,7 @@ def energy(trial: Trial) -> None:
     """A rig or a bench of any law and engine: its ledger closes, and no law gives back more than it took."""
     kind = trial.draw("rig", "rig", "rig", "bench", "masses", "linear")
     tables = grammar.scene(trial, kind)
-    for table in ("wear",):
-        tables.pop(table, None)
+    tables.pop("wear", None)
     if kind not in ("bench", "linear"):
         tables["accuracy"]["method"] = trial.draw(*ENGINES)
     found = solved(trial, tables)

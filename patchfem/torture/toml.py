@@ -43,7 +43,7 @@ def value_of(value) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
-        return repr(value).replace("inf", "inf") if value == value else "nan"
+        return repr(value)
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(value_of, value)) + "]"
     if isinstance(value, dict):
