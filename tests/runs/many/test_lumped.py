@@ -99,7 +99,8 @@ def held_against(cases, ones, many, of_bar: float = 0.0) -> None:
             assert many.values[name][case] == pytest.approx(value, rel=0, abs=near, nan_ok=True), (case, name)
             if name not in DIFFERENCES:
                 told = 1e-9 * near + of_bar * abs(value)
-                if name.endswith("_steady"):  # told by differences of amplitudes, down to their round-off
+                # by differences of amplitudes; batches in closed form have other last bits of them
+                if name.endswith("_steady") and cases[case].friction.law == "coulomb":
                     told = 1e-11 * abs(value)
                 if cases[case].friction.law == "iwan":  # a coarser run tells it
                     told = 3 * near
