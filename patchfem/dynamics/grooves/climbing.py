@@ -38,8 +38,34 @@ def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -
     return replace(model, shear=found, share=tuple(force[found.points] / force.sum()))
 
 
+class FlankModel:
+    """What `march.march` asks of every contact along flanks: of `grooves`, under a `load` [N], with the coefficient
+    `static` [1]."""
+
+    __slots__ = ()
+
+    @property
+    def limit(self) -> float:
+        """Scale of the residuals [N]: the largest force of the steepest flank."""
+        return self.grooves.capacity(self.load, self.static)
+
+    @property
+    def reduction(self):
+        """ShearModes behind the contact, None of pieces that are rigid in shear."""
+
+    @property
+    def set_valued(self) -> bool:
+        """Whether the law holds without any stretch: it stretches."""
+        return False
+
+    @property
+    def runner(self):
+        """The class that marches it."""
+        return FlankRun
+
+
 @dataclass(frozen=True, eq=False, slots=True)
-class ClimbingModel:
+class ClimbingModel(FlankModel):
     """What `march.march` needs to know: grooves under a load [N], and the law as under a load that changes.
 
     shear: ShearModes on the points under load where the pieces give way, share (a,): those of the points in the load.
@@ -59,23 +85,14 @@ class ClimbingModel:
         return HERE, ""
 
     @property
-    def limit(self) -> float:
-        """Scale of the residuals [N]: the largest force of the steepest flank."""
-        return self.grooves.capacity(self.load, self.law.static)
+    def static(self) -> float:
+        """Coefficient of friction [1]."""
+        return self.law.static
 
     @property
     def length(self) -> float:
         """Bond length [m]."""
         return self.law.length
-
-    @property
-    def reduction(self):
-        """ShearModes, None of pieces that are rigid in shear."""
-
-    @property
-    def set_valued(self) -> bool:
-        """Whether the law holds without any stretch: it stretches."""
-        return False
 
     @property
     def runner(self):

@@ -112,20 +112,34 @@ def bent(hess, p, room):
 
 
 @njit(error_model="numpy", **LEAN)
+def climb(dq, q, dt, flank, at):
+    """(path [m] along the flank, normal force [N] at its end without friction, slope [1] there) of a slide dq [m] in dt
+    [s]; mean slope, path over slide and mean vertical force [N] go into `at`."""
+    at[MEAN_SLOPE], at[PATH] = over(flank, q, dq)
+    at[HELD] = flank[LOAD]
+    if flank[LIFTED] > 0.0:
+        at[HELD] += flank[LIFTED] * 2 * (at[MEAN_SLOPE] * dq / dt - at[RISE]) / dt
+    end = steep(flank, q + dq)
+    return at[PATH] * dq, max(at[HELD], 0.0) * sqrt(1 + end * end), end
+
+
+@njit(error_model="numpy", **LEAN)
+def resist(pulled, gain, middle, dt, flank, at):
+    """Write the mean force against a slide, and its slope [N/m], into `at`; pulled [N], gain [N/m]: mean force along
+    the flank and its slope; middle [m]: of the slide."""
+    slope, path = at[MEAN_SLOPE], at[PATH]
+    at[ALONG], at[PULL] = pulled, at[HELD] * slope + pulled * path
+    bend = 0.5 * flank[AMPLITUDE] * flank[WAVE] * flank[WAVE] * cos(flank[WAVE] * middle - flank[PHASE])
+    at[PULL_SLOPE] = gain * path * path + at[HELD] * bend + 2 * flank[LIFTED] * slope * slope / (dt * dt)
+
+
+@njit(error_model="numpy", **LEAN)
 def pull(dq, q, dt, c):
     """Write the mean force over the slide dq [m] in dt [s], and what belongs to it, into c.now_at; c.now is the normal
     force at its end. c.before is that at its start, and the force of the law there stands in c.now_at[PLACE]."""
-    flank, at = c.flank, c.now_at
-    slope, path = over(flank, q, dq)
-    vertical = flank[LOAD]
-    if flank[LIFTED] > 0.0:
-        vertical += flank[LIFTED] * 2 * (slope * dq / dt - at[RISE]) / dt
-    end = steep(flank, q + dq)
-    pulled, gain = drag(path * dq, max(vertical, 0.0) * sqrt(1 + end * end), end, dt, c)
-    at[PULL], at[ALONG], at[MEAN_SLOPE], at[PATH], at[HELD] = vertical * slope + pulled * path, pulled, slope, path, \
-        vertical
-    bend = 0.5 * flank[AMPLITUDE] * flank[WAVE] * flank[WAVE] * cos(flank[WAVE] * (q + 0.5 * dq) - flank[PHASE])
-    at[PULL_SLOPE] = gain * path * path + vertical * bend + 2 * flank[LIFTED] * slope * slope / (dt * dt)
+    ds, flat, end = climb(dq, q, dt, c.flank, c.now_at)
+    pulled, gain = drag(ds, flat, end, dt, c)
+    resist(pulled, gain, q + 0.5 * dq, dt, c.flank, c.now_at)
 
 
 @njit(error_model="numpy", **LEAN)

@@ -7,7 +7,7 @@ Either loses some of the energy stored, R k z^2/(2 N), and neither gives any. Pa
 a step are those of `contact_kernels`: half of the change of the normal force, the slide, the other half.
 """
 
-from math import cos, sin, sqrt
+from math import sin, sqrt
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from ...friction.flags_kernels import LEAN
 from ...friction.laws import lugre_kernels as law
 from ..modal_kernels import narrowed
 from .contact_kernels import (
-    ALONG,
     AMPLITUDE,
     BEFORE,
     HELD,
@@ -35,9 +34,10 @@ from .contact_kernels import (
     RISE,
     VERTICAL,
     WAVE,
+    climb,
     hold,
-    over,
     passed,
+    resist,
     steep,
 )
 
@@ -86,17 +86,9 @@ def drag(ds, flat, end, dt, c):
 def pull(dq, q, dt, c):
     """Write the mean force over the slide dq [m] in dt [s], and what belongs to it, into c.now_at, as
     `contact_kernels.pull`."""
-    flank, at = c.flank, c.now_at
-    slope, path = over(flank, q, dq)
-    vertical = flank[LOAD]
-    if flank[LIFTED] > 0.0:
-        vertical += flank[LIFTED] * 2 * (slope * dq / dt - at[RISE]) / dt
-    end = steep(flank, q + dq)
-    pulled, gain = drag(path * dq, max(vertical, 0.0) * sqrt(1 + end * end), end, dt, c)
-    at[PULL], at[ALONG], at[MEAN_SLOPE], at[PATH], at[HELD] = vertical * slope + pulled * path, pulled, slope, path, \
-        vertical
-    bend = 0.5 * flank[AMPLITUDE] * flank[WAVE] * flank[WAVE] * cos(flank[WAVE] * (q + 0.5 * dq) - flank[PHASE])
-    at[PULL_SLOPE] = gain * path * path + vertical * bend + 2 * flank[LIFTED] * slope * slope / (dt * dt)
+    ds, flat, end = climb(dq, q, dt, c.flank, c.now_at)
+    pulled, gain = drag(ds, flat, end, dt, c)
+    resist(pulled, gain, q + 0.5 * dq, dt, c.flank, c.now_at)
 
 
 @njit(error_model="numpy", **LEAN)

@@ -7,7 +7,7 @@ import numpy as np
 from ...friction.grooves import Grooves
 from ...friction.protocol import Element
 from ..contacts.arrays import Flanked
-from .climbing import BEFORE, NORMAL, VERTICAL, FlankRun
+from .climbing import BEFORE, NORMAL, VERTICAL, FlankModel
 from .run import refuse_heavy
 
 HERE = "dynamics.grooves.element_kernels"
@@ -24,7 +24,7 @@ def model_of(grooves: Grooves, load: float, static: float, element: Element, mod
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class ElementsModel:
+class ElementsModel(FlankModel):
     """What `march.march` needs to know: grooves under a load [N], the static coefficient [1] and the law of a contact
     under that load, which `element_kernels` takes to the normal force of the flank."""
 
@@ -39,28 +39,9 @@ class ElementsModel:
         return HERE, self.element.kernels
 
     @property
-    def limit(self) -> float:
-        """Scale of the residuals [N]: the largest force of the steepest flank."""
-        return self.grooves.capacity(self.load, self.static)
-
-    @property
     def length(self) -> float:
         """Slide over which the law stretches before it slips [m]."""
         return self.element.length
-
-    @property
-    def reduction(self):
-        """None: no shear modes."""
-
-    @property
-    def set_valued(self) -> bool:
-        """Whether the law holds without any stretch: it stretches."""
-        return False
-
-    @property
-    def runner(self):
-        """The class that marches it."""
-        return FlankRun
 
     def build(self, hub=None) -> tuple:
         """(Flanked, None) with arrays of their own, at rest at the slide 0."""
