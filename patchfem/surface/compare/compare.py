@@ -11,7 +11,7 @@ from ..roughness.filter import even
 from ..roughness.spectrum import BAND
 from . import depth as worn_depth
 from .depth import Worn
-from .extent import grown
+from .extent import exchanged, grown
 from .flanks import Flanks, flanks_of
 from .place import CLEAR, Match, matched
 from .quantity import SIDE, Quantity, around, refused
@@ -36,7 +36,8 @@ class Comparison:
 
     before, after: Profile or Areal; direction: "x", "y" or ""; reference: what the worn depth counts from: "place",
     "flanks" or "" for nothing; match: the search for the same place, None for scans; shift, stretch, tilt, worn_*,
-    amplitude_ratio, slope_ratio, abbott: Quantity; sizes: `Size` before and after; notes: sentences.
+    amplitude_ratio, slope_ratio, abbott: Quantity; sizes: `Size` before and after; notes: sentences; exchanged: whether
+    the other order of the traces is the likelier one.
     """
 
     before: Profile | Areal
@@ -55,6 +56,7 @@ class Comparison:
     registration: Registration | None = None
     flanks: Flanks | None = None
     notes: tuple = field(default=())
+    exchanged: bool = False
 
     @property
     def values(self) -> dict:
@@ -110,6 +112,16 @@ def _turned(before: Profile, after: Profile, shift: float) -> Registration | Non
         return None
 
 
+def _likelier(before: Profile, after: Profile, shift: float, other: Registration) -> bool:
+    """Whether the other order is likelier for traces that are too noisy for a place: a worn floor has a place too."""
+    try:
+        found = register(before, after, shift)
+    except PatchfemError:
+        return True
+    worn = worn_depth.of_registration(found)
+    return exchanged(found, other, worn.area, worn.deposited)
+
+
 def _traces(before: Profile, after: Profile, direction: str, band: tuple) -> Comparison:
     steps = [one.length / (one.x.size - 1) for one in (even(before), even(after))]
     match, found = same_place(before, after)
@@ -125,13 +137,16 @@ def _traces(before: Profile, after: Profile, direction: str, band: tuple) -> Com
         stretch = around(1 + found.stretch[0], found.stretch[1], "1", STRETCH) if np.isfinite(found.stretch[0]) \
             else refused("1", STRETCH, "too few heights are unworn")
         worn, reference = worn_depth.of_registration(found), "place"
-        notes += grown(found, _turned(before, after, found.shift), worn.area.value, worn.deposited)
+        other = _turned(before, after, found.shift)
+        notes += grown(found, other, worn.area.value, worn.deposited)
+        order = exchanged(found, other, worn.area, worn.deposited)
     else:
         why = (f"the surface repeats itself: shifts apart from each other fit alike, {match.likeness:.3f} and "
                f"{match.second:.3f}") if match.repeats and match.clear > CLEAR else \
             f"the traces show no common place: chance brings their valleys the likeness of {match.likeness:.2f} too"
         other = _turned(before, after, match.shift) if match.clear > CLEAR and not match.repeats else None
-        if other is not None and _same(other, match):
+        order = other is not None and _same(other, match) and _likelier(before, after, match.shift, other)
+        if order:
             notes.append("taken the other way round, as wear of the trace after, the traces show a common place: are "
                          "the two files in the wrong order?")
         shift, tilt, stretch = (refused(unit, text, why) for unit, text in
@@ -146,7 +161,7 @@ def _traces(before: Profile, after: Profile, direction: str, band: tuple) -> Com
     ratios = [ratio(part, text, sizes[1], sizes[0], one) for part, text, one in
               zip(("amplitude", "slope"), (AMPLITUDE, SLOPE), alike)]
     return Comparison(before, after, direction, reference, match, shift, stretch, tilt, worn, *ratios, abbott, sizes,
-                      found, flanks, tuple(notes))
+                      found, flanks, tuple(notes), order)
 
 
 def _alike(found: Registration, step: float, band: tuple) -> tuple:

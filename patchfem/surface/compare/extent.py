@@ -77,6 +77,25 @@ def _edge(rest, noise: float, together: float):
     return best, max(low + int(near[0]) - 1, 0), min(low + int(near[-1]) + 1, rest.size - 1)
 
 
+def _unworn(found: Registration, other: Registration) -> tuple:
+    """Shares of the heights that are unworn, within the smaller noise of both registrations."""
+    reach = REACH * min(found.noise, other.noise)
+    return tuple(float(np.mean(np.abs(one.rest) <= reach)) for one in (found, other))
+
+
+def exchanged(found: Registration, other: Registration | None, area: Quantity, deposited: float) -> bool:
+    """Whether the other order of the traces is the likelier one; arguments as those of `grown`.
+
+    Either it leaves more heights unworn, or more stands above the first trace than can be worn off it: deposited is
+    beyond the interval of the worn area.
+    """
+    if other is not None:
+        kept, more = _unworn(found, other)
+        if more > MORE * kept:
+            return True
+    return deposited > area.high
+
+
 def grown(found: Registration, other: Registration | None, area: float, deposited: float) -> list[str]:
     """What speaks for material that grew, or for files in the wrong order, as sentences.
 
@@ -86,8 +105,7 @@ def grown(found: Registration, other: Registration | None, area: float, deposite
     the smaller noise of both, it is the likelier one.
     """
     if other is not None:
-        reach = REACH * min(found.noise, other.noise)
-        kept, more = (float(np.mean(np.abs(one.rest) <= reach)) for one in (found, other))
+        kept, more = _unworn(found, other)
         if more > MORE * kept:
             top = float(np.quantile(other.rest, 0.99))
             return [f"taken the other way round, as wear of the trace after, {100 * more:.0f} % of the heights are "

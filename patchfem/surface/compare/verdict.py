@@ -4,8 +4,10 @@ import numpy as np
 
 from ...core import say
 from .compare import Comparison
+from .extent import DEPOSITED
 from .quantity import SIDE, Quantity
 
+EXCHANGED = "the files may be in the wrong order, or material grew"
 NEAR = 1e-6  # a ratio that close to one is one but for round-off
 
 
@@ -14,7 +16,8 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
 
     directions: (when, amplitude ratio x over y, slope ratio) for each time at which both directions are known. The
     headline is "reduced", "increased" or "no change shown", by the amplitude of the band in each direction. Unchanged
-    surfaces are called "reduced" in 2.5 of 100 cases, and as often "increased".
+    surfaces are called "reduced" in 2.5 of 100 cases, and as often "increased". Where the other order of the files is
+    the likelier one, that is said before it.
     """
     words = [changed(one.amplitude_ratio) for one in parts]
     names = [f" along {one.direction}" if one.direction else "" for one in parts]
@@ -24,6 +27,8 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
         told = ["worn"] * any(_sure(one.worn.mean) for one in parts)
         told += ["flatter"] * any(changed(one.slope_ratio) == "reduced" for one in parts)
         headline = " and ".join(told) + ", no change of the waves shown" if told else headline
+    if any(one.exchanged for one in parts):
+        headline = f"{EXCHANGED}; as given: {headline}"
     out = []
     for one, word, name in zip(parts, words, names):
         out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name), _worn(one, name)]
@@ -97,13 +102,18 @@ def _worn(one: Comparison, name: str) -> str:
         return f"Worn depth{name}: none shown; at most {say(mean.high)} in the mean."
     what = "over the track below its unworn flanks" if one.reference == "flanks" else "over the common length"
     text = f"Worn{name}: {_length(mean)} in the mean {what}, {_length(one.worn.largest)} at the deepest place."
-    if one.worn.deposited > 0.05 * one.worn.area.value:
+    if one.worn.deposited > DEPOSITED * one.worn.area.value:
         text += f" {1e12 * one.worn.deposited:.3g} um^2 stand above the surface before: deposits."
     if one.worn.extent is not None:
-        first, last = (pair for pair in zip(one.worn.extent.before, one.worn.extent.after))
-        text += (f" Worn from x = {say(first[0].value)} to {say(last[0].value)} of the trace before, that is from "
-                 f"{say(first[1].value)} to {say(last[1].value)} of the trace after.")
+        before, after = (_span(*(end.value for end in ends)) for ends in one.worn.extent)
+        text += f" Worn from x = {before} of the trace before, that is from {after} of the trace after."
     return text
+
+
+def _span(first: float, last: float) -> str:
+    """Two places [m] as words, both to the last of four digits of the farther one: one near 0 has no more than that."""
+    step = 10.0 ** (np.floor(np.log10(max(abs(first), abs(last), 1e-12))) - 3)
+    return " to ".join(say(float(np.round(place / step)) * step) for place in (first, last))
 
 
 def _direction(when: str, amplitude: Quantity, slope: Quantity) -> str:

@@ -1,0 +1,78 @@
+"""Files in the wrong order: the headline says so, for exchanged traces and not for others; places to the same digits.
+
+The rule was tuned on seeds 95000 to 95020; the seeds here are others, but for the one that was called wrongly.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pairs import KINDS, pair, track
+
+from patchfem.surface.compare.compare import compared
+from patchfem.surface.compare.verdict import EXCHANGED, _span, verdicts
+
+HELD_OUT = 96000
+SHARES = (0.1, 0.3, 0.5)
+
+
+def made(count: int):
+    """Pairs and tracks of held-out seeds."""
+    for seed in range(HELD_OUT, HELD_OUT + count):
+        yield from (pair(seed, share=share) for share in SHARES)
+        yield from (track(kind, seed, 2001) for kind in KINDS)
+
+
+def called(count: int) -> tuple:
+    """Shares of the traces that are called exchanged: in their order, and exchanged."""
+    pairs = [(compared(p.before, p.after).exchanged, compared(p.after, p.before).exchanged) for p in made(count)]
+    return tuple(np.mean(pairs, axis=0))
+
+
+def test_always_the_order_of_made_traces_is_known():
+    wrong, right = called(1)
+    assert wrong == 0 and right >= 5 / 6
+
+
+@pytest.mark.slow
+def test_always_the_order_of_150_made_traces_is_known():
+    """Called exchanged though they are not: at most 2 of 150; told where they are: at least 8 of 10."""
+    wrong, right = called(25)
+    assert wrong <= 2 / 150 and right >= 0.8, (wrong, right)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_exact_the_headline_names_the_order_first(share):
+    """Unworn traces have no order: nothing is said about it either way."""
+    p = pair(30077, share=share)
+    there, back = compared(p.before, p.after), compared(p.after, p.before)
+    assert not there.exchanged and EXCHANGED not in verdicts([there])[0]
+    assert back.exchanged == (share > 0) and verdicts([back])[0].startswith(EXCHANGED) == (share > 0)
+    if share:
+        assert verdicts([back])[0] == f"{EXCHANGED}; as given: increased"
+
+
+def test_always_a_flat_floor_is_no_reason_to_exchange():
+    """Too noisy for a place as given, and the worn floor alone agrees when exchanged: 21 of 100 heights against 76."""
+    p = track("band", 95000, 2001)
+    found = compared(p.before, p.after)
+    assert found.reference == "flanks" and not found.exchanged
+    assert not any("wrong order" in text for text in found.notes)
+    assert compared(p.after, p.before).exchanged
+
+
+@pytest.mark.parametrize("first, last, says", [
+    (76.58e-9, 7.9404e-3, "0 um to 7.94 mm"), (-3.2e-6, 7.9404e-3, "-3 um to 7.94 mm"),
+    (1.23456e-3, 7.98765e-3, "1.235 mm to 7.988 mm"), (0.0, 0.0, "0 um to 0 um"), (-2.04e-6, 100e-6, "-2 um to 100 um"),
+])
+def test_exact_two_places_have_their_digits_in_common(first, last, says):
+    assert _span(first, last) == says
+
+
+def test_exact_a_place_near_zero_has_no_digits_that_the_far_one_lacks():
+    """The sentence once said "from x = 76.58 nm to 7.94 mm"."""
+    one = compared(*track("band", 90301, 2001)[:2])
+    places = tuple(end._replace(value=value) for end, value in zip(one.worn.extent.before, (76.58e-9, 7.9404e-3)))
+    worn = replace(one.worn, extent=one.worn.extent._replace(before=places))
+    text = next(text for text in verdicts([replace(one, worn=worn)])[1] if "Worn from x = " in text)
+    assert "Worn from x = 0 um to 7.94 mm of the trace before, that is from " in text
