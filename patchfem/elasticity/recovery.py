@@ -266,6 +266,20 @@ def indicator(found: Recovery, u, stress, rules: list | None = None) -> Indicato
     return Indicator(frozen_array(errors), frozen_array(energies))
 
 
+def harmless_step(found: Recovery, error: Indicator, rules: list, share: float) -> float:
+    """Step [Pa] to which the stresses of a piece may be rounded; 0 where no frame has an estimated error.
+
+    What rounding changes is then, in energy norm, at most `share` [1] of the estimated error of any loaded frame: a
+    multiple of q nearest to xx, yy and xy errs by q/sqrt(12) in the mean square, whose complementary energy is at most
+    q^2/(6 mu) per volume. rules: the `quadratures` of the cells.
+    """
+    cells, total = found.cells, error.error.sum(axis=1)
+    mu = np.array([lame(*pair, cells.layers.plane)[1] for pair in (cells.layers.substrate, cells.layers.coating)])
+    area = np.concatenate([rule.weight.sum(axis=1) for rule in rules])
+    least = total[total > 0].min(initial=np.inf)
+    return float(share * np.sqrt(6 * least / (area / mu[cells.is_coating.astype(int)]).sum())) if total.any() else 0.0
+
+
 def _complementary(stress, lam, mu) -> np.ndarray:
     """Complementary energy density s : C^-1 : s (c, g) [Pa] of plane stresses (c, g, 3); lam and mu (c,)."""
     xx, yy, xy = np.moveaxis(stress, -1, 0)

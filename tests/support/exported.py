@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 from scene_texts import COATED, COULOMB
 
-from patchfem.export.fields.blocks import blocks_of
-from patchfem.export.fields.vtkhdf import NAME, write_series
+from patchfem.export.fields import vtkhdf
+from patchfem.export.fields.blocks import Block, blocks_of
 
 UNITS = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "stress_error": "1", "material": "1",
          "normal_stress": "Pa", "gap": "m", "status": "1", "normal_bond_lower": "Pa", "normal_bond_upper": "Pa"}
@@ -50,8 +50,35 @@ def write_small(folder, frames: int = 3, seed: int = 0, times=None):
     blocks = blocks_of(*pair, np.array([-1e-3, -0.2e-3, 0.3e-3, 1e-3]), interface)
     times = np.cumsum(rng.random(frames)) if times is None else np.array(times)
     folder.mkdir(exist_ok=True)
-    write_series(folder / NAME, blocks, times, UNITS)
+    vtkhdf.write_series(folder / vtkhdf.NAME, blocks, times, UNITS)
     return SimpleNamespace(blocks=blocks, times=times, pair=pair, interface=interface)
+
+
+def waves(frames: int, across: int, deep: int) -> Block:
+    """Quads with a smooth field that wanders, as a rubbing piece has."""
+    x, y = np.meshgrid(np.linspace(0, 12.7e-3, across + 1), np.linspace(0, 6.35e-3, deep + 1), indexing="ij")
+    node = np.arange(x.size).reshape(x.shape)
+    quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    at, turn = points[quads].mean(axis=1), np.sin(2 * np.pi * np.arange(frames) / frames)[:, None]
+    mises = 8e6 * np.exp(-((at[:, 0] - 2e-3 * (2 + turn)) / 3e-3)**2 - at[:, 1] / 2e-3)
+    move = np.zeros((frames, x.size, 3), np.float32)
+    move[..., 0] = 1e-5 * turn + 1e-7 * np.cos(300 * points[:, 0]) * np.exp(-points[:, 1] / 3e-3)
+    move[..., 1] = -1e-6 * np.exp(-((points[:, 0] - 2e-3 * (2 + turn)) / 4e-3)**2) * (1 - points[:, 1] / 7e-3)
+    stress = np.zeros((frames, len(quads), 6), np.float32)
+    for number, share in enumerate((-0.7, -1.1, -0.5, 0.3)):
+        stress[..., number] = share * mises * np.cos(number + 200 * at[:, 0])
+    return Block(points, quads.ravel(), np.arange(len(quads) + 1) * 4, np.full(len(quads), 9, np.uint8),
+                 {"displacement": move}, {"stress": stress, "von_mises": mises.astype(np.float32),
+                                          "stress_error": (0.03 + 1e-9 * mises).astype(np.float32)})
+
+
+def write_waves(path, frames: int, across: int, deep: int) -> Block:
+    """A series of one block of `waves`."""
+    block = waves(frames, across, deep)
+    vtkhdf.write_series(path, {"lower": block}, np.arange(frames) * 1e-4, {"displacement": "m", "von_mises": "Pa"},
+                        {"lower": {"stress": 4096.0, "von_mises": 5000.0, "displacement": 2e-10}})
+    return block
 
 
 def at(values, frame: int):

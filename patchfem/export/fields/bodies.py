@@ -8,13 +8,17 @@ import numpy as np
 
 from ...elasticity import coating_bond, elasticity
 from ...elasticity.elasticity import Piece, von_mises
-from ...elasticity.recovery import Cells, Recovery, cells_of, indicator, quadratures, recovery
+from ...elasticity.recovery import Cells, Recovery, cells_of, harmless_step, indicator, quadratures, recovery
 from .blocks import blocks_of
 from .vtkhdf import write_series
 
 UNITS = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "stress_error": "1", "material": "1",
          "normal_stress": "Pa", "shear_stress": "Pa", "gap": "m", "slip": "m", "status": "1", "worn_depth": "m"} | {
     f"{name}_{side}": "Pa" for name in ("normal_bond", "shear_bond") for side in ("lower", "upper")}
+
+SHARE = 0.25  # of the estimated error of the stress that rounding may add to it: sqrt(1 + 1/16) is 3 % more
+FINEST = 2.0**-10  # of the largest value: a step of rounding that no scale of colours shows
+DEFORMED = 2.0**-14  # of the largest displacement of a piece in its holder: its error in space is of the order of 1e-4
 
 
 def write_fields(result, path: Path) -> dict:
@@ -32,7 +36,8 @@ def write_fields(result, path: Path) -> dict:
     low, high = (_body(patch, fields, *of) for of in zip(("lower", "upper"), insides, motions))
     for one, other in ((low, high), (high, low)):
         one["stress_error"] = one["error"].shares(other["error"])[0]
-    write_series(path, blocks_of(low, high, patch.x, interface), times, UNITS)
+    steps = {"lower": low["steps"], "upper": high["steps"]}
+    write_series(path, blocks_of(low, high, patch.x, interface), times, UNITS, steps)
     if not isinstance(patch.pair.piece, Piece):
         return {}
     shape, shown = (patch.x.size - 1, -1), result.extra.get("wear_shown", {"states": 0})["states"]
@@ -114,9 +119,12 @@ def _body(patch, fields: dict, side: str, inside: _Inside, u) -> dict:
     if not lower:
         move += _rigid(patch, fields, inside.points)
     blocks = [block if not lower else block[:, ::-1] for block in inside.blocks]
+    mises = von_mises(stress)
+    finest = min(harmless_step(inside.found, error, inside.rules, SHARE), FINEST * float(mises.max(initial=0.0)))
+    steps = {"stress": finest, "von_mises": finest, "displacement": DEFORMED * float(np.abs(u).max(initial=0.0))}
     return {"points": inside.points * [1.0, sign], "blocks": blocks, "interface": inside.interface,
-            "displacement": move, "material": cells.is_coating, "stress": stress, "mises": von_mises(stress),
-            "error": error, "bond": bond}
+            "displacement": move, "material": cells.is_coating, "stress": stress, "mises": mises,
+            "error": error, "bond": bond, "steps": steps}
 
 
 def _rigid(patch, fields: dict, points) -> np.ndarray:

@@ -6,10 +6,14 @@ attributes of the arrays and in the field arrays `units` and `codes` of every bl
 VTK 9.6 and 9.7 stay at the first time without `Steps` beside the blocks; 9.4 takes whatever stands there for a block.
 So `Steps` is a whole mesh too, an empty one that the assembly leaves out.
 
-A series of more than LARGE bytes is packed, its numbers rounded to BITS, and written frame after frame: what a killed
-process leaves (`.fields.*.vtkhdf`) holds every frame that its `NSteps` count.
+A series of more than LARGE bytes is packed, component by component, and written frame after frame: what a killed
+process leaves (`.fields.*.vtkhdf`) holds every frame that its `NSteps` count. Its numbers are rounded, to a multiple of
+a step or to so many bits, and every array says what that changes: at most `rounding_error` in its unit, or the share
+2^-(significant_bits + 1) of each value.
 """
 
+import math
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -21,16 +25,17 @@ from .blocks import CODES, Block
 NAME = "fields.vtkhdf"
 VERSION = np.array([2, 2], np.int64)  # of the format; later ones add nothing that stands here
 LARGE = 1 << 28  # bytes of all arrays; below it gzip saves a third of the bytes and doubles the time of all fields
-BITS = {"displacement": 17, "stress_error": 7}  # kept of 23 behind the leading one, in a large series
-MOST_BITS = 14  # of every other array: 3e-5 of a value, far below what the elements err by
+BITS = {"stress_error": 5}  # kept of 23 behind the leading one, in a large series: an estimate is good to some 10 %
+MOST_BITS = 14  # of every other array without a step: 3e-5 of a value, far below what the elements err by
 EMPTY = Block(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.uint8), {}, {})
 
 
-def write_series(path: Path, blocks: dict, times, units: dict) -> None:
+def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | None = None) -> None:
     """Write a series of fields on fixed meshes.
 
-    blocks: name -> Block whose data are (f or 1, n or c, ...), 1 if constant; times: (f,) [s]; units: name -> unit. The
-    file is written whole beside `path` and then renamed; it is of an HDF5 version that VTK's reader knows.
+    blocks: name -> Block whose data are (f or 1, n or c, ...), 1 if constant; times: (f,) [s]; units: name -> unit;
+    steps: block -> array -> largest step [its unit] that a large series may round it to. The file is written whole
+    beside `path` and then renamed; it is of an HDF5 version that VTK's reader knows.
     """
     path = Path(path)
     size = sum(values.nbytes for one in blocks.values() for data in (one.point_data, one.cell_data)
@@ -44,26 +49,28 @@ def write_series(path: Path, blocks: dict, times, units: dict) -> None:
         text = _text(blocks, units)
         assembly = _group(root, "Assembly")
         for name, one in blocks.items():
-            _block(_group(root, name), one, times, (units, text, later if large else None))
+            _block(_group(root, name), one, times, (units, text, later if large else None,
+                                                         (steps or {}).get(name, {})))
             assembly[name] = h5py.SoftLink(f"/VTKHDF/{name}")
-        steps = _steps(root, times)
-        _mesh(steps, EMPTY)
-        steps["Steps"] = root[next(iter(blocks))]["Steps"]
+        all_steps = _steps(root, times)
+        _mesh(all_steps, EMPTY)
+        all_steps["Steps"] = root[next(iter(blocks))]["Steps"]
         if later:
-            _frames(file, [steps, *(root[name]["Steps"] for name in blocks)], later, len(times))
+            _frames(file, [all_steps, *(root[name]["Steps"] for name in blocks)], later, len(times))
 
 
 def _frames(file, steps: list, later: list, count: int) -> None:
-    """Write the arrays that wait, [(dataset, (f, n, ...))], frame after frame, each on the disk before it counts.
+    """Write the arrays that wait, [(dataset, (f, n, ...), rounding of one frame)], frame after frame, each on the disk
+    before it counts.
 
     steps: the groups `Steps`, whose times are as many as their frames: VTK reads over the end of its memory otherwise.
     """
     times = [one["Values"][:] for one in steps]
     for number in range(count):
         _counted(steps, times, number)
-        for dataset, values in later:
+        for dataset, values, nearest in later:
             size = values.shape[1]
-            dataset[number * size:(number + 1) * size] = rounded(values[number], dataset.attrs["significant_bits"])
+            dataset[number * size:(number + 1) * size] = nearest(values[number])
         file.flush()
     _counted(steps, times, count)
 
@@ -84,6 +91,28 @@ def rounded(values, bits: int) -> np.ndarray:
     half, one = np.uint32(1) << (drop - np.uint32(1)), np.uint32(1)
     near = (raw + (half - one) + ((raw >> drop) & one)) >> drop << drop
     return np.where(np.isfinite(values), near.view(np.float32), values)
+
+
+def stepped(values, step: float) -> np.ndarray:
+    """float32 values rounded to the nearest multiple of `step`, a power of two: off by half a step at most.
+
+    Infinities, NaN and what is too large to have parts of a step stay.
+    """
+    values = np.asarray(values, np.float32)
+    step = np.float32(step)
+    with np.errstate(over="ignore"):
+        return np.where(np.abs(values) < step * np.float32(1 << 23), np.rint(values / step) * step, values)
+
+
+def _nearest(dataset, step: float, bits: int):
+    """The rounding of an array, said in its attributes: to the power of two at or below `step`, to `bits` where that is
+    0 or beyond what float32 is divided by."""
+    if not 1e-30 < step < 1e30:
+        dataset.attrs["significant_bits"] = bits
+        return partial(rounded, bits=bits)
+    step = 2.0**math.floor(math.log2(step))
+    dataset.attrs["rounding_error"] = step / 2
+    return partial(stepped, step=step)
 
 
 def _group(parent, name: str):
@@ -127,9 +156,9 @@ def _mesh(group, one: Block) -> None:
 
 
 def _block(group, one: Block, times, about: tuple) -> None:
-    """about: units by name, the field arrays of text, and the list that takes what is written frame after frame, None
-    where all is written at once."""
-    units, text, later = about
+    """about: units by name, the field arrays of text, the list that takes what is written frame after frame, None where
+    all is written at once, and the steps of rounding by name."""
+    units, text, later, rounding = about
     _mesh(group, one)
     steps, count = _steps(group, times), len(times)
     for name in ("PartOffsets", "PointOffsets"):
@@ -137,21 +166,22 @@ def _block(group, one: Block, times, about: tuple) -> None:
     steps["NumberOfParts"] = np.ones(count, np.int64)
     for name in ("CellOffsets", "ConnectivityIdOffsets"):
         steps[name] = np.zeros((count, 1), np.int64)
-    _arrays(group, steps, "PointData", one.point_data, (units, later))
-    _arrays(group, steps, "CellData", one.cell_data, (units, later))
+    _arrays(group, steps, "PointData", one.point_data, (units, later, rounding))
+    _arrays(group, steps, "CellData", one.cell_data, (units, later, rounding))
     _field_data(group, steps, text, count)
 
 
 def _arrays(group, steps, kind: str, data: dict, about: tuple) -> None:
-    (units, later), into, offsets = about, group[kind], _group(steps, f"{kind}Offsets")
+    (units, later, rounding), into, offsets = about, group[kind], _group(steps, f"{kind}Offsets")
     count = int(steps.attrs["NSteps"])
     for name, values in data.items():
         size = values.shape[1]
         if later is not None and values.dtype == np.float32 and len(values) == count:
+            # a chunk holds one component: neighbours in it are neighbours in space, which pack to three quarters
             one = into.create_dataset(name, (count * size, *values.shape[2:]), values.dtype, shuffle=True,
-                                      chunks=(max(size, 1), *values.shape[2:]), compression="gzip", compression_opts=1)
-            one.attrs["significant_bits"] = BITS.get(name, MOST_BITS)
-            later.append((one, values))
+                                      chunks=(max(size, 1), *(1 for _ in values.shape[2:])), compression="gzip",
+                                      compression_opts=1)
+            later.append((one, values, _nearest(one, rounding.get(name, 0.0), BITS.get(name, MOST_BITS))))
         else:
             one = into.create_dataset(name, data=values.reshape(-1, *values.shape[2:]))
         one.attrs["units"] = units.get(name, "1")
