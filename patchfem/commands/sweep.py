@@ -90,7 +90,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     asked, cases = asked_of(scene, set_, (what or Over()).request())
     target = out if out is not None else Path("out") / f"{scene.stem}-sweep"
     if by.collect:
-        _answer(collect(asked, cases, target, not no_page), target, not no_page, json_, perf_counter() - begin)
+        _answer(cases, collect(asked, cases, target, not no_page), target, not no_page, json_, perf_counter() - begin)
         return
     line = Progress(quiet)
     try:
@@ -106,7 +106,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
         print(json.dumps({"cases": line.done, "folder": str(target)}) if json_ else
               f"shard {by.shard}: {line.done} cases in {target}; when all shards are done: the same with --collect")
         return
-    _answer(found, target, not no_page, json_, perf_counter() - begin)
+    _answer(cases, found, target, not no_page, json_, perf_counter() - begin)
 
 
 class Progress:
@@ -133,10 +133,11 @@ class Progress:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
-def _answer(found, target: Path, page: bool, json_: bool, seconds: float) -> None:
+def _answer(cases, found, target: Path, page: bool, json_: bool, seconds: float) -> None:
     from collections import Counter
 
-    from ..export.pages.sweep import span
+    from ..export.pages.sweep import span, turns
+    from ..export.sweeps.page import columns_of
 
     counts = dict(Counter(map(str, found.outcome)).most_common())
     failed = sorted(found.messages)
@@ -145,10 +146,10 @@ def _answer(found, target: Path, page: bool, json_: bool, seconds: float) -> Non
                           "seconds": round(seconds, 3)}, ensure_ascii=False))
     else:
         print(f"{len(found)} cases: " + ", ".join(f"{count} {name}" for name, count in counts.items()))
-        said = span({name: (values, found.errors[name], found.units[name]) for name, values in found.values.items()},
-                    found.outcome)
-        if said:
-            print(said)
+        columns = {name: (values, found.errors[name], found.units[name]) for name, values in found.values.items()}
+        for said in (span(columns, found.outcome), turns(columns_of(cases), columns, found.outcome, not cases.rows)):
+            if said:
+                print(said)
         if page:
             print(f"page: {target / 'report.html'}")
         print(f"results: {target / 'sweep.csv'} {target / 'sweep.nc'}")

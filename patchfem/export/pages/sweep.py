@@ -8,6 +8,7 @@ from math import isfinite
 import numpy as np
 
 from ..scales import LADDERS, axis_unit
+from .changes import changes
 from .document import Section, document
 from .words import linked
 
@@ -124,6 +125,23 @@ def span(measures: dict, outcome) -> str:
     return ""
 
 
+def turns(keys: list, measures: dict, outcome, grid: bool = True) -> str:
+    """What changes first as a swept key grows, and from where on, as a sentence; "" where nothing does beyond the bars.
+
+    keys: [{`name`, `values` (n,), `texts` (n,)}] of the cases; measures and outcome as `span` takes them; grid: the
+    cases are all combinations of the keys' values.
+    """
+    main = next((name for name in FIRST if name in measures and np.isfinite(measures[name][0]).any()), "")
+    known = {name: one[:2] for name, one in measures.items()}
+    if main:
+        settled = np.isin(np.asarray(outcome, str), SETTLED)
+        there = settled & np.isfinite(known[main][0])
+        known[main] = np.where(settled if there.any() else True, known[main][0], np.nan), known[main][1]
+    named = [one | {"texts": [brief(str(text)) for text in one["texts"]],
+                    "words": not any(NUMBER.match(str(text)) for text in one["texts"])} for one in keys]
+    return changes(named, known, outcome, grid, main)
+
+
 def _said(value: float, unit: str, digits: int) -> str:
     """A value with so many digits and the unit that suits it."""
     unit, scale = axis_unit(np.array([value]), unit) if unit in LADDERS else (unit, 1.0)
@@ -131,13 +149,13 @@ def _said(value: float, unit: str, digits: int) -> str:
 
 
 def _lead(table: dict) -> str:
-    """The verdict: how many cases, over what, how they ended, and the span of the first measure."""
+    """The verdict: how many cases, over what, how they ended, the span of the first measure, what changes first."""
     number, over = len(table["outcome"]), " × ".join(one["name"] for one in table["keys"])
     ended = ", ".join(f"{count} {label(name)}" for name, count in Counter(table["outcome"]).most_common())
     text = f"<b>{number} cases</b> over {escape(over)}: {escape(ended)}."
-    said = span({name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()},
-                table["outcome"])
-    text += f" {escape(said)}" if said else ""
+    columns = {name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()}
+    for said in (span(columns, table["outcome"]), turns(table["keys"], columns, table["outcome"], table["grid"])):
+        text += f" {escape(said)}" if said else ""
     failed = table["messages"]
     fault = ""
     if failed:

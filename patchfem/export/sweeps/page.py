@@ -32,11 +32,7 @@ def write_page(asked: Asked, cases: Cases, found: Answers, keys: list, folder: P
 
 def table_of(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Path) -> dict:
     """The table of `pages.sweep.page` from the answers of the cases."""
-    number = range(len(cases))
-    places = np.array([cases.places(one) for one in number], int).reshape(len(cases), len(cases.axes))
-    columns = [{"name": axis.key, "unit": axis.unit or "1", "texts": [axis.texts[k] for k in place],
-                "values": numbers([axis.values[k] for k in place]), "log": wide(axis.values)}
-               for axis, place in zip(cases.axes, places.T)]
+    columns = columns_of(cases)
     measures = {name: {"unit": found.units[name], "means": meaning(name), "values": found.values[name],
                        "errors": found.errors[name]}
                 for name in names_of(found) if name not in [axis.name for axis in cases.axes]}
@@ -45,6 +41,14 @@ def table_of(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Pat
             "grid": not cases.rows, "keys": columns, "measures": measures,
             "outcome": [str(one) for one in found.outcome],
             "messages": found.messages, "folders": [opened(folder, key) for key in keys]}
+
+
+def columns_of(cases: Cases) -> list:
+    """The swept keys, each with its values in SI and as written in every case."""
+    places = np.array([cases.places(one) for one in range(len(cases))], int).reshape(len(cases), len(cases.axes))
+    return [{"name": axis.key, "unit": axis.unit or "1", "texts": [axis.texts[k] for k in place],
+             "values": numbers([axis.values[k] for k in place]), "log": wide(axis.values)}
+            for axis, place in zip(cases.axes, places.T)]
 
 
 def opened(folder: Path, key: str) -> str:

@@ -1,0 +1,150 @@
+"""What changes as the key of a sweep grows, and from where on, in one sentence: what comes first stands first."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .words import NO_SLIP
+
+SHARE = 0.1  # of its first value, beyond the errors of both, from which a measure has changed
+MOST = 3  # changes in the sentence
+WHOLE = 1 - 1e-12  # a contact fraction of 1 but for round-off
+ENDS = {
+    "done": "the run ends as asked", "steady": "the motion settles", "stuck": "the interface holds as a whole",
+    "transient": "the run ends before the motion settles", "grows": "the motion grows",
+    "exceeds_travel": "the motion passes the stop", "leaves_contact": "the slide passes the end of the piece",
+    "no_contact": "the pieces do not touch", "not_converged": "a solve does not converge"}
+SLIPS = "the interface slips as a whole"  # from "stuck" to "steady"
+STATES = {  # measure: what its state is called once it has it, and once it has it no longer
+    "contact_fraction": ("the contact fraction is below 1", "the whole length is in contact"),
+    "stick_fraction": ("the interface slips as a whole in part of the cycle", "the interface holds all the cycle"),
+    "slip_amplitude": ("slip begins", "there is no slip")}
+
+
+class Change(NamedTuple):
+    """One change along a line of cases: what it is; places of the first case that has it and of the last one before it;
+    whether all later ones have it too; the line."""
+
+    what: str
+    at: int
+    before: int
+    stays: bool
+    line: int
+
+
+def changes(keys: list, measures: dict, outcome: Sequence, grid: bool = True, main: str = "") -> str:
+    """What changes first as a swept key grows, as one sentence; "" where nothing changes beyond the numerical errors.
+
+    keys: [{`name`, `values` (n,), `texts` (n,), `words`: whether its values are words}]; the key is that of numbers
+    with most values. measures: {name: (values (n,), errors (n,))}, NaN where a case has none; outcome (n,); grid: the
+    cases are all combinations of the keys' values; main: the measure that has changed where it differs by a tenth from
+    its value at the smallest key and by more than both errors. Failed cases, and those that their errors leave open,
+    are passed over.
+    """
+    numbers = [one for one in keys if not one["words"]]
+    if not numbers or (len(keys) > 1 and not grid):
+        return ""
+    key = max(numbers, key=lambda one: len(set(np.asarray(one["values"]).tolist())))
+    others = [one for one in keys if one is not key]
+    lines = _lines(key, others)
+    found = {}
+    for number, line in enumerate(lines):
+        for one in _along(line, measures, np.asarray(outcome, str), main, key["texts"]):
+            found.setdefault(one.what, []).append(one._replace(line=number))
+    order = np.asarray(key["values"], float)
+    parts = sorted(found.values(), key=lambda each: min(order[one.at] for one in each))[:MOST]
+    where = [", ".join(f"{one['name']} {one['texts'][line[0]]}" for one in others) for line in lines]
+    told = {}
+    for each in parts:
+        told.setdefault(_where(each, order, key["texts"], where), []).append(each[0].what)
+    said = [f"{place} {' and '.join(what)}" for place, what in told.items()]
+    return f"As {key['name']} grows: {'; '.join(said)}." if said else ""
+
+
+def _lines(key: dict, others: list) -> list:
+    """The cases of each combination of the other keys, by the size of the key."""
+    lines = {}
+    for case in np.argsort(np.asarray(key["values"], float), kind="stable").tolist():
+        lines.setdefault(tuple(one["texts"][case] for one in others), []).append(case)
+    return [np.array(line) for line in lines.values()]
+
+
+def _along(line: np.ndarray, measures: dict, outcome: np.ndarray, main: str, texts: Sequence) -> list:
+    """Every change along a line of cases."""
+    out = _ends(line, outcome[line])
+    for name, states in STATES.items():
+        if name in measures:
+            values, errors = (np.asarray(one, float)[line] for one in measures[name][:2])
+            known = np.nan_to_num(errors)
+            there, not_there = ((values + known < 1, values >= WHOLE) if name.endswith("fraction") else
+                                (values > np.maximum(known, NO_SLIP), values <= NO_SLIP))
+            out += _turn(line, np.where(there, 1.0, np.where(not_there, 0.0, np.nan)), states)
+    out = _once(out)
+    if main in measures:
+        out += _departed(line, *(np.asarray(one, float)[line] for one in measures[main][:2]), main, texts)
+    return out
+
+
+def _once(found: list) -> list:
+    """The changes without those that say less of one slip that begins at one place."""
+    said = (SLIPS, STATES["stick_fraction"][0], STATES["slip_amplitude"][0])
+    places = {one.what: one.at for one in found if one.what in said}
+    return [one for one in found if one.what not in said or not any(
+        places.get(other) == one.at for other in said[:said.index(one.what)])]
+
+
+def _ends(line: np.ndarray, outcome: np.ndarray) -> list:
+    """The outcomes other than that of the first case, each where it comes first."""
+    known = np.isin(outcome, list(ENDS))
+    line, outcome = line[known], outcome[known]
+    out = []
+    for name in dict.fromkeys(outcome.tolist()):
+        first = int(np.argmax(outcome == name))
+        if first:
+            what = SLIPS if name == "steady" and outcome[0] == "stuck" else ENDS[name]
+            out.append(Change(what, int(line[first]), int(line[first - 1]), bool(np.all(outcome[first:] == name)), 0))
+    return out
+
+
+def _turn(line: np.ndarray, state: np.ndarray, words: tuple) -> list:
+    """Where a state, 1 or 0 or NaN for unknown, is another one than at first; words: for 1 and for 0."""
+    known = np.isfinite(state)
+    line, state = line[known], state[known]
+    other = np.flatnonzero(state != state[:1]) if state.size else state
+    if not other.size:
+        return []
+    first = int(other[0])
+    return [Change(words[int(state[0])], int(line[first]), int(line[first - 1]), other.size == state.size - first, 0)]
+
+
+def _departed(line: np.ndarray, values: np.ndarray, errors: np.ndarray, name: str, texts: Sequence) -> list:
+    """Where a measure is a tenth above or below its first value, beyond both errors."""
+    known = np.isfinite(values)
+    line, values, errors = line[known], values[known], np.nan_to_num(errors[known])
+    if not values.size or values[0] == 0:
+        return []
+    far = np.abs(values - values[0]) > SHARE * abs(values[0]) + errors + errors[0]
+    if not far.any():
+        return []
+    above = values[int(np.argmax(far))] > values[0]
+    what = (f"the {name.replace('_', ' ')} is more than {100 * SHARE:g} % {'above' if above else 'below'} its value at "
+            f"{texts[line[0]]}")
+    return _turn(line, np.where(far & ((values > values[0]) == above), 1.0, 0.0), (what, what))
+
+
+def _where(found: list, order: np.ndarray, texts: Sequence, where: list) -> str:
+    """From where on there is a change: of the line that has it first and of the one that has it last."""
+    first, last = (pick(found, key=lambda one: order[one.at]) for pick in (min, max))
+    stays = all(one.stays for one in found)
+
+    def place(one: Change) -> str:
+        return f"from {texts[one.at]} on" if stays else f"first at {texts[one.at]}"
+
+    text = f"{place(first)} (not yet at {texts[first.before]})"
+    if order[first.at] != order[last.at]:
+        text += f" with {where[first.line]}, {place(last)} with {where[last.line]},"
+    elif len(found) == 1 < len(where):
+        text += f" with {where[first.line]}"
+    lacking = len(where) > len(found) > 1
+    return text + (f" (in {len(found)} of {len(where)} combinations of the other keys)" if lacking else "")

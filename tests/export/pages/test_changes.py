@@ -1,0 +1,128 @@
+"""What changes first as a swept key grows: places that are known beforehand, bars that hide a change, no change."""
+
+import numpy as np
+import pytest
+from page_data import own_part
+
+from patchfem.export.pages.changes import changes
+from patchfem.export.pages.sweep import page, turns
+
+TILT = [0.05, 0.1, 0.2, 0.5, 1.0]
+
+
+def key(values=TILT, name="contact.tilt.angle", unit="mrad", words=False) -> dict:
+    return {"name": name, "values": np.array(values, float), "texts": [f"{one:g} {unit}" for one in values],
+            "words": words}
+
+
+def said(fraction, errors=0.0, outcome=None, **more) -> str:
+    measures = {"contact_fraction": (np.array(fraction, float), np.zeros(len(fraction)) + errors)}
+    return changes([key()], measures | more, outcome or ["done"] * len(fraction))
+
+
+def test_exact_the_first_case_below_one_and_the_last_before_it():
+    assert said([1, 1, 0.9, 0.6, 0.3]) == \
+        "As contact.tilt.angle grows: from 0.2 mrad on (not yet at 0.1 mrad) the contact fraction is below 1."
+    assert said([0.5, 1, 1, 1, 1]) == \
+        "As contact.tilt.angle grows: from 0.1 mrad on (not yet at 0.05 mrad) the whole length is in contact."
+
+
+def test_exact_a_case_that_its_error_leaves_open_is_neither():
+    """0.99 with an error of 0.02 may be 1, and is no longer 1 for sure: both sides are named without it."""
+    assert said([1, 1, 0.99, 0.6, 0.3], 0.02) == \
+        "As contact.tilt.angle grows: from 0.5 mrad on (not yet at 0.1 mrad) the contact fraction is below 1."
+
+
+@pytest.mark.parametrize("fraction, errors", [([1, 1, 1, 1, 1], 0.0), ([1, 1, 0.99, 0.98, 0.99], 0.05),
+                                              ([0.5, 0.4, 0.3, 0.2, 0.1], 0.0), ([np.nan] * 5, 0.0)])
+def test_exact_nothing_where_nothing_changes_beyond_the_errors(fraction, errors):
+    assert said(fraction, errors) == ""
+
+
+def test_exact_a_change_that_does_not_stay_is_first_at_its_place():
+    assert said([1, 1, 0.9, 1, 0.3]) == \
+        "As contact.tilt.angle grows: first at 0.2 mrad (not yet at 0.1 mrad) the contact fraction is below 1."
+
+
+def test_exact_the_order_of_the_cases_does_not_count():
+    """Cases of a file come in any order; `as a key grows` is by its size."""
+    turned = [3, 0, 4, 2, 1]
+    fraction = np.array([1, 1, 0.9, 0.6, 0.3])[turned]
+    one = key(np.array(TILT)[turned])
+    measures = {"contact_fraction": (fraction, np.zeros(5))}
+    assert changes([one], measures, ["done"] * 5, grid=False) == said([1, 1, 0.9, 0.6, 0.3])
+
+
+def test_exact_slip_is_told_once_by_what_says_most():
+    zero, slip = np.zeros(5), np.array([0, 0, 1e-9, 2e-6, 3e-6])
+    outcome = ["stuck", "stuck", "stuck", "steady", "grows"]
+    assert said([1] * 5, outcome=outcome, slip_amplitude=(slip, zero)) == \
+        ("As contact.tilt.angle grows: from 0.2 mrad on (not yet at 0.1 mrad) slip begins; first at 0.5 mrad (not yet "
+         "at 0.2 mrad) the interface slips as a whole; from 1 mrad on (not yet at 0.5 mrad) the motion grows.")
+    outcome[2] = "steady"
+    stick = np.array([1, 1, 0.5, 0.4, 0.3]), zero
+    assert said([1] * 5, outcome=outcome, slip_amplitude=(slip, zero), stick_fraction=stick) == \
+        ("As contact.tilt.angle grows: first at 0.2 mrad (not yet at 0.1 mrad) the interface slips as a whole; from "
+         "1 mrad on (not yet at 0.5 mrad) the motion grows.")
+
+
+def test_exact_failed_cases_are_passed_over():
+    fraction = [1, np.nan, 0.9, 0.6, 0.3]
+    assert said(fraction, outcome=["done", "failed", "done", "done", "done"]) == \
+        "As contact.tilt.angle grows: from 0.2 mrad on (not yet at 0.05 mrad) the contact fraction is below 1."
+
+
+def test_exact_a_measure_has_changed_by_a_tenth_beyond_both_errors():
+    values = np.array([1.0, 1.09, 1.12, 1.2, 1.5])
+    for error, place, before in ((0.0, "0.2", "0.1"), (0.02, "0.5", "0.2"), (0.1, "1", "0.5")):
+        found = changes([key()], {"loop_area": (values, np.full(5, error))}, ["steady"] * 5, main="loop_area")
+        assert found == (f"As contact.tilt.angle grows: from {place} mrad on (not yet at {before} mrad) the loop area "
+                         "is more than 10 % above its value at 0.05 mrad.")
+    assert changes([key()], {"loop_area": (values, np.full(5, 0.3))}, ["steady"] * 5, main="loop_area") == ""
+
+
+def test_exact_another_key_says_where_it_comes_first_and_last():
+    tilt, load = (grid.ravel() for grid in np.meshgrid(TILT, [10.0, 20.0, 40.0], indexing="ij"))
+    keys = [key(tilt), key(load, "normal.load", "N")]
+    outcome = ["done"] * 15
+
+    def found(limit) -> str:
+        return changes(keys, {"contact_fraction": (np.where(tilt > limit, 0.5, 1.0), np.zeros(15))}, outcome)
+
+    start = "As contact.tilt.angle grows: from "
+    assert found(load / 45) == (start + "0.5 mrad on (not yet at 0.2 mrad) with normal.load 10 N, from 1 mrad on "
+                                "with normal.load 40 N, the contact fraction is below 1.")
+    assert found(0.15) == start + "0.2 mrad on (not yet at 0.1 mrad) the contact fraction is below 1."
+    assert found(np.where(load > 15, 2.0, 0.15)) == (start + "0.2 mrad on (not yet at 0.1 mrad) with normal.load 10 N "
+                                                     "the contact fraction is below 1.")
+    assert found(np.where(load > 25, 2.0, 0.15)) == (
+        start + "0.2 mrad on (not yet at 0.1 mrad) (in 2 of 3 combinations of the other keys) the contact fraction is "
+        "below 1.")
+
+
+def test_exact_words_do_not_grow_and_draws_have_no_lines():
+    measures = {"contact_fraction": (np.array([1, 1, 0.9, 0.6, 0.3]), np.zeros(5))}
+    assert changes([key(words=True)], measures, ["done"] * 5) == ""
+    assert changes([key(), key(name="normal.load")], measures, ["done"] * 5, grid=False) == ""
+
+
+def test_exact_the_page_says_it_as_text(table):
+    """Amplitude 1e-5 (1 + load/10) log10(tilt/1e-7), case 7 failed, the last one grows and is no settled value."""
+    want = ("As contact.tilt.angle grows: from 0.01 mrad on (not yet at 0.001 mrad) the relative displacement "
+            "amplitude is more than 10 % above its value at 0.001 mrad; from 1 mrad on (not yet at 0.1 mrad) with "
+            "normal.load 40 N the motion grows.")
+    assert want in own_part(page(table))
+    table["keys"][0]["name"] = "<b>"
+    assert "As &lt;b&gt; grows: " in own_part(page(table))
+
+
+def test_always_many_cases_are_read_at_once():
+    """A second would be felt after a sweep of 1e5 cases."""
+    from time import process_time
+
+    many = 100_000
+    values = np.linspace(1, 2, many)
+    one = {"name": "x", "values": values, "texts": [f"{value!r} N" for value in values.tolist()]}
+    begin = process_time()
+    text = turns([one], {"loop_area": (values, np.zeros(many), "J")}, ["steady"] * many)
+    assert "more than 10 % above" in text and process_time() - begin < 5
