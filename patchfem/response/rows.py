@@ -132,7 +132,8 @@ ROWS = (
         "mean over the last cycles", lambda s: s.cycle.get("equivalent_damping"), group="friction"),
     Row("friction_work", "J", 1e-10, "work that went into the interface over the run",
         lambda s: s.energies.get("friction_work"), group="energy"),
-    Row("energy_stored", "J", 1e-10, "elastic energy in the interface at the end", group="energy"),
+    Row("energy_stored", "J", 1e-10, "energy in the interface at the end: elastic, over grooves with the "
+        "height of the load, or what was done against a load that changes", group="energy"),
     Row("energy_dissipated", "J", 1e-10, "energy that friction turned into heat over the run",
         lambda s: s.energies.get("energy_dissipated"), group="energy"),
     Row("energy_created", "J", 1e-10,

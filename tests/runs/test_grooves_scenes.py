@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 import patchfem as pf
 from patchfem.core import NotConverged, Outcome
@@ -43,6 +44,15 @@ acceleration = "5 g"
 cycles = 30
 [accuracy]
 steps_per_cycle = 100
+"""
+PIECES = """
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6 mm"
+load = "115 N"
+substrate = "Ti-8Al-1Mo-1V"
+element_size = "1 mm"
 """
 WAVE = 2 * np.pi / 80e-6
 LATER = {"iwan": ["friction.law=iwan", "friction.stiffness=1e7 N/m", "friction.chi=-0.5", "friction.beta=0.5"],
@@ -163,15 +173,7 @@ def test_always_a_rig_keeps_its_books_and_says_its_vertical_force():
 
 
 def test_exact_a_patch_under_a_rigid_slide_is_the_point():
-    pieces = """
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6 mm"
-load = "115 N"
-substrate = "Ti-8Al-1Mo-1V"
-element_size = "1 mm"
-""" + GROOVES
+    pieces = PIECES + GROOVES
     point = f'[normal]\nload = "115 N"\n{GROOVES}'
     for text, names in ((RIG, ("relative_displacement_amplitude", "loop_area")), (BENCH, ("loop_area",))):
         there, here = (run(one, **{"accuracy.steps_per_cycle": "40"}) for one in (text.replace(point, pieces), text))
@@ -217,6 +219,62 @@ def test_always_a_balanced_motion_that_does_not_last_is_said():
     assert found.values["relative_displacement_amplitude"] > 20e-6
 
 
+SWINGS = {"normal.amplitude": "40 N", "normal.frequency": "20 Hz", "normal.phase": "0.7 rad"}
+
+
+def swung(time):
+    return 115 + 40 * np.cos(2 * np.pi * 20 * time + 0.7)
+
+
+def test_exact_a_slow_slide_under_a_load_that_swings():
+    """N(time) (t +- mu)/(1 -+ mu t) along a slide at a constant speed, by quadrature; stored is int N dz."""
+    text = BENCH.replace('kind = "triangle"\namplitude = "30 um"', 'kind = "constant"\ndistance = "200 um"')
+    found = run(text, **SWINGS)
+
+    def slope(time):
+        return 7.5e-6 * WAVE * np.sin(WAVE * 1e-3 * time)
+
+    work = quad(lambda s: 1e-3 * swung(s) * (slope(s) + 0.4) / (1 - 0.4 * slope(s)), 0, 0.2, limit=400, epsrel=1e-11)[0]
+    lifted = quad(lambda s: 1e-3 * swung(s) * slope(s), 0, 0.2, limit=400, epsrel=1e-11)[0]
+    assert value(found, "friction_work") == pytest.approx(work, rel=1e-6)
+    assert value(found, "energy_stored") == pytest.approx(lifted, rel=1e-5)
+    assert value(found, "energy_dissipated") == pytest.approx(work - lifted, rel=1e-6)
+    assert value(found, "energy_balance") < 1e-12
+
+
+def test_exact_a_slide_at_rest_under_a_load_that_swings():
+    """The friction f along the flank stays until it is mu R of R = N sqrt(1 + t^2) + f t; F = N t + f sqrt(1 + t^2)."""
+    text = BENCH.replace('kind = "triangle"\namplitude = "30 um"', 'kind = "dwell"\ndistance = "50 um"\nhold = "0.1 s"')
+    found = run(text, **SWINGS, **{"friction.kinetic": "0.35"})
+    time, force = found.to_xarray()["time"].values, found.to_xarray()["friction_force"].values
+    t = 7.5e-6 * WAVE * np.sin(WAVE * 50e-6)
+    rests = np.flatnonzero((time >= 0.05 * (1 - 1e-9)) & (time <= 0.15 * (1 - 1e-9)))
+    f = 0.35 * swung(time[rests[0]]) * np.hypot(1, t) / (1 - 0.35 * t)
+    assert rests.size > 20
+    for k in rests:
+        f = min(f, 0.4 * swung(time[k]) * np.hypot(1, t) / (1 - 0.4 * t))
+        assert force[k] == pytest.approx(swung(time[k]) * t + f * np.hypot(1, t), rel=1e-9)
+
+
+@pytest.mark.parametrize("law", ["coulomb", "tanh", "elastic-plastic", "nonlocal", *LATER])
+def test_always_books_close_under_a_load_that_swings(law):
+    """Every law in bench and rig: to 1e-8, and nothing is created."""
+    sets = LATER.get(law) or [f"friction.law={law}", *{"coulomb": [], "tanh": ["friction.reference_speed=1 mm/s"]}.get(
+        law, ["friction.bond_length=1 um"])]
+    sets += [f"{key}={one}" for key, one in SWINGS.items()]
+    for text, more in ((BENCH, ["accuracy.steps_per_cycle=200"]), (RIG, ["drive.cycles=6", "normal.frequency=150 Hz"])):
+        found = pf.run(loads(text, sets=[*sets, *more]))
+        assert value(found, "energy_balance") < 1e-8 and value(found, "energy_created") == 0.0
+    assert value(found, "normal_load_least") < 80 and value(found, "normal_load_peak") > 150
+
+
+def test_refuses_heave_over_grooves():
+    text = RIG.replace("[normal]", PIECES).replace('load = "115 N"\ngrooves', "grooves").replace(
+        "slide = 1.0}", "slide = 1.0, normal = 0.1}")
+    with pytest.raises(SceneError, match=r"structure\.mode\.\S+: beside \[contact\.grooves\], whose climb would press"):
+        loads(text)
+
+
 def test_exact_the_plan_prints_stiffness_and_capacity():
     found = pf.plan(loads(RIG))
     assert found.chain["grooves"] == pytest.approx(115 * WAVE**2 * 7.5e-6)
@@ -237,7 +295,7 @@ def test_exact_the_plan_prints_stiffness_and_capacity():
      "beside [normal.grooves]"),
     (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "accuracy.quadrature=direct"], "accuracy.quadrature",
      "'direct' beside [normal.grooves]"),
-    (RIG, ["normal.amplitude=10 N", "normal.frequency=50 Hz"], "normal.amplitude", "beside [normal.grooves]"),
+    (RIG, ["normal.amplitude=115 N", "normal.frequency=50 Hz"], "normal.amplitude", "less than normal.load = 115 N"),
     (RIG, ["structure.bonded.stiffness=1e5 N/m", "structure.bonded.wavelength=80 um"], "structure.bonded.wavelength",
      "beside [normal.grooves]"),
     (BENCH, ["wear.coefficient=1e-14 m^2/N", "wear.cycles=1000"], "wear",

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...core import Outcome, Response
-from ...friction.grooves import Grooves
+from ...friction.grooves import STEADY, Grooves, Swing
 from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
 from ..contacts.arrays import Climbing, sheared
 from ..march.march import Run
@@ -13,7 +13,7 @@ from ..march.varying_load import PLASTIC, POINTS, Rubbing, bonds, plastic
 from .run import lifts, refuse_heavy
 
 HERE = "dynamics.grooves.contact_kernels"
-RISE, VERTICAL, LIFTS, BEFORE, NORMAL = 0, 1, 4, 12, 13  # of Climbing.now_at
+RISE, VERTICAL, LIFTS, BEFORE, NORMAL, RAISED = 0, 1, 4, 12, 13, 15  # of Climbing.now_at
 
 
 def model_of(grooves: Grooves, load: float, static: float, length: float, law, modes) -> "ClimbingModel":
@@ -39,15 +39,15 @@ def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -
 
 
 class FlankModel:
-    """What `march.march` asks of every contact along flanks: of `grooves`, under a `load` [N], with the coefficient
-    `static` [1]."""
+    """What `march.march` asks of a contact along flanks: of `grooves`, under a `load` [N] with its `swing`, of the
+    coefficient `static` [1]."""
 
     __slots__ = ()
 
     @property
     def limit(self) -> float:
         """Scale of the residuals [N]: the largest force of the steepest flank."""
-        return self.grooves.capacity(self.load, self.static)
+        return self.grooves.capacity(self.load + abs(self.swing.amplitude), self.static)
 
     @property
     def reduction(self):
@@ -70,7 +70,8 @@ class ClimbingModel(FlankModel):
 
     shear: ShearModes on the points under load where the pieces give way, share (a,): those of the points in the load.
     The pieces climb as one: the height and the slope are those at the slide of the holder, and the points share the
-    normal force as they share the load.
+    normal force as they share the load. swing: of the load about its mean; the books then count the work done against
+    it, int N dz, for what its height stores.
     """
 
     grooves: Grooves
@@ -78,6 +79,7 @@ class ClimbingModel(FlankModel):
     law: Rubbing
     shear: object = None
     share: tuple = (1.0,)
+    swing: Swing = STEADY
 
     @property
     def kind(self) -> tuple:
@@ -102,14 +104,16 @@ class ClimbingModel(FlankModel):
     def build(self, hub=None) -> tuple:
         """(Climbing, None) with arrays of their own, at rest at the slide 0."""
         g, law, share = self.grooves, self.law, np.array(self.share, float)
-        whole, size = self.load * np.hypot(1.0, float(g.slope(0.0))), share.size
+        begin, size = float(self.swing.about(self.load, 0.0)), share.size
+        whole = begin * np.hypot(1.0, float(g.slope(0.0)))
         normal, memory = whole * share, np.zeros((3, size))
         memory[1 if law.kind == PLASTIC else 0] = normal * (1.0 if law.kind == PLASTIC else law.force[3])
         weight = np.full(size, law.static / (law.length if law.kind == POINTS else 1.0))
         psi, kappa = (np.zeros((size, 0)), ()) if self.shear is None else (self.shear.shape, self.shear.stiffness)
-        at = np.zeros(14)
-        at[[VERTICAL, BEFORE, NORMAL]] = self.load, whole, whole
-        flank = np.array([self.load, g.wave, g.amplitude, g.phase, g.lifted_mass, law.kind])
+        at = np.zeros(16)
+        at[[VERTICAL, BEFORE, NORMAL, RAISED]] = begin, whole, whole, begin * g.height(0.0)
+        swing = self.swing.amplitude, self.swing.omega, self.swing.phase
+        flank = np.array([self.load, g.wave, g.amplitude, g.phase, g.lifted_mass, law.kind, *swing])
         return Climbing(flank, at, share, np.array(law.force, float), memory, normal.copy(), normal,
                         np.array(psi.T, order="C"), np.arange(size),
                         **sheared(weight, law.length, law.growth, psi, kappa)), None
@@ -136,9 +140,10 @@ class FlankRun(Run):
         super().__init__(modes, drive, model, steps_per_cycle, travel, hub, start)
         q, v = self.modes.slide @ self.state[0], self.modes.slide @ self.state[1]
         steep, at = float(model.grooves.slope(q)), self.contact.now_at
-        normal = model.load * np.hypot(1.0, steep)
+        begin = float(model.swing.about(model.load, 0.0))
+        normal = begin * np.hypot(1.0, steep)
         self._pressed(normal / at[NORMAL])
-        at[RISE], at[BEFORE], at[NORMAL] = steep * v, normal, normal
+        at[RISE], at[BEFORE], at[NORMAL], at[RAISED] = steep * v, normal, normal, begin * model.grooves.height(q)
         self.ledger[0] += self.strained()
 
     def placed(self, place, rate) -> None:
@@ -150,15 +155,17 @@ class FlankRun(Run):
         """Bring the memory to a normal force that is `share` of that at the slide 0, for which it was built."""
 
     def response(self, rows, number) -> Response:
-        """Histories; with a lifted mass `extra` has normal_load [N], the vertical force N + m (t q'' + t' q'^2)."""
-        out, g, modes = super().response(rows, number), self.model.grooves, self.modes
-        if not g.lifted_mass:
+        """Histories; with a lifted mass or a load that swings `extra` has normal_load [N], the vertical force
+        N + m (t q'' + t' q'^2)."""
+        out, g, modes, swing = super().response(rows, number), self.model.grooves, self.modes, self.model.swing
+        if not g.lifted_mass and not swing.amplitude:
             return out
         push, springs = np.outer(self.drive.values(out.time), modes.base), out.modal * modes.omega**2
         pull = np.outer(out.force, modes.slide) / modes.mass
         along = -(push + out.modal_rate @ modes.dampers.T + springs + pull) @ modes.slide
         lift = g.slope(out.slide) * along + g.bend(out.slide) * out.slide_rate**2
-        return replace(out, extra=out.extra | {"normal_load": self.model.load + g.lifted_mass * lift})
+        return replace(out, extra=out.extra | {"normal_load": swing.about(self.model.load, out.time)
+                                               + g.lifted_mass * lift})
 
     def _judge(self, status: int) -> None:
         super()._judge(status)

@@ -24,9 +24,9 @@ from ..march.varying_friction_kernels import press_all, rub_commit, rub_force, r
 from ..modal_kernels import narrowed
 
 SET_VALUED = False
-LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, KIND = range(6)  # of contacts.arrays.Climbing.flank
-RISE, VERTICAL, LAST, LAST_BUT_ONE, LIFTS, PULL, PULL_SLOPE, ALONG, MEAN_SLOPE, PATH, HELD, PLACE, BEFORE, NORMAL = \
-    range(14)  # of now_at
+LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, KIND, SWING, PACE, LAG = range(9)  # of contacts.arrays.Climbing.flank
+RISE, VERTICAL, LAST, LAST_BUT_ONE, LIFTS, PULL, PULL_SLOPE, ALONG, MEAN_SLOPE, PATH, HELD, PLACE, BEFORE, NORMAL, \
+    CLOCK, RAISED = range(16)  # of now_at
 TINY = 1e-13  # of the friction limit, to which pieces that give way are solved
 INNER = sqrt(0.6)  # outer points of Gauss's rule of three
 STEEP = 1e-4  # radians of a groove below which sines are series
@@ -36,6 +36,31 @@ STEEP = 1e-4  # radians of a groove below which sines are series
 def steep(flank, q):
     """Slope t [1] of the flank at the slide q [m]."""
     return flank[AMPLITUDE] * flank[WAVE] * sin(flank[WAVE] * q - flank[PHASE])
+
+
+@njit(error_model="numpy", **LEAN)
+def loaded(flank, at, dt):
+    """(load [N] at the start of a step, load at its end dt [s] later)."""
+    if flank[SWING] == 0.0:
+        return flank[LOAD], flank[LOAD]
+    turn = flank[PACE] * at[CLOCK] + flank[LAG]
+    return flank[LOAD] + flank[SWING] * cos(turn), flank[LOAD] + flank[SWING] * cos(turn + flank[PACE] * dt)
+
+
+@njit(error_model="numpy", **LEAN)
+def raised(dq, dt, flank, at):
+    """Book the work of a solved step against the load, and what carries on into the next one."""
+    before, after = loaded(flank, at, dt)
+    at[RAISED] += 0.5 * (before + after) * at[MEAN_SLOPE] * dq
+    at[VERTICAL], at[LAST_BUT_ONE], at[LAST] = at[HELD] + 0.5 * (after - before), at[LAST], dq
+    at[CLOCK] += dt
+
+
+@njit(error_model="numpy", **LEAN)
+def of_height(c, q):
+    """Energy [J] of the load's height at the slide q [m], or what was done against a load that swings."""
+    turn = sin(0.5 * (c.flank[WAVE] * q - c.flank[PHASE]))
+    return c.now_at[RAISED] if c.flank[SWING] != 0.0 else 2 * c.flank[LOAD] * c.flank[AMPLITUDE] * turn * turn
 
 
 @njit(error_model="numpy", **LEAN)
@@ -116,11 +141,12 @@ def climb(dq, q, dt, flank, at):
     """(path [m] along the flank, normal force [N] at its end without friction, slope [1] there) of a slide dq [m] in dt
     [s]; mean slope, path over slide and mean vertical force [N] go into `at`."""
     at[MEAN_SLOPE], at[PATH] = over(flank, q, dq)
-    at[HELD] = flank[LOAD]
+    before, after = loaded(flank, at, dt)
+    at[HELD] = 0.5 * (before + after)
     if flank[LIFTED] > 0.0:
         at[HELD] += flank[LIFTED] * 2 * (at[MEAN_SLOPE] * dq / dt - at[RISE]) / dt
     end = steep(flank, q + dq)
-    return at[PATH] * dq, max(at[HELD], 0.0) * sqrt(1 + end * end), end
+    return at[PATH] * dq, max(at[HELD] + 0.5 * (after - before), 0.0) * sqrt(1 + end * end), end
 
 
 @njit(error_model="numpy", **LEAN)
@@ -184,7 +210,7 @@ def commit(dq, force, q, v0, v1, dt, c):
     if c.flank[LIFTED] > 0.0:
         at[RISE] = 2 * at[MEAN_SLOPE] * dq / dt - at[RISE]
         at[LIFTS] = max(at[LIFTS], 0.0 if at[HELD] > 0.0 else 1.0)
-    at[VERTICAL], at[LAST_BUT_ONE], at[LAST] = at[HELD], at[LAST], dq
+    raised(dq, dt, c.flank, at)
     for j in range(c.now.size):
         c.before[j] = c.now[j]
     at[BEFORE], at[PLACE] = at[NORMAL], rub_state(kind, c, 0.0, 0.0)[0]
@@ -197,8 +223,7 @@ def state(c, q, v):
     slide q [m] and the speed v [m/s]."""
     flank, at, t = c.flank, c.now_at, steep(c.flank, q)
     along, energy, kept = rub_state(int(flank[KIND]), c, q, 0.0)
-    turn = sin(0.5 * (flank[WAVE] * q - flank[PHASE]))
-    energy += 2 * flank[LOAD] * flank[AMPLITUDE] * turn * turn + 0.5 * flank[LIFTED] * at[RISE] * at[RISE]
+    energy += of_height(c, q) + 0.5 * flank[LIFTED] * at[RISE] * at[RISE]
     length = sqrt(1 + t * t)
     return at[VERTICAL] * t + along * length, energy, q - (q - kept) / length
 

@@ -7,7 +7,7 @@ Either loses some of the energy stored, R k z^2/(2 N), and neither gives any. Pa
 a step are those of `contact_kernels`: half of the change of the normal force, the slide, the other half.
 """
 
-from math import sin, sqrt
+from math import sqrt
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from ...friction.flags_kernels import LEAN
 from ...friction.laws import lugre_kernels as law
 from ..modal_kernels import narrowed
 from .contact_kernels import (
-    AMPLITUDE,
     BEFORE,
     HELD,
     LAST,
@@ -27,16 +26,16 @@ from .contact_kernels import (
     MEAN_SLOPE,
     NORMAL,
     PATH,
-    PHASE,
     PLACE,
     PULL,
     PULL_SLOPE,
     RISE,
     VERTICAL,
-    WAVE,
     climb,
     hold,
+    of_height,
     passed,
+    raised,
     resist,
     steep,
 )
@@ -131,7 +130,8 @@ def commit(dq, force, q, v0, v1, dt, c):
     if c.flank[LIFTED] > 0.0:
         at[RISE] = 2 * at[MEAN_SLOPE] * dq / dt - at[RISE]
         at[LIFTS] = max(at[LIFTS], 0.0 if at[HELD] > 0.0 else 1.0)
-    at[VERTICAL], at[LAST_BUT_ONE], at[LAST], at[BEFORE] = at[HELD], at[LAST], dq, at[NORMAL]
+    raised(dq, dt, c.flank, at)
+    at[BEFORE] = at[NORMAL]
     at[PLACE] = at[NORMAL] / load * law.state(c.num, c.mem, 0, 0.0, v1)[0]
     return lost, True
 
@@ -143,7 +143,5 @@ def state(c, q, v):
     flank, at, t = c.flank, c.now_at, steep(c.flank, q)
     length, part = sqrt(1 + t * t), at[NORMAL] / flank[LOAD]
     along, energy, kept = law.state(c.num, c.mem, 0, q, v * length)
-    turn = sin(0.5 * (flank[WAVE] * q - flank[PHASE]))
-    energy = part * energy + 2 * flank[LOAD] * flank[AMPLITUDE] * turn * turn \
-        + 0.5 * flank[LIFTED] * at[RISE] * at[RISE]
+    energy = part * energy + of_height(c, q) + 0.5 * flank[LIFTED] * at[RISE] * at[RISE]
     return at[VERTICAL] * t + part * along * length, energy, q - (q - kept) / length

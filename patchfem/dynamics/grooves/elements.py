@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...friction.grooves import Grooves
+from ...friction.grooves import STEADY, Grooves, Swing
 from ...friction.protocol import Element
 from ..contacts.arrays import Flanked
-from .climbing import BEFORE, NORMAL, VERTICAL, FlankModel
+from .climbing import BEFORE, NORMAL, RAISED, VERTICAL, FlankModel
 from .run import refuse_heavy
 
 HERE = "dynamics.grooves.element_kernels"
@@ -26,12 +26,13 @@ def model_of(grooves: Grooves, load: float, static: float, element: Element, mod
 @dataclass(frozen=True, eq=False, slots=True)
 class ElementsModel(FlankModel):
     """What `march.march` needs to know: grooves under a load [N], the static coefficient [1] and the law of a contact
-    under that load, which `element_kernels` takes to the normal force of the flank."""
+    under that load, which `element_kernels` takes to the normal force of the flank; swing: as of a ClimbingModel."""
 
     grooves: Grooves
     load: float
     static: float
     element: Element
+    swing: Swing = STEADY
 
     @property
     def kind(self) -> tuple:
@@ -45,9 +46,11 @@ class ElementsModel(FlankModel):
 
     def build(self, hub=None) -> tuple:
         """(Flanked, None) with arrays of their own, at rest at the slide 0."""
-        g, law, at = self.grooves, self.element, np.zeros(14)
-        at[[VERTICAL, BEFORE, NORMAL]] = self.load, *2 * (self.load * np.hypot(1.0, float(g.slope(0.0))),)
-        flank = np.array([self.load, g.wave, g.amplitude, g.phase, g.lifted_mass, -1.0])
+        g, law, at, begin = self.grooves, self.element, np.zeros(16), float(self.swing.about(self.load, 0.0))
+        normal = begin * np.hypot(1.0, float(g.slope(0.0)))
+        at[[VERTICAL, BEFORE, NORMAL, RAISED]] = begin, normal, normal, begin * g.height(0.0)
+        swing = self.swing.amplitude, self.swing.omega, self.swing.phase
+        flank = np.array([self.load, g.wave, g.amplitude, g.phase, g.lifted_mass, -1.0, *swing])
         bound = law.limit if law.bounded else np.inf
         return Flanked(flank, at, np.array(law.numbers[None]), np.array(law.memory[None]),
                        np.array(law.memory[None]), np.array([bound])), None

@@ -19,9 +19,12 @@ from .step_kernels import (
     FORCE,
     LENGTH,
     NORMAL,
+    PACE,
+    RAISED,
     SPEED,
     START,
     STICKS,
+    SWING,
     TRIAL,
     WAY,
     WORK,
@@ -36,6 +39,7 @@ from .step_kernels import (
 LIFTS = 5  # how a call ends, besides those of `march.loop_kernels`
 MOST = 10_000  # steps between two samples
 EVENTS = 50  # stops and releases between two samples
+QUICK = 0.2  # radians of a load that swings in a step: what sticks has no error that would tell of it
 FORGET = 1e-3  # of the largest coordinate and rate, per step
 
 
@@ -50,7 +54,7 @@ def beyond(m, t, y, slopes):
     q, v = slide_of(m, y)
     if m.flags[STICKS] == 0.0:
         return -m.flags[WAY] * v
-    low, high = holds(m.num, q)
+    low, high = holds(m.num, q, t)
     return max(m.flags[FORCE] - high, low - m.flags[FORCE])
 
 
@@ -111,7 +115,7 @@ def begin(m, t, y, v):
     else:
         m.flags[STICKS] = 1.0
         m.flags[FORCE] = slope(m, t, y, m.work[0])[0]
-        low, high = holds(m.num, slide_of(m, y)[0])
+        low, high = holds(m.num, slide_of(m, y)[0], t)
         if m.flags[FORCE] > high or m.flags[FORCE] < low:
             m.flags[STICKS], m.flags[WAY] = 0.0, 1.0 if m.flags[FORCE] > high else -1.0
     m.flags[FORCE], m.flags[NORMAL] = slope(m, t, y, m.work[0])
@@ -132,6 +136,8 @@ def taken(m, t, end, tolerance):
     """One step from m.work[START] at the time t [s] to `end` [s] at most, whose error meets the tolerance: (its length,
     0 where there is none, whether stick or slip ends there). m.work[0] holds the slopes at the start."""
     h = min(m.flags[LENGTH], end - t) if m.flags[LENGTH] > 0 else end - t
+    if m.num[SWING] != 0.0:
+        h = min(h, QUICK / m.num[PACE])
     for _ in range(60):
         past = tried(m, t, h)
         error = missed(m, m.work[START], h, tolerance)
@@ -177,7 +183,7 @@ def advance(m, t, end, tolerance, ledger):
             continue
         events += 1
         if m.flags[STICKS] == 1.0:  # it lets go the way it is pulled
-            low, high = holds(m.num, slide_of(m, y)[0])
+            low, high = holds(m.num, slide_of(m, y)[0], t)
             m.flags[STICKS], m.flags[WAY] = 0.0, 1.0 if m.flags[FORCE] > 0.5 * (low + high) else -1.0
             m.flags[FORCE], m.flags[NORMAL] = slope(m, t, y, m.work[0])
         else:
@@ -209,7 +215,7 @@ def march(m, ends, first, steps, dt, motion, tolerance, travel, ledger, rows):
         while t >= ends[int(m.now[PIECE])]:
             m.now[PIECE] += 1
         m.flags[FORCE], m.flags[NORMAL] = slope(m, t, y, m.work[0])
-        height = stored(m.num, q, v)
+        height = stored(m, q, v)
         status = note(rows[i, :2 * n + 6], m.flags[FORCE], height, q, out, travel,
                       height + of_modes(motion, m.omega, m.mass[0]), ledger)
         rows[i, 2 * n + 8] = m.flags[NORMAL]
@@ -241,4 +247,5 @@ def march(m, ends, first, steps, dt, motion, tolerance, travel, ledger, rows):
         ledger[2] += abs(y[2 * n])
         ledger[3] += y[2 * n + 3]
         ledger[8] += work
+        m.flags[RAISED] += y[2 * n + 4]
     return steps, 0

@@ -6,13 +6,14 @@ import numpy as np
 
 from ...compiled import load as compiled
 from ...core import Outcome, PatchfemError, Response
-from ...friction.grooves import Grooves
+from ...friction.grooves import STEADY, Grooves, Swing
 from ..march.march import Run
 from ..march.models import coulomb_model
 from ..second_book import sampled_work
 from ..smooth.waves import wave_of
 
 KIND, PIECE = 11, 12  # of Climb.now
+RAISED = 7  # of Climb.flags
 TOLERANCE = 1e-11  # relative error of a step
 REST = 1e-6  # of wavelength/(2 pi), below which a motion is at rest to the choice of the step
 
@@ -21,7 +22,8 @@ REST = 1e-6  # of wavelength/(2 pi), below which a motion is at rest to the choi
 class GroovesModel:
     """What `march.march` needs to know: grooves under a load [N], static and kinetic coefficient [1].
 
-    speed: v_0 [m/s] of eq. 2.4, static tanh(v/v_0) along the flank, or None for Coulomb's law.
+    speed: v_0 [m/s] of eq. 2.4, static tanh(v/v_0) along the flank, or None for Coulomb's law; swing: of the load about
+    its mean. Under a load that swings the books count the work done against it, int N dz, for what its height stores.
     """
 
     grooves: Grooves
@@ -29,11 +31,12 @@ class GroovesModel:
     static: float
     kinetic: float
     speed: float | None = None
+    swing: Swing = STEADY
 
     @property
     def limit(self) -> float:
         """Largest force [N] of the steepest flank."""
-        return self.grooves.capacity(self.load, self.static)
+        return self.grooves.capacity(self.load + abs(self.swing.amplitude), self.static)
 
     @property
     def length(self) -> float:
@@ -92,15 +95,16 @@ class GroovesRun(Run):
     def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
         self.loop = compiled("dynamics.grooves.loop_kernels")
         super().__init__(modes, drive, model, steps_per_cycle, travel, hub, start)
-        g, size = model.grooves, 2 * modes.omega.size + 4
+        g, size, swing = model.grooves, 2 * modes.omega.size + 5, model.swing
         least, pace = REST / g.wave, max(float(modes.omega.max()), 2 * np.pi / drive.period)
         num = [model.load, g.wave, g.amplitude, g.phase, g.lifted_mass, model.static, model.kinetic,
-               model.speed or 0.0, least, least * pace]
+               model.speed or 0.0, least, least * pace, swing.amplitude, swing.omega, swing.phase]
         damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
         parts = (modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output, damping,
-                 [modes.mass], np.zeros((1, 6)), np.zeros(14), num, np.zeros(7), np.zeros((9, size)))
+                 [modes.mass], np.zeros((1, 6)), np.zeros(14), num, np.zeros(8), np.zeros((9, size)))
         self.climb = compiled("dynamics.grooves.step_kernels").Climb(*(np.array(p, float, order="C") for p in parts))
         self._driven()
+        self.climb.flags[RAISED] = swing.about(model.load, 0.0) * g.height(modes.slide @ self.state[0])
         self.width += 2
         self.ledger[0] += self.strained()
 
@@ -155,12 +159,14 @@ class GroovesRun(Run):
                             "raise accuracy.steps_per_cycle")
 
     def strained(self) -> float:
-        """Energy of the height of the load, and of the speed of what rises [J]."""
+        """Energy of the height of the load, or done against one that swings, and of the speed of what rises [J]."""
         g, (z, v) = self.model.grooves, self.state
         q, rate = float(self.modes.slide @ z), float(self.modes.slide @ v)
-        return float(self.model.load * g.height(q) + 0.5 * g.lifted_mass * (g.slope(q) * rate)**2)
+        height = self.climb.flags[RAISED] if self.model.swing.amplitude else self.model.load * g.height(q)
+        return float(height + 0.5 * g.lifted_mass * (g.slope(q) * rate)**2)
 
     def response(self, rows, number) -> Response:
-        """Histories; with a lifted mass `extra` has normal_load [N], the vertical force."""
-        out = super().response(rows, number)
-        return replace(out, extra=out.extra | {"normal_load": rows[:, -1]}) if self.model.grooves.lifted_mass else out
+        """Histories; with a lifted mass or a load that swings `extra` has normal_load [N], the vertical force."""
+        out, model = super().response(rows, number), self.model
+        changes = model.grooves.lifted_mass or model.swing.amplitude
+        return replace(out, extra=out.extra | {"normal_load": rows[:, -1]}) if changes else out

@@ -1,7 +1,8 @@
 """The force of a flank that the load climbs, and one Runge-Kutta step of order 5 of modes under it, compiled.
 
-The state y (2 n + 4,) holds coordinates and rates of the modes, and work of the drive, viscous loss, work of the slide
-and friction's own loss along the flank [J]. The energies feed nothing and take no part in the choice of the step.
+The state y (2 n + 5,) holds coordinates and rates of the modes, and work of the drive, viscous loss, work of the slide,
+friction's own loss along the flank, and work done against the load, int N dz [J]. The energies feed nothing and take
+no part in the choice of the step.
 Source of the coefficients: Dormand and Prince, J. Comp. Appl. Math. 6 (1980).
 """
 
@@ -14,9 +15,10 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from ..smooth.step_kernels import push
 
-LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, STATIC, KINETIC, SPEED, LEAST, LEAST_RATE = range(10)  # of Climb.num
-STICKS, WAY, FORCE, NORMAL, LENGTH, CREST, CREST_SPEED = range(7)  # of Climb.flags
-WORK = 4  # energies behind the modes
+LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, STATIC, KINETIC, SPEED, LEAST, LEAST_RATE, SWING, PACE, LAG = \
+    range(13)  # of Climb.num
+STICKS, WAY, FORCE, NORMAL, LENGTH, CREST, CREST_SPEED, RAISED = range(8)  # of Climb.flags
+WORK = 5  # energies behind the modes
 TRIAL, START = 7, 8  # of Climb.work, whose first rows are the slopes
 PLACES = np.array([0.0, 0.2, 0.3, 0.8, 8 / 9, 1.0, 1.0])  # of the stages in the step
 SHARES = np.zeros((7, 7))  # of the slopes before it in every stage; row 6 is the step itself
@@ -33,11 +35,12 @@ class Climb(NamedTuple):
     """A motion over grooves as the compiled loops see it.
 
     omega, damp, slide, base, output (n,), damping (n, n) or (0, 0), and mass (1,) [kg] of the modes; pieces and now
-    (14,): the drive, as `smooth.step_kernels.push` takes it; num (10,): load [N], wave number [rad/m], amplitude
-    [m], phase [rad], lifted mass [kg], mu_s, mu_k, speed v_0 [m/s] of a law of the speed, 0 of Coulomb's, and sizes of
-    coordinates [m] and rates [m/s] below which they are at rest. flags (7,): 1
-    where it sticks, the way of the slide, force [N] and vertical force [N] at the last sample, length [s] of the next
-    step, largest coordinate and rate. work (9, 2 n + 4): slopes of the stages, the state tried and that at the start.
+    (14,): the drive, as `smooth.step_kernels.push` takes it; num (13,): load [N], wave number [rad/m], amplitude
+    [m], phase [rad], lifted mass [kg], mu_s, mu_k, speed v_0 [m/s] of a law of the speed, 0 of Coulomb's, sizes of
+    coordinates [m] and rates [m/s] below which they are at rest, and of the load amplitude [N], pace [rad/s] and phase
+    [rad] of its swing. flags (8,): 1 where it sticks, the way of the slide, force [N] and vertical force [N] at the
+    last sample, length [s] of the next step, largest coordinate and rate, work done against a load that swings [J].
+    work (9, 2 n + 5): slopes of the stages, the state tried and that at the start.
     """
 
     omega: np.ndarray
@@ -62,18 +65,26 @@ def flank(num, q):
 
 
 @njit(error_model="numpy", **LEAN)
-def stored(num, q, v):
-    """Energy [J] of the load's height and of the mass that rises with it."""
-    turn = sin(0.5 * (num[WAVE] * q - num[PHASE]))
-    rise = flank(num, q)[0] * v
-    return 2 * num[LOAD] * num[AMPLITUDE] * turn * turn + 0.5 * num[LIFTED] * rise * rise
+def loaded(num, time):
+    """Load [N] at a time [s]."""
+    return num[LOAD] + num[SWING] * cos(num[PACE] * time + num[LAG]) if num[SWING] != 0.0 else num[LOAD]
 
 
 @njit(error_model="numpy", **LEAN)
-def holds(num, q):
-    """Smallest and largest force [N] with which the flank at q [m] holds at rest."""
-    t, mu = flank(num, q)[0], num[STATIC]
-    return num[LOAD] * (t - mu) / (1 + mu * t), num[LOAD] * (t + mu) / (1 - mu * t)
+def stored(m, q, v):
+    """Energy [J] of the load's height, or what was done against a load that swings, and of the mass that rises."""
+    num = m.num
+    turn = sin(0.5 * (num[WAVE] * q - num[PHASE]))
+    rise = flank(num, q)[0] * v
+    height = m.flags[RAISED] if num[SWING] != 0.0 else 2 * num[LOAD] * num[AMPLITUDE] * turn * turn
+    return height + 0.5 * num[LIFTED] * rise * rise
+
+
+@njit(error_model="numpy", **LEAN)
+def holds(num, q, time):
+    """Smallest and largest force [N] with which the flank at q [m] holds at rest at a time [s]."""
+    t, mu, load = flank(num, q)[0], num[STATIC], loaded(num, time)
+    return load * (t - mu) / (1 + mu * t), load * (t + mu) / (1 - mu * t)
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
@@ -110,7 +121,8 @@ def slope(m, t, y, out):
         work -= m.base[i] * rate
         lost += damped * rate
     steep, bend = flank(num, q)
-    normal = num[LOAD]
+    load = loaded(num, t)
+    normal = load
     if m.flags[STICKS] == 1.0:
         force, own = free / share, 0.0
     else:
@@ -125,7 +137,7 @@ def slope(m, t, y, out):
     for i in range(n):
         out[n + i] -= m.slide[i] * force / mass
     out[energies], out[energies + 1] = mass * drive * work, mass * lost
-    out[energies + 2], out[energies + 3] = force * v, own
+    out[energies + 2], out[energies + 3], out[energies + 4] = force * v, own, load * steep * v
     return force, normal
 
 

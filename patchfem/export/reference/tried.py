@@ -76,6 +76,8 @@ RIGS = (Beside("one point", POINT + RIG), Beside("a patch", PATCH + RIG),
         Beside("heave or pitch", PATCH + RIG, ("structure.mode.axial.pitch=1 rad/m",)),
         Beside("pitch and shear", PATCH + "[contact.shear]\n" + RIG, ("structure.mode.axial.pitch=1 rad/m",)))
 MORE = (Beside("grooves of a point", POINT + GROOVES.format("normal") + RIG),
+        Beside("their load changes", POINT + GROOVES.format("normal") + RIG, ("normal.amplitude=20 N",
+                                                                              "normal.frequency=50 Hz")),
         Beside("grooves and shear", PATCH + GROOVES.format("contact") + "[contact.shear]\n" + RIG),
         Beside("a cubic spring", POINT + RIG, ("structure.stiffening.cubic=1e10 N/m^3",)),
         Beside("an interlocking spring", POINT + RIG, ("structure.bonded.stiffness=1e5 N/m",

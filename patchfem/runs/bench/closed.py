@@ -47,42 +47,80 @@ def closed(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
 def climbed(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     """As `closed`, of a slow slide over grooves: the force is N (t + phi)/(1 - phi t), phi = f/R along the flank.
 
-    The height of the load is stored, friction's own work along the flank is dissipated; no mass is lifted.
+    The height of the load is stored, friction's own work along the flank is dissipated; no mass is lifted. Under a load
+    N(time) on a point what counts as stored is the work done against it, int N dz.
     """
     (time, slide), (sigma, weight), law, grooves = path, pressed(model, patch), law_for(model, patch), model.grooves
-    load, move, f = float(weight @ sigma), np.diff(slide), model.friction
+    move, f, varies = np.diff(slide), model.friction, model.load_varies
+    load = model.point.at(time) if varies else np.full(time.size, float(weight @ sigma))
     pace = np.divide(move, np.diff(time), out=np.zeros_like(move), where=np.diff(time) > 0)
     if law.holds:
         last = np.maximum.accumulate(np.where(move != 0, np.arange(move.size), -1))
         way = np.append(0.0, np.where(last < 0, 0.0, np.sign(move)[last]))
-        least, most = (grooves.ratio(slide[0], side, f.static) for side in (-1.0, 1.0))
         ratio = grooves.ratio(slide, way, law.kinetic)
-        ratio[way == 0] = np.clip(0.0, least, most)  # at rest before the motion the flank holds what it must
-        own = grooves.lost(slide[:-1], slide[1:], law.kinetic)
+        rests = np.append(True, move == 0)
+        if varies:
+            _held(grooves, slide, load, ratio, np.flatnonzero(rests & (way != 0)), f.static)
+        at_first = way == 0
+        least, most = (grooves.ratio(slide[0], side, f.static) for side in (-1.0, 1.0))
+        ratio[at_first] = np.clip(0.0, least, most)  # at rest before the motion the flank holds what it must
+
+        def share(q, speed):
+            return law.kinetic * np.sign(speed)
     else:
-        ratio, own = _paced(law, grooves, slide, move, pace)
-    work = np.append(0.0, np.cumsum(load * (grooves.rise(slide[:-1], slide[1:]) + own)))
-    losses = np.stack([np.zeros(slide.size), np.append(0.0, load * own)], axis=1)
+        def share(q, speed):
+            return law.static * law.share(np.sqrt(1 + grooves.slope(q)**2) * speed, 1.0)
+
+        ratio = _ratio(grooves, slide, share(slide, np.append(0.0, pace)))
+    if law.holds and not varies:
+        own = load[0] * grooves.lost(slide[:-1], slide[1:], law.kinetic)
+    else:
+        own = _over_steps(load, slide, move, lambda q: _own(grooves, q, share(q, pace)))
+    height = load[0] * grooves.height(slide)
+    if varies:
+        height = height[0] + np.append(0.0, np.cumsum(_over_steps(load, slide, move, grooves.slope)))
+    rise = np.diff(height) if varies else load[0] * grooves.rise(slide[:-1], slide[1:])
     for k, side in ends_of_rest(model, slide).items():
         ratio[k] = grooves.ratio(slide[k], side, f.static)
-    at, force, loads = frame_numbers(slide.size, frames), load * ratio, np.full(slide.size, load)
+    at = frame_numbers(slide.size, frames)
     watch.tell(1.0)
-    tau = ratio[at, None] * sigma
-    return Slid(force, loads, slide.copy(), ledger_of(work, load * grooves.height(slide), losses), at, tau,
+    return Slid(load * ratio, load, slide.copy(), ledger_of(np.append(0.0, np.cumsum(rise + own)), height,
+                np.stack([np.zeros(slide.size), np.append(0.0, own)], axis=1)), at,
+                (load[at] / load[0] * ratio[at] if varies else ratio[at])[:, None] * sigma,
                 np.repeat(slide[at, None], sigma.size, axis=1))
 
 
-def _paced(law, grooves, slide, move, pace) -> tuple:
-    """(force over load (k,) [1], friction's own work per load (k - 1,) [J/N]) of a law of the speed along the flank."""
-    def share(q, speed):
-        along = np.sqrt(1 + grooves.slope(q)**2)
-        return law.static * law.share(along * speed, 1.0)
+def _ratio(grooves, q, phi):
+    """Force over vertical force [1] of a share phi = f/R along the flank at slides q [m]."""
+    t = grooves.slope(q)
+    return (t + phi) / (1 - phi * t)
 
-    before = np.append(0.0, pace)
-    t, phi = grooves.slope(slide), share(slide, before)
-    own = np.zeros_like(move)
-    for place, part in zip(*np.polynomial.legendre.leggauss(GAUSS)):
-        q = slide[:-1] + 0.5 * (1 + place) * move
-        steep, held = grooves.slope(q), share(q, pace)
-        own += 0.5 * part * held * (1 + steep**2) / (1 - held * steep) * move
-    return (t + phi) / (1 - phi * t), own
+
+def _own(grooves, q, phi):
+    """Friction's own work per slide and vertical force [1], phi (1 + t^2)/(1 - phi t), at slides q [m]."""
+    t = grooves.slope(q)
+    return phi * (1 + t**2) / (1 - phi * t)
+
+
+def _over_steps(load, slide, move, part) -> np.ndarray:
+    """int N part(q) dq [J] of every step of the slide (k,) [m], move (k - 1,) [m], under a load (k,) [N] that changes
+    evenly in it; part: function of slides (k - 1,) [m]."""
+    out = np.zeros_like(move)
+    for place, weight in zip(*np.polynomial.legendre.leggauss(GAUSS)):
+        share = 0.5 * (1 + place)
+        out += 0.5 * weight * (load[:-1] + share * np.diff(load)) * part(slide[:-1] + share * move) * move
+    return out
+
+
+def _held(grooves, slide, load, ratio, rests, static: float) -> None:
+    """Write the ratios of force to load at the samples `rests`, at which a slide has stopped while the load changes.
+
+    The friction f along the flank stays, as it does where the load is constant, or is the limit mu R of the normal
+    force R = N sqrt(1 + t^2) + f t.
+    """
+    for k in rests:
+        t = grooves.slope(slide[k])
+        long = np.sqrt(1 + t * t)
+        f = (ratio[k - 1] * load[k - 1] - load[k - 1] * t) / long
+        least, most = (load[k] * long * side * static / (1 - side * static * t) for side in (-1.0, 1.0))
+        ratio[k] = t + min(max(f, least), most) * long / load[k]

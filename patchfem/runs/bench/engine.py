@@ -56,7 +56,7 @@ def engine_of(model, slide, points: int = 1, choice: Choice | None = None) -> En
         return Engine(POINTS, 4e-8 * points * (1 + modes / 4))
     if soft:
         return Engine(ELEMENTS, 3e-9 * points + 1e-7)
-    if changes(model):
+    if changes(model) and model.grooves is None:
         return _stepped(model, slide, points)
     if has(f.law, "memoryless"):
         return Engine(CLOSED, 1e-7)

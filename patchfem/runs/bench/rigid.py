@@ -26,10 +26,10 @@ def rigid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) 
     (time, slide), f = path, model.friction
     sigma, weight = pressed(model, patch)
     load = float(weight @ sigma)
-    paced = f.rest_growth is not None or not (has(f.law, "bonds") or has(f.law, "timeless"))
+    paced = f.rest_growth is not None or model.load_varies or not (has(f.law, "bonds") or has(f.law, "timeless"))
     done = follow(one_point(model, load, engine), time, slide, frames, watch, paced)
     tau = np.outer(done.force[done.at] / load if load > 0 else np.zeros(done.at.size), sigma)
-    loads = np.full(time.size, load)
+    loads = model.point.at(time) if model.load_varies else np.full(time.size, load)
     if engine.kind == ELEMENTS or model.grooves is not None:
         slip, local = done.slip, np.where(sigma > 0, done.slip[done.at, None], slide[done.at, None])
     else:
@@ -50,10 +50,19 @@ def climbing(model, load: float, patch=None, count: int | None = None):
     if not carries(f, "varying-load"):
         from ...dynamics.grooves import elements
 
-        return elements.model_of(grooves, load, f.static, law_from(f, load).element(load), modes)
+        found = elements.model_of(grooves, load, f.static, law_from(f, load).element(load), modes)
+        return replace(found, swing=swing_of(model))
     law = model.bonds if has(f.law, "bonds") else None
-    found = model_of(grooves, load, f.static, f.bond_length, law, modes)
+    found = replace(model_of(grooves, load, f.static, f.bond_length, law, modes), swing=swing_of(model))
     return giving(found, patch, count, model.accuracy.tolerance) if model.soft else found
+
+
+def swing_of(model):
+    """How the load of a point swings about its mean, a `friction.grooves.Swing`."""
+    from ...friction.grooves import STEADY, Swing
+
+    point = model.point
+    return Swing(point.amplitude, 2 * np.pi * point.frequency, point.phase) if model.load_varies else STEADY
 
 
 def one_point(model, load: float, engine: Engine) -> ContactModel:

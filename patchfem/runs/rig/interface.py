@@ -1,5 +1,7 @@
 """From the law, the load and the pressed patch to the contact that a march moves."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...dynamics.march import models
@@ -59,9 +61,11 @@ def _climbing(model: Model, patch, count: int | None = None):
 
         return climbing(model, load, patch, count)
     from ...dynamics.grooves.run import model_of
+    from ..bench.rigid import swing_of
 
     speed = None if has(f.law, "set-valued") else f.reference_speed
-    return model_of(model.grooves, load, f.static, f.static if f.kinetic is None else f.kinetic, speed, model.rig.modes)
+    kinetic = f.static if f.kinetic is None else f.kinetic
+    return replace(model_of(model.grooves, load, f.static, kinetic, speed, model.rig.modes), swing=swing_of(model))
 
 
 def flank_of(model: Model, patch):

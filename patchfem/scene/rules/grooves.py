@@ -52,8 +52,19 @@ def _locks(draft: Draft, at: str, grooves: Any, law: Any) -> None:
                   f"wavelength/(2 pi static) = {most:.6g} m is wanted, or a smaller static")
 
 
+def _under_changing_load(draft: Draft, beside: str) -> None:
+    """A load that is prescribed may swing above zero; heave and pitch would press the flanks by themselves."""
+    cause, normal = changing_load(draft.tables), draft.tables.normal
+    if cause == "normal.amplitude":
+        if normal.load is not None and normal.amplitude >= normal.load:
+            draft.say(cause, f"{normal.amplitude:.6g} N takes the load to zero, where nothing holds the pieces in "
+                      f"their grooves; less than normal.load = {normal.load:.6g} N is wanted {beside}")
+    elif cause:
+        draft.say(cause, unbuilt(f"{beside}, whose climb would press the contact against this motion", "either"))
+
+
 def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
-    """Grooves are climbed as a whole by one interface under a constant load."""
+    """Grooves are climbed as a whole by one interface, whose load heave and pitch do not change."""
     contact, structure = draft.tables.contact, draft.tables.structure
     beside = f"beside [{at}]"
     if has(law.law, "bonds") and (listed(law) or law.breakaway):
@@ -74,9 +85,7 @@ def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
             draft.say("wear", unbuilt(f"{beside} and {contact.gives_way}", "either"))
     if contact is not None and contact.strips is not None and (turning(draft.tables) or contact.gives_way):
         draft.say(at, unbuilt("beside strips that yaw or give way", "either"))
-    cause = changing_load(draft.tables)
-    if cause:
-        draft.say(cause, unbuilt(beside, "either"))
+    _under_changing_load(draft, beside)
     lower = [f"contact.{name}.on" for name, one in (contact.shapes if contact is not None else {}).items()
              if one.on == "lower"]
     if lower:

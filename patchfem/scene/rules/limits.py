@@ -12,7 +12,7 @@ from ...effects import MEANWHILE, carries, has, listed, named, refusal, takes, u
 from ..keys.contact import Contact
 from ..keys.tables import Friction, Tables
 from .draft import Draft
-from .methods import beside_load, changing_load, check_method, turning
+from .methods import beside_load, changing_load, check_method, climbed, turning
 
 # Valid in a scene but without an implementation -> what serves meanwhile.
 NOT_YET_BUILT: dict[str, str] = {
@@ -57,7 +57,8 @@ def combinations(draft: Draft, kind: str) -> None:
     _quadrature(draft, kind, law, shear)
     if kind == "rig" and (cause := changing_load(draft.tables)):
         _under_changing_load(draft, law, shear, cause)
-    if kind == "bench" and _still(law) and draft.tables.normal is not None and draft.tables.normal.amplitude:
+    still = _still(law) and not climbed(draft.tables)  # along flanks every law has a normal force that changes
+    if kind == "bench" and still and draft.tables.normal is not None and draft.tables.normal.amplitude:
         draft.say("normal.amplitude", f"beside law '{law.law}': {refusal('varying-load')}")
     if kind == "rig" and has(law.law, "bonds") and law.breakaway and law.order != 1:
         draft.say("friction.breakaway", unbuilt(f"beside order = {law.order:g} in a rig", "order"))
@@ -146,8 +147,9 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
     contact, structure, beside = draft.tables.contact, draft.tables.structure, beside_load(cause)
     if contact is None and cause != "normal.amplitude":
         draft.say(cause, "one rigid point leaves no room for heave or pitch: name [contact] in place of [normal]")
-    if not has(law.law, "bonds") and not carries(law, "varying-load"):
-        draft.say("friction.law", f"'{law.law}' {beside}: {refusal('varying-load')}")
+    carried = "grooves" if climbed(draft.tables) else "varying-load"
+    if not has(law.law, "bonds") and not carries(law, carried):
+        draft.say("friction.law", f"'{law.law}' {beside}: {refusal(carried)}")
     elif listed(law) or (has(law.law, "bonds") and law.breakaway):
         key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
         draft.say(f"friction.{key}", unbuilt(beside, "recursion"))

@@ -13,7 +13,7 @@ from patchfem.dynamics.grooves.run import model_of
 from patchfem.dynamics.march.hub import follow_path
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import element_model
-from patchfem.friction.grooves import Grooves
+from patchfem.friction.grooves import STEADY, Grooves, Swing
 from patchfem.friction.laws.bouc_wen import BoucWen
 from patchfem.friction.laws.elastic_plastic import parallel
 from patchfem.friction.laws.iwan import Iwan, sliders
@@ -41,18 +41,19 @@ def law_of(name, length=2e-6):
 NAMES = ("elements", "bouc-wen", "lugre")
 
 
-def model(name, grooves=GROOVES, length=2e-6):
-    return ElementsModel(grooves, LOAD, MU, law_of(name, length).element(LOAD))
+def model(name, grooves=GROOVES, length=2e-6, swing=STEADY):
+    return ElementsModel(grooves, LOAD, MU, law_of(name, length).element(LOAD), swing)
 
 
-def slid(name, grooves, slide, dt=1e-3):
-    forces, energies, contact = np.zeros((slide.size, 3)), np.zeros((slide.size, 2)), model(name, grooves).build()[0]
+def slid(name, grooves, slide, dt=1e-3, swing=STEADY):
+    contact = model(name, grooves, swing=swing).build()[0]
+    forces, energies = np.zeros((slide.size, 3)), np.zeros((slide.size, 2))
     kind = model(name, grooves).kind
     assert follow_path(slide, dt, kind, contact, None, 1e-9, energies, forces) == 0
     return forces, energies
 
 
-def twin(name, grooves, slide, dt):
+def twin(name, grooves, slide, dt, swing=STEADY):
     """Mean force and energy lost (k - 1,) of the steps of a slide: the NumPy law under the mean normal force, before
     and after half of its change, where the stretch of what stays is kept and that of what comes is none."""
     law, one = law_of(name), np.ones(1)
@@ -69,9 +70,10 @@ def twin(name, grooves, slide, dt):
     def rates(state, v):
         return v - abs(v) * state[0] * law.stiffness / law.limit(abs(v))
 
-    normal = LOAD * np.hypot(1, float(grooves.slope(slide[0])))
+    loads = swing.about(LOAD, dt * np.arange(slide.size))
+    normal = loads[0] * np.hypot(1, float(grooves.slope(slide[0])))
     state, place, speed, forces, losses = law.start(normal * one), 0.0, 0.0, [], []
-    for q, end in pairwise(slide):
+    for (q, end), (load, later) in zip(pairwise(slide), pairwise(loads)):
         dq = end - q
         inner = 0.5 * (q + end) + 0.5 * dq * np.array([-np.sqrt(0.6), 0, np.sqrt(0.6)])
         path, t = np.array([5, 8, 5]) / 18 @ np.hypot(1, grooves.slope(inner)) * dq, float(grooves.slope(end))
@@ -83,22 +85,23 @@ def twin(name, grooves, slide, dt):
             pulled, old = float(step.mean[0]), after
             held = 2 * pulled - place
             held = held if name == "lugre" else min(max(held, -MU * after), MU * after)
-            after = LOAD * np.hypot(1, t) + held * t
+            after = later * np.hypot(1, t) + held * t
             if abs(after - old) < 1e-14 * LOAD:
                 break
         state, last = pressed(step.state, mean, after)
         speed = dq / dt * np.hypot(1, t)
         place, normal = pull(state, speed), after
-        forces.append((LOAD * float(grooves.rise(q, end)) + pulled * path) / dq)
+        forces.append((0.5 * (load + later) * float(grooves.rise(q, end)) + pulled * path) / dq)
         losses.append(first + float(step.dissipated[0]) + last)
     return np.array(forces), np.array(losses)
 
 
+@pytest.mark.parametrize("swing", [STEADY, Swing(40.0, 2 * np.pi * 97, 0.7)])
 @pytest.mark.parametrize("name", NAMES)
-def test_exact_a_slow_slide_by_the_numpy_law(name):
+def test_exact_a_slow_slide_by_the_numpy_law(name, swing):
     slide = 30e-6 * np.sin(np.linspace(0, 7.3, 101))
-    forces, energies = slid(name, GROOVES, slide)
-    mean, lost = twin(name, GROOVES, slide, 1e-3)
+    forces, energies = slid(name, GROOVES, slide, swing=swing)
+    mean, lost = twin(name, GROOVES, slide, 1e-3, swing)
     np.testing.assert_allclose(forces[:-1, 1], mean, rtol=1e-8, atol=1e-9 * LOAD)
     np.testing.assert_allclose(energies[:-1, 0], lost, rtol=1e-7, atol=1e-11 * lost.sum())
     assert energies[:-1, 0].min() > -1e-12 * energies[:-1, 0].sum()  # no change of load gives energy
