@@ -71,8 +71,7 @@
     return {sizing_mode: "fixed", width: place.clientWidth, frame_width: Math.round(share * wide), frame_height: Math.round(share * tall)};
   }
 
-  function draw(chart) {
-    const place = document.getElementById(chart.anchor);
+  function made(chart, place) {
     const range = (axis) => axis.range ? new Bokeh.Range1d({start: axis.range[0], end: axis.range[1]}) : undefined;
     const ranges = {x_range: range(chart.x), y_range: range(chart.y)};
     Object.keys(ranges).forEach((name) => ranges[name] === undefined && delete ranges[name]);
@@ -89,8 +88,11 @@
     fig.title.text = chart.title;
     Object.assign(fig.title, {text_color: ink("--ink"), text_font_style: "normal", text_font_size: "13px"});
     if (chart.marks.some((mark) => mark.name)) legend(fig);
-    put(fig, place);
+    return fig;
   }
 
-  themed(() => data.charts.forEach(draw));
+  themed(() => data.charts.forEach((chart) => {
+    const place = document.getElementById(chart.anchor);
+    put(() => made(chart, place), place);
+  }));
 })();

@@ -207,12 +207,12 @@
   function draw() {
     const cases = chosen(), x = key(at("along").value), beside = key(at("beside").value);
     const m = data.measures.find((one) => one.name === at("measure").value);
-    const fig = !data.grid ? cloud(cases, x, beside, m) :
+    const make = () => !data.grid ? cloud(cases, x, beside, m) :
       beside && at("shown").value === "map" ? map(cases, x, beside, m) : lines(cases, x, beside, m);
     const words = told(cases, x, beside, m);
     at("means").textContent = `${m.means ? `${m.means[0].toUpperCase()}${m.means.slice(1)}. ` : ""}${words}`;
     at("chart").setAttribute("aria-label", words);
-    put(fig, at("chart"));
+    put(make, at("chart"));
   }
 
   fill();

@@ -1,7 +1,8 @@
 // What every picture of a page shares: colours of the page, numbers as people read them, an empty figure.
 "use strict";
 const pictures = (() => {
-  const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const root = document.documentElement;
+  const ink = (name) => getComputedStyle(root).getPropertyValue(name).trim();
   const colours = () => [ink("--accent"), ink("--warm"), "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86", "#3aa6b9", "#7d7d7d"];
   const number = (v) => v === null ? "–" : Number(v.toPrecision(7)).toString();
   const within = (v, e) => {                     // a value with its error, as many digits as the error allows
@@ -38,20 +39,37 @@ const pictures = (() => {
   }
 
   function bar(fig, color_mapper, title) {       // the scale of the colours
+    fig.scaled = true;
     fig.add_layout(new Bokeh.ColorBar({color_mapper, title, title_text_color: ink("--ink"),
       title_text_font_style: "normal", major_label_text_color: ink("--ink"), background_fill_color: null}), "right");
   }
 
   let queue = Promise.resolve();                 // one picture after the other: showing takes its time
-  function put(fig, place) {
+  function put(make, place) {                    // make: returns the figure, in the inks that stand
+    const fig = make();
+    if (place.nextElementSibling?.classList.contains("onpaper")) place.nextElementSibling.remove();
+    const twice = Boolean(fig.scaled) && root.dataset.drawn === "dark";
+    place.classList.toggle("twice", twice);
+    show(fig, place);
+    if (!twice) return;
+    const copy = document.createElement("div");  // a scale of colours cannot be inverted: paper gets a picture of its own
+    copy.className = "chart onpaper";
+    copy.style.width = `${place.clientWidth}px`;
+    copy.setAttribute("aria-hidden", "true");
+    place.after(copy);
+    root.dataset.inks = "paper";
+    try { show(make(), copy); } finally { delete root.dataset.inks; }
+  }
+
+  function show(fig, place) {
     queue = queue.then(() => { place.replaceChildren(); return Bokeh.Plotting.show(fig, place); });
   }
 
   function themed(draw) {                        // now, and when the reader's theme changes
     const dark = matchMedia("(prefers-color-scheme: dark)");
     const all = () => {
-      if (matchMedia("print").matches) return;   // paper takes what stands: a dark picture is inverted by its style
-      document.documentElement.dataset.drawn = dark.matches ? "dark" : "light";
+      if (matchMedia("print").matches) return;   // paper takes what stands: the style inverts a dark picture
+      root.dataset.drawn = dark.matches ? "dark" : "light";
       draw();
     };
     all();
