@@ -8,7 +8,7 @@ from ..core import ModalBasis, Start
 from ..structure.drive_sizes import omega_of, peak_speed
 from .drive import cycles_of, cycles_per_level, drive_of, levelled
 from .law import interface_names, rubbings_of
-from .structure import acts, first_of, frequencies, modes_of, notes_of, start_of, yaws
+from .structure import acts, first_of, frequencies, modes_of, notes_of, own_modes, start_of, yaws
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -75,9 +75,10 @@ class Rig:
 
 def rig_asked(scene) -> Rig:
     """The rig of a scene with [structure] and [drive]; PatchfemError for files or starts that cannot be used."""
-    structure, asked, modes = scene.structure, scene.drive, modes_of(scene)
+    structure, asked, alone = scene.structure, scene.drive, own_modes(scene)
+    modes = modes_of(scene, alone)
     drive, bonded = drive_of(scene, modes), structure.bonded
-    own, mass = first_of(scene)
+    own, mass = first_of(scene, alone)
     rows = levelled(asked)
     bends = bonded is not None and bonded.wavelength is not None
     return Rig(modes, drive, start_of(scene, modes), asked.kind, asked.waveform, asked.frequency,

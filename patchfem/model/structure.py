@@ -15,14 +15,16 @@ from ..structure import starts
 from ..structure.modes import basis
 
 
-def modes_of(scene) -> ModalBasis:
+def modes_of(scene, own: ModalBasis | None = None) -> ModalBasis:
     """Coordinates of [structure] with a linear [structure.bonded] worked in; `base` is the drive's participation.
+
+    own: what `own_modes` gives, where it is known.
 
     A moving base: each coordinate's share of its motion. A force: minus its share, with a(t) = F/basis.mass; it acts
     on drive.mass (structure.output_mass unless given), at the output of [[structure.mode]] and of a file without a
     force of its own. PatchfemError names what a file lacks.
     """
-    found = _over_strips(scene, _unbonded(scene))
+    found = _over_strips(scene, own_modes(scene) if own is None else own)
     if found.faces is not None and not len(found.faces):
         found = replace(found, faces=None)  # nothing rubs: the output stands for a slide without friction
     bonded = scene.structure.bonded
@@ -52,7 +54,8 @@ def _over_strips(scene, found: ModalBasis) -> ModalBasis:
     return replace(found, faces=frozen_array(strip_rows(found, offsets)))
 
 
-def _unbonded(scene) -> ModalBasis:
+def own_modes(scene) -> ModalBasis:
+    """Coordinates of [structure] without the bonded spring; of masses the eigenproblem is solved."""
     structure, drive = scene.structure, scene.drive
     forced = drive.kind == "force"
     if structure.mode:
@@ -140,9 +143,9 @@ def frequencies(structure, modes: ModalBasis) -> np.ndarray:
     return modes.omega / (2 * pi)
 
 
-def first_of(scene) -> tuple:
+def first_of(scene, found: ModalBasis) -> tuple:
     """Frequency [Hz] and mass [kg] of the first mode that is not rigid, without the bonded spring; 0 where all are
-    rigid.
+    rigid. found: what `own_modes` gives.
 
     mass: structure.moving_mass, or the modal mass at the output; where that mode leaves the output at rest, the mass of
     all coordinates. Masses and files have their modes in ascending order.
@@ -151,7 +154,6 @@ def first_of(scene) -> tuple:
     if structure.mode:
         held = [mode.frequency for mode in structure.mode if mode.frequency > 0]
         return (held[0] if held else 0.0), structure.moving_mass
-    found = _unbonded(scene)
     held = np.flatnonzero(found.omega > 0)
     k = held[0] if held.size else 0
     frequency = float(found.omega[k] / (2 * pi)) if held.size else 0.0

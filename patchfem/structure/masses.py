@@ -30,6 +30,6 @@ def basis(masses, springs, dampers, interfaces, output: int, pushed: int | None 
     stretch = rows([pair for pair, _ in springs], n) * np.sqrt([[k] for _, k in springs] or np.zeros((0, 1)))
     dash = rows([pair for pair, _ in dampers], n) * np.sqrt([[c] for _, c in dampers] or np.zeros((0, 1)))
     unit = np.eye(n)
-    return matrices.basis(np.diag(np.asarray(masses, float)), stretch.T @ stretch, dash.T @ dash if len(dash) else None,
-                          faces=rows(interfaces, n) if interfaces else None, output=unit[output - 1],
-                          force=None if pushed is None else unit[pushed - 1], stretch=stretch)
+    return matrices.basis(np.diag(np.asarray(masses, float)), faces=rows(interfaces, n) if interfaces else None,
+                          output=unit[output - 1], force=None if pushed is None else unit[pushed - 1], stretch=stretch,
+                          dash=dash if len(dash) else None)

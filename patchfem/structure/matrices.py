@@ -15,7 +15,7 @@ SKEW = 1e-8  # share of the largest entry by which a symmetric matrix may differ
 APART = 1e-11  # relative distance of eigenvalues below which any mix of their shapes is as good
 
 
-def basis(M, K, C=None, *, faces=None, output=None, base=None, force=None, names=None, stretch=None,
+def basis(M, K=None, C=None, *, faces=None, output=None, base=None, force=None, names=None, stretch=None, dash=None,
           **rows) -> ModalBasis:
     """ModalBasis of mass 1 kg from M, K and C (n, n) [kg, N/m, N s/m], C may be None.
 
@@ -23,19 +23,21 @@ def basis(M, K, C=None, *, faces=None, output=None, base=None, force=None, names
     motion of the output. output (n,): what the accelerometer feels, default the first interface. base (n,): unit motion
     of the base, default ones. force (n,) instead: a force drive acts by these shares, a(t) = F/1 kg. rows: normal,
     pitch, lateral, yaw (n,).
-    stretch (s, n): rows with K = stretch^T stretch, for springs that are known one by one: soft modes beside stiff
-    links keep all their digits. The coordinates are sorted by frequency; rigid ones have omega exactly 0.
+    stretch (s, n): rows with K = stretch^T stretch, instead of K, for springs that are known one by one: soft modes
+    beside stiff links keep all their digits. dash (d, n): the same of C. The coordinates are sorted by frequency; rigid
+    ones have omega exactly 0.
 
     PatchfemError names a matrix that is not square, finite, symmetric, or M not positive, K or C not positive
     semidefinite.
     """
-    M, K = _symmetric(M, "M"), _symmetric(K, "K", np.shape(M))
+    M = _symmetric(M, "M")
     n = len(M)
+    K = _symmetric(K, "K", M.shape) if stretch is None else None
     C = None if C is None else _symmetric(C, "C", M.shape)
     root = _root(M)
     omega, turned = _modes(root, K, stretch)
-    phi = solve_triangular(root, turned, lower=True, trans="T")
-    D = np.zeros((n, n)) if C is None else _damper(phi, C)
+    phi = _divided(root, turned, "T")
+    D = np.zeros((n, n)) if C is None and dash is None else _damper(phi, C) if dash is None else _dashed(phi, dash)
     phi, D = _unmixed(phi, omega, D)
     faces = np.zeros((0, n)) if faces is None else np.atleast_2d(_row(faces, n, "slide"))
     if output is None:
@@ -84,11 +86,8 @@ def trimmed(D, scale) -> np.ndarray:
 
 def _modes(root, K, stretch) -> tuple:
     if stretch is not None:
-        return decouple(solve_triangular(root, np.asarray(stretch, float).T, lower=True).T)
-    half = solve_triangular(root, K, lower=True)
-    unit = solve_triangular(root, half.T, lower=True, check_finite=False)
-    if not np.isfinite(unit).all():
-        raise PatchfemError("structure: K over M is too large for a number; are both in SI units?")
+        return decouple(_numbers(_divided(root, np.asarray(stretch, float).T).T))
+    unit = _numbers(_divided(root, _divided(root, K).T))
     square, turned = eigh((unit + unit.T) / 2)
     least = len(K) * ROUND * np.abs(square).max(initial=0.0)
     if square[0] < -least:
@@ -98,18 +97,35 @@ def _modes(root, K, stretch) -> tuple:
     return np.sqrt(np.where(square <= least, 0.0, square)), turned
 
 
+def _numbers(unit) -> np.ndarray:
+    if not np.isfinite(unit).all():
+        raise PatchfemError("structure: K over M is too large for a number; are both in SI units?")
+    return unit
+
+
 def _root(M):
+    """Lower Cholesky factor (n, n) of M; of a diagonal M the diagonal (n,) alone."""
+    alone = not (M - np.diag(np.diag(M))).any()
+    scale = np.sqrt(np.maximum(np.diag(M), 0.0))
     try:
-        root = cholesky(M, lower=True)
+        root = scale if alone else cholesky(M, lower=True)
     except LinAlgError:
         root = None
-    scale = np.sqrt(np.maximum(np.diag(M), 0.0))
-    if root is None or np.any(np.diag(root) <= np.sqrt(len(M) * ROUND) * scale):
+    least = 0.0 if alone else np.sqrt(len(M) * ROUND) * scale
+    if root is None or np.any((root if alone else np.diag(root)) <= least):
         bare = np.flatnonzero(np.diag(M) <= 0)
         which = f" (coordinate {bare[0] + 1} has none)" if bare.size else ""
         raise PatchfemError(f"structure: M is not positive definite: every coordinate needs mass{which}; condense the "
                             "others out or give them their mass")
     return root
+
+
+def _divided(root, right, trans: str = "N") -> np.ndarray:
+    """root^-1 right, or root^-T right, of a lower triangle or of a diagonal as `_root` gives it."""
+    if root.ndim == 2:
+        return solve_triangular(root, right, lower=True, trans=trans, check_finite=False)
+    with np.errstate(over="ignore"):  # `_numbers` refuses it
+        return right / root[:, None]
 
 
 def without_phase(values, name):
@@ -160,6 +176,13 @@ def _damper(phi, C):
         raise PatchfemError(f"structure: C feeds energy in: one shape has the damping {least[0]:.3g} 1/s over its "
                             "mass; dampers >= 0 are wanted")
     return D
+
+
+def _dashed(phi, dash) -> np.ndarray:
+    """D of dampers that are known one by one, which takes energy out as it stands."""
+    dash = np.asarray(dash, float)
+    moved, size = dash @ phi, np.abs(dash) @ np.abs(phi)
+    return trimmed(moved.T @ moved, size.T @ size)
 
 
 def _unmixed(phi, omega, D) -> tuple:

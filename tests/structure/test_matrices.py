@@ -88,6 +88,21 @@ def test_always_springs_one_by_one_are_their_matrix(seed, n):
     np.testing.assert_allclose(*(receptance(one, w, one.slide, one.base) for one in (ours, want)), rtol=1e-8)
 
 
+@given(st.integers(0, 10**6), st.integers(2, 6))
+def test_always_dampers_one_by_one_are_their_matrix(seed, n):
+    """The same net of dampers by its single dampers and by its C: zeta and damping to round-off of the largest."""
+    rng = np.random.default_rng(seed)
+    pairs = [(i + 1, int(rng.integers(0, i + 1))) for i in range(n)]
+    springs, dampers = ([(pair, k) for pair, k in zip(pairs, rng.uniform(0.5, 2, n))] for _ in range(2))
+    m, dash = rng.uniform(0.5, 2, n), masses.rows(pairs, n) * np.sqrt([[c] for _, c in dampers])
+    ours = masses.basis(m, springs, dampers, [(1, 0)], n)
+    stretch = masses.rows(pairs, n) * np.sqrt([[k] for _, k in springs])
+    want = matrices.basis(np.diag(m), C=dash.T @ dash, faces=masses.rows([(1, 0)], n), output=np.eye(n)[n - 1],
+                          stretch=stretch)
+    np.testing.assert_allclose(ours.dampers, want.dampers, atol=1e-12 * np.abs(want.dampers).max())
+    np.testing.assert_allclose(ours.zeta, want.zeta, rtol=1e-10)
+
+
 @given(st.integers(0, 10**6), st.integers(1, 6))
 def test_always_modal_energy_is_physical_energy(seed, n):
     """Kinetic, strain and dissipated energy of any motion are the same in masses and in modes; work of the face too."""
@@ -173,6 +188,11 @@ def test_refuses_matrices_without_modes(M, K, C, says):
     with pytest.raises(PatchfemError) as caught:
         matrices.basis(M, K, C)
     assert says in str(caught.value)
+
+
+def test_refuses_springs_too_stiff_for_their_masses():
+    with pytest.raises(PatchfemError, match="K over M is too large for a number"):
+        masses.basis([1e-320], [((1, 0), 1e300)], [], [(1, 0)], 1)
 
 
 def test_exact_matrices_stored_as_complex_numbers_are_their_real_parts():
