@@ -7,21 +7,48 @@ from typing import NamedTuple
 from ..core import Missing
 from ..model.model import Model
 
-PACKAGES, COMPILED = 76e6, 62e6  # bytes of what every run imports, and of what runs compiled code
+PACKAGES = 80e6  # bytes of what every run imports
 FULL = 125.0  # per pair of coordinates: matrices, shapes and what diagonalises them
 WAVE = 94.0  # per pair of sines and cosines of harmonic balance: its Jacobian and the factors of its error
 KEPT = 32.0  # per number of a kept sample: the window, the response, what is read off it
 GRID = 24.0  # per number of a step of the comparison methods, which keep all of them
 SLIDE = 250.0  # per sample of a bench
 ROW = 400.0  # per row of a recorded drive
-LOADED = 0.4  # seconds of CPU until the first compiled code runs
 MAPPED, CODE = 60e6, 150e6  # of address space beside what is used: packages, and the compiler's library
-PLAIN = ("static", "exact", "harmonic", "bench, closed form", "bench, law step by step", "bench, two directions")
 CODE_PART = "compiled code"
 CURES = {"contact.element_size": "make contact.element_size larger", "contact.mesh": "give contact.mesh fewer nodes on "
          "its interface", "accuracy.tail": "loosen accuracy.tail or accuracy.merge", "structure": "give fewer modes",
          "slide.file": "keep every few rows of slide.file", "drive.file": "keep every few rows of drive.file"}
 COMPARED = ("duhamel", "newmark", "euler")
+
+
+class Code(NamedTuple):
+    """What the code of an engine takes besides the program: bytes, seconds of CPU until it runs, and whether a compiler
+    is loaded with it."""
+
+    bytes: float
+    seconds: float
+    compiled: bool = True
+
+
+NONE = Code(0.0, 0.0, False)
+FEW, EVENTS = Code(6e6, 0.05, False), Code(28e6, 0.25, False)  # exact: of one mode under sines or no friction; of any
+STEPS, SMOOTH, PIECES, BALANCE = Code(58e6, 0.4), Code(74e6, 0.4), Code(82e6, 0.4), Code(1e8, 0.55)
+CODES = {"static": NONE, "bench, closed form": NONE, "bench, law step by step": NONE, "bench, two directions": NONE,
+         "smooth": SMOOTH, "piecewise": PIECES, "harmonic": BALANCE}
+
+
+def code(model: Model, engine: str) -> Code:
+    """The code of the engine that will run a model."""
+    by = engine
+    if engine == "harmonic":
+        from .rig.engines import steady_by
+
+        by = {"events": "exact", "yields": "piecewise"}.get(steady_by(model), engine)
+    if by == "exact":
+        rig = model.rig
+        return FEW if not rig.interfaces or (len(rig.frequencies) == 1 and rig.drive.segments) else EVENTS
+    return CODES.get(by, STEPS)
 
 
 class Need(NamedTuple):
@@ -41,7 +68,8 @@ def needs(model: Model, engine: str, steps: int, unknowns: dict, numerics=None, 
     masses as the largest; files and page take less than what they show.
     """
     points = unknowns.get("interface_points", 0)
-    parts = [Need(PACKAGES, "packages", ""), Need(0 if engine in PLAIN else COMPILED, CODE_PART, "")]
+    runs = code(model, engine)
+    parts = [Need(PACKAGES, "packages", ""), Need(runs.bytes, CODE_PART if runs.compiled else "code", "")]
     if points:
         key = "contact.mesh" if model.patch.mesh else "contact.element_size"
         parts.append(Need(pressed, f"{points} nodes of the interface", key))

@@ -78,9 +78,12 @@ def _planned(model: Model, per_point: bool) -> Plan:
         said[2] = of_rig.sum_words(model) if model.kind == "rig" else []
     if model.patch is not None:
         from .patch import plan as of_patch
+        from .patch.foreseen.grids import sizes as of_grids
 
-        unknowns, chain = of_patch.sizes(model.patch) | unknowns, chain | of_patch.chain(model.patch)
-        seconds, pressed = of_patch.effort(model.patch, model.kind == "patch", model.accuracy.tolerance)
+        tolerance = model.patch.mesh_tolerance or model.accuracy.tolerance
+        grids = of_grids(model.patch, tolerance)
+        unknowns, chain = of_patch.sizes(grids) | unknowns, chain | of_patch.chain(model.patch)
+        seconds, pressed = of_patch.effort(model.patch, grids, tolerance)
         groups |= of_patch.groups(model)
         said[1] = of_patch.verdict(groups)
     if model.rig is not None:
@@ -96,7 +99,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
 
         seconds += of_wear.cost(model, unknowns["interface_points"], more)
         said[2] = [*said[2], of_wear.verdict(model)]
-    seconds += START + (0.0 if engine in memory.PLAIN else memory.LOADED)
+    seconds += START + memory.code(model, engine).seconds
     parts = memory.needs(model, engine, steps, unknowns, numerics, pressed)
     if model.friction is not None:
         from . import law

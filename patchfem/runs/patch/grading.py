@@ -146,15 +146,20 @@ def loaded(patch: Patch) -> Found:
 
 def grids_of(asked, layout: Layout) -> list:
     """Grids of the pieces, one where they are alike, with the columns of a layout, MOST_COLUMNS at most."""
-    pieces = (asked.lower,) if asked.alike else (asked.lower, asked.upper)
+    pieces, x = (asked.lower,) if asked.alike else (asked.lower, asked.upper), columns_of(asked, layout)
+    return [outlined(asked, piece, grid_on(asked, x, piece), 1 + SLOPE[asked.still]) for piece in pieces]
+
+
+def columns_of(asked, layout: Layout) -> np.ndarray:
+    """Columns (k,) [m] of a layout, MOST_COLUMNS at most."""
     x = columns(layout, asked.gap.jumps)
     while x.size > MOST_COLUMNS + 1 and layout.bands:
         layout = layout.times(x.size / MOST_COLUMNS)
         x = columns(layout, asked.gap.jumps)
-    return [outlined(asked, piece, _grid(asked, x, piece), 1 + SLOPE[asked.still]) for piece in pieces]
+    return x
 
 
-def _grid(asked, x, piece) -> TensorGrid:
+def grid_on(asked, x, piece) -> TensorGrid:
     """Grid of one piece: rows as fine as the columns at the interface, at the coating's own face and at the holder."""
     thick, height = piece.thickness, piece.height
     top = float(np.diff(x).min())

@@ -1,38 +1,42 @@
 """Sizes, stiffness and groups of a patch, before it is pressed."""
 
-from math import sqrt
+from math import log10, sqrt
 
 from ...model.model import Model
-from ...model.patch import CHOSEN_POINTS, bars, block_shear
+from ...model.patch import bars, block_shear
+from .foreseen.grids import Sizes, work
+from .high_order import serves
 
-PRESSED, SQUARE = 0.15, 1.5e-6  # seconds of a patch, and per pair of nodes
-NODE, PAIR, PACKAGES = 5.5e4, 133.0, 1.6e7  # bytes per node, per pair of nodes: flexibilities, factors; of packages
-MOVING, FRAMES = 0.35, 2.5e7  # seconds and bytes of the frames of a patch whose contact moves
+PRESSED, WORK = 0.15, 3.0  # seconds of a patch with its fields, and per predicted second of condensing it
+OUTLINED = 2.2  # the last of pieces beyond the interface, whose predicted seconds are those of any cells already
+MOVING, MOVING_NODE = 0.35, 3e-5  # seconds of the frames of a patch that moves, and per node of the finest grids
+# bytes of packages; per predicted byte of condensing; per node: of pieces beyond the interface, of frames
+PACKAGES, CONDENSED, OUTLINED_NODE, FRAMES_NODE = 2e7, 0.8, 4.6e3, 3.5e3
+SHARPER, SHARPER_BYTES = 0.09, 1.2e7  # seconds and bytes of cells of order 4 at a tolerance of 1e-4
+EDGED = 3.0  # times that where a contact ends inside or under a coating
+SHARP_FROM = 5e-4  # tolerance from which cells of order 4 are wanted
 
 
-def sizes(asked) -> dict:
-    """Sizes of a `PatchModel` by name: interface points, and about how many elastic unknowns."""
-    points = CHOSEN_POINTS if asked.chosen else round(asked.length / asked.size) + 1
-    return {"interface_points": points, "elastic_unknowns_about": int(points * 2 * 33)}
+def sizes(found: Sizes) -> dict:
+    """Sizes of a patch of such grids by name: interface points, and about how many elastic unknowns."""
+    return {"interface_points": found.points, "elastic_unknowns_about": int(2 * found.nodes)}
 
 
-def effort(asked, still: bool, tolerance: float) -> tuple:
-    """(seconds, bytes) of pressing a `PatchModel` and of its fields, besides the program itself; still: nothing moves.
+def effort(asked, found: Sizes, tolerance: float) -> tuple:
+    """(seconds, bytes) of pressing a `PatchModel` on such grids and of its fields, besides the program itself.
 
-    Measured over random patches: the square of the nodes, and what outlines, steps, unlike pieces and a mesh that has
-    to follow the edge of the contact to a fine tolerance take besides.
+    Both follow from the work of condensing the grids, which is known from their sizes; what a unit of it takes, with
+    the fields and files of the finest grid, was measured over random patches.
     """
-    points = sizes(asked)["interface_points"]
-    seconds, size = PRESSED + SQUARE * points**2, PACKAGES + NODE * points + PAIR * points**2
-    unlike = asked.lower != asked.upper
-    if asked.outlined or asked.gap.jumps:
-        seconds, size = seconds + 1.3, size + 1.2e8
-    if asked.chosen and (asked.outlined or asked.gap.jumps):
-        seconds, size = seconds + 0.7, size + 5e7
-    ends = bool(asked.gap.shapes) or asked.offset or asked.line_moment
-    if asked.chosen and ends and not still and tolerance < 2e-3:
-        seconds, size = seconds + 2.5, size + 2.8e8
-    return seconds + (0.0 if still else MOVING) + 0.3 * unlike, size + (0.0 if still else FRAMES)
+    seconds, size = work(found)
+    seconds = PRESSED + (OUTLINED if found.outlined else WORK) * seconds
+    size = PACKAGES + (OUTLINED_NODE * found.nodes if found.outlined else CONDENSED * size)
+    if tolerance < SHARP_FROM and serves(asked):
+        decades = log10(1e-3 / tolerance) * (1 if found.ends == 0 and not asked.lower.thickness else sqrt(EDGED))
+        seconds, size = seconds + SHARPER * decades**2, size + SHARPER_BYTES * decades**2
+    if not asked.still:
+        seconds, size = seconds + MOVING + MOVING_NODE * found.nodes, size + FRAMES_NODE * found.nodes
+    return seconds, size
 
 
 def chain(asked) -> dict:
