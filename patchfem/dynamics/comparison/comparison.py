@@ -103,11 +103,18 @@ def grid(modes: ModalBasis, drive, law: tuple, duration: float, steps_per_cycle:
         if not np.all(np.isfinite([start.z, start.v])):
             raise PatchfemError("a start needs finite coordinates and rates")
         z[0], v[0] = start.z, start.v
-    values = np.ascontiguousarray(drive.values(time), float)
+    values = np.array(drive.values(time), float, order="C")
     found = Grid(h, time, values, z, v, np.zeros((i, steps + 1)), np.zeros((i, steps + 1)),
                  np.zeros(steps + 1, np.int64))
     found.force[:, 0] = first_forces(modes, laws, kernels, values[0], z[0], v[0])
     return found
+
+
+def taken(modes: ModalBasis) -> tuple:
+    """(omega, dampers, interfaces, base, mass) of modes as the compiled loops take them: arrays of their own, for numba
+    compiles a loop anew for one that is read-only or lies otherwise in memory."""
+    return *(np.array(one, float, order="C") for one in (modes.omega, modes.dampers, modes.interfaces, modes.base)), \
+        float(modes.mass)
 
 
 def first_forces(modes: ModalBasis, laws: np.ndarray, kernels, drive: float, z, v) -> np.ndarray:

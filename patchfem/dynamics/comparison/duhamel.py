@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from ...core import ModalBasis, PatchfemError, Start
-from .comparison import Comparison, finish, grid
+from .comparison import Comparison, finish, grid, taken
 from .point_laws import Smooth, loops, rows, sticking_warnings
 
 CRITERIA = ("displacement", "velocity", "force")
@@ -53,15 +53,13 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     law = rows(laws, len(modes.interfaces))
     compiled = loops(laws)
     found = grid(modes, drive, (law, compiled), duration, steps_per_cycle, start)
-    dampers = np.ascontiguousarray(modes.dampers, float)
+    omega, dampers, *others = taken(modes)
     maps, coupling = kernels(modes, found.h), dampers - np.diag(np.diag(dampers))
     solve = np.linalg.inv(np.eye(modes.omega.size) + maps[:, 1, 3:] * coupling)
     room = np.empty((3, len(law))), np.empty((3, modes.omega.size))
     failures = compiled.duhamel_loop(
-        maps, coupling, solve, np.array(modes.omega), dampers,
-        np.ascontiguousarray(modes.interfaces, float), np.array(modes.base), float(modes.mass), found.drive, law,
-        CRITERIA.index(convergence), float(tolerance), float(relax), int(most), room, found.z, found.v, found.force,
-        found.residual, found.iterations)
+        maps, coupling, solve, omega, dampers, *others, found.drive, law, CRITERIA.index(convergence), float(tolerance),
+        float(relax), int(most), room, found.z, found.v, found.force, found.residual, found.iterations)
     said = _warnings(modes, laws, law, found, convergence, tolerance, relax, failures)
     return finish(modes, found, failures, said)
 

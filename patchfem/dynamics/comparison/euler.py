@@ -7,7 +7,7 @@ and friction limit tanh(v/v_0) shakes at rest for h > 2 v_0 m/limit.
 import numpy as np
 
 from ...core import ModalBasis, Start
-from .comparison import Comparison, finish, grid
+from .comparison import Comparison, finish, grid, taken
 from .point_laws import Smooth, loops, rows, sticking_warnings
 
 
@@ -24,10 +24,7 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     found = grid(modes, drive, (law, kernels), duration, steps_per_cycle, start)
     room = np.empty(len(law)), np.empty(modes.omega.size)
     with np.errstate(over="ignore", invalid="ignore"):
-        kernels.euler_loop(
-            np.array(modes.omega), np.ascontiguousarray(modes.dampers, float),
-            np.ascontiguousarray(modes.interfaces, float), np.array(modes.base), float(modes.mass), found.drive, law,
-            found.h, room, found.z, found.v, found.force)
+        kernels.euler_loop(*taken(modes), found.drive, law, found.h, room, found.z, found.v, found.force)
         return finish(modes, found, 0, _warnings(modes, laws, found.h))
 
 

@@ -10,7 +10,7 @@ friction is that of the speed at the start of the step, so a reversal without st
 import numpy as np
 
 from ...core import ModalBasis, PatchfemError, Start
-from .comparison import Comparison, finish, grid
+from .comparison import Comparison, finish, grid, taken
 from .point_laws import Coulomb, loops, rows, sticking_warnings
 
 
@@ -27,14 +27,13 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     law = rows(laws, len(modes.interfaces), stick_speed)
     kernels = loops(laws)
     found = grid(modes, drive, (law, kernels), duration, steps_per_cycle, start)
-    h, dampers = found.h, np.ascontiguousarray(modes.dampers, float)
-    inverse = np.linalg.inv(np.eye(modes.omega.size) + h / 2 * dampers + h * h / 4 * np.diag(modes.omega**2))
-    count, n = len(law), modes.omega.size
+    h, (omega, dampers, *others) = found.h, taken(modes)
+    inverse = np.linalg.inv(np.eye(omega.size) + h / 2 * dampers + h * h / 4 * np.diag(omega**2))
+    count, n = len(law), omega.size
     room = np.zeros((3, count, count)), np.zeros(count, bool), np.zeros((4, count)), np.zeros((4, n))
     stops = kernels.newmark_loop(
-        inverse, np.array(modes.omega), dampers, np.ascontiguousarray(modes.interfaces, float), np.array(modes.base),
-        float(modes.mass), found.drive, law, h, int(by_force), room, found.z, found.v, found.force, found.residual,
-        found.iterations)
+        inverse, omega, dampers, *others, found.drive, law, h, int(by_force), room, found.z, found.v, found.force,
+        found.residual, found.iterations)
     return finish(modes, found, stops, _warnings(modes, laws, law, found, stick_speed, by_force, stops))
 
 

@@ -1,5 +1,6 @@
 """The comparison methods by themselves: kernels, order, compiled loops against plain ones, ledgers, refusals."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -21,8 +22,9 @@ from comparison_cases import (
 )
 from hypothesis import given
 from hypothesis import strategies as st
+from numba import typeof
 
-from patchfem.core import BaseSine, PatchfemError, Start
+from patchfem.core import BaseSine, PatchfemError, Start, frozen_array
 from patchfem.dynamics.comparison import duhamel, euler, newmark
 from patchfem.dynamics.comparison.comparison import first_forces
 from patchfem.dynamics.comparison.point_laws import Coulomb, loops, rows
@@ -236,3 +238,25 @@ def test_exact_forces_of_a_start():
     laws[0, 1:3] = 0.01
     assert first_forces(COUPLED, laws, compiled, 0.7, z, v)[0] == pytest.approx(0.01 * np.sign(force[0]))
     assert first_forces(COUPLED, laws, compiled, 0.7, z, -v)[1] == pytest.approx(-0.3 * np.tanh(5.0))
+
+
+@pytest.mark.parametrize("method", [duhamel, newmark, euler])
+def test_exact_one_compiled_loop_serves_read_only_arrays_and_any_order_in_memory(monkeypatch, method):
+    """Numba compiles a loop for each type of its arguments; those of a rig's file and of one made by hand differ."""
+    asked, laws = set(), (Coulomb(0.5, 0.4, 0.02), Coulomb(0.3, 0.3))
+
+    class Loops:
+        def __getattr__(self, name):
+            def called(*given):
+                asked.add((name, *(typeof(one) for one in given)))
+                return getattr(loops(laws), name)(*given)
+            return called
+
+    monkeypatch.setattr(method, "loops", lambda laws: Loops())
+    damping, faces, ends = np.array([[0.2, 0.1], [0.1, 0.3]]), np.array([[1.0, 0.5], [0.3, -0.8]]), []
+    for form in (frozen_array, np.array, np.asfortranarray):
+        modes = replace(basis([1.0, 2.5], [0.02, 0.05], faces, [1.0, 0.4]), damping=form(damping), faces=form(faces))
+        ends.append(method.run(modes, DRIVE, laws, 20.0, 40).z[-1])
+    assert {name for name, *_ in asked} == {"first_forces", f"{method.__name__.rpartition('.')[2]}_loop"}
+    assert len(asked) == 2
+    assert np.array_equal(ends[0], ends[1]) and np.array_equal(ends[0], ends[2])
