@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -132,7 +133,7 @@ def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):
     words = [sys.executable, "-c", code, "run", scene, "--no-page", "-q", "-o", out]
     run = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
     while not (tmp_path / "out.partial" / "march_1.npz").is_file() and run.poll() is None:
-        pass
+        time.sleep(0.005)
     run.send_signal(number)
     said = run.communicate()[1]
     left = {one.name for one in tmp_path.iterdir()} - {"scene.toml"}

@@ -80,7 +80,7 @@ def test_exact_the_initial_bonds_have_no_sign_at_their_own_place(reading):
         path[-1] = off
         got, state, numpy = follow_list(law, path).after[-1], Quadrature(law, 0.0).start(one), Quadrature(law, 0.0)
         for dq in np.diff(path):
-            state = numpy.step(state, dq, one, one, 1.0).state
+            state = numpy.carried(state, dq, one, one, 1.0)
         sides = [follow_list(law, np.append(path, side)).after[-1] for side in (-1e-7, 1e-7)]
         assert got == pytest.approx(np.mean(sides), abs=1e-6) and abs(sides[1] - sides[0]) > 0.1
         assert numpy.traction(state)[0] == pytest.approx(got, abs=1e-9)
