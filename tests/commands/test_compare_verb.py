@@ -36,21 +36,32 @@ def written(path: Path, trace: Profile) -> Path:
     return path
 
 
-@pytest.fixture
-def files(tmp_path) -> tuple:
+@pytest.fixture(scope="module")
+def files(tmp_path_factory) -> tuple:
     """Before, after with half of it worn, and the pair."""
-    p = pair(30077, share=0.5)
-    return written(tmp_path / "before.csv", p.before), written(tmp_path / "after.csv", p.after), p
+    p, place = pair(30077, share=0.5), tmp_path_factory.mktemp("traces")
+    return written(place / "before.csv", p.before), written(place / "after.csv", p.after), p
 
 
-def test_exact_the_answer_in_one_command(files, tmp_path):
-    before, after, p = files
-    out = tmp_path / "out"
-    answer = cli("compare", before, after, "--direction", "x", "-o", out)
+@pytest.fixture(scope="module")
+def compared(files, tmp_path_factory) -> tuple:
+    """(Answer, folder) of the comparison of both along y."""
+    out = tmp_path_factory.mktemp("compared") / "out"
+    return cli("compare", *files[:2], "--direction", "y", "-o", out), out
+
+
+@pytest.fixture
+def no_page(monkeypatch):
+    """The page, most of the time of a comparison, is left out."""
+    monkeypatch.setattr("patchfem.export.surfaces.compare.write_page", lambda *of: None)
+
+
+def test_exact_the_answer_in_one_command(files, compared):
+    p, (answer, out) = files[2], compared
     assert answer.code == 0 and answer.out.splitlines()[0] == "reduced"
     assert answer.out.splitlines()[-1] == f"results: {out}"
     found = json.loads((out / "compare.json").read_text())
-    assert found["reference"] == "place" and found["direction"] == "x"
+    assert found["reference"] == "place" and found["direction"] == "y"
     for name in NAMES:
         assert set(found[name]) == {"value", "low", "high", "unit"}
         assert found[name]["low"] <= found[name]["value"] <= found[name]["high"]
@@ -63,7 +74,7 @@ def test_exact_the_answer_in_one_command(files, tmp_path):
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
-def test_exact_json_says_why_there_is_no_depth(files, tmp_path):
+def test_exact_json_says_why_there_is_no_depth(files, tmp_path, no_page):
     other = written(tmp_path / "elsewhere.csv", pair(50001, share=0.3).after)
     found = json.loads(cli("compare", files[0], other, "--json", "-o", tmp_path / "out").out)
     for name in NAMES[:4]:
@@ -73,14 +84,14 @@ def test_exact_json_says_why_there_is_no_depth(files, tmp_path):
     assert found["amplitude_ratio"]["value"] > 0
 
 
-def test_exact_identical_traces_show_no_change(files, tmp_path):
+def test_exact_identical_traces_show_no_change(files, tmp_path, no_page):
     found = json.loads(cli("compare", files[0], files[0], "--json", "-o", tmp_path / "out").out)
     assert found["verdict"] == "no change shown" and found["worn_depth_mean"]["value"] == 0.0
     assert found["shift"]["value"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_always_a_scene_is_pressed_with_both(files, tmp_path):
-    (tmp_path / "patch.toml").write_text(SCENE)
+    (tmp_path / "patch.toml").write_text(SCENE.replace("before.csv", str(files[0])))
     out = tmp_path / "out"
     answer = cli("compare", files[0], files[1], "--scene", tmp_path / "patch.toml", "-o", out)
     assert answer.code == 0, answer.err
@@ -101,7 +112,8 @@ def test_always_a_scene_is_pressed_with_both(files, tmp_path):
 
 
 def test_always_a_scene_that_is_longer_than_the_trace_is_told(files, tmp_path):
-    (tmp_path / "patch.toml").write_text(SCENE.replace("0.9 mm", "12.7 mm").replace("2 um", "50 um"))
+    (tmp_path / "patch.toml").write_text(SCENE.replace("0.9 mm", "12.7 mm").replace("2 um", "50 um")
+                                         .replace("before.csv", str(files[0])))
     answer = cli("compare", files[0], files[1], "--scene", tmp_path / "patch.toml", "-o", tmp_path / "out")
     assert answer.code in (0, 2) and "long, the patch 12.7 mm" in answer.out + answer.err
 
@@ -120,8 +132,8 @@ def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
     assert found["verdict"] == "no change shown" and "one row" in found["worn_depth_max"]["reason"]
 
 
-def test_exact_python_gives_what_the_command_writes(files, tmp_path):
-    said = json.loads(cli("compare", *files[:2], "--direction", "y", "--json", "-o", tmp_path / "out").out)
+def test_exact_python_gives_what_the_command_writes(files, compared):
+    said = json.loads((compared[1] / "compare.json").read_text("utf-8"))
     found = pf.compare(str(files[0]), files[1], direction="y")
     assert json.loads(json.dumps(found)) == said and found["direction"] == "y" and found["verdict"] == "reduced"
 
@@ -162,11 +174,9 @@ def test_exact_neither_meshes_nor_compiled_code_are_imported(files, tmp_path):
     assert not modules & {*ALWAYS, "skfem"}
 
 
-def test_exact_the_pages_are_the_same_bytes(files, tmp_path):
-    pages = []
-    for name in ("one", "two"):
-        cli("compare", *files[:2], "-o", tmp_path / name)
-        pages.append((tmp_path / name / "report.html").read_bytes())
+def test_exact_the_pages_are_the_same_bytes(files, compared, tmp_path):
+    cli("compare", *files[:2], "--direction", "y", "-o", tmp_path / "again")
+    pages = [(out / "report.html").read_bytes() for out in (compared[1], tmp_path / "again")]
     assert pages[0] == pages[1] and np.all([len(page) > 50000 for page in pages])
 
 

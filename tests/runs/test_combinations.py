@@ -47,7 +47,7 @@ SKIN = ["contact.asperities.law=exponential", "contact.asperities.decay_length=1
 YAW, PITCH = [*STRIPS, "structure.mode.axial.yaw=2 rad/m"], ["structure.mode.axial.pitch=1 rad/m"]
 WAVES = [["drive.waveform=step"], ["drive.kind=free", "drive.displacement=0.1 mm"],
          ["drive.waveform=levels", 'drive.levels=["3 g", "4 g"]'],
-         ["drive.waveform=sweep", "drive.from=140 Hz", "drive.to=146 Hz", "drive.rate=100 Hz/s"]]
+         ["drive.waveform=sweep", "drive.from=143 Hz", "drive.to=143.2 Hz", "drive.rate=10 Hz/s"]]
 METHODS = [[], *([f"accuracy.method={name}"] for name in ("exact", "march", "harmonic", "newmark", "duhamel"))]
 SUMS = [[], *([f"accuracy.quadrature={name}"] for name in ("recursion", "direct", "merged"))]
 # kind of run -> (text, table of the law, effects, engines)
