@@ -9,8 +9,8 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from . import keep_kernels, sdof_kernels, slip_kernels
 
-SLIP = ("oscillator", "series", "step_answer", "moved", "motion", "first_leap", "_free", "leap", "bend", "over_parts",
-        "forced_part", "clear", "stop")
+SLIP = ("size_of", "oscillator", "series", "step_answer", "moved", "motion", "first_leap", "_free", "leap", "bend",
+        "over_parts", "forced_part", "clear", "stop")
 INNER = ("need_slopes", "release", "crossing", "_turn", "closed_books", "add", "book_slip", "note", "note_stick",
          "note_slip", "_keep", "begin")
 

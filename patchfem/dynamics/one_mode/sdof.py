@@ -11,7 +11,7 @@ import numpy as np
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
 from ..events.event_list import ROOM, EventLog
 from ..events.histories import LEAST, SAMPLES, EventRun
-from . import sdof_kernels
+from . import sdof_kernels, window_kernels
 from .sdof_keep import keep
 from .sdof_samples import (
     OneMode,
@@ -30,6 +30,7 @@ from .sdof_samples import (
 COMPILED_FROM = 2000  # cycles: loading the compiled code takes 0.07 s, plain Python 0.12 ms more a cycle
 CHUNK = 4096  # events held at once beside those of the window
 CORNERS = 400_000  # corners kept from before the window
+ENDS = 5  # last windows whose phasors tell a steady motion (response.settling)
 
 
 def scene_of(modes: ModalBasis, drive, static: float, kinetic: float, duration: float) -> OneMode:
@@ -158,7 +159,7 @@ class _Run:
             self.corners.append(rows)
             self.kept += len(rows)
         self.recent = np.concatenate([self.recent, rows])
-        old = np.searchsorted(self.recent[:, 0], self.recent[-1, 0] - (self.window + 1) * self.period)
+        old = np.searchsorted(self.recent[:, 0], self.recent[-1, 0] - (ENDS * self.window + 1) * self.period)
         self.recent = self.recent[max(old - 1, 0):]
 
     def log(self) -> EventLog:
@@ -189,12 +190,24 @@ class _Run:
         amplitudes = np.sort(block.output * self.extremes[seen], axis=1)
         count = 1 if block.friction[0] == 0 else int(self.book[4])
         stuck = float((high - low)[rows[:, 3] == 0].sum())
+        self._ends()
         phasors = block.output * (self.parts[:, 0] + 1j * self.parts[:, 1])
         return EventRun(full, wide, amplitudes, phasors[:len(amplitudes)], book, self.outcome, count, loop, stuck,
                         self._starts(first), peak_acceleration(low, high, rows, block), end / self.period, self.log(),
                         force_peaks=np.array([peak_force(low, high, rows, block)]),
                         waves=self._waves(loop[0], weight, block.output * gain + base_part(tau, rows, owner, block)),
                         means=self._means(first, end))
+
+    def _ends(self) -> None:
+        """Phasors of the last cycle of the last windows of a run under one sine, to the bits of a run in a batch."""
+        block, last = self.block, len(self.parts) - 1
+        if len(block.segments) > 1 or self.outcome is not None or self.period != 2 * pi / block.segments[0, 4]:
+            return
+        least = max(last % self.window, last - (ENDS - 1) * self.window)
+        mode = (block.w, block.decay, *block.friction, *block.segments[0, 3:5].tolist())
+        ends = np.zeros_like(self.parts)
+        window_kernels.cycle_parts(self.recent, len(self.recent), (last, self.window, least), mode, ends)
+        self.parts[least::self.window] = ends[least::self.window]
 
     def _means(self, first: float, end: float) -> tuple | None:
         """Means of the slide over the first and the last cycle of the window, None where it holds none."""

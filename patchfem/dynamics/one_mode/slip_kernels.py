@@ -4,12 +4,13 @@ From event to event z'' + alpha z' + beta z = g0 + bc sin(om u) - bs (1 - cos(om
 solution is written in divided differences of exp at the two free rates and i om, so that resonance, no damping,
 critical damping and a rigid mode are no special cases, and by its power series for short times, so that nothing cancels
 at a grazing onset. The end of a slip is found by steps that a bound on the fourth derivative of the speed proves free
-of roots.
+of roots. Python and the compiled copy give the same bits: powers are products, and `size_of` stands for hypot, which
+each of the two rounds in its own way.
 
 `o` below: (beta, alpha, decay, own, kind, om, top) of `oscillator`.
 """
 
-from math import acos, atan2, cos, exp, expm1, hypot, inf, sin, sqrt
+from math import acos, atan2, cos, exp, expm1, inf, sin, sqrt
 
 TERMS = 15  # of the power series: rounding at a reach of 0.3
 REACH = 0.3
@@ -27,6 +28,12 @@ def oscillator(w, decay, om):
     if decay < w:
         return w * w, 2 * decay, decay, own, 0.0, om, max(w, om)
     return w * w, 2 * decay, decay, own, 1.0, om, max(decay + own, om)
+
+
+def size_of(x, y):
+    """sqrt(x^2 + y^2), without overflow."""
+    high, low = max(abs(x), abs(y)), min(abs(x), abs(y))
+    return high * sqrt(1.0 + (low / high) * (low / high)) if high > 0.0 else 0.0
 
 
 def series(u, v0, g0, bc, bs, o):
@@ -206,7 +213,8 @@ def over_parts(v0, a0, size, bc, bs, o):
     weight = x * x + y * y
     va, aa = v0 - om * (bc * x + bs * y) / weight, a0 + om * om * (bs * x - bc * y) / weight
     quick, late = (aa - slow * va) / (fast - slow), (aa - fast * va) / (slow - fast)
-    return abs(quick) * fast**4, abs(late) * slow**4, om**5 * size / sqrt(weight)
+    square, other, turn = fast * fast, slow * slow, om * om
+    return abs(quick) * (square * square), abs(late) * (other * other), turn * turn * om * size / sqrt(weight)
 
 
 def forced_part(v0, a0, bc, bs, o):
@@ -220,7 +228,7 @@ def forced_part(v0, a0, bc, bs, o):
     vc, vs = om * (bc * x + bs * y) / weight, om * (bc * y - bs * x) / weight
     v, a = v0 - vc, a0 - om * vs
     if kind == 0.0:
-        return vc, vs, hypot(v, (a + decay * v) / own), decay
+        return vc, vs, size_of(v, (a + decay * v) / own), decay
     if kind == 1.0:
         fast = -(decay + own)
         slow = beta / fast
@@ -230,7 +238,7 @@ def forced_part(v0, a0, bc, bs, o):
 
 def clear(u, vc, vs, free, om):
     """Time from u on in which vc cos(om u) + vs sin(om u) stays above `free`; 0 where it is not above it at u."""
-    size, angle = hypot(vc, vs), om * u
+    size, angle = size_of(vc, vs), om * u
     now = vc * cos(angle) + vs * sin(angle)
     if now <= free:
         return 0.0
@@ -245,7 +253,7 @@ def stop(v0, g0, bc, bs, o, limit):
     The time is -1 if there is none, -2 if it was lost.
     """
     beta, alpha, om = o[0], o[1], o[5]
-    size = hypot(bc, bs)
+    size = size_of(bc, bs)
     free = alpha if o[4] != 1.0 else 0.0
     stride = 1.1 / (free + sqrt(free * free + 1.1 * beta)) if beta + free > 0.0 else inf
     if size > 0.0:

@@ -259,27 +259,35 @@ def window(rows, used, begin, cycles, rig, room, out):
     return True
 
 
-def cycle_parts(rows, used, every, last, rig, phasors):
-    """Parts of z at the drive's frequency in cycle `last` and in every `every`-th before it, to phasors (c, 2); returns
-    the largest z'^2 + w^2 z^2 of the run.
-
-    rows, used: all phases of the run; the other cycles of phasors, zero before, hold what comes by the way.
-    """
-    o, per, energy = oscillator(rig[0], rig[1], rig[5]), 2 * pi / rig[5], 0.0
+def energy(rows, used, rig):
+    """Largest z'^2 + w^2 z^2 [m2 s-2] of `used` phases, by their starts and their middles."""
+    o, largest = oscillator(rig[0], rig[1], rig[5]), 0.0
     for k in range(used):
-        time, span, way, z = rows[k, 0], rows[k, 2], rows[k, 3], rows[k, 4]
-        v, g0, bc, bs, shift, speed = rows[k, 5], rows[k, 6], rows[k, 7], rows[k, 8], 0.0, 0.0
+        span, way, z, v, shift, speed = rows[k, 2], rows[k, 3], rows[k, 4], rows[k, 5], 0.0, 0.0
         if way != 0.0:
-            shift, speed, _ = motion(0.5 * span, v, g0, bc, bs, o)
-        energy = max(energy, v * v + o[0] * z * z, speed * speed + o[0] * (z + way * shift)**2)
-        position = time / per
+            shift, speed, _ = motion(0.5 * span, v, rows[k, 6], rows[k, 7], rows[k, 8], o)
+        largest = max(largest, v * v + o[0] * z * z, speed * speed + o[0] * (z + way * shift)**2)
+    return largest
+
+
+def cycle_parts(rows, used, picks, rig, phasors):
+    """Parts of z at the drive's frequency in some cycles, to phasors (c, 2).
+
+    rows: phases of the run to its end, `used` of them; picks: (last, every, least): cycle `last` and every `every`-th
+    before it down to `least`; the other cycles of phasors, zero before, hold what comes by the way.
+    """
+    o, per, (last, every, least) = oscillator(rig[0], rig[1], rig[5]), 2 * pi / rig[5], picks
+    for k in range(used):
+        # float: NumPy divides complex numbers in its own way
+        span, way, z, position = float(rows[k, 2]), float(rows[k, 3]), float(rows[k, 4]), float(rows[k, 0]) / per
         first = int(position + 1e-12)
         after = max(first, int(position + span / per - 1e-12))
-        if (last - first) // every == (last - after - 1) // every:
+        if after < least or (last - max(first, least)) // every == (last - after - 1) // every:
             continue  # none of the cycles that are asked for
+        v, g0, bc, bs = float(rows[k, 5]), float(rows[k, 6]), float(rows[k, 7]), float(rows[k, 8])
+        shift, speed = 0.0, 0.0
         if k + 1 < used:
-            shift, speed = way * (rows[k + 1, 4] - z), rows[k + 1, 5]
+            shift, speed = way * (float(rows[k + 1, 4]) - z), float(rows[k + 1, 5])
         elif way != 0.0:
             shift, speed, _ = motion(span, v, g0, bc, bs, o)
         add_phasors(phasors, position, per, z, way, v, g0, bc, bs, span, shift, speed, o)
-    return energy

@@ -44,8 +44,9 @@ def plant_of(modes: ModalBasis) -> Plant:
 
 
 class Clock(NamedTuple):
-    """Time of a run: now (3,) cycle, offset in it [s], segment of the drive; segments (p, 10) rows of `drive_kernels`;
-    period (1,) [s]; rest (i + 1,) 1 where a slide, or last the output, stands still at a turning point."""
+    """Time of a run: now (6,) cycle, offset in it [s], segment of the drive, and of a loop of one mode that stopped for
+    want of rows the drive and its quadrature [m s-2] and 1; segments (p, 10) rows of `drive_kernels`; period (1,) [s];
+    rest (i + 1,) 1 where a slide, or last the output, stands still at a turning point."""
 
     now: np.ndarray
     segments: np.ndarray
@@ -64,7 +65,7 @@ def clock_of(drive, faces: int) -> Clock:
     out = np.zeros((len(rows), 10))
     for row, (start, *numbers) in zip(out, rows):
         row[:2], row[2:] = place(start, period), numbers
-    return Clock(np.zeros(3), out, np.array([period]), np.zeros(faces + 1))
+    return Clock(np.zeros(6), out, np.array([period]), np.zeros(faces + 1))
 
 
 def place(time: float, period: float) -> tuple:

@@ -309,11 +309,11 @@ def march(stop, motion, rig, table, memory, clock, books, room, rows):
     """
     (lines, hulls), now, ledger, used, first = room, clock.now, books.ledger, 0, 1.0
     c, poly, spare, wave, output, face = lines[0], lines[1], lines[2], lines[3], rig[OUTPUT], rig[FACE]
-    push, side, fresh, soft, slowest = 0.0, 0.0, True, face * face / rig[MASS], 1 / clock.period[0]
-    memory.force[0], begun = carried(0, table, memory)
-    begun += memory.lost[0] - memory.worked[0]
+    push, side, fresh, soft, slowest = now[3], now[4], now[5] == 0.0, face * face / rig[MASS], 1 / clock.period[0]
+    begun, now[5] = carried(0, table, memory)[1] + memory.lost[0] - memory.worked[0], 0.0
     while now[0] < stop[0] or (now[0] == stop[0] and now[1] < stop[1]):
         if used == rows.shape[0] and used > 0:
+            now[3], now[4], now[5] = push, side, 0.0 if fresh else 1.0  # it goes on as if it had not stopped
             return FULL, used
         left, segment, z, v = left_of(clock, stop), clock.segments[int(now[2])], motion[0, 0], motion[1, 0]
         size, constant, omega = -rig[BASE] * segment[AMPLITUDE], -rig[BASE] * segment[CONSTANT], segment[OMEGA]

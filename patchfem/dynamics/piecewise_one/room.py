@@ -49,7 +49,7 @@ def work_of(most: int, cycles: int, wanted, rows: int) -> tuple:
     """All that `batch_kernels.runs` works in: for at most so many elements and rows of the window; wanted (c,): 1 for
     cycles with a phasor."""
     table = Table(np.zeros(1, np.int64), np.zeros((1, most + 1)), *np.zeros((3, 1, most + 1)))
-    clock = Clock(np.zeros(3), np.zeros((1, 10)), np.ones(1), np.zeros(2))
+    clock = Clock(np.zeros(6), np.zeros((1, 10)), np.ones(1), np.zeros(2))
     books = Books(np.zeros(8), np.zeros((cycles, 2)), np.zeros((cycles, 2)), np.array(wanted, float),
                   np.array([np.inf, 0.0]))
     return (table, np.zeros((2, 1)), memory_of(most), clock, books, room_of(),

@@ -94,6 +94,17 @@ def test_always_compiled_keeps_what_plain_keeps():
     np.testing.assert_allclose(two.log.slide, one.log.slide, rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize("zeta, friction", [(0.0, 0.3), (0.003, 0.8), (0.9, 0.1), (1, 0.05), (1.7, 0.02), (40.0, 0.3)])
+def test_exact_compiled_and_plain_have_the_same_bits(zeta, friction):
+    """Extremes of all cycles, and the phasors of the last five windows, which tell the steady motion."""
+    compiled()
+    for ratio in np.random.default_rng(3).uniform(0.02, 1.9, 4).tolist():
+        one, two = (simulate(modes_of(1.1, zeta), BaseSine(1.3, ratio), friction, 0.9 * friction, 30, 3, compiled=fast)
+                    for fast in (False, True))
+        np.testing.assert_array_equal(one.amplitudes, two.amplitudes)
+        np.testing.assert_array_equal(one.phasors[-13:][::3], two.phasors[-13:][::3])
+
+
 def test_always_the_oldest_events_make_room():
     drive = BaseSine(1.0, 1.0)
     block = scene_of(modes_of(1.0, 0.003), drive, 0.8, 0.8, 40 * drive.period)

@@ -62,6 +62,19 @@ def test_exact_one_mode_as_any_modes(seed):
     same(modes, drive, [elements_of(k, y)])
 
 
+def test_exact_a_run_that_stops_for_want_of_rows_is_the_run(monkeypatch):
+    """Extremes to the last bit, wherever the rows are full: a batch holds them all."""
+    for seed in (1, 3, 5):
+        modes, drive, k, y = random_run(seed)
+        whole = histories.simulate(modes, drive, [elements_of(k, y)], 13, window=4)
+        for rows in (3, 7, 64):
+            monkeypatch.setattr(histories, "CHUNK", rows)
+            parts = histories.simulate(modes, drive, [elements_of(k, y)], 13, window=4)
+            np.testing.assert_array_equal(parts.amplitudes, whole.amplitudes)
+            np.testing.assert_array_equal(parts.phasors, whole.phasors)
+        monkeypatch.undo()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100, 180))
 def test_exact_one_mode_as_any_modes_many(seed):

@@ -25,12 +25,12 @@ class Runs:
     """What an engine found of n runs of `cycles` cycles each, the last `window` of which are read.
 
     values: measure -> (n,), NaN where a run has none; book: energies of the run [J], (n,) each; extremes: (n, c, 2) [m]
-    of the output per cycle; phasors: (n, w) [m] of the output in the last cycle of every window; stuck, lost: (n,)
-    whether nothing slipped, and whether a run must be made by itself; errors: measure -> (n,) beside `least` of its
-    value; closes: gap of the energy balance beyond which a run has not converged; loads: (n,) of a stuck run, whether
-    what it holds still rises; steady: ((n,), (n,)) [m] amplitude and error of the motion that a run is known to settle
-    to, NaN where none is; chosen: what each run chose besides; same_bits: whether extremes are
-    those of a run by itself to the last bit.
+    of the output per cycle; phasors: (n, w) [m] of the output in the last cycle of the last w windows; stuck, lost:
+    (n,) whether nothing slipped, and whether a run must be made by itself; errors: measure -> (n,) beside `least` of
+    its value; closes: gap of the energy balance beyond which a run has not converged; loads: (n,) of a stuck run,
+    whether what it holds still rises; steady: ((n,), (n,)) [m] amplitude and error of the motion that a run is known to
+    settle to, NaN where none is; chosen: what each run chose besides. Extremes and phasors are those of a run by itself
+    to the last bit: what is extrapolated far shows it.
     """
 
     cycles: int
@@ -47,7 +47,6 @@ class Runs:
     loads: np.ndarray | bool = False
     steady: tuple | None = None
     chosen: tuple = ()
-    same_bits: bool = False
 
     @property
     def amplitudes(self) -> np.ndarray:
@@ -85,8 +84,7 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
         row, floor = TABLE[name], floor_of(name, moved)
         wide = there & (errors[name] > tolerance * np.abs(value) + floor)
         loose |= wide & ~grows
-        # a run by itself may be made again with finer steps; what is extrapolated far shows the last bits of extremes
-        if name == MAIN or (name.endswith("_steady") and not runs.same_bits):
+        if name == MAIN:  # a run by itself may be made again with finer steps
             alone |= wide & ~grows
         if not name.endswith("_steady"):
             resolved &= ~wide
@@ -108,7 +106,7 @@ def _outcome(models, runs: Runs, tolerance) -> tuple:
     floor = SMALL * np.array([largest(m.rig.drive) / omega_of(m.rig.drive)**2 for m in models])
     decay = np.array([slowest(m.rig.modes) * runs.window * m.rig.drive.period for m in models])
     with np.errstate(all="ignore"):
-        steady, bounded = steady_amplitudes(ends, runs.phasors), False
+        steady, bounded = steady_amplitudes(ends[:, -runs.phasors.shape[1]:], runs.phasors), False
         if runs.steady is not None:
             bounded = ~np.isnan(runs.steady[0])
             steady = [np.where(bounded, known, seen) for known, seen in zip(runs.steady, steady)]

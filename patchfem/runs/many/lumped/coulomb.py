@@ -5,6 +5,7 @@ import numpy as np
 
 from ....compiled import load
 from ....dynamics.one_mode import window_kernels as read
+from ....dynamics.one_mode.sdof import ENDS
 from ....dynamics.second_book import gap
 from ....effects import has
 from ....response.loops import interface_loops
@@ -36,7 +37,7 @@ def row_of(model) -> tuple:
     rig, modes = model.rig, model.rig.modes
     drive, mass, slide, base = rig.drive, modes.mass, float(modes.slide[0]), float(modes.base[0])
     output = float(modes.output[0])
-    static, kinetic = (force * abs(slide) / mass for force in model.limits(model.point.load))
+    static, kinetic = (force * (abs(slide) / mass) for force in model.limits(model.point.load))
     z, v = (0.0, 0.0) if rig.start is None else (float(rig.start.z[0]), float(rig.start.v[0]))
     return (float(modes.omega[0]), float(modes.dampers[0, 0]) / 2, static, kinetic, -base * drive.acceleration,
             drive.omega, -1 / (base * output) if drive.moving else 0.0, z, v, slide, output, mass, rig.stiffness,
@@ -50,7 +51,8 @@ def coarsened(model) -> int:
 
 def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     """Runs of models of this kind, all of `cycles` cycles from their starts; pairs: 0."""
-    table, n, windows = np.array([row_of(model) for model in models]), len(models), (cycles - 1) // window + 1
+    table, n = np.array([row_of(model) for model in models]), len(models)
+    windows = min(ENDS, (cycles - 1) // window + 1)
     extremes, phasors, books = np.empty((n, cycles, 2)), np.empty((n, windows, 2)), np.empty((n, 10))
     numbers, ends, codes = np.full((n, read.NUMBERS), np.nan), np.full((n, 3), np.nan), np.zeros(n, np.int64)
     kernels, given = load(KERNELS, say), np.ascontiguousarray(table[:, :9])
@@ -75,8 +77,7 @@ def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     reach = np.abs(table[:, 9]) * np.abs(numbers[:, [read.LOW, read.HIGH]]).max(axis=1)
     return Runs(cycles, window, values, book, np.sort(output[:, None, None] * extremes, axis=2),
                 output[:, None] * (phasors[:, :, 0] + 1j * phasors[:, :, 1]),
-                stuck, lost, {"drift_per_cycle": 1e-14 * reach}, EXACT.least,
-                EXACT.closes)
+                stuck, lost, {"drift_per_cycle": 1e-14 * reach}, EXACT.least, EXACT.closes)
 
 
 def _values(table, x, book: dict, window: int, stuck) -> dict:

@@ -61,7 +61,7 @@ def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     book = {name: np.concatenate([one[2][name] for one in solved]) for name in solved[0][2]}
     extremes, phasors, lost = (np.concatenate([one[k] for one in solved]) for k in (3, 4, 5))
     return Runs(cycles, window, values, book, extremes, phasors, np.zeros(len(models), bool), lost, errors,
-                SMOOTH.least, np.inf, chosen=sum((one[6] for one in solved), ()), same_bits=True)
+                SMOOTH.least, np.inf, chosen=sum((one[6] for one in solved), ()))
 
 
 def _solved(models, cycles: int, window: int) -> tuple:
