@@ -28,7 +28,7 @@ from pathlib import Path
 
 from ..disk import own
 from ..disk.whole import short
-from . import machine
+from . import bounded, machine
 
 HERE = Path(__file__).parents[1]  # the package
 # tuples that kernels take: numba's cache would not notice two of their fields that change places
@@ -314,6 +314,8 @@ def _folder() -> Path:
     folder, elsewhere = _placed()
     if elsewhere:
         os.environ["PATCHFEM_CACHE"] = str(folder.parents[1])  # for processes that this one starts
+    else:
+        bounded.used(folder)
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
     if "numba" in sys.modules:
         sys.modules["numba"].config.CACHE_DIR = str(folder)
