@@ -136,6 +136,8 @@ def _fit_rows(found, to: str, asked: tuple, out: Path | None, json_: bool, quiet
         raise Refused(f"--starts {rows.starts}: one at least is wanted")
     target, path = out if out is not None else Path("out") / f"{found.path.stem}-fit", Path(to)
     with Folder(target, rows.resume) as folder, progress_bar(quiet or json_) as progress:
+        if folder.dropped and not quiet:
+            say(folder.dropped)
         question = (found.resolved(), free, hold, rows.leave_out, rows.placebo, rows.seed, rows.unstable,
                     path.read_bytes() if path.is_file() else "")
         how = Search(rows.starts, rows.seed, rows.unstable, written.Starts(folder.path / STARTS, question, rows.resume))

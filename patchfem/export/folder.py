@@ -37,6 +37,8 @@ def run_into(what, target: Path, say=None, progress=None, fresh: bool = False, r
     from which they go on with `resume`; PatchfemError where there is none.
     """
     with Folder(target, resume) as folder:
+        if folder.dropped and say is not None:
+            say(folder.dropped)
         kept = Kept(folder.path / STATE, __version__, resume) if keeps(what) else None
         result = run(what, say, progress, fresh=fresh, kept=kept)
         return write(result, folder.path)

@@ -26,14 +26,15 @@ class Folder:
     """Context of a results folder, which is claimed at entry.
 
     `path` is the partial folder to write into. Leaving without an error puts it in the place of an older one, leaving
-    with one removes it but for kept STATES, which `resume` leaves in place at the next entry. PatchfemError for a
-    target that holds other files, Missing where it is in use or cannot be written.
+    with one removes it but for kept STATES, which `resume` leaves in place at the next entry; without `resume` that
+    entry drops them, and `dropped` says so as a sentence. PatchfemError for a target that holds other files, Missing
+    where it is in use or cannot be written.
     """
 
     def __init__(self, target: Path, resume: bool = False):
         self.target = Path(os.path.abspath(target)).resolve()
         self.path = self.target.parent / (self.target.name + ".partial")
-        self.shown, self.resume = target, resume
+        self.shown, self.resume, self.dropped = target, resume, ""
         self.claim = Claim(self.target.parent / f".{self.target.name}{LOCK}", target, "run")
 
     def __enter__(self) -> "Folder":
@@ -51,6 +52,7 @@ class Folder:
             restore(self.target)
             self._refuse_others()
             if self.path.exists() and not self.resume:
+                self.dropped = self._told()
                 shutil.rmtree(self.path)
             self.path.mkdir(exist_ok=True)
         except BaseException as error:
@@ -79,6 +81,13 @@ class Folder:
     def _refuse_others(self) -> None:
         for place in (self.target, self.path, aside(self.target)):
             refuse_others(place, self.shown, (*FILES, LOCK), "patchfem results")
+
+    def _told(self) -> str:
+        """What is said when kept states are dropped, "" where there are none."""
+        if not any(is_state(part.name) for part in self.path.iterdir()):
+            return ""
+        return (f"note: {self.path.name} held the state of an interrupted run, which is dropped: this one begins anew; "
+                "--resume goes on with one")
 
     def _abandon(self) -> None:
         """Remove everything but a kept state; the folder too where there is none."""

@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import shutil
 
 import numpy as np
 import pytest
@@ -156,7 +157,13 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
     assert answer.code == 130 and "--resume" in answer.err
     assert 2 <= len(list((out / "cases").iterdir())) < 6 and not (out / "sweep.csv").exists()
     monkeypatch.setattr(many, "answers", real)
-    assert cli("sweep", scene, *OVER, "-o", out, "--resume").code == 3
+    held, text = len(list((out / "cases").iterdir())), "cases have an answer from an interrupted sweep"
+    copied = tmp_path / "copied"
+    shutil.copytree(out, copied)
+    assert f"note: {held} of 6 {text} and are run again" in cli("sweep", scene, *OVER, "-o", copied).err
+    assert text not in cli("sweep", scene, *OVER, "-o", copied).err  # it is whole now
+    answer = cli("sweep", scene, *OVER, "-o", out, "--resume")
+    assert answer.code == 3 and text not in answer.err
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
 

@@ -272,13 +272,27 @@ def test_exact_an_interrupted_run_goes_on_to_the_same_bits(tmp_path, monkeypatch
     assert [path.name for path in (tmp_path / "out.partial").iterdir()] == ["wear.npz"]
     other = cli("run", scene, "-o", tmp_path / "out", "--resume", "--set", "wear.coefficient=2e-14 m^2/N", *sets)
     assert other.code == 2 and "another scene" in other.err
-    assert cli("run", scene, "-o", tmp_path / "out", "-q", "--resume", *sets).code == 0
+    resumed = cli("run", scene, "-o", tmp_path / "out", "--resume", *sets)
+    assert resumed.code == 0 and "held the state" not in resumed.err
     one, two = (json.loads((tmp_path / name / "summary.json").read_text())["measures"] for name in ("whole", "out"))
     assert one == two
     with xr.open_dataset(tmp_path / "whole" / "result.nc", engine="h5netcdf") as a, \
             xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as b:
         assert a.worn_depth.equals(b.worn_depth) and a.wear_pressure_peak.equals(b.wear_pressure_peak)
     assert not (tmp_path / "out" / "wear.npz").exists() and not (tmp_path / "out.partial").exists()
+
+
+@pytest.mark.parametrize("quiet, state, told", [((), "wear.npz", 1), (("-q",), "wear.npz", 0), ((), "", 0)])
+def test_exact_a_run_that_begins_anew_says_once_that_a_kept_state_is_dropped(tmp_path, quiet, state, told):
+    scene = tmp_path / "plain.toml"
+    scene.write_text(SINE + COULOMB + '[normal]\nload = "10 N"\n')
+    (tmp_path / "out.partial").mkdir()
+    if state:
+        (tmp_path / "out.partial" / state).write_bytes(b"kept")
+    answer = cli("run", scene, "-o", tmp_path / "out", "--no-page", *quiet)
+    assert answer.code == 0, answer.err
+    assert answer.err.count("out.partial held the state of an interrupted run, which is dropped") == told
+    assert not (tmp_path / "out.partial").exists() and not (tmp_path / "out" / "wear.npz").exists()
 
 
 def test_refuses_to_go_on_where_nothing_is_kept(tmp_path):

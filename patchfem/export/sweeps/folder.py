@@ -101,6 +101,10 @@ class Folder:
         if not self.shared:
             self.claim.release()
 
+    def whole(self) -> bool:
+        """Whether the folder holds the tables of a sweep that came to its end."""
+        return (self.target / TABLES[0]).is_file()
+
     def there(self) -> list[int]:
         """Numbers of the cases that have an answer."""
         named = {one.name for one in os.scandir(self.target / CASES)}

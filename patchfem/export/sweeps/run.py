@@ -45,6 +45,10 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
     keys = cases.keys(asked)
     with Folder(place.target, keys, place.shard is not None) as folder:
         wanted = _part(len(cases), place.shard)
+        again = 0 if place.resume or place.shard is not None or folder.whole() else len(folder.there())
+        if again and say is not None:
+            say(f"note: {again} of {len(cases)} cases have an answer from an interrupted sweep and are run again; "
+                "--resume takes them as they are")
         total, there = Answers.blank(len(cases)), []
         if place.resume or place.shard is not None:
             there, found = folder.answers(sorted(set(folder.there()) & set(wanted)), place.whole, place.pages)
