@@ -66,9 +66,13 @@ class PatchfemError(Exception):
 
 
 class NotConverged(PatchfemError):
-    """A numerical method missed its residual after every fallback."""
+    """A numerical method missed its residual after every fallback.
+
+    so_far: what a run had computed before, as a Result marked not_converged; None for nothing.
+    """
 
     code = 3
+    so_far = None
 
 
 class Missing(PatchfemError):

@@ -1,13 +1,15 @@
 """A finished run on disk: summary, netCDF, fields and resolved scene in one folder, then the page that shows it."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
 from .. import __version__
-from ..core import Missing
+from ..core import Missing, NotConverged
 from ..disk.whole import write_text
+from ..runs.results.places import placeless
 from ..runs.results.result import Result
 from ..runs.run import Kept, marches, run
 from . import netcdf
@@ -34,14 +36,26 @@ def run_into(what, target: Path, say=None, progress=None, fresh: bool = False, r
 
     The folder is claimed first. An older folder of results is replaced only when the new one is whole, and a folder
     with other files is refused before anything runs. A run with [wear] and a long march keep their state in the folder,
-    from which they go on with `resume`; PatchfemError where there is none.
+    from which they go on with `resume`; PatchfemError where there is none. Where the motion of a run does not converge
+    the patch that was pressed before is written, marked not_converged; NotConverged where there is none.
     """
     with Folder(target, resume) as folder:
         if folder.dropped and say is not None:
             say(folder.dropped)
         kept = Kept(folder.path / STATE, __version__, resume) if keeps(what) else None
-        result = run(what, say, progress, fresh=fresh, kept=kept)
+        try:
+            result = run(what, say, progress, fresh=fresh, kept=kept)
+        except NotConverged as error:
+            if error.so_far is None:
+                raise NotConverged(f"{error}; nothing was computed before it, so there is no results folder") from None
+            result = _marked(error)
         return write(result, folder.path)
+
+
+def _marked(error: NotConverged) -> Result:
+    """What a run had computed before it did not converge, with the reason among its warnings."""
+    found = error.so_far
+    return replace(found, warnings=[*placeless([str(error)], found.plan.model.source.path), *found.warnings])
 
 
 def keeps(what) -> bool:

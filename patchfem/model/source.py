@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..core import PatchfemError
+from ..core import NotConverged, PatchfemError
 from ..scene.lines import counted, key_lines
 
 
@@ -49,4 +49,7 @@ def placed(source: Source) -> Iterator[None]:
         if error.key is None:
             raise
         where = source.where(error.key) if error.key else str(source.path)
-        raise type(error)(f"{where}: {counted(str(error))}") from None
+        told = type(error)(f"{where}: {counted(str(error))}")
+        if isinstance(error, NotConverged):
+            told.so_far = error.so_far
+        raise told from None

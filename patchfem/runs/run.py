@@ -7,7 +7,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
-from ..core import Measure, Outcome, PatchfemError
+from ..core import Measure, NotConverged, Outcome, PatchfemError
 from ..model.model import Model
 from ..model.source import placed
 from .plan import Plan, plan, refuse_size
@@ -18,6 +18,8 @@ from .results.result import Result, worded
 __all__ = ["Kept", "Plan", "Result", "plan", "run"]
 KINDS = {"patch": "patch.result static", "bench": "bench.result prescribed", "rig": "rig.rig coupled",
          "linear": "rig.rig coupled"}  # the function that runs it, imported when it is wanted
+
+AT_REST = "the measures are those of the pressed patch at rest; the motion was not found"
 
 
 class Kept(NamedTuple):
@@ -35,7 +37,8 @@ def run(what, say=None, progress=None, per_point: bool = False, estimate: bool =
     say: called with one line when compiled code has to be made; progress: called with the share of the main pass that
     is done. per_point forces the path of every interface point where one lumped point would do; estimate=False skips
     the coarser runs and leaves the errors None; fresh condenses the pieces anew; kept: where the state of a run with
-    [wear] or of a long march is kept on the way. NotConverged and Missing as named by the stages.
+    [wear] or of a long march is kept on the way. NotConverged and Missing as named by the stages; the first carries the
+    pressed patch where the motion alone is missed.
     """
     what = what if isinstance(what, Plan) else plan(what, per_point)
     with placed(what.model.source):
@@ -77,8 +80,14 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
                 here = replace(what, model=lowered(model, patch, evolved.state.depth))
         module, function = KINDS[what.kind].split()
         solve = getattr(import_module(f"patchfem.runs.{module}"), function)
-        with _keeping(kept, what, patch):
-            result = solve(here, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
+        try:
+            with _keeping(kept, what, patch):
+                result = solve(here, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
+        except NotConverged as error:
+            if patch is not None and what.kind != "patch":
+                at_rest = of_patch.static(what, patch, coarse, seconds, [*warnings, AT_REST])
+                error.so_far = _whole(replace(at_rest, outcome=Outcome.NOT_CONVERGED), notes, begin)
+            raise
         if patch is not None and what.kind != "patch":
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
             result = replace(result, measures=of_patch.measured(model, patch, coarse) | found)
@@ -86,7 +95,12 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             from .wear.measures import worn
 
             result = replace(worn(result, evolved, estimate), plan=what)
-    seconds["total"] = perf_counter() - begin
+    return _whole(result, notes, begin)
+
+
+def _whole(result: Result, notes: list, begin: float) -> Result:
+    """The result with its time since `begin`, its notes, and words that name no folder."""
+    result.seconds["total"], model = perf_counter() - begin, result.plan.model
     apart = "strip" if model.patch is not None else "interface"
     warned, noted = result.warnings + loose(result), [*notes, *result.extra.get("notes", [])]
     return replace(result, measures=worded(result.measures, apart), warnings=placeless(warned, model.source.path),
