@@ -14,12 +14,13 @@ from ...friction.flags_kernels import FAST, INNER
 from ...friction.laws import stretch_kernels as law
 from .tableau_kernels import BEFORE, FIFTH, INSIDE, PLACES, SHARES, STAGES, THIRD
 
-TIME, STEP, TURNED, ORIGIN, LEFT, CREST, CREST_SPEED, PACE, BEGUN, STOOD, MASS, KIND, PIECE, MOVES = range(14)  # of now
+# of now
+TIME, STEP, TURNED, ORIGIN, LEFT, CREST, CREST_SPEED, PACE, BEGUN, STOOD, MASS, KIND, PIECE, MOVES, STIFF = range(15)
 OMEGA, DAMP, SLIDE, BASE, OUTPUT = range(5)  # of Moving.rows
 MEANS = np.array([1 / 2, 1 / 6, 1 / 12, 1 / 30, 1 / 60, 1 / 140, 1 / 280])  # of s, s (1 - s), s^2 (1 - s), ...
 EXTENSION, SIZES, TRIAL = 16, 24, 25  # of Moving.work, whose first rows are the slopes
 LEAST = 1e-30  # of a size: at rest everything is as large as this
-NOISE = 2e-15  # of the force of a mode's stiffness: round-off of its acceleration where friction balances it
+NOISE = 2e-15  # of the forces of a mode's stiffness and of the law's: round-off of the acceleration where they balance
 SINES, SWEEP, ROWS = range(3)  # of now[KIND]: sines one after the other, a sweep, straight between rows
 
 
@@ -106,7 +107,7 @@ def missed(m, h, tolerance):
     counts no less than what the step makes of round-off: held at a distance, it decays to that, and it is no error.
     """
     n, size = m.rows.shape[1], m.y.size - 3
-    fifth, third = 0.0, 0.0
+    fifth, third, pull = 0.0, 0.0, m.now[STIFF] * abs(slide_of(m, m.y)[0]) / m.now[MASS]
     for c in range(size):
         scale = m.now[CREST] if c < n else m.now[CREST_SPEED] if c < 2 * n else m.work[SIZES, c]
         high, low = 0.0, 0.0
@@ -115,7 +116,8 @@ def missed(m, h, tolerance):
             low += THIRD[j] * m.work[j, c]
         top = max(abs(m.y[c]), abs(m.work[TRIAL, c])) if c < 2 * n else 0.0
         if n <= c < 2 * n:
-            top = max(top, NOISE * abs(h * m.y[c - n]) * m.rows[OMEGA, c - n]**2 / tolerance)
+            felt = abs(m.y[c - n]) * m.rows[OMEGA, c - n]**2 + abs(m.rows[SLIDE, c - n]) * pull
+            top = max(top, NOISE * abs(h) * felt / tolerance)
         scale = max(scale, top, LEAST)
         fifth += (high / scale)**2
         third += (low / scale)**2

@@ -80,6 +80,21 @@ def test_always_a_motion_held_at_a_distance_is_not_refused_for_its_round_off(tol
     assert force == pytest.approx(-0.2199 * omega**2 * y[0], rel=1e-9)  # friction balances the spring
 
 
+@pytest.mark.parametrize("tolerance", [1e-9, 1e-11])
+def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for_their_round_off(tolerance):
+    """Of a release that bonds 500 times as stiff as its spring catch far from rest: it rings on them at 23 times its
+    frequency and dies out. The round-off of their force counted as an error of the step then: 839 000 steps in the
+    first 40 cycles, 13 000 in all 108 now."""
+    omega, load, length = 2 * np.pi * 62.86, 8.528, 1.523e-7
+    law, start = points_element(Bonds(0.588, length), [1.0], [load]), Start(np.array([1.023e-5]), np.zeros(1))
+    run = Run(one_mode(omega, 0.05, 0.4143), drives.release(1 / 62.86), law, 108, tolerance, start=start)
+    run.until(108 / 62.86)
+    y, force = run.moving.y, run.settled()[0][5]
+    assert run.outcome is None and run.kept.tally[13:15].sum() < 40_000
+    assert abs(y[1]) < 1e-9 * omega * abs(y[0])
+    assert force == pytest.approx(-0.4143 * omega**2 * y[0], rel=1e-8)  # the bonds balance the spring
+
+
 def test_exact_a_long_call_is_left_now_and_then_and_goes_on_to_the_last_bit():
     """So a signal is heard. The room for turns ends calls elsewhere; neither changes the motion."""
     law, told = element(Bonds(0.3, 5e-6)), []
