@@ -1,6 +1,6 @@
 """What is written: files whole or not at all, folders with one writer, old and new exchanged in one step.
 
 In: a path and what writes it. Out: the file or folder in its place, or Missing that names path, need and room, with the
-older one untouched. `whole` writes files, `claim` says who writes a folder, `exchange` puts a folder in its place.
-Read `whole` first.
+older one untouched. `whole` writes files, `claim` says who writes a folder, `exchange` puts a folder in its place,
+`opened` opens what is read. Read `whole` first.
 """

@@ -15,6 +15,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
+from ..disk.opened import reading
 from ..effects import MOST_COORDINATES, takes
 from .keys import tables
 from .keys.same import once
@@ -109,7 +110,7 @@ def load(path: str | Path, sets: Iterable[str] = (), faults: Callable | None = N
 def text_of(path: str | Path) -> str:
     """The text of a scene file; SceneError where it cannot be read."""
     try:
-        with open(path, "rb") as file:
+        with reading(path) as file:
             content = file.read(LARGEST + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import io
 import re
 from pathlib import Path
 
+from ...disk.opened import reading
 from ...scene.axes import Axis, values_of
 from .cases import Cases
 
@@ -17,7 +19,7 @@ HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
 def read(path: Path) -> tuple[Cases | None, list[str]]:
     """(cases, mistakes) of a file; every mistake names file, line and key."""
     try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
+        with reading(path) as raw, io.TextIOWrapper(raw, encoding="utf-8-sig", newline="") as file:
             lines = [(number, [cell.strip() for cell in row]) for number, row in enumerate(csv.reader(file), 1)
                      if any(cell.strip() for cell in row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:

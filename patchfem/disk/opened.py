@@ -1,0 +1,26 @@
+"""A file that is read, a pipe among them, which has to begin within some seconds.
+
+In: a path. Out: the open file. A shell hands on what another program says as a pipe; one that nobody writes to would
+hold whoever opens it for ever.
+"""
+
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+PATIENCE = 5.0  # s that a pipe may take to begin
+
+
+def reading(path: str | Path) -> BinaryIO:
+    """The file, open for its bytes; OSError where it cannot be opened, TimeoutError for a pipe that does not begin."""
+    file = open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb")
+    if stat.S_ISFIFO(os.fstat(file.fileno()).st_mode):
+        import select
+
+        if not select.select([file], [], [], PATIENCE)[0]:
+            file.close()
+            raise TimeoutError(0, f"a pipe that nobody has written to within {PATIENCE:.0f} s")
+    if hasattr(os, "set_blocking"):
+        os.set_blocking(file.fileno(), True)
+    return file

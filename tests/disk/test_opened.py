@@ -1,0 +1,44 @@
+"""Pipes as scenes: one that begins late is read, one that nobody writes to is refused."""
+
+import os
+import threading
+import time
+
+import pytest
+
+from patchfem.campaigns.sweeps.table import read
+from patchfem.disk import opened
+from patchfem.scene import scene
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+
+
+@pytest.fixture
+def pipe(tmp_path):
+    os.mkfifo(tmp_path / "x.toml")
+    return tmp_path / "x.toml"
+
+
+def test_exact_a_pipe_that_begins_late_and_pauses_is_read_whole(pipe):
+    parts = ("[friction]\n", "# " + "x" * 200_000 + "\n", "static = 0.3\n")  # more than a pipe holds at once
+
+    def write():
+        time.sleep(0.1)
+        with open(pipe, "w", encoding="utf-8") as file:
+            for part in parts:
+                file.write(part)
+                file.flush()
+                time.sleep(0.1)
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    assert scene.text_of(pipe) == "".join(parts)
+    writer.join()
+
+
+def test_refuses_a_pipe_that_nobody_writes_to(pipe, monkeypatch):
+    """It once held `check` and every other verb for ever."""
+    monkeypatch.setattr(opened, "PATIENCE", 0.1)
+    with pytest.raises(scene.SceneError, match=r"x\.toml: cannot be read: a pipe that nobody has written to within"):
+        scene.text_of(pipe)
+    assert read(pipe)[1] == [f"{pipe}: cannot be read: a pipe that nobody has written to within 0 s"]
