@@ -19,8 +19,10 @@ gc.set_threshold(50_000, *gc.get_threshold()[1:])
 import atexit  # noqa: E402
 import sys  # noqa: E402
 import threading  # noqa: E402
+from pathlib import Path  # noqa: E402
+from typing import Annotated, Literal  # noqa: E402
 
-from cyclopts import App, CycloptsError  # noqa: E402
+from cyclopts import App, CycloptsError, Parameter  # noqa: E402
 
 from . import __version__  # noqa: E402
 from .commands.compare import compare  # noqa: E402
@@ -50,7 +52,24 @@ app = App(name="patchfem", version=__version__, help_format="plaintext", suppres
 for verb in VERBS:
     app.command(verb, name=verb.__name__.rstrip("_"))
 app.command(torture_of(lambda words: _guarded(words)), name="torture", show=False)
-app.register_install_completion_command(help="Complete commands and options in this shell (bash, zsh, fish).")
+
+
+@app.command(name="--install-completion")
+def completion(*, shell: Literal["zsh", "bash", "fish", "powershell"] | None = None,
+               output: Annotated[Path | None, Parameter(name=["-o", "--output"])] = None):
+    """Complete commands and options in this shell (bash, zsh, fish).
+
+    Parameters
+    ----------
+    shell : Literal["zsh", "bash", "fish", "powershell"] | None
+        Shell that is to complete; this one where it is left out.
+    output : Path | None
+        File of the completions; the usual one of the shell where it is left out.
+    """
+    from cyclopts.completion.install import create_install_completion_command  # 10 ms of every command otherwise
+
+    create_install_completion_command(app.install_completion, True)(shell=shell, output=output)
+
 
 
 def main(argv: list | None = None) -> None:

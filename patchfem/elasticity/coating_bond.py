@@ -42,7 +42,7 @@ def bond_line(cells: Cells, u, rules: list | None = None) -> Bond | None:
         np.add.at(length, end, np.hypot(*aside.T) / 2)
     across /= np.hypot(*across.T)[:, None]
     along = across[:, ::-1] * [1.0, -1.0]
-    coating, own = _coating_only(cells, quadratures(cells) if rules is None else rules)
+    coating, own = _coating_at(cells, quadratures(cells) if rules is None else rules, node)
     force = np.stack([-_nodal_forces(coating, own, motion)[node] for motion in u])
     shear, normal = ((force * way).sum(axis=2) / length for way in (along, across))
     return Bond(node, length, force, shear, normal)
@@ -60,11 +60,13 @@ def _bond_edges(cells: Cells) -> tuple:
     return mine, way[:, ::-1] * [1.0, -1.0]
 
 
-def _coating_only(cells: Cells, rules: list) -> tuple:
-    """The coating as Cells on the same points, with its own part of the quadratures."""
-    out, first = [], 0
+def _coating_at(cells: Cells, rules: list, node) -> tuple:
+    """The cells of the coating that touch some nodes (b,), as Cells on the same points, with their part of the
+    quadratures: no other gives these nodes a force."""
+    out, first, touched = [], 0, np.zeros(len(cells.points), bool)
+    touched[node] = True
     for rule in rules:
-        coat = cells.is_coating[first:first + len(rule.block)]
+        coat = cells.is_coating[first:first + len(rule.block)] & touched[rule.block].any(axis=1)
         first += len(rule.block)
         out.append(Quadrature(rule.block[coat], rule.shape, rule.slope[coat], rule.weight[coat]))
     blocks = tuple(rule.block for rule in out)

@@ -153,9 +153,16 @@ def cell_stress(piece: Piece, u: np.ndarray) -> tuple:
     axis is kept, so xy changes sign for the piece drawn at y < 0. The middle of a bilinear quad is its superconvergent
     point.
     """
-    corner, place = u[:, piece.cells], piece.nodes[piece.cells]
-    along, inward = (corner[:, :, 1] + corner[:, :, 2] - corner[:, :, 0] - corner[:, :, 3],
-                     corner[:, :, 3] + corner[:, :, 2] - corner[:, :, 0] - corner[:, :, 1])
+    stress = middle_stress(piece, u)
+    return stress, von_mises(stress)
+
+
+def middle_stress(piece: Piece, u: np.ndarray) -> np.ndarray:
+    """The stress (frames, t, 4) [Pa] of `cell_stress` alone."""
+    place = piece.nodes[piece.cells]
+    grid = u.reshape(len(u), piece.x.size, -1, 2)
+    rise, fall = grid[:, 1:, 1:] - grid[:, :-1, :-1], grid[:, 1:, :-1] - grid[:, :-1, 1:]
+    along, inward = ((rise + way * fall).reshape(len(u), -1, 2) for way in (1, -1))
     a, b = place[:, 1] + place[:, 2] - place[:, 0] - place[:, 3], place[:, 3] + place[:, 2] - place[:, 0] - place[:, 1]
     area = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])[:, None]  # four times that of the cell
     by_x = (along * b[:, 1, None] - inward * a[:, 1, None]) / area
@@ -164,8 +171,8 @@ def cell_stress(piece: Piece, u: np.ndarray) -> tuple:
     return hooke(exx, eyy, exy, piece.is_coating, piece.layers)
 
 
-def hooke(exx, eyy, exy, is_coating, layers: Layers) -> tuple:
-    """Stresses (..., t, 4) as xx, yy, zz, xy [Pa] of plane strains by Hooke's law, and von Mises (..., t) [Pa].
+def hooke(exx, eyy, exy, is_coating, layers: Layers) -> np.ndarray:
+    """Stresses (..., t, 4) as xx, yy, zz, xy [Pa] of plane strains by Hooke's law.
 
     Tension > 0. exx, eyy, exy: (..., t) [1], exy half the engineering shear; is_coating: (t,) bool; layers: the two
     materials. zz is nu (xx + yy) in plane strain, 0 in plane stress.
@@ -176,8 +183,7 @@ def hooke(exx, eyy, exy, is_coating, layers: Layers) -> tuple:
     sxx = lam * (exx + eyy) + 2 * mu * exx
     syy = lam * (exx + eyy) + 2 * mu * eyy
     szz = poisson * (sxx + syy) if layers.plane == "strain" else np.zeros_like(sxx)
-    stress = np.stack([sxx, syy, szz, 2 * mu * exy], axis=-1)
-    return stress, von_mises(stress)
+    return np.stack([sxx, syy, szz, 2 * mu * exy], axis=-1)
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:

@@ -13,9 +13,9 @@ from skfem import Basis, ElementQuad1, ElementTriP1, MeshQuad, MeshTri
 
 from ..core import NotConverged, frozen_array
 from ..mesh.anymesh import cell_edges
-from .condense import CORRECTION, RESIDUAL
+from .condense import CORRECTION, RESIDUAL, rough
 from .dissect import dissection
-from .elasticity import Layers, hooke, lame, remedy
+from .elasticity import Layers, hooke, lame, remedy, von_mises
 from .factor import factorise
 from .lapack import one_thread
 from .mapped import stiffness
@@ -68,7 +68,7 @@ def assemble(mesh, layers: Layers, factor: str | None = None) -> Substructure:
 
     mesh: points (N, 2) as x and depth [m], triangles, quads, is_coating, interface, far as in mesh.anymesh.PieceMesh.
     factor: name of the factors, see `factor.factorise`. NotConverged when they do not solve the system: one step of
-    refinement moves the solution for random loads by more than 1e-2; a smaller move is its `rounding`.
+    refinement moves the solution for a `rough` load by more than 1e-2; a smaller move is its `rounding`.
     """
     piece = Substructure(mesh, layers, factor)
     _ = piece.factor
@@ -80,7 +80,7 @@ def _assembled(mesh, layers: Layers, name: str | None) -> tuple:
     matrix = _stiffness(mesh, layers, order)
     with one_thread():
         found = factorise(matrix, firsts, name)
-        load = np.random.default_rng(0).normal(size=(matrix.shape[0], 1))
+        load = rough(matrix.shape[0])[:, None]
         u = found.solve(load)
         rest = load - matrix @ u
         change = 0.0 if np.abs(rest).max() <= RESIDUAL * np.abs(load).max() else \
@@ -178,6 +178,12 @@ def cell_stress(piece: Substructure, u: np.ndarray) -> tuple:
     Returns (frames, t + q, 4) as xx, yy, zz, xy [Pa] and von Mises (frames, t + q). u: (frames, N, 2) [m]. The inward
     axis is kept, so xy changes sign for the piece drawn at y < 0.
     """
+    stress = middle_stress(piece, u)
+    return stress, von_mises(stress)
+
+
+def middle_stress(piece: Substructure, u: np.ndarray) -> np.ndarray:
+    """The stress (frames, t + q, 4) [Pa] of `cell_stress` alone."""
     mesh = piece.mesh
     slope = np.concatenate([np.einsum("cnj,fcni->fcij", _gradients(mesh.points[cells]), u[:, cells])
                             for cells in (mesh.triangles, mesh.quads) if len(cells)], axis=1)

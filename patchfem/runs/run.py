@@ -114,7 +114,7 @@ def _keeping(kept: Kept | None, what: Plan, patch):
     if kept is None or not marches(what):
         return nullcontext()
     from ..dynamics.resume import Keeper, keeping
-    from .wear.keep import key_of
+    from .key import key_of
 
     def path(number: int) -> Path:
         return kept.path.parent / f"march_{number}.npz"

@@ -17,7 +17,18 @@ from patchfem.core import Compliance, Interface
 from patchfem.elasticity import elasticity, substructure
 from patchfem.elasticity.coating_bond import bond_line
 from patchfem.elasticity.elasticity import Layers, hooke, lame
-from patchfem.elasticity.recovery import Cells, cells_of, indicator, peak, quadratures, recovery
+from patchfem.elasticity.recovery import (
+    Cells,
+    _by_points,
+    _of_cells,
+    _sides,
+    cells_of,
+    harmless_step,
+    indicator,
+    peak,
+    quadratures,
+    recovery,
+)
 from patchfem.mesh.anymesh import halved
 from patchfem.mesh.tensor import TensorGrid, graded_grid, graded_rows
 
@@ -86,7 +97,7 @@ def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(see
     stress, _ = elasticity.cell_stress(piece, u)
     found = recovery(cells)
     x, y = cells.points[found.node].T
-    exact, _ = hooke(2 * a[0] * x + a[1] * y, b[1] * x + 2 * b[2] * y,
+    exact = hooke(2 * a[0] * x + a[1] * y, b[1] * x + 2 * b[2] * y,
                      (a[1] * x + 2 * a[2] * y + 2 * b[0] * x + b[1] * y) / 2, found.coating, layers)
     assert np.abs(found(stress)[0] - exact).max() <= 1e-11 * np.abs(exact).max()
     corner = cells.points[piece.cells]
@@ -97,6 +108,45 @@ def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(see
                                 + tall**2 * ((lam + 2 * mu) * b[2]**2 + mu * a[2]**2))
     error = indicator(found, u, stress).error[0]
     assert np.abs(error / missed - 1).max() <= 1e-9
+
+
+@given(seed=st.integers(0, 2**32 - 1), plane=st.sampled_from(["strain", "stress"]))
+@settings(max_examples=10, deadline=None)
+def test_exact_rectangles_taken_apart_into_modes_are_the_sum_over_the_points_of_integration(seed, plane):
+    """Any motion of both materials, on any grid."""
+    rng = np.random.default_rng(seed)
+    x, depth = np.cumsum(rng.uniform(0.1, 1, 7)) * 1e-3, np.append(0, np.cumsum(rng.uniform(0.02, 1, 5))) * 1e-3
+    piece = tensor(TensorGrid(x, depth, int(rng.integers(1, 5))), COATED if plane == "strain" else
+                   Layers(COATED.coating, COATED.substrate, plane))
+    found, u = recovery(cells_of(piece)), rng.normal(size=(2, len(piece.nodes), 2)) * 1e-6
+    stress = elasticity.middle_stress(piece, u)
+    assert np.array_equal(stress, elasticity.cell_stress(piece, u)[0])
+    one = indicator(found, u, stress)
+    material = _of_cells(found.cells)
+    for k in range(2):
+        error, energy = _by_points(found, quadratures(found.cells), u[k], stress[k][:, [0, 1, 3]], *material)
+        assert np.abs(one.error[k] - error).max() <= 1e-12 * error.max() and one.energy[k] == pytest.approx(energy)
+    bent = found.cells.points + rng.uniform(-1e-6, 1e-6, found.cells.points.shape)
+    assert _sides(found.cells) is not None
+    assert _sides(Cells(bent, found.cells.blocks, found.cells.is_coating, found.cells.layers)) is None
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=5, deadline=None)
+def test_always_rounding_to_the_harmless_step_adds_the_wanted_share_of_the_error(seed):
+    """Of equal materials with no Poisson ratio the bound is the mean itself."""
+    layers = Layers((200e9, 0.0), (200e9, 0.0), "strain")
+    piece = tensor(graded_grid(4e-3, 1e-3, 4e-5, COATING), layers)
+    found = recovery(cells_of(piece))
+    u = np.random.default_rng(seed).normal(size=(1, len(piece.nodes), 2)) * 1e-6
+    stress, rules = elasticity.middle_stress(piece, u), quadratures(found.cells)
+    error = indicator(found, u, stress, rules)
+    step = harmless_step(found, error, rules, 1e-3)
+    change = np.round(stress[0] / step) * step - stress[0]
+    area = np.concatenate([rule.weight.sum(axis=1) for rule in rules])
+    energy = area @ (change[:, 0]**2 + change[:, 1]**2 + 2 * change[:, 3]**2) / 200e9
+    assert energy == pytest.approx(1e-6 * error.error.sum(), rel=0.05)
+    assert harmless_step(found, indicator(found, 0 * u, 0 * stress, rules), rules, 1e-3) == 0
 
 
 @pytest.mark.parametrize("split", [None, 0.5])
@@ -236,7 +286,7 @@ def test_exact_bond_line_of_a_slanted_coating_under_even_stress(seed, slope):
     strain = np.random.default_rng(seed).normal(size=(2, 2))
     bond = bond_line(cells, (points @ strain.T)[None])
     (exx, exy), (eyx, eyy) = strain
-    (xx, yy, _, xy), _ = hooke(exx, eyy, (exy + eyx) / 2, np.array(0), bare(TITANIUM))
+    xx, yy, _, xy = hooke(exx, eyy, (exy + eyx) / 2, np.array(0), bare(TITANIUM))
     into, along = np.array([[-slope, 1.0], [1.0, slope]]) / np.hypot(1, slope)
     traction = -np.array([[xx, xy], [xy, yy]]) @ into
     scale = np.abs([xx, yy, xy]).max()

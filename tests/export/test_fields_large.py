@@ -104,10 +104,12 @@ def rubbing(tmp_path_factory):
         changed.setattr(vtkhdf, "LARGE", 0)
         changed.setattr(bodies, "write_series", lambda path, blocks, times, units, steps: kept.update(
             blocks=blocks) or write(path, blocks, times, units, steps))
-        begin = process_time()
-        bodies.write_fields(SimpleNamespace(patch=pressed.patch, fields=fields, extra={}), folder / NAME)
-        kept["seconds"] = process_time() - begin
-    return pressed, kept["blocks"], folder / NAME, kept["seconds"]
+        seconds = []
+        for _ in range(2):
+            begin = process_time()
+            bodies.write_fields(SimpleNamespace(patch=pressed.patch, fields=fields, extra={}), folder / NAME)
+            seconds.append(process_time() - begin)
+    return pressed, kept["blocks"], folder / NAME, min(seconds)
 
 
 def test_always_packing_errs_as_little_as_it_says_and_less_than_the_elements(rubbing):
@@ -145,15 +147,17 @@ def test_always_packing_errs_as_little_as_it_says_and_less_than_the_elements(rub
     assert number == 8 and total > 0
 
 
-def test_always_packed_stress_takes_a_share_of_200_megabytes(rubbing):
-    """Of 200 frames of 100 000 cells: bytes for each cell in each frame. Smaller cells pack better."""
-    _, blocks, path, _ = rubbing
+def test_always_packed_stress_takes_a_share_of_200_megabytes_and_25_seconds(rubbing):
+    """Of 200 frames of 100 000 cells: bytes and seconds of a CPU for each cell in each frame, with all that leads to
+    them: twice as long is allowed, for nine frames share what 200 share, and other programs run beside a test."""
+    _, blocks, path, seconds = rubbing
     with h5py.File(path) as file:
         size = sum(array.id.get_storage_size() for side in ("lower", "upper") for kind in ("PointData", "CellData")
                    for array in file[f"VTKHDF/{side}/{kind}"].values())
         frames = int(file["VTKHDF/Steps"].attrs["NSteps"])
     cells = sum(len(blocks[side].types) for side in ("lower", "upper"))
     assert cells > 15_000 and size / frames / cells < 200e6 / 200 / 1e5
+    assert seconds / frames / cells < 2 * 25 / 200 / 1e5
 
 
 def test_exact_a_large_series_holds_every_frame_rounded_as_it_says(tmp_path, monkeypatch):

@@ -16,6 +16,7 @@ from patchfem.closed_forms import hertz_half_width, hertz_peak
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity.elasticity import assemble, interface_compliance
+from patchfem.runs.key import key_of
 from patchfem.runs.wear import evolve, keep
 from patchfem.scene.scene import loads
 from patchfem.slip.partial_slip import Step, advance, operators_of, start
@@ -266,7 +267,7 @@ def test_exact_an_interrupted_run_goes_on_to_the_same_bits(tmp_path, monkeypatch
     with monkeypatch.context() as patched:
         patched.setattr(keep, "evolved_with", lambda kept, model, patch, coarse, progress: evolve.evolve(
             model, patch, coarse, progress, None,
-            lambda state, moments: interrupted(kept.path, keep.key_of(model, patch, kept.version), state, moments)))
+            lambda state, moments: interrupted(kept.path, key_of(model, patch, kept.version), state, moments)))
         answer = cli("run", scene, "-o", tmp_path / "out", *sets)
     assert answer.code == 130 and "--resume" in answer.err
     assert [path.name for path in (tmp_path / "out.partial").iterdir()] == ["wear.npz"]

@@ -243,7 +243,7 @@ class Run:
         Returns (first step, rows (steps + 1, width), friction work [J]); snapshots: list to add to.
         """
         first, before, parts = self.done, self.ledger[8], []
-        edges = np.unique(np.linspace(0, size, max(frames, 1) + 1).round().astype(int))
+        edges = np.linspace(0, size, max(min(frames, size), 1) + 1).round().astype(int)
         for piece in np.diff(edges) if size else [0]:
             rows = np.empty((piece + 1, self.width))
             rows[-1] = 0.0  # what belongs to the step after the last one is nothing yet

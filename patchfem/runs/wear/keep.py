@@ -1,6 +1,5 @@
 """The state of a wear run on disk, from which an interrupted run goes on to the same bits."""
 
-import hashlib
 import os
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import numpy as np
 from ...core import PatchfemError
 from ...disk.whole import whole
 from ...wear.jumps import Worn
+from ..key import key_of
 from .evolve import Evolved, Moment, evolve
 
 STATE = tuple(Worn.__slots__)
@@ -22,15 +22,6 @@ def evolved_with(kept, model, patch, coarse, progress=None) -> Evolved:
     key = key_of(model, patch, kept.version)
     begin = load(kept.path, key) if kept.resume else None
     return evolve(model, patch, coarse, progress, begin, lambda state, moments: save(kept.path, key, state, moments))
-
-
-def key_of(model, patch, version: str) -> str:
-    """What a kept state belongs to: the scene in SI, the unworn gap on its nodes, a slide from a file, the version."""
-    corners = () if model.slide is None or model.slide.corners is None else model.slide.corners
-    of_patch = () if patch is None else (patch.x, patch.gap)
-    parts = (f"{version}\n{model.source.resolved}".encode(), *of_patch, *corners)
-    return hashlib.sha256(b"".join(one if isinstance(one, bytes) else np.asarray(one).tobytes()
-                                   for one in parts)).hexdigest()
 
 
 def save(path: Path, key: str, state: Worn, moments: tuple) -> None:

@@ -1,0 +1,42 @@
+"""A whole run loads nothing that it could do without, and says the versions that the packages' own records say."""
+
+from importlib.metadata import version
+from pathlib import Path
+
+from command_line import MODULES, cli, loaded
+
+from patchfem.export.summary import PACKAGES, versions
+
+RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
+FROM_SHELL = f"""\
+import sys
+from patchfem.__main__ import main
+try:
+    main(sys.argv[1:])
+except SystemExit as end:
+    assert not end.code, end.code
+{MODULES}
+"""
+
+
+def test_exact_a_rig_with_its_page_loads_no_dice_and_no_benches(tmp_path):
+    """Each takes 10 to 30 ms: numpy's generators, the writer of completions, and the benches behind wear."""
+    words = ("run", RIG, "--set", "drive.cycles=12", "-o", tmp_path / "out", "-q")
+    loaded(FROM_SHELL, *words)  # keeps compiled code
+    modules = loaded(FROM_SHELL, *words)
+    assert "patchfem.dynamics.march.march" in modules and (tmp_path / "out" / "report.html").is_file()
+    unwanted = {"numpy.random", "cyclopts.completion", "numba", "patchfem.runs.bench.bench", "patchfem.runs.wear"}
+    assert not {name for name in modules if any(f"{name}.".startswith(f"{one}.") for one in unwanted)}
+
+
+def test_exact_versions_are_those_of_the_installed_packages():
+    found = versions()
+    assert set(found) == {"python", *PACKAGES}
+    assert all(found[name] == version(name) for name in PACKAGES)
+
+
+def test_always_completions_are_written_where_they_are_asked_for(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    done = cli("--install-completion", "--shell", "bash", "-o", tmp_path / "patchfem.bash")
+    assert done.code == 0, done.err
+    assert "torture" not in (tmp_path / "patchfem.bash").read_text() and "patchfem" in done.out
