@@ -19,6 +19,7 @@ from ..core import PatchfemError, frozen_array
 from ..elasticity.lapack import dger, one_thread
 
 SHEAR_MODES = 8  # modes a shear reduction starts from
+BACK = 2.0  # bond lengths: exp(2) of the stiffness at rest
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -199,6 +200,7 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
         full = _backbone(limit[index], shape[:, :many], values[:many], bond_length, slides)
         few = _backbone(limit[index], shape[:, :count], values[:count], bond_length, slides)
     error = float(np.abs(full - few).max() / limit.sum())
+    error = error if np.isfinite(error) else np.inf  # bonds too short for the backbone: nothing is known
     return ShearModes(frozen_array(index, np.int64), frozen_array(shape[:, :count]),
                       frozen_array(1 / values[:count]), error)
 
@@ -217,20 +219,33 @@ def enough_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, 
 
 
 def _backbone(limit, shape, values, length, slides) -> np.ndarray:
-    """Resultant [N] on the virgin slides (k,) for the saturating law D (1 - exp(-xi/length)), by Newton."""
+    """Resultant [N] on the virgin slides (k,) for the saturating law D (1 - exp(-xi/length)), by Newton.
+
+    No step takes a point further back than BACK lengths, where the law is so steep that Newton does not come back. NaN
+    where it does not come to an end.
+    """
     b = np.zeros(values.size)
     out = []
     for slide in slides:
-        for _ in range(60):
+        for _ in range(200):
             xi = slide - shape @ b
             decay = np.exp(np.minimum(-xi / length, 700.0))
             traction, slope = 1 - decay, decay / length
             missing = b / values - shape.T @ (limit * traction)
             tangent = np.diag(1 / values) + shape.T @ ((limit * slope)[:, None] * shape)
             step = np.linalg.solve(tangent, missing)
+            change = shape @ step  # of xi
+            back = change < 0
+            part = np.min((xi[back] + BACK * length) / -change[back], initial=1.0)
+            if 0 < part < 1:
+                b = b - part * step
+                continue
             b = b - step
             if np.abs(step).max() <= 1e-11 * (np.abs(b).max() + 1e-300):  # quadratic: the next one is round-off
                 break
+        else:
+            if not np.abs(step).max() <= 1e-6 * np.abs(b).max():
+                return np.full(len(slides), np.nan)
         out.append(limit @ -np.expm1(np.minimum(-(slide - shape @ b) / length, 700.0)))
     return np.array(out)
 

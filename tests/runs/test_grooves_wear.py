@@ -85,6 +85,36 @@ def test_exact_a_rig_wears_by_the_work_of_its_friction(lifted):
         assert value(found, "worn_volume") == pytest.approx(KAPPA * 10 * value(found, "loop_area") / part, rel=1e-4)
 
 
+SOFT = PIECES.replace("[friction]", "[contact.shear]\n[friction]")
+
+
+@pytest.mark.parametrize(("text", "more"), [
+    (SLIDE, {"slide.amplitude": "0.3 um", "contact.grooves.phase": "1 rad"}),
+    (RIG, {"drive.acceleration": "5 g", "drive.cycles": 20, "contact.grooves.lifted_mass": "0.4 kg"}),
+    pytest.param(RIG, {"drive.acceleration": "5 g", "drive.cycles": 20, "friction.law": "elastic-plastic",
+                       "friction.bond_length": "5 nm"}, marks=pytest.mark.slow)])
+def test_exact_pieces_that_give_way_wear_by_the_work_of_their_friction(text, more):
+    """Slip and normal force of every point along the flank: their sum over the patch is what the books say, kappa times
+    friction's own work (form 'energy') or that over mu, and the flanks lose their share of it."""
+    for form, part in (("archard", MU), ("energy", 1.0)):
+        found = run(SOFT + text, False, **{"wear.form": f'"{form}"', "wear.cycles": 10, "wear.jumps": 1, **more})
+        volume = value(found, "worn_volume")
+        assert volume == pytest.approx(KAPPA * 10 * value(found, "loop_area") / part, rel=1.2e-3)
+        assert (7.5e-6 - value(found, "groove_amplitude")) * AREA == pytest.approx(0.5 * volume, rel=1e-9)
+        assert value(found, "energy_balance") < 1e-8
+
+
+def test_exact_on_flat_ground_they_wear_as_the_exact_set_of_elements():
+    """Worn depth of every point, flanks of a slope of 1e-12, a stroke of some three slides at which the pieces let
+    go."""
+    keys = {"slide.amplitude": "0.3 um", "wear.cycles": 1000, "wear.jumps": 1}
+    here = run(SOFT + SLIDE, False, **keys, **{"contact.grooves.amplitude": "1e-11 um"})
+    there = run(SOFT + SLIDE, False, **keys, **{"contact.grooves.amplitude": "0 um"})
+    np.testing.assert_allclose(here.patch.gap, there.patch.gap, rtol=2e-3)
+    path = here.patch.gap / here.patch.pressure.sigma_n
+    assert np.ptp(path) > 0.05 * path.mean()
+
+
 def test_always_worn_grooves_let_the_motion_run_away():
     """At 7 g new grooves hold for ever; worn by a tenth they let the motion grow, and then pass its stop."""
     found = run(PIECES + RIG, False, **{"wear.cycles": 2e7})

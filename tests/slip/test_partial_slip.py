@@ -15,6 +15,7 @@ from patchfem.contact.unilateral import press
 from patchfem.core import PatchfemError
 from patchfem.slip.shear_modes import (
     JenkinsSet,
+    enough_modes,
     jenkins_set,
     merged,
     normal_stiffness,
@@ -272,6 +273,18 @@ def test_always_more_modes_never_worsen_the_backbone(angle, length):
     assert np.all(np.diff(errors) <= 1e-12)
     assert errors[3] <= (1e-6 if length == 1e-6 else 3e-5)
     assert errors[0] > errors[3]
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-4])
+def test_always_short_bonds_have_the_modes_that_they_need(angle):
+    """Bonds a hundredth and a thousandth of the slide at which the patch lets go: shares of the limit that fall with
+    the modes; where the bonds are too short to tell, all that are allowed."""
+    pair, limit = coated_pair(100), friction_limit(100, angle)
+    reach = limit.sum() / tangential_stiffness(pair.tangential, limit > 0)
+    for share, most in ((1e-2, 1e-3), (1e-3, 5e-3)):
+        errors = [shear_modes(pair.tangential, limit, share * reach, n).backbone_error for n in (4, 8, 16, 32)]
+        assert np.all(np.diff(errors) <= 1e-12) and errors[1] < most and errors[0] < 0.05
+    assert enough_modes(pair.tangential, limit, 1e-9 * reach, 8, 1e-4).stiffness.size == min(64, np.sum(limit > 0))
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-4])

@@ -6,19 +6,22 @@ import numpy as np
 
 from ...core import Outcome, Response
 from ...friction.grooves import STEADY, Grooves, Swing
-from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
+from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes, tangential_stiffness
 from ..contacts.arrays import Climbing, sheared
 from ..march.march import Run
 from ..march.varying_load import PLASTIC, POINTS, Rubbing, bonds, plastic
 from .run import lifts, refuse_heavy
 
 HERE = "dynamics.grooves.contact_kernels"
+STIFF = 0.1  # of tolerance times the slide at which pieces let go: a bond length that is 1.7 of it off in force at most
+SHORT = 1e-3  # of that slide: the shortest bonds by which shear modes are chosen
 RISE, VERTICAL, LIFTS, BEFORE, NORMAL, RAISED = 0, 1, 4, 12, 13, 15  # of Climbing.now_at
 
 
 def model_of(grooves: Grooves, load: float, static: float, length: float, law, modes) -> "ClimbingModel":
     """The model of the elastic-plastic law of a length [m], or of the bonds `law` (friction.bonds.parameters.Bonds).
 
+    length 0: Coulomb's law at the points of pieces that give way, which `giving` makes.
     modes: of the rig, None of a bench; PatchfemError as of `run.refuse_heavy`.
     """
     if modes is not None:
@@ -28,14 +31,22 @@ def model_of(grooves: Grooves, load: float, static: float, length: float, law, m
 
 def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -> "ClimbingModel":
     """The model whose points are those of a solved Patch, behind the shear modes of its pieces: `count` of them, or as
-    many as the tolerance asks for."""
+    many as the tolerance asks for.
+
+    Points of Coulomb's law behind pieces of the stiffness K_t are elastic-plastic ones whose springs are 1/(STIFF
+    tolerance) times as stiff, a bond length STIFF tolerance mu N/K_t: on flat ground the force is then off by at most
+    0.17 of the tolerance, over the friction limit, from the exact elements (`slip.shear_modes.jenkins_set`).
+    """
     law, force = model.law, patch.pressure.sigma_n * patch.pieces.interface.weight
-    limit, weakening = law.static * force, 1.0
+    limit, weakening, length = law.static * force, 1.0, law.length
+    if not length:
+        reach = limit.sum() / tangential_stiffness(patch.giving, force > 0)
+        law, length = plastic(law.static, STIFF * tolerance * reach), max(STIFF * tolerance, SHORT) * reach
     if law.growth[0] >= 0:
         weakening = law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf
-    found = shear_modes(patch.giving, limit, law.length, count, weakening) if count is not None else \
-        enough_modes(patch.giving, limit, law.length, SHEAR_MODES, 0.1 * tolerance, weakening)
-    return replace(model, shear=found, share=tuple(force[found.points] / force.sum()))
+    found = shear_modes(patch.giving, limit, length, count, weakening) if count is not None else \
+        enough_modes(patch.giving, limit, length, SHEAR_MODES, 0.1 * tolerance, weakening)
+    return replace(model, law=law, shear=found, share=tuple(force[found.points] / force.sum()))
 
 
 class FlankModel:

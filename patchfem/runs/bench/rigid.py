@@ -53,7 +53,7 @@ def climbing(model, load: float, patch=None, count: int | None = None):
         found = elements.model_of(grooves, load, f.static, law_from(f, load).element(load), modes)
         return replace(found, swing=swing_of(model))
     law = model.bonds if has(f.law, "bonds") else None
-    found = replace(model_of(grooves, load, f.static, f.bond_length, law, modes), swing=swing_of(model))
+    found = replace(model_of(grooves, load, f.static, f.bond_length or 0.0, law, modes), swing=swing_of(model))
     return giving(found, patch, count, model.accuracy.tolerance) if model.soft else found
 
 

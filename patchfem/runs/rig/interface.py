@@ -56,7 +56,7 @@ def model_of(model: Model, numerics: Numerics, patch):
 def _climbing(model: Model, patch, count: int | None = None):
     """The model of a rig whose load climbs grooves."""
     f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
-    if not has(f.law, "memoryless"):
+    if model.soft or not has(f.law, "memoryless"):
         from ..bench.rigid import climbing
 
         return climbing(model, load, patch, count)

@@ -16,6 +16,7 @@ from ..rig.rig import rig_fields
 
 UNBOUNDED = (Outcome.GROWS, Outcome.EXCEEDS_TRAVEL, Outcome.NOT_CONVERGED)
 LEAST_FRAMES, MOST_FRAMES = 64, 800
+GAUSS = 8  # points in a step over a flank
 
 
 class Rubbed(NamedTuple):
@@ -58,9 +59,14 @@ def _bench(model, patch, frames: int) -> Rubbed:
     outcome = ended(None, model.patch, patch, found.slide)
     if shaped:
         last = found.frames >= found.first
-        local, tau = found.local[last], found.tau[last]
+        local, tau, slide = found.local[last], found.tau[last], found.slide[found.frames[last]]
         if found.first == 0:
             local, tau = (np.concatenate([np.zeros((1, part.shape[1])), part]) for part in (local, tau))
+            slide = np.append(0.0, slide)
+            if model.grooves is not None:  # it stands on its flank
+                tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
+        if model.grooves is not None:
+            local, tau = along(model, patch, slide, np.full(slide.size, patch.pressure.load), local, tau)
         return _read(model, patch, local, tau, False, found.values, outcome)
     last = [part[found.first:] for part in (found.slide, found.slip, found.force, found.load)]
     return _alike(model, patch, last, last[-1][0], found.values, outcome)
@@ -76,7 +82,13 @@ def _rig(model, patch, frames: int) -> Rubbed:
     outcome = ended(settled if settled in UNBOUNDED else None, model.patch, patch, found.response.slide)
     if shaped:
         fields = rig_fields(model, numerics, patch, found)
-        return _read(model, patch, fields["slip"][1:], fields["shear_stress"][1:], True, found.values, outcome)
+        local, tau = fields["slip"][1:], fields["shear_stress"][1:]
+        if model.grooves is not None:
+            slide, time, window = fields["holder_slide"][1:], fields["time"][1:], found.response
+            lifted = np.interp(time, window.time, window.extra.get("normal_load", np.full(
+                window.time.size, patch.pressure.load)))
+            local, tau = along(model, patch, slide, lifted, local, tau)
+        return _read(model, patch, local, tau, True, found.values, outcome)
     load = patch.pressure.load
     return _alike(model, patch, _last_cycle(model, found.window, load), load, found.values, outcome)
 
@@ -128,9 +140,33 @@ def along_flanks(model, slide, force, load) -> np.ndarray:
     return np.abs(force - load * t) if model.wear.energy else np.maximum(load + force * t, 0.0)
 
 
+def along(model, patch, slide, vertical, local, tau) -> tuple:
+    """(slip along the flank (f, m) [m], what wears there (f, m) [Pa]) of points of pieces that give way, from frames of
+    the holder's slide (f,) [m], the vertical force V (f,) [N], irreversible slip and resultant traction (f, m).
+
+    The slip is s - e, s the path along the flank and e what is elastic of it. A point of pressure sigma carries V
+    sigma/N, so its normal stress on the flank is R = (V sigma/N + tau t)/sqrt(1 + t^2) and its friction along it, with
+    form 'energy', |tau - t V sigma/N|/sqrt(1 + t^2).
+    """
+    g, sigma = model.grooves, patch.pressure.sigma_n
+    t = g.slope(slide)[:, None]
+    long, carried = np.sqrt(1 + t * t), (vertical / patch.pressure.load)[:, None] * sigma
+    path = np.append(0.0, np.cumsum(_lengths(g, slide[:-1], slide[1:])))
+    worn = np.abs(tau - t * carried) if model.wear.energy else np.maximum(carried + tau * t, 0.0)
+    return path[:, None] - (slide[:, None] - local) * long, worn / long
+
+
+def _lengths(grooves, begin, end) -> np.ndarray:
+    """Path along the flank [m] of the slides (k,) from begin to end [m], its sign that of the slide."""
+    out = np.zeros(begin.size)
+    for place, weight in zip(*np.polynomial.legendre.leggauss(GAUSS)):
+        out += 0.5 * weight * np.hypot(1, grooves.slope(0.5 * (1 - place) * begin + 0.5 * (1 + place) * end))
+    return out * (end - begin)
+
+
 def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> Rubbed:
-    """The path of every node from frames (f, m) of local slip [m] and shear stress [Pa]; closed: the last frame is
-    followed by the first."""
+    """The path of every node from frames (f, m) of local slip [m] and shear stress [Pa], over grooves those of
+    `along`; closed: the last frame is followed by the first."""
     path = _path(model, patch, local, tau, closed)
     coarse = _path(model, patch, local[::2], tau[::2], closed)
     total = path @ patch.pressure.sigma_n
@@ -144,7 +180,7 @@ def _path(model, patch, local, tau, closed: bool) -> np.ndarray:
     steps = np.abs(np.diff(local, axis=0))
     sigma = patch.pressure.sigma_n
     path = steps.sum(axis=0)
-    if model.wear.energy:
+    if model.wear.energy or model.grooves is not None:
         work = np.sum(steps * (np.abs(tau[1:]) + np.abs(tau[:-1])) / 2, axis=0)
         path = np.divide(work, sigma, out=np.zeros_like(work), where=sigma > 0)
     return path[_nearest(patch.x, sigma > 0)]

@@ -77,12 +77,8 @@ def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
         draft.say("accuracy.quadrature", unbuilt(f"'{accuracy.quadrature}' {beside}",
                                                  "use 'recursion' or 'auto'"))
     if contact is not None and contact.gives_way:
-        if has(law.law, "memoryless"):
-            draft.say("friction.law", unbuilt(f"{named(law)} {beside} and {contact.gives_way}", "stiff"))
         if contact.holder is not None and contact.holder.tangential_stiffness is not None:
             draft.say("contact.holder.tangential_stiffness", unbuilt(beside, "out"))
-        if draft.tables.wear is not None:
-            draft.say("wear", unbuilt(f"{beside} and {contact.gives_way}", "either"))
     if contact is not None and contact.strips is not None and (turning(draft.tables) or contact.gives_way):
         draft.say(at, unbuilt("beside strips that yaw or give way", "either"))
     _under_changing_load(draft, beside)

@@ -1,10 +1,13 @@
 """Points behind shear modes over grooves: rigid pieces, flat ground, one spring before all points, books, a scene."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import patchfem as pf
 from patchfem.core import BaseSine, ModalBasis
+from patchfem.dynamics.grooves import climbing
 from patchfem.dynamics.grooves.climbing import ClimbingModel
 from patchfem.dynamics.march.hub import follow_path
 from patchfem.dynamics.march.march import march
@@ -83,6 +86,65 @@ def test_exact_one_spring_before_all_points_by_small_steps():
         here = slid(model, wave(steps))[0][:, 0]
         true = spring_before_all(GROOVES, wave(steps * fine), stiffness)[::fine]
         np.testing.assert_allclose(here[:-1], true[:-1], rtol=0, atol=2e-3 * np.abs(true).max())
+
+
+def coulomb(grooves, tolerance, compliance=GIVING):
+    """Coulomb's law at the points."""
+    ones = SimpleNamespace(interface=SimpleNamespace(weight=np.ones(COUNT)))
+    patch = SimpleNamespace(pressure=SimpleNamespace(sigma_n=LOAD * SHARE), pieces=ones, giving=compliance)
+    return climbing.giving(climbing.model_of(grooves, LOAD, MU, 0.0, None, None), patch, None, tolerance)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])
+def test_exact_coulombs_points_on_flat_ground_are_their_exact_elements(tolerance):
+    """Flanks of a slope of 1e-12, strokes at which some points slip and all do: to 0.17 of the tolerance."""
+    found = jenkins_set(GIVING, MU * LOAD * SHARE)
+    slide = np.concatenate([np.linspace(0, 1, 40), np.linspace(1, -0.8, 60)[1:], np.linspace(-0.8, 3, 90)[1:]])
+    slide *= found.yield_slide.max()
+    exact = slid(jenkins_model(found.stiffness, found.yield_slide), slide)[0]
+    here = slid(coulomb(Grooves(80e-6, 1e-17), tolerance), slide)[0]
+    assert np.abs(here[:-1, 0] - exact[:-1, 0]).max() < 0.17 * tolerance * MU * LOAD
+
+
+def coulombs_points(grooves, slide, compliance):
+    """Force against the slide of Coulomb points behind a compliance [m/N] along the flank: at the end of every step
+    the forces f are those of least f C f/2 - f (path - slip) with |f| <= mu share R, by Gauss and Seidel."""
+    force, f, slip, path = np.full(slide.size, LOAD * grooves.slope(slide[0])), np.zeros(COUNT), np.zeros(COUNT), 0.0
+    for i in range(1, slide.size):
+        t = float(grooves.slope(slide[i]))
+        path += np.hypot(1, grooves.slope(0.5 * (slide[i] + slide[i - 1]))) * (slide[i] - slide[i - 1])
+        for _ in range(400):
+            old = f.copy()
+            bound = MU * SHARE * (LOAD * np.hypot(1, t) + f.sum() * t)
+            for k in range(COUNT):
+                tried = f[k] + (path - slip[k] - compliance[k] @ f) / compliance[k, k]
+                f[k] = min(max(tried, -bound[k]), bound[k])
+            if np.abs(f - old).max() < 1e-9 * LOAD:
+                break
+        slip = path - compliance @ f
+        force[i] = LOAD * t + f.sum() * np.hypot(1, t)
+    return force
+
+
+def test_exact_coulombs_points_on_the_flank_by_least_energy():
+    """Soft pieces, of which some points slip over most of a stroke of a quarter of a wave."""
+    soft, slide = 40 * GIVING, 20e-6 * np.sin(np.linspace(0, 7.3, 401))
+    true = coulombs_points(GROOVES, slide, soft)
+    here = slid(coulomb(GROOVES, 1e-3, soft), slide)[0][:, 0]
+    np.testing.assert_allclose(here[:-1], true[:-1], rtol=0, atol=2e-3 * np.abs(true).max())
+    rigid = LOAD * GROOVES.ratio(slide[1:-1], np.sign(np.diff(slide)[1:]), MU)
+    assert np.abs(rigid - true[1:-1]).max() > 0.5 * np.abs(true).max()  # far from pieces that are rigid
+
+
+def test_exact_the_books_of_coulombs_points_close():
+    forces, energies = slid(coulomb(GROOVES, 1e-3), wave(200))
+    work = forces[:-1, 1] @ np.diff(wave(200))
+    assert work - energies[:-1, 0].sum() == pytest.approx(energies[-1, 1] - energies[0, 1], rel=1e-9)
+    one = np.ones(1)
+    basis = ModalBasis(("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), one, one, one, 1.194)
+    done = march(basis, BaseSine(49.0, 2 * np.pi * 143), coulomb(Grooves(80e-6, 7.5e-6, 0.3, 0.4), 1e-3), 4, 200,
+                 window=3)
+    assert done.outcome is None and energy_balance(done.ledger) < 1e-11
 
 
 @pytest.mark.parametrize("law", LAWS)
