@@ -221,7 +221,7 @@ def test_exact_bonds_that_lose_their_pressure_give_nothing_back():
     law = Quadrature(Bonds(1.0, 1.0, 0.5, initial=0.7), 0.0)
     one, state = np.ones(1), law.start(np.ones(1))
     for _ in range(20):
-        state = law.step(state, 0.1, one, one, 1.0).state
+        state = law.carried(state, 0.1, one, one, 1.0)
     last = law.step(state, 0.05, one, 0 * one, 1.0)
     work, part, count = 0.0, state, 250
     for k in range(count):

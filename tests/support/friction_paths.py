@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import gamma
 
+from patchfem.friction.bonds.quadrature import Quadrature
+
 sys.path.append(str(Path(__file__).parents[2] / "studies/drift"))
 from force_control import drift, slides  # noqa: F401  (force control: one door for the tests of the laws)
 
@@ -57,6 +59,24 @@ def walk(law, path, pressure, dt=1.0):
         state = step.state
         rows.append((step.mean, law.traction(state), step.dissipated, law.stored(state)))
     return Walk(*(np.array(part) for part in zip(*rows)), state)
+
+
+class Pulled(NamedTuple):
+    """Tractions of a law after each step of a path, and its last state."""
+
+    traction: np.ndarray
+    state: object
+
+
+def pulled(law, path, pressure, dt=1.0) -> Pulled:
+    """As `walk`, without means and energies: of a sum over bonds at a tenth of the cost."""
+    times = np.broadcast_to(dt, len(path) - 1)
+    state, rows = law.start(pressure(path[0])), []
+    for k, dq in enumerate(np.diff(path)):
+        given = state, float(dq), pressure(path[k]), pressure(path[k + 1]), float(times[k])
+        state = law.carried(*given) if isinstance(law, Quadrature) else law.step(*given).state
+        rows.append(law.traction(state))
+    return Pulled(np.array(rows), state)
 
 
 def rates(law, speed):

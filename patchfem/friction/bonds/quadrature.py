@@ -61,7 +61,8 @@ class Quadrature:
         """
         dq = np.atleast_1d(np.asarray(dq, float))
         after = self.carried(state, dq, s0, s1, dt)
-        gain = self.stored(after) - self.stored(state)
+        before, end = self.stored(state), self.stored(after)
+        gain = end - before
         if not dq.any():
             return Step(self.traction(after), -gain, after)
         if self._closed:
@@ -73,10 +74,10 @@ class Quadrature:
         else:
             mean, spent = self._along(state, dq, s0, s1, dt)
             # bonds lost at the end of the step leave their energy to nobody: the force holds them until then
-            held = after if (s1 > 0).all() else self.carried(state, dq, s0, np.maximum(s1, np.finfo(float).tiny), dt,
-                                                            forming=(s0 + s1) / 2)
+            held = end if (s1 > 0).all() else self.stored(self.carried(
+                state, dq, s0, np.maximum(s1, np.finfo(float).tiny), dt, forming=(s0 + s1) / 2))
             path, e = direction(dq)
-            own = (spent + self.stored(held) - self.stored(state)) / path
+            own = (spent + held - before) / path
             mean = mean + e[:, None] * (own - e @ mean) if len(dq) > 1 else e[:, None] * own
         return Step(_squeezed(mean), dq @ mean - gain, after)
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from friction_paths import triangle, upper_pressure, walk
+from friction_paths import pulled, triangle, upper_pressure, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -137,7 +137,7 @@ def test_exact_reversal_after_a_long_slide(order, reading, want):
     back = np.array([0.1, np.log(2) / 2, np.log(2), 1, 3])
     path = np.concatenate([np.linspace(0, 40, 9), 40 - back])
     for law in laws(order, reading, 1.0 if reading == "stretch" else 0.0):
-        force = walk(law, path, ONE).traction[-5:, 0]
+        force = pulled(law, path, ONE).traction[-5:, 0]
         assert force == pytest.approx(want, abs=1e-6)
         assert force == pytest.approx(reversal_force(back, 1.0, order, reading), abs=1e-12)
 
@@ -147,7 +147,7 @@ def test_exact_reversal_after_a_long_slide(order, reading, want):
 def test_exact_reversal_of_other_orders(order, reading):
     back = np.array([0.25, 1.0, 2.5])
     path = np.concatenate([np.linspace(0, 40, 161), 40 - back])
-    force = walk(Quadrature(bonds(order, reading, 0.0)), path, ONE).traction[-3:, 0]
+    force = pulled(Quadrature(bonds(order, reading, 0.0)), path, ONE).traction[-3:, 0]
     within = 1e-9 if reading == "report" or order == 2 else 5e-4  # |u|^p is not smooth where u changes sign
     assert force == pytest.approx(reversal_force(back, 1.0, order, reading), abs=within)
 

@@ -4,7 +4,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from friction_paths import random_walk, triangle, upper_pressure, walk
+from friction_paths import pulled, random_walk, triangle, upper_pressure
 from march_paths import OMEGA, follow, one_mode
 from scene_texts import DRIVE, KILOGRAM
 
@@ -122,7 +122,7 @@ def test_order_of_negative_orders_converges(order):
     path = random_walk(2, 20, 0.6)
     fine = np.interp(np.linspace(0, 20, 81), np.arange(21), path)
     got = follow(list_model(law, 1.2, np.inf, 0.0), fine)[0]
-    run = walk(Quadrature(law, tail=0.0), path, upper_pressure([3.0]), 0.3)
+    run = pulled(Quadrature(law, tail=0.0), path, upper_pressure([3.0]), 0.3)
     assert got[4::4, 0] == pytest.approx(run.traction[:, 0], abs=1e-7)
 
 
@@ -135,7 +135,7 @@ def test_exact_march_of_a_list_replayed_by_the_numpy_law(reading, order):
     limit = 0.4 * 98.0665
     got = march(one_mode(OMEGA, 0.01, 1.0), BaseSine(5 * 9.80665, OMEGA), list_model(law, limit, np.inf, 0.0), 2, 100,
                 window=2)
-    run = walk(Quadrature(law, tail=0.0), got.window.slide, upper_pressure([98.0665]), 1 / 14300)
+    run = pulled(Quadrature(law, tail=0.0), got.window.slide, upper_pressure([98.0665]), 1 / 14300)
     book = got.ledger
     assert got.outcome is None and np.ptp(got.window.slide) > 5e-6
     assert got.window.force[1:] == pytest.approx(run.traction[:, 0], abs=2e-4 * limit)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from friction_paths import random_walk, sum_by_hand, triangle, upper_pressure, walk
+from friction_paths import pulled, random_walk, sum_by_hand, triangle, upper_pressure, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from list_paths import empty_list, energy_by_hand, follow_list
@@ -54,7 +54,7 @@ def test_exact_direct_of_the_printed_law_is_the_quadrature(order, initial):
     """Closed strips, exact for p = 0, 1, 2; other orders from the table of P, 7e-9 off at most."""
     law = Bonds(1.0, 1.0, order, "report", initial=initial)
     path = np.concatenate([random_walk(3, 40, 0.7), random_walk(3, 40, 0.7)[-1] + np.array([0, 0.2, 0.4, 30, 30])])
-    got, run = follow_list(law, path), walk(Quadrature(law, tail=0.0), path, ONE)
+    got, run = follow_list(law, path), pulled(Quadrature(law, tail=0.0), path, ONE)
     within = 1e-12 if order in (0, 1, 2) else 2e-8
     assert got.after == pytest.approx(run.traction[:, 0], abs=within)
     assert got.ahead == pytest.approx(got.after, abs=within)
@@ -67,7 +67,7 @@ def test_exact_direct_of_the_stretch_reading_is_the_quadrature(order, within, gr
     """Reversals where u = 0 falls inside a strip: order 0 was 5e-2 off there before strips were split."""
     law = Bonds(1.0, 1.0, order, "stretch", **growth)
     path = np.concatenate([triangle(1.5, 3, 13), [-1.43, -0.77, 4.0, 3.3, 3.9]])
-    got, run = follow_list(law, path, 0.4), walk(Quadrature(law, tail=0.0), path, ONE, 0.4)
+    got, run = follow_list(law, path, 0.4), pulled(Quadrature(law, tail=0.0), path, ONE, 0.4)
     assert got.after == pytest.approx(run.traction[:, 0], abs=within)
     assert got.ahead == pytest.approx(got.after, abs=within)
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import mpmath
 import numpy as np
 import pytest
-from friction_paths import drift, lower_pressure, sum_by_hand, upper_pressure, walk
+from friction_paths import drift, lower_pressure, pulled, sum_by_hand, upper_pressure, walk
 from list_paths import follow_list
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -179,7 +179,7 @@ def test_exact_c10_pressure_wave_is_smoothed_and_delayed(order, eps, size, lag):
         law = Recursion(law) if order == 1 else Quadrature(law, tail=0.0)
         path = np.linspace(0, 30 * eps, count + 1)
         pressure = lower_pressure(x, 80.0, 2.0)
-        tau = walk(law, path, pressure).traction[-1]
+        tau = pulled(law, path, pressure).traction[-1]
         place = x + path[-1]
         return 1j * (tau @ np.exp(-1j * k * place)) / 3
 
@@ -480,7 +480,7 @@ def test_exact_extreme_orders_of_the_printed_law(order):
     """p = -0.9, 20: virgin curve P(p + 1, x), reversal P(p + 1, 60 + x) - 2 P(p + 1, 2x) and cut-off in many digits."""
     law = Bonds(1.0, 1.0, order, "report", initial=0.0)
     path = np.concatenate([np.linspace(0, 60, 121), 60 - np.array([0.01, 0.5, 4.0, 12.0, 30.0])])
-    force = walk(Quadrature(law, tail=0.0), path, ONE).traction[:, 0]
+    force = pulled(Quadrature(law, tail=0.0), path, ONE).traction[:, 0]
 
     def below(x):
         return float(mpmath.gammainc(mpmath.mpf(order) + 1, 0, x, regularized=True))
@@ -596,8 +596,8 @@ def test_exact_a_reversal_of_the_stretch_reading_of_any_order(order, bound):
     engine, one = Quadrature(law, 0.0), np.ones(1)
     state = engine.start(one)
     for _ in range(160):
-        state = engine.step(state, 0.25, one, one, 1.0).state
+        state = engine.carried(state, 0.25, one, one, 1.0)
     for back in np.full(12, 0.171).cumsum():
-        state = engine.step(state, -0.171, one, one, 1.0).state
+        state = engine.carried(state, -0.171, one, one, 1.0)
         wanted = closed_forms.reversal_force(back, 1.0, order, "stretch", 1.0)
         assert abs(float(engine.traction(state)[0]) - wanted) <= bound

@@ -1,14 +1,16 @@
 """The sum over bonds for every order and both readings: closed forms, a sum by hand, orders and bounds."""
 
+from dataclasses import fields
 
 import numpy as np
 import pytest
-from friction_paths import lower_pressure, sum_by_hand, triangle, upper_pressure, walk
+from friction_paths import lower_pressure, pulled, sum_by_hand, triangle, upper_pressure, walk
 from scipy.special import gammaincc
 
 from patchfem.closed_forms.friction import virgin_force
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff
+from patchfem.friction.bonds.strips import Strips
 
 ONE = upper_pressure([1.0, 0.25])
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
@@ -26,7 +28,7 @@ def test_exact_printed_law_on_random_paths(order, initial):
     """Incomplete-gamma strips against 2.17 summed by hand; orders below one keep a kink at R = 0 in the hand sum."""
     law = Bonds(1.0, 1.0, order, "report", initial=initial)
     path = random_path(4, 40)
-    run = walk(Quadrature(law, tail=0.0), path, ONE)
+    run = pulled(Quadrature(law, tail=0.0), path, ONE)
     within = {-0.5: 0.05, 0.5: 1e-4}.get(order, 1e-8 if order == 3.7 else 1e-12)
     assert run.traction[-1] == pytest.approx(sum_by_hand(law, path, ONE), abs=within)
 
@@ -36,7 +38,7 @@ def test_exact_printed_law_of_fractional_order_where_the_strips_are_old(order):
     """After a slide far from every turn the kink has died out in the hand sum except in the newest strip, cut fine."""
     law = Bonds(1.0, 1.0, order, "report", initial=0.0)
     path = np.concatenate([random_path(4, 20), [1.0 + 1e-9]])
-    run = walk(Quadrature(law, tail=0.0), path, ONE)
+    run = pulled(Quadrature(law, tail=0.0), path, ONE)
     coarse, fine = (sum_by_hand(law, path, ONE, pieces=n)[0] for n in (400, 1600))
     rate = 4.0**(order + 1)  # the hand sum's own error falls as h^(p+1)
     assert run.traction[-1, 0] == pytest.approx((rate * fine - coarse) / (rate - 1), abs=2e-4 if order < 0 else 1e-7)
@@ -47,7 +49,7 @@ def test_exact_printed_law_of_fractional_order_where_the_strips_are_old(order):
 def test_exact_pressure_on_either_piece(reading, order, pressure):
     law = Bonds(1.0, 1.0, order, reading, initial=0.5)
     path = random_path(5, 40)
-    run = walk(Quadrature(law, tail=0.0), path, pressure)
+    run = pulled(Quadrature(law, tail=0.0), path, pressure)
     assert run.traction[-1] == pytest.approx(sum_by_hand(law, path, pressure), abs=1e-12)
 
 
@@ -88,7 +90,7 @@ def test_exact_readings_agree_without_a_reversal(order, sign):
 
 def test_exact_readings_differ_after_a_reversal():
     path = np.array([0.0, 2.0, 1.0])
-    stretch, report = (walk(Quadrature(Bonds(1.0, 1.0, 1.0, r)), path, ONE).traction[-1, 0]
+    stretch, report = (pulled(Quadrature(Bonds(1.0, 1.0, 1.0, r)), path, ONE).traction[-1, 0]
                        for r in ("stretch", "report"))
     assert report - stretch > 0.05  # u/|u| turns at once, the stretch first has to be undone
 
@@ -100,7 +102,7 @@ def test_exact_gauss_strips_on_a_root():
     for step in (0.2, 0.1, 0.05, 0.025):
         law = Bonds(1.0, 1.0, 0.5, "stretch", initial=0.0)
         path = np.linspace(0, 0.8, round(0.8 / step) + 1)
-        end = walk(Quadrature(law, tail=0.0), path, ONE).traction[-1, 0]
+        end = pulled(Quadrature(law, tail=0.0), path, ONE).traction[-1, 0]
         assert end == pytest.approx(virgin_force(0.8, 1.0, 0.5, 0.0), abs=1e-8)
 
 
@@ -108,7 +110,7 @@ def test_exact_gauss_strips_on_a_root():
 def test_exact_gauss_strips_of_smooth_orders(order):
     path = np.concatenate([np.linspace(0, 3, 13), np.linspace(3, 1, 9)[1:]])
     law = Bonds(1.0, 1.0, order, "stretch", initial=0.3)
-    run = walk(Quadrature(law, tail=0.0), path, ONE)
+    run = pulled(Quadrature(law, tail=0.0), path, ONE)
     assert run.traction[-1] == pytest.approx(sum_by_hand(law, path, ONE), abs=1e-11)
 
 
@@ -118,7 +120,7 @@ def test_exact_printed_law_with_growing_bonds_at_steps_of_any_length(order):
     law = Bonds(1.0, 1.0, order, "report", initial=0.0, **GROWTH)
     for parts in (1, 2, 4):
         path = triangle(1.0, 1, 8 * parts)[: 20 * parts + 1]
-        run = walk(Quadrature(law, tail=0.0), path, ONE, dt=0.4 / parts)
+        run = pulled(Quadrature(law, tail=0.0), path, ONE, dt=0.4 / parts)
         found, wanted = run.traction[-1, 0], sum_by_hand(law, path, ONE, 0.4 / parts)[0]
         assert found == pytest.approx(wanted, abs=2e-6 if order > -0.5 else 1e-4)
 
@@ -129,8 +131,22 @@ def test_exact_printed_law_pushes_back_while_it_heals(order):
     law = Bonds(1.0, 1.0, order, "report", ratio=0.5, rest_growth=10.0, slip_growth=1e-3, rest_speed=1.0)
     path = np.concatenate([np.linspace(0, 20, 201), [20, 20]])
     times = np.append(np.full(200, 1e-9), [0.1, 0.1])
-    force = walk(Quadrature(law), path, upper_pressure([1.0]), times).traction[-3:, 0]
+    force = pulled(Quadrature(law), path, upper_pressure([1.0]), times).traction[-3:, 0]
     assert force == pytest.approx([0.5, 0.81606, 0.93233], abs=5e-4)
+
+
+@pytest.mark.parametrize("reading, order, growth", [("report", 0.0, {}), ("report", 1.0, GROWTH), ("stretch", 0.5, {}),
+                                                    ("stretch", 1.0, GROWTH), ("stretch", 2.0, GROWTH)])
+@pytest.mark.parametrize("tail", [0.0, 1e-2])
+def test_exact_bonds_that_are_only_carried_are_those_of_a_step(reading, order, growth, tail):
+    law, pressure = Quadrature(Bonds(0.4, 1.0, order, reading, **growth), tail), lower_pressure(np.zeros(3), 5.0, 0.5)
+    path = np.concatenate([random_path(6, 12, 0.4), [0.0, 0.0, 30.0]])
+    stepped, carried = walk(law, path, pressure, 0.3), pulled(law, path, pressure, 0.3)
+    assert np.array_equal(stepped.traction, carried.traction)
+    for each in fields(Strips):
+        both = (getattr(run.state, each.name) for run in (stepped, carried))
+        for one, two in zip(*(part if isinstance(part, tuple) else (part,) for part in both), strict=True):
+            assert np.array_equal(one, two), each.name
 
 
 # ---- cut-off
@@ -141,9 +157,9 @@ def test_exact_printed_law_pushes_back_while_it_heals(order):
 def test_always_the_cut_off_loses_less_than_its_bound(reading, order, growth):
     law = Bonds(0.4, 1.0, order, reading, **growth)
     path = np.concatenate([random_path(6, 150, 0.4), random_path(6, 151, 0.4)[-1] + np.linspace(0.2, 20, 100)])
-    whole = walk(Quadrature(law, 0.0), path, ONE, 0.3)
+    whole = pulled(Quadrature(law, 0.0), path, ONE, 0.3)
     for tail in (1e-2, 1e-5):
-        cut = walk(Quadrature(law, tail), path, ONE, 0.3)
+        cut = pulled(Quadrature(law, tail), path, ONE, 0.3)
         assert cut.state.dropped > 0 and len(cut.state.q) < len(whole.state.q)
         gap = np.abs(cut.traction - whole.traction).max()
         assert gap <= tail * 0.4 * 1.0
@@ -180,5 +196,5 @@ def test_exact_a_dwell_does_not_count_as_growth_of_the_next_strip():
     law = Bonds(1.0, 1.0, 1.0, "report", ratio=0.5, rest_growth=0.1, slip_growth=0.2, rest_speed=1e-2, initial=0.0)
     path = np.concatenate([np.linspace(0, 2, 41), [2.0, 2.05]])
     times = np.append(np.full(40, 0.5), [1.0, 0.5])
-    got = walk(Quadrature(law, tail=0.0), path, upper_pressure([1.0]), times).traction[-1, 0]
+    got = pulled(Quadrature(law, tail=0.0), path, upper_pressure([1.0]), times).traction[-1, 0]
     assert got == pytest.approx(sum_by_hand(law, path, upper_pressure([1.0]), times)[0], abs=2e-4)

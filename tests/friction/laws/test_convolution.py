@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from friction_paths import triangle, upper_pressure, walk
+from friction_paths import pulled, triangle, upper_pressure, walk
 from hypothesis import given
 from hypothesis import strategies as st
 from scene_texts import COULOMB, POINT, SHEAR, SHORT, SLIDE, SMALL_PATCH
@@ -112,7 +112,7 @@ def test_exact_a_long_slide_over_a_pressure_below_settles_to_the_average(law, or
     bonds = Bonds(0.4, 1.0, float(order), "report" if order != 1 else "stretch", initial=0.0)
     engine = law(bonds, 0.0) if law is Quadrature else law(bonds)
     pressure = lower(nodes, sigma)
-    coarse, fine = (walk(engine, way * np.linspace(0, 20, steps + 1), pressure).traction[-1] for steps in (160, 320))
+    coarse, fine = (pulled(engine, way * np.linspace(0, 20, steps + 1), pressure).traction[-1] for steps in (160, 320))
     averaged = Convolution(0.4, 1.0, order, nodes, sigma)
     end = averaged.step(averaged.start(sigma), way * 20.0, sigma, pressure(way * 20.0), 1.0).state
     assert (np.diff((sigma > 0).astype(int)) != 0).sum() >= 2
