@@ -199,7 +199,7 @@ def test_exact_arrays_of_several_blocks_and_none_are_unpacked_by_vtk(tmp_path):
         path = tmp_path / "field.vtu"
         path.write_text(f'''<?xml version="1.0"?>
 <VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64"
- compressor="vtkZLibDataCompressor"><UnstructuredGrid><FieldData>
+ compressor="vtkLZMADataCompressor"><UnstructuredGrid><FieldData>
 <DataArray type="Float64" Name="a" NumberOfTuples="{count}" format="binary">{_packed(values)}</DataArray></FieldData>
 <Piece NumberOfPoints="0" NumberOfCells="0"/></UnstructuredGrid></VTKFile>''', "ascii")
         array = through_vtk(path).GetFieldData().GetArray("a")
