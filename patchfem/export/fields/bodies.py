@@ -20,6 +20,7 @@ from ...elasticity.recovery import (
     recovery,
 )
 from .blocks import blocks_of
+from .strength import beyond_yield
 from .vtkhdf import write_series
 
 UNITS = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "stress_error": "1", "material": "1",
@@ -35,7 +36,8 @@ DEFORMED = 2.0**-14  # of the largest displacement of a piece in its holder: its
 def write_fields(result, path: Path) -> dict:
     """Write both bodies and the interface of one pair, frame by frame.
 
-    Returns the pressed state for the report's picture, after all wear; it is drawn for tensor grids only.
+    Returns the pressed state for the report's picture, after all wear; it is drawn for tensor grids only. A stress
+    beyond the yield strength of a named material is noted in the result.
     """
     patch, fields = result.patch, result.fields
     times = fields["time"]
@@ -47,6 +49,8 @@ def write_fields(result, path: Path) -> dict:
     low, high = (_body(patch, fields, *of) for of in zip(("lower", "upper"), insides, motions))
     for one, other in ((low, high), (high, low)):
         one["stress_error"] = one["error"].shares(other["error"])[0]
+    notes = result.extra.setdefault("notes", [])
+    notes += [one for one in beyond_yield(result.plan.model.patch, {"lower": low, "upper": high}) if one not in notes]
     steps = {"lower": low["steps"], "upper": high["steps"]}
     write_series(path, blocks_of(low, high, patch.x, interface), times, UNITS, steps)
     if not isinstance(patch.pair.piece, Piece):

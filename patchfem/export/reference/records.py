@@ -2,7 +2,7 @@
 
 from ...response.rows import ROWS as MOTION
 from ...runs.results.patch_rows import ROWS as STATIC
-from ...scene.keys.materials import MATERIALS, THERMAL
+from ...scene.keys.materials import MATERIALS, THERMAL, YIELD
 from .keys import FOLDER, grid
 
 MADE = "Generated from the program's own records by `python -m patchfem.export.reference`; a test compares the two."
@@ -52,7 +52,12 @@ decides, measure it.
         rows = [(f"`{name}`", *(f"{value:g}" for value in (m.young / 1e9, *m[1:3])), m.source)
                 for name, m in MATERIALS.items()]
         warm = [(f"`{name}`", f"{t.conductivity:g}", f"{t.heat_capacity:g}", t.source) for name, t in THERMAL.items()]
+        firm = [(f"`{name}`", f"{one.strength / 1e6:g}", one.source) for name, one in YIELD.items()]
         heads = (("name", "young [GPa]", "poisson", "density [kg/m^3]", "source"),
-                 ("name", "conductivity [W/(m K)]", "heat capacity [J/(kg K)]", "source"))
+                 ("name", "conductivity [W/(m K)]", "heat capacity [J/(kg K)]", "source"),
+                 ("name", "yield strength [MPa]", "source"))
         return "\n\n".join([cls.HEAD.strip(), grid(heads[0], rows), "## Heat", "For the note on how far friction warms "
-                            "the faces, beside `[friction.temperature]`.", grid(heads[1], warm)]) + "\n"
+                            "the faces, beside `[friction.temperature]`.", grid(heads[1], warm), "## Strength",
+                            "For the note on pieces whose stress is beyond it, which the run, elastic throughout, "
+                            "leaves out.",
+                            grid(heads[2], firm)]) + "\n"

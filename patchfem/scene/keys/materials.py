@@ -30,6 +30,21 @@ MATERIALS: dict[str, Elastic] = {
 }
 
 
+class Yield(NamedTuple):
+    """Yield strength in tension [Pa] at 20 degC, with the source of the number."""
+
+    strength: float
+    source: str
+
+
+YIELD: dict[str, Yield] = {
+    "Ti-8Al-1Mo-1V": Yield(930e6, "MatWeb MTA816: annealed 8 h at 790 degC; 828 MPa is the specified minimum."),
+    "steel": Yield(235e6, "EN 10025-2: minimum of S235 up to 16 mm thick, the softest of the common grades."),
+    "stainless steel": Yield(205e6, "ASTM A240: minimum of annealed 304; 310 MPa is typical."),
+    "aluminium": Yield(240e6, "ASTM B209: minimum of 6061-T6."),
+}
+
+
 class Thermal(NamedTuple):
     """Thermal conductivity [W m-1 K-1] and heat capacity [J kg-1 K-1] near 20 degC, with the source of the numbers."""
 
