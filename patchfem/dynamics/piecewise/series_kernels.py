@@ -270,23 +270,39 @@ def _halve(hull, half, degree, first):
 @njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
 def largest(poly, top, best, hulls):
     """The larger of `best` and max |sum poly[k] u^k| over [0, 1], to 1e-14 of it: halves whose hull cannot pass it are
-    left out."""
+    left out, and of one that turns once that turn is what counts."""
     best = max(best, abs(poly[0]), abs(value(poly, 0, top, 1.0)))
     bernstein(poly, 0, top, hulls[0])
-    depth = 0
+    depth, left, width, rate = 0, 0.0, 1.0, hulls[DEEP + 1]
     while True:
-        hull, most = hulls[depth], 0.0
-        for k in range(top + 1):
+        hull, most, turns, at = hulls[depth], abs(hulls[depth, 0]), 0, 0
+        for k in range(1, top + 1):
             most = max(most, abs(hull[k]))
-        if most <= best * (1 + 1e-14) or depth == DEEP:
+            if k > 1 and (hull[k] < hull[k - 1]) != (hull[k - 1] < hull[k - 2]):
+                turns += 1
+                at = k
+        known = most <= best * (1 + 1e-14) or depth == DEEP
+        if not known and turns < 2:  # Descartes: one turn at most; the ends have been looked at
+            if turns == 1:
+                sense = 1.0 if hull[1] > hull[0] else -1.0
+                before, after = hull[at - 1] - hull[at - 2], hull[at] - hull[at - 1]
+                for k in range(top):
+                    rate[k] = sense * (k + 1) * poly[k + 1]
+                share = (at - 2 + before / (before - after)) / (top - 1)
+                u = polish(rate, 0, top - 1, left, left + width, left + width * share)
+                best = max(best, abs(value(poly, 0, top, u)))
+            known = True
+        if known:
+            left += width
             while depth > 0 and hulls[depth, WIDE - 1] == 1.0:
                 depth -= 1
+                width *= 2
             if depth == 0:
                 return best
             _halve(hulls[depth - 1], hulls[depth], top, False)
             hulls[depth, WIDE - 1] = 1.0
             continue
         _halve(hull, hulls[depth + 1], top, True)
-        depth += 1
+        depth, width = depth + 1, width / 2
         hulls[depth, WIDE - 1] = 0.0
         best = max(best, abs(hulls[depth, top]))
