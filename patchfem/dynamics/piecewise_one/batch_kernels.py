@@ -79,8 +79,8 @@ def runs(cases, shape, work, answers, codes):
 
     cases: rigs (n, 6) and starts (n, 5) by the places of `names_kernels`, segments (n, 10) of the drives, counts (n,)
     and sorts (n, 4, t + 1) of the elements; shape: (cycles, cycles of the window); work: as `room.work_of` has it.
-    answers: extremes of the output per cycle (n, c, 2), its parts at the drive's frequency in the last cycle of every
-    window (n, windows, 2), ledgers (n, 8), numbers (n, NUMBERS) of `window_kernels`, ends (n, 5), steady (n, 3) and
+    answers: extremes of the output per cycle (n, c, 2), its parts at the drive's frequency in the last cycle of last
+    windows (n, windows, 2), ledgers (n, 8), numbers (n, NUMBERS) of `window_kernels`, ends (n, 5), steady (n, 3) and
     slope (n, MOST, MOST) as of `settled`; codes (n,).
     """
     rigs, starts, segments, counts, sorts = cases

@@ -149,9 +149,9 @@ def moved_to(u, h, top, c):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def phasor(u, h, output, top, c, clock, books):
-    """Add the output's part at the cycle's frequency of a piece up to u."""
-    cycle, period, count = int(clock.now[0]), clock.period[0], points(REACH * u)
+def phasor(x, u, h, output, top, c, clock, books):
+    """Add the output's part at the cycle's frequency of a piece of x times the fastest rate up to u."""
+    cycle, period, count = int(clock.now[0]), clock.period[0], points(x * u)
     for g in range(count):
         share = u * _PLACE[count, g]
         out = 2 * u * h * _WEIGHT[count, g] / period * output * value(c, 0, top, share)
@@ -338,7 +338,7 @@ def march(stop, motion, rig, table, memory, clock, books, room, rows):
                 write(rows[used], z, v, span, theta % (2 * pi), first, spring, share, limit, memory, clock)
                 used += 1
             if books.wanted[int(now[0])] == 1.0:
-                phasor(u, h, output, top, c, clock, books)
+                phasor(x, u, h, output, top, c, clock, books)
             went, close = moved_to(u, h, top, c)
             p, q = turned_by(push, side, omega * span, theta + omega * span, size)
             ends = (v, gain - rig[DAMPING] * v, push, side,

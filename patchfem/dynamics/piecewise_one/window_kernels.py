@@ -9,7 +9,7 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from ..piecewise.drive_kernels import AMPLITUDE, CONSTANT, OMEGA
 from ..piecewise.march_kernels import HEAD
-from ..piecewise.series_kernels import _PLACE, _WEIGHT, largest, points
+from ..piecewise.series_kernels import _PLACE, _WEIGHT, largest, points, value_and_slope
 from .names_kernels import (
     A3_COS,
     A3_SIN,
@@ -71,10 +71,8 @@ def sums(cycle, cycles, begin, h, top, c, springs, drive, rig, out):
     count, first = points(0.5 * (rate + 3 * omega) * h), place * rig[FACE]
     for g in range(count):
         u, w = _PLACE[count, g], h * _WEIGHT[count, g]
-        z, v = c[top], top * c[top]
-        for k in range(top - 1, 0, -1):
-            z, v = z * u + c[k], v * u + k * c[k]
-        z, v = z * u + c[0], v / h
+        z, v = value_and_slope(c, 0, top, u)
+        v /= h
         turn = theta + omega * h * u
         cosine, sine = cos(turn), sin(turn)
         slide, push = rig[FACE] * z, size * sine + constant

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from ....core import Outcome
+from ....dynamics.one_mode.sdof import ENDS
 from ....response.errors import total_error
 from ....response.measures import energy_balance
 from ....response.outcome import SMALL, settled, steady_error
@@ -25,12 +26,12 @@ class Runs:
     """What an engine found of n runs of `cycles` cycles each, the last `window` of which are read.
 
     values: measure -> (n,), NaN where a run has none; book: energies of the run [J], (n,) each; extremes: (n, c, 2) [m]
-    of the output per cycle; phasors: (n, w) [m] of the output in the last cycle of the last w windows; stuck, lost:
-    (n,) whether nothing slipped, and whether a run must be made by itself; errors: measure -> (n,) beside `least` of
-    its value; closes: gap of the energy balance beyond which a run has not converged; loads: (n,) of a stuck run,
-    whether what it holds still rises; steady: ((n,), (n,)) [m] amplitude and error of the motion that a run is known to
-    settle to, NaN where none is; chosen: what each run chose besides. Extremes and phasors are those of a run by itself
-    to the last bit: what is extrapolated far shows it.
+    of the output per cycle; phasors: (n, w) [m] of the output in the last cycle of the last ENDS windows, or of all;
+    stuck, lost: (n,) whether nothing slipped, and whether a run must be made by itself; errors: measure -> (n,) beside
+    `least` of its value; closes: gap of the energy balance beyond which a run has not converged; loads: (n,) of a stuck
+    run, whether what it holds still rises; steady: ((n,), (n,)) [m] amplitude and error of the motion that a run is
+    known to settle to, NaN where none is; chosen: what each run chose besides. Extremes and phasors are those of a run
+    by itself to the last bit: what is extrapolated far shows it.
     """
 
     cycles: int
@@ -106,7 +107,7 @@ def _outcome(models, runs: Runs, tolerance) -> tuple:
     floor = SMALL * np.array([largest(m.rig.drive) / omega_of(m.rig.drive)**2 for m in models])
     decay = np.array([slowest(m.rig.modes) * runs.window * m.rig.drive.period for m in models])
     with np.errstate(all="ignore"):
-        steady, bounded = steady_amplitudes(ends[:, -runs.phasors.shape[1]:], runs.phasors), False
+        steady, bounded = steady_amplitudes(ends[:, -ENDS:], runs.phasors[:, -ENDS:]), False
         if runs.steady is not None:
             bounded = ~np.isnan(runs.steady[0])
             steady = [np.where(bounded, known, seen) for known, seen in zip(runs.steady, steady)]

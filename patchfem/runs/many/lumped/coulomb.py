@@ -5,13 +5,12 @@ import numpy as np
 
 from ....compiled import load
 from ....dynamics.one_mode import window_kernels as read
-from ....dynamics.one_mode.sdof import ENDS
 from ....dynamics.second_book import gap
 from ....effects import has
 from ....response.loops import interface_loops
 from ....response.spectrum import distorted
 from ...rig.engines import EXACT, engine_of
-from .columns import Runs
+from .columns import ENDS, Runs
 from .threads import in_threads
 
 PHASES = 8  # of a cycle for which there is room, beside those of the first ones

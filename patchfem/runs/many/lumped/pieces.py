@@ -21,7 +21,7 @@ from ....response.spectrum import distorted
 from ...rig.engines import PIECES, engine_of
 from ...rig.pieces.costs import REACH, pairs_of
 from ...rig.pieces.run import group_of, settled_of, stuck_share
-from .columns import MAIN, Runs
+from .columns import ENDS, MAIN, Runs
 from .threads import in_threads
 
 KERNELS = "dynamics.piecewise_one.batch_kernels"
@@ -99,7 +99,7 @@ class _Found:
     """What the compiled call gave of n cases, arrays by the names that it has for them."""
 
     def __init__(self, given, counts, sorts, cycles: int, window: int):
-        n, windows = len(counts), (cycles - 1) // window + 1
+        n, windows = len(counts), min(ENDS, (cycles - 1) // window + 1)
         self.rigs, self.starts, self.segments, self.counts, self.sorts = *given, counts, sorts
         self.extremes, self.phasors = np.empty((n, cycles, 2)), np.empty((n, windows, 2))
         self.ledgers, self.numbers = np.empty((n, 8)), np.full((n, read.NUMBERS), np.nan)
@@ -113,7 +113,7 @@ def _solved(kernels, given, groups: list, shape: tuple, most: int) -> _Found:
     wide = sorts.shape[2]
     found = _Found(given, counts, sorts, cycles, window)
     wanted = np.zeros(cycles)
-    wanted[cycles - 1::-window] = 1.0
+    wanted[cycles - 1 - window * np.arange(found.phasors.shape[1])] = 1.0
 
     def go(part: slice) -> None:
         answers = (found.extremes, found.phasors, found.ledgers, found.numbers, found.ends, found.steady, found.slopes)
