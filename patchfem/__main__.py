@@ -1,8 +1,11 @@
 """The command line. Nothing scientific is imported until a verb needs it."""
 
 import gc
+import importlib
 import os
 import signal
+import sys
+from types import ModuleType
 
 # what asks a process to end: a person, a batch queue, a terminal that is closed (unless nohup lets it pass)
 ENDINGS = [one for one in (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP"))
@@ -16,8 +19,24 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # looking for cycles of objects takes a tenth of a short command, which makes few of them
 gc.set_threshold(50_000, *gc.get_threshold()[1:])
 
+
+
+class _Later(ModuleType):
+    """importlib.metadata until something of it is used. pydantic only takes its `entry_points` to look for plugins, and
+    its parser of mails, sockets and calendars would cost every command a tenth of the time that an answer may take."""
+
+    def __getattr__(self, name: str):
+        if sys.modules.get(self.__name__) is self:
+            del sys.modules[self.__name__]
+        return getattr(importlib.import_module(self.__name__), name)
+
+
+if "importlib.metadata" not in sys.modules:
+    later = sys.modules["importlib.metadata"] = importlib.metadata = _Later("importlib.metadata")
+    later.__path__ = [os.path.join(one, "metadata") for one in importlib.__path__]
+    later.entry_points = lambda **of: later.__getattr__("entry_points")(**of)
+
 import atexit  # noqa: E402
-import sys  # noqa: E402
 import threading  # noqa: E402
 from pathlib import Path  # noqa: E402
 from typing import Annotated, Literal  # noqa: E402

@@ -4,6 +4,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from command_line import MODULES, cli, loaded
+from scene_texts import COULOMB, POINT, STRUCTURE
 
 from patchfem.export.summary import PACKAGES, versions
 
@@ -27,6 +28,17 @@ def test_exact_a_rig_with_its_page_loads_no_dice_and_no_benches(tmp_path):
     assert "patchfem.dynamics.march.march" in modules and (tmp_path / "out" / "report.html").is_file()
     unwanted = {"numpy.random", "cyclopts.completion", "numba", "patchfem.runs.bench.bench", "patchfem.runs.wear"}
     assert not {name for name in modules if any(f"{name}.".startswith(f"{one}.") for one in unwanted)}
+
+
+def test_exact_a_check_reads_no_metadata_and_who_wants_it_has_it(tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(POINT + COULOMB + STRUCTURE, "utf-8")
+    assert not {name for name in loaded(FROM_SHELL, "check", scene) if name.split(".")[0] in ("email", "socket")}
+    for use in ("import importlib.metadata; found = importlib.metadata.version('numpy')",
+                "from importlib.metadata import entry_points as e; from importlib.metadata import version; "
+                "found = version('numpy') if e(group='console_scripts') else ''"):
+        code = f"import json, sys, patchfem.__main__; {use}; print(json.dumps([found]))"
+        assert loaded(code) == {version("numpy")}
 
 
 def test_exact_versions_are_those_of_the_installed_packages():
