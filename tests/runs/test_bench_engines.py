@@ -81,7 +81,7 @@ def test_exact_a_list_of_bonds_is_the_numpy_sum_within_its_stated_error(reading,
 def test_exact_samples_at_the_place_of_the_first_bonds_cost_no_work():
     """Every fourth of a sine stands there; the printed force jumps, and its mean over a step beside it must not."""
     for keys in ("order = 0\n", 'reading = "report"\norder = 2\n'):
-        one, two = both(model_of(BONDS + keys, "small", "accuracy.quadrature=direct"), 200)
+        one, two = both(model_of(BONDS + keys, "small", "accuracy.quadrature=direct"), 100)
         power = np.abs(np.diff(two.ledger[0])).sum()
         assert one.ledger == pytest.approx(two.ledger, abs=1e-6 * power)
 

@@ -130,7 +130,7 @@ def test_exact_every_point_of_a_patch_stepped_on_its_own(table, strips):
 
 
 def test_exact_histories_of_both_directions_are_written(table, tmp_path):
-    scene = table(L_SHAPE, SMALL_PATCH + STRIPS + LONGER)
+    scene = table(L_SHAPE, SMALL_PATCH + STRIPS + LONGER + "[accuracy]\nsteps_per_cycle = 100\n")
     answer = cli("run", scene.path, "-o", tmp_path / "out")
     assert answer.code == 0, answer.err
     result = run(plan(scene), estimate=False)
@@ -139,9 +139,8 @@ def test_exact_histories_of_both_directions_are_written(table, tmp_path):
             assert data[name].attrs["units"] == unit and data[name].dims == ("time",)
         assert data["lateral_force"].values == pytest.approx(result.response.lateral_force)
         assert data["lateral_displacement"].values[-1] == pytest.approx(24e-6)
-    wide = L_SHAPE.replace("24", "2400")
-    assert any("0.189 of the width" in w or "0.19 of the width" in w for w in
-               run(plan(table(wide, SMALL_PATCH + LONGER)), estimate=False).warnings)
+    wide = table(L_SHAPE.replace("24", "2400"), SMALL_PATCH + LONGER, "accuracy.steps_per_cycle=50")
+    assert any("0.189 of the width" in w or "0.19 of the width" in w for w in run(plan(wide), estimate=False).warnings)
 
 
 def test_exact_the_table_is_read_in_any_order_of_columns(tmp_path):
