@@ -99,7 +99,7 @@ class Slot:
     """The file of one march; without a path nothing is kept."""
 
     def __init__(self, path: Path | None, key: str):
-        self.path, self.key, self.next, self.cost = path, key, perf_counter() + SECONDS, 0.0
+        self.path, self.key, self.next = path, key, perf_counter() + SECONDS
 
     def offer(self, run, samples: Samples) -> None:
         """Write the state between two cycles where it is time to; where there is no room nothing is kept any more."""

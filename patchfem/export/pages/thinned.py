@@ -46,7 +46,7 @@ def thinned(points, cells, material, most: int, near: tuple | None = None) -> Th
     """The mesh of points (n, 2) [m], cells (m, 4) and material (m,) with about `most` cells at most.
 
     near: x (left, right) [m] where half of the columns stand, if there are as many.
-    Of a grid every so manieth line stays, the outer ones and those between two materials among them; so stays the
+    Of a grid one line in several stays, the outer ones and those between two materials among them; so stays the
     outline. In any other mesh all points of a box between such lines become one of them. Without need nothing changes.
     """
     count, size = len(cells), areas(points, cells)

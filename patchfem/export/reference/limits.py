@@ -3,6 +3,8 @@
 import re
 from importlib import import_module
 
+from ...runs.patch.notes import COUPLED
+from ...runs.patch.result import SMALL
 from ...scene.keys.types import DIVIDED_BY, LARGEST
 from .keys import FOLDER, bounds, grid
 from .tried import BENCHES, METHODS, MORE, POINT, RIG, RIGS, Beside, across, laws, refused
@@ -30,17 +32,17 @@ SIZES = {  # constant -> what it bounds and how it is written
     "friction.bonds.parameters.LONGEST": "seconds that a list of bonds may take by its estimate",
     "dynamics.comparison.comparison.MOST_NUMBERS": "numbers that a comparison method keeps",
     "dynamics.march.march.MOST_KEPT": "samples kept of a run outside its last cycles; more are thinned"}
-LEFT_OUT = """\
+LEFT_OUT = f"""\
 **Two dimensions.** The pieces are sections in plane strain (or stress, `contact.plane`). The band between the two is
 said with every patch. Edges across the width are not seen; `[contact.strips]` are sections side by side that do not
 feel each other.
 
 **Small strains, linear elasticity.** Isotropic, without plasticity, creep or heat; the coating is bonded; the far
-faces are held rigidly. A run whose strains exceed 0.02 says so. The bending of a tall piece does not move its load
+faces are held rigidly. A run whose strains exceed {SMALL:g} says so. The bending of a tall piece does not move its load
 sideways; a note says where that matters.
 
 **No friction in the static patch.** Pressure is solved without shear. Between alike pieces shear leaves it as it is;
-between unlike ones the coupling is left out of a motion, and said from 2 % of the compliance on.
+between unlike ones the coupling is left out of a motion, and said from {100 * COUPLED:g} % of the compliance on.
 
 **Quasi-static pieces.** The pieces have no mass of their own: waves in them are left out. The modes of the rig carry
 the inertia.

@@ -13,6 +13,8 @@ from .rounding import beyond_gentle
 from .shared import kept
 from .values import values
 
+SMALL = 0.02  # strain that is taken as small: what is of its second order is left out
+
 __all__ = ["bodies", "left_out", "measured", "probed", "solve_all", "static", "strained"]
 
 
@@ -77,8 +79,8 @@ def strained_by(asked, top: float, approach: float, beyond=()) -> list:
     closed = approach / sum(piece.height for piece in pieces)
     for share, what in ((deep, "the peak pressure is {:.3g} of the lowest Young's modulus"),
                         (closed, "the approach is {:.3g} of the pieces' height")):
-        if share > 0.02:
-            out.append(what.format(share) + ", beyond the small strains that are assumed (0.02)")
+        if share > SMALL:
+            out.append(what.format(share) + f", beyond the small strains that are assumed ({SMALL:g})")
     out += beyond
     stiff = max(m.poisson for m in stuff)
     if asked.plane == "strain" and stiff > 0.47:
