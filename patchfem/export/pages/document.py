@@ -10,6 +10,7 @@ import numpy as np
 from . import library
 
 DIGITS = 9  # of the numbers in a page: a picture shows four, a hovered value seven
+NUMBER = f"%.{DIGITS}g,"
 
 
 class Section(NamedTuple):
@@ -31,7 +32,7 @@ def document(title: str, lead: str, sections: list, data: dict | None = None, sc
                      for one in sections)
     drawn = ""
     if scripts:
-        text = json.dumps(plain(data or {}), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+        text = encoded(data or {}).replace("<", "\\u003c")
         drawn = (f"<script>{library.bokeh()}</script>\n<script type=application/json id=data>{text}</script>\n"
                  + "".join(f"<script>{library.inert(library.own(name))}</script>\n" for name in scripts))
     return (f"<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content='width=device-width, "
@@ -40,16 +41,20 @@ def document(title: str, lead: str, sections: list, data: dict | None = None, sc
             f"<main>\n{body}\n</main>\n{drawn}</body></html>\n")
 
 
-def plain(value):
-    """Arrays, numbers and containers as JSON takes them: rounded to DIGITS digits, null where not finite."""
+def encoded(value) -> str:
+    """JSON of arrays, numbers, texts and containers of them: numbers to DIGITS digits, null where not finite."""
     if isinstance(value, dict):
-        return {str(key): plain(one) for key, one in value.items()}
+        return "{" + ",".join(f"{json.dumps(str(key))}:{encoded(one)}" for key, one in value.items()) + "}"
     if isinstance(value, np.ndarray):
-        value = value.tolist()
+        if value.dtype.kind == "f" and value.ndim == 1 and np.isfinite(value).all():
+            return "[" + (NUMBER * value.size % tuple(value.tolist()))[:-1] + "]"  # one by one: six times as long
+        value = list(value) if value.ndim > 1 else value.tolist()
     if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
+        if set(map(type, value)) == {float} and all(map(math.isfinite, value)):
+            return "[" + (NUMBER * len(value) % tuple(value))[:-1] + "]"
+        return "[" + ",".join(map(encoded, value)) + "]"
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float):
-        return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
-    return value
+        return f"{value:.{DIGITS}g}" if math.isfinite(value) else "null"
+    return json.dumps(value)

@@ -1,5 +1,6 @@
 """The page of a sweep: one file, nothing fetched, texts shown as texts, numbers as they came."""
 
+import json
 import re
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from page_data import data_of, own_part
 
 from patchfem.export.pages import library
-from patchfem.export.pages.document import document, plain
+from patchfem.export.pages.document import DIGITS, document, encoded
 from patchfem.export.pages.sweep import brief, page, span
 from patchfem.export.sweeps.page import joined, wide
 
@@ -97,8 +98,23 @@ def test_exact_long_numbers_are_shown_short(text, shown):
 
 
 def test_exact_numbers_that_are_not_finite_are_null():
-    assert plain({"a": [np.nan, np.inf, 1 / 3], "b": np.float64(2.0), "c": (np.int64(3), "x", None)}) == \
-        {"a": [None, None, 0.333333333], "b": 2.0, "c": [3, "x", None]}
+    given = {"a": [np.nan, np.inf, 1 / 3], "b": np.float64(2.0), "c": (np.int64(3), "x", None), 4: True}
+    assert json.loads(encoded(given)) == {"a": [None, None, 0.333333333], "b": 2.0, "c": [3, "x", None], "4": True}
+
+
+@pytest.mark.parametrize("shape", [(0,), (), (7,), (3, 5), (0, 2), (2, 3, 2)])
+@pytest.mark.parametrize("kind", [float, np.float32, int, bool])
+def test_exact_arrays_and_lists_are_encoded_number_by_number(shape, kind):
+    """Against Python's own encoder and rounding to as many digits."""
+    values = (np.random.default_rng(1).normal(size=shape) * 10.0**np.random.default_rng(2).integers(-9, 20, shape))
+    values = np.asarray(values if kind in (float, np.float32) else values > 0).astype(kind)
+
+    def short(one):
+        return list(map(short, one)) if isinstance(one, list) else \
+            float(f"{one:.{DIGITS}g}") if isinstance(one, float) else one
+
+    for given in (values, values.tolist()):
+        assert json.loads(encoded({"<": given})) == json.loads(json.dumps({"<": short(values.tolist())}))
 
 
 def test_exact_a_script_cannot_end_its_element():
