@@ -3,25 +3,13 @@
 import re
 
 import pytest
+from scene_texts import JOINT, JOINT_SHAKEN
 
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
-PIECES = """
-[contact]
-length = "20 mm"
-width = "20 mm"
-height = "6 mm"
-load = "2 kN"
-substrate = "steel"
-[contact.shear]
-[friction]
-law = "coulomb"
-static = 0.2
-kinetic = 0.2
-"""
-BENCH = PIECES + """[slide]
+BENCH = JOINT + """[slide]
 kind = "sine"
 amplitude = "45 nm"
 frequency = "1 Hz"
@@ -29,19 +17,6 @@ cycles = 3
 [accuracy]
 tolerance = 1e-2
 steps_per_cycle = {steps}
-"""
-RIG = PIECES + """[structure]
-moving_mass = "0.5 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "200 Hz"
-damping = 0.01
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "120 Hz"
-acceleration = "20 g"
-cycles = {cycles}
 """
 BOWED = """[contact.crown]
 radius = "100 m"
@@ -76,7 +51,7 @@ def test_always_what_the_mesh_leaves_open_is_not_laid_on_the_steps():
 def test_exact_the_ringing_of_a_start_is_no_dissipation():
     """A flat joint below its limit dissipates nothing: the bar of its work per cycle holds 0, and the cycles that a
     note names let the ring decay."""
-    first = ran(RIG.format(cycles=20))
+    first = ran(JOINT_SHAKEN)
     loop = first.measures["loop_area"]
     assert first.outcome == "stuck" and abs(loop.value) > loop.floor / 100 and abs(loop.value) <= loop.error
     assert abs(first.measures["equivalent_damping"].value) <= first.measures["equivalent_damping"].error
@@ -84,7 +59,7 @@ def test_exact_the_ringing_of_a_start_is_no_dissipation():
     assert len(told) == 1
     cycles = re.search(r"drive.cycles = (\d+) lets", told[0])[1]
     assert any(f"drive.cycles = {cycles} lets" in text for text in first.warnings)
-    again = ran(RIG.format(cycles=cycles))
+    again = ran(JOINT_SHAKEN.replace("cycles = 20", f"cycles = {cycles}"))
     assert not any("rings" in text for text in again.extra["notes"])
     damping = again.measures["equivalent_damping"]
     assert abs(damping.value) <= damping.error <= damping.floor
@@ -94,8 +69,8 @@ def test_exact_the_ringing_of_a_start_is_no_dissipation():
 def test_always_a_ring_that_steps_do_not_resolve_is_followed_without_them():
     """800 steps of a cycle are few for a ring of 88 periods in it: the exact engine is advised, and cures it."""
     loose = "[accuracy]\ntolerance = 0.3\n"
-    first = ran(RIG.format(cycles=20) + loose)
+    first = ran(JOINT_SHAKEN + loose)
     assert first.extra["engine"] == "march" and 'accuracy.method = "exact"' in first.warnings[0]
-    again = ran(RIG.format(cycles=20) + loose + 'method = "exact"\n')
+    again = ran(JOINT_SHAKEN + loose + 'method = "exact"\n')
     bars = [one.measures["secant_stiffness"].error for one in (first, again)]
     assert bars[1] < bars[0] / 10

@@ -68,6 +68,35 @@ FORCED = '[drive]\nkind = "force"\nmass = 2\nforce = "30 N"\nfrequency = "90 Hz"
 SWEEP = '[drive]\nkind = "base"\nwaveform = "sweep"\nacceleration = "3 g"\nfrom = "120 Hz"\nto = "150 Hz"\n' \
         'rate = "80 Hz/s"\n'
 
+# a bolted joint that holds, and the block that shakes it
+JOINT = """\
+[contact]
+length = "20 mm"
+width = "20 mm"
+height = "6 mm"
+load = "2 kN"
+substrate = "steel"
+[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.2
+kinetic = 0.2
+"""
+JOINT_SHAKEN = JOINT + """\
+[structure]
+moving_mass = "0.5 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "200 Hz"
+damping = 0.01
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "120 Hz"
+acceleration = "20 g"
+cycles = 20
+"""
+
 # whole scenes
 BENCH = POINT + COULOMB + SLIDE
 SMALL_PATCH = 'title = "a small patch"\n' + COATED + '[contact.tilt]\nangle = "0.02 mrad"\n'
