@@ -4,6 +4,7 @@ The file is looked at, taken over and removed only by who holds the kernel's loc
 cannot both have it. It stays when its owner is killed; the next one sees that no such process runs and takes it over.
 """
 
+import errno
 import hashlib
 import os
 import platform
@@ -72,7 +73,9 @@ class Claim:
                                   "another -o or wait; if that process is no patchfem, remove "
                                   f"{self.path.parent.name}/{self.path.name}")
                 os.ftruncate(file, 0)
-                os.pwrite(file, self.me.encode(), 0)
+                if os.pwrite(file, self.me.encode(), 0) < len(self.me):  # part of a name would be nobody's
+                    os.ftruncate(file, 0)
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
             with suppress(OSError):
                 if not self.path.stat().st_size:

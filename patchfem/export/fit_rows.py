@@ -34,7 +34,7 @@ class Starts:
         if resume and path.is_file():
             try:
                 found = json.loads(path.read_text("utf-8"))
-            except ValueError:
+            except (ValueError, RecursionError):
                 found = {}
             if found.get("question") == self.key:
                 self.known = found["ends"]

@@ -50,6 +50,48 @@ def write_json(value: dict, path: Path) -> None:
     write_text(path, json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
 
 
+def read_summary(path: Path) -> dict:
+    """The object in summary.json; OSError where it cannot be read, ValueError where it is none that `summary` makes."""
+    text = path.read_text(encoding="utf-8")
+    try:
+        _shape().model_validate_json(text)
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("nested deeper than a summary is") from None
+    except ValueError as fault:  # of pydantic, with many lines
+        first = fault.errors(include_url=False)[0]
+        at = ".".join(map(str, first["loc"]))
+        raise ValueError(f"{path.name} is no summary of a run: {at + ': ' * bool(at)}{first['msg']}") from None
+
+
+@cache
+def _shape() -> type:
+    """What readers of a summary rely on."""
+    from pydantic import BaseModel
+
+    class Number(BaseModel):
+        value: float | None
+        unit: str
+        error: float | None
+        floor: float
+        reason: str = ""
+
+    class Seconds(BaseModel):
+        total: float
+
+    class Summary(BaseModel):
+        patchfem: str
+        title: str
+        kind: str
+        outcome: str
+        measures: dict[str, Number]
+        warnings: list[str]
+        notes: list[str]
+        seconds: Seconds
+
+    return Summary
+
+
 def summary_of(result: Result) -> dict:
     """The object of summary.json."""
     what = result.plan

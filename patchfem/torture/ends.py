@@ -114,7 +114,8 @@ def disks(trial: Trial) -> None:
     if ended.code == 0 and words[0] == "run" and limited is not None:
         whole(trial.folder / "out")
     out = trial.folder / words[words.index("-o") + 1]
-    if ended.code not in (0, 3) and limited is not None and out.exists():
+    kept = words[0] == "sweep" and any(out.glob("cases/[0-9a-f]*/summary.json"))  # a sweep keeps its whole cases
+    if ended.code not in (0, 3) and limited is not None and out.exists() and not kept:
         raise Wrong(f"exit code {ended.code}, and {out.name} is there")
     if limited is not None:
         _clean(trial.folder)

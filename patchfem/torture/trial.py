@@ -68,7 +68,8 @@ class Trial:
             done = subprocess.run(process(*words), capture_output=True, timeout=seconds * self.patience, **options)
         except subprocess.TimeoutExpired:
             raise Wrong(f"no end within {seconds:.0f} s") from None
-        ended = Ended(done.returncode, done.stdout.decode("utf-8", "replace"), done.stderr.decode("utf-8", "replace"))
+        coding = options["env"].get("PYTHONIOENCODING", "utf-8")
+        ended = Ended(done.returncode, *(stream.decode(coding, "replace") for stream in (done.stdout, done.stderr)))
         return judged(ended, allowed)
 
     def announced(self, file, *words) -> float | None:

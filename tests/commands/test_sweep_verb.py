@@ -137,9 +137,11 @@ def test_exact_a_resumed_sweep_runs_what_is_missing(swept, scene, tmp_path, monk
     (out / "cases" / rows(out)[0]["case"] / "summary.json").write_text('{"patchf')  # as a full disk leaves it
     answer = cli("sweep", scene, *OVER, "-o", out, "--resume")
     assert answer.code == 3 and len(ran) == 5
+    (out / "cases" / rows(out)[0]["case"] / "summary.json").write_text("[]")  # of another shape: once an internal fault
+    assert cli("sweep", scene, *OVER, "-o", out, "--resume").code == 3 and len(ran) == 6
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
-    assert cli("sweep", scene, *OVER, "-o", out).code == 3 and len(ran) == 9
+    assert cli("sweep", scene, *OVER, "-o", out).code == 3 and len(ran) == 10
 
 
 def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypatch):

@@ -15,6 +15,7 @@ from patchfem.core import Missing
 from patchfem.disk import exchange
 from patchfem.disk.claim import HELD, HOST, Claim, alive, started
 from patchfem.export.results import Folder
+from patchfem.export.sweeps.folder import Folder as SweepFolder
 
 PYTHON = [sys.executable, "-c"]
 # each of several processes tries to own every file, all at the same instants
@@ -136,6 +137,17 @@ def test_refuses_a_claim_through_a_link_or_in_the_way(tmp_path):
         with pytest.raises(Missing, match="out: cannot be written"):
             Claim(tmp_path / name, "out", "run").take()
     assert (tmp_path / "mine.txt").read_text() == "mine" and names(tmp_path) == {"mine.txt", "link", "folder"}
+
+
+def test_exact_a_claim_whose_name_has_no_room_leaves_nothing(tmp_path, monkeypatch):
+    """Part of a name once stayed behind, which no process could own or remove."""
+    write = os.pwrite
+    monkeypatch.setattr(os, "pwrite", lambda file, text, at: write(file, text[:5], at))
+    with pytest.raises(Missing, match=r"out: cannot be written \(No space left"):
+        Claim(tmp_path / "lock", "out", "run").take()
+    with pytest.raises(Missing, match="out: cannot be written"), SweepFolder(tmp_path / "out", ["a"]):
+        pass
+    assert not names(tmp_path)
 
 
 @pytest.mark.parametrize("can", [True, False], ids=["in one step", "in two"])

@@ -21,6 +21,7 @@ WORDS = re.compile(rf"\b({'|'.join(CODE)})\(|\b({'|'.join(UNSAFE | NETWORK)})\b|
 HARMLESS = {("compiled.kept", "pickle"),  # numba's own form of machine code, in a folder that is the user's own
             ("compiled", "compile()"), ("compiled", "exec()"),  # a loop of the package with its law put in
             ("torture.hostile", "pickle"), ("torture.hostile", "os.system"),  # planted, and must not be run
+            ("__main__", "shell=shell"),  # the name of the shell whose completions are written
             ("torture.hostile", "allow_pickle=True"), ("torture.tables", "allow_pickle=True")}
 FINE = "re.compile('x'); from .http import x; np.load(a, allow_pickle=False); json.load(f)"
 

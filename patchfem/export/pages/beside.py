@@ -1,6 +1,5 @@
 """Several runs on one page: what differs in their scenes, their measures side by side, their curves in one picture."""
 
-import json
 import math
 import tomllib
 from html import escape
@@ -11,6 +10,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ..scales import LADDERS, axis_unit
+from ..summary import read_summary
 from .charts import COLOURS, mark
 from .document import Section, document
 from .sweep import NUMBER, label
@@ -51,11 +51,13 @@ def read(folder: Path) -> Run:
     """The run in a results folder; PatchfemError where there is none."""
     folder = Path(folder)
     try:
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        summary = read_summary(folder / "summary.json")
         resolved = tomllib.loads((folder / "scene.resolved.toml").read_text(encoding="utf-8"))
+        if not isinstance(resolved.get("drive", {}), dict):
+            raise ValueError("scene.resolved.toml: drive is no table")
     except FileNotFoundError as fault:
         raise PatchfemError(f"{folder}: no results folder: it has no {Path(fault.filename).name}") from None
-    except (ValueError, OSError) as fault:
+    except (ValueError, OSError, RecursionError) as fault:
         raise PatchfemError(f"{folder}: its results cannot be read: {fault}") from None
     return Run(folder.resolve().name, summary, resolved, _arrays(folder / "result.nc"))
 

@@ -24,7 +24,7 @@ from ...model.model import Model
 from ...runs.many.answers import FAILED, Answers
 from ..folder import save
 from ..results import LOCK, PAGE, refuse_others
-from ..summary import summary
+from ..summary import read_summary, summary
 
 CASES, SUMMARY, TABLES = "cases", "summary.json", ("sweep.csv", "sweep.nc", "report.html")
 
@@ -94,7 +94,13 @@ class Folder:
         except OSError as error:
             raise Missing(f"{self.shown}: the folder of the sweep cannot be made ({error.strerror})") from None
         if not self.shared:
-            self.claim.take()
+            try:
+                self.claim.take()
+            except Missing:
+                for empty in (self.target / CASES, self.target):
+                    with suppress(OSError):  # it holds what is older
+                        empty.rmdir()
+                raise
         return self
 
     def __exit__(self, *_) -> None:
@@ -137,7 +143,7 @@ class Folder:
         for number in numbers:
             place = self.target / CASES / self.keys[number]
             try:
-                one = json.loads((place / SUMMARY).read_text(encoding="utf-8"))
+                one = read_summary(place / SUMMARY)
             except (OSError, ValueError):
                 continue
             if one["outcome"] == FAILED or all((place / name).is_file() for name in asked):

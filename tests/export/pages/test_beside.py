@@ -1,6 +1,5 @@
 """Several runs on one page: read from their folders, differences beyond both errors marked."""
 
-import json
 import re
 
 import numpy as np
@@ -8,10 +7,11 @@ import pytest
 from command_line import cli
 from page_data import charts_of, own_part
 
-from patchfem.core import PatchfemError
+from patchfem.core import Measure, PatchfemError
 from patchfem.export.netcdf import of_run, write
 from patchfem.export.pages.beside import measured, page, read
 from patchfem.export.reports import report_of
+from patchfem.export.summary import summary, write_json
 
 SCENE = """[normal]
 load = "{load} N"
@@ -26,9 +26,9 @@ frequency = "143 Hz"
 def made(folder, load: float, amplitude: float, error: float):
     """A results folder of a sine of 100 Hz, 20 cycles of 50 samples."""
     folder.mkdir()
-    measures = {"relative_displacement_amplitude": {"value": amplitude, "unit": "m", "error": error, "floor": 0.0},
-                "normal_load": {"value": load, "unit": "N", "error": 0.0, "floor": 0.0}}
-    (folder / "summary.json").write_text(json.dumps({"kind": "rig", "outcome": "steady", "measures": measures}))
+    measures = {"relative_displacement_amplitude": Measure(amplitude, "m", error, 0.0),
+                "normal_load": Measure(load, "N", 0.0, 0.0)}
+    write_json(summary("0", "", "rig", "steady", measures, [], [], ((), ()), {"total": 1.0}), folder / "summary.json")
     (folder / "scene.resolved.toml").write_text(SCENE.format(load=load))
     time = np.linspace(0.0, 0.2, 1001)
     motion = amplitude * np.sin(2 * np.pi * 100 * time)
@@ -80,9 +80,23 @@ def test_refuses_a_folder_without_results(tmp_path):
     with pytest.raises(PatchfemError, match="cannot be read"):
         read(tmp_path)
     folder = made(tmp_path / "good", 1.0, 1e-6, 0.0)
+    (folder / "scene.resolved.toml").write_text("drive = 3")
+    with pytest.raises(PatchfemError, match=r"scene\.resolved\.toml: drive is no table"):
+        read(folder)
+    (folder / "scene.resolved.toml").write_text(SCENE.format(load=1.0))
     (folder / "result.nc").write_bytes(b"nothing")
     with pytest.raises(PatchfemError, match=r"result\.nc: cannot be read as netCDF"):
         read(folder)
+
+
+@pytest.mark.parametrize("text, why", [
+    ("[" * 100_000, "recursion limit exceeded"), ("[]", "should be an object"), ("{}", "patchfem: Field required"),
+    ('{"measures": {"loop_area": 3}}', r"measures\.loop_area|patchfem: Field required"), ("3", "should be an object")])
+def test_refuses_a_summary_of_another_shape(tmp_path, text, why):
+    """Each of them once ended `report` with an internal fault."""
+    (tmp_path / "summary.json").write_text(text)
+    with pytest.raises(PatchfemError, match=f"cannot be read: summary.json is no summary of a run: .*{why}"):
+        read(tmp_path)
 
 
 def test_exact_a_measurement_lies_over_the_runs_in_phase(tmp_path):
