@@ -104,6 +104,7 @@ class Chunks:
         if not self.left:
             return [self.alone.popleft()] if self.alone and idle else None
         fair = -(-len(self.left) // (2 * self.workers))  # so that the last chunks end together
+        fair = fair if self.workers > 1 else len(self.left)
         count = max(1, min(int(SPAN / max(self.each, 1e-9)), MOST, fair))
         return [self.left.popleft() for _ in range(min(count, len(self.left)))]
 

@@ -10,7 +10,7 @@ from .waves import SINES
 
 HERE = "dynamics.smooth"
 FREE = 7  # of the numbers of points of bonds: share of the bond length that stretches without damage
-NUMBERS = 25  # of a lane
+NUMBERS = 22  # of a lane
 
 
 @cache
@@ -32,7 +32,10 @@ def loops_of(law: str, say=None):
 def lanes_of(law: str):
     """The compiled loop over motions side by side for the law of this module."""
     parts = parts_of(law)
-    return compiled.instance(f"{HERE}.lane_kernels", parts | {"stepping": step_of(parts["law"])})
+    polynomial = compiled.instance(f"{HERE}.polynomial_kernels", {"steps": parts["steps"]})
+    reading = compiled.instance(f"{HERE}.watch_kernels", {"law": parts["law"], "steps": polynomial})
+    own = {"stepping": step_of(parts["law"]), "polynomial": polynomial, "reading": reading}
+    return compiled.instance(f"{HERE}.lane_kernels", parts | own)
 
 
 def fits(modes, element, wave, travel: float = np.inf) -> bool:
@@ -47,8 +50,8 @@ def fits(modes, element, wave, travel: float = np.inf) -> bool:
 def advance(law: str, many, kept, until, tolerance) -> np.ndarray:
     """Move n motions on to the times `until` (n,) [s]: codes (n,) of how they ended, as `loop_kernels` has them.
 
-    many, kept: Moving and Kept with one more dimension of n in front, but for damping, work, samples, room and table;
-    tolerance (n,): of a step, relative.
+    many, kept: Moving and Kept with one more dimension of n in front, but for damping, work, room and table;
+    tolerance (n,): of a step, relative. What kept asks for is read on the way.
     """
     codes = np.zeros(len(until), np.int64)
     lanes_of(law).advance(many, kept, np.zeros(SIZE), np.zeros((LANES, NUMBERS)), until, tolerance, codes)
@@ -60,4 +63,4 @@ def stacked(parts, shared: tuple):
     return parts._replace(**{name: array[None] for name, array in parts._asdict().items() if name not in shared})
 
 
-OF_MOVING, OF_KEPT = ("damping", "work"), ("samples", "room", "table")
+OF_MOVING, OF_KEPT = ("damping", "work"), ("room", "table")

@@ -8,16 +8,13 @@ from .arrays import Kept, Moving
 from .lanes import OF_KEPT, OF_MOVING, advance, loops_of
 from .run import (
     BEGIN,
-    CLOSER,
     END,
     FINISHED,
     FULL,
     HELD,
-    PAUSED,
     POWER,
     SAMPLE,
     SAMPLES,
-    STEP,
     STORED,
     WANTED,
     WAVES,
@@ -60,39 +57,32 @@ def together(cases, cycles: int, window: int, tolerances) -> Motions:
     number, tolerance = period.size, np.ravel(tolerances)
     kept = kept._replace(turns=np.zeros((number, int(TURNING * cycles) + AT_REST, 9)))
     kept.cycles[:, 2:, ~asked(cycles, window)] = np.nan
-    loops, begun, stored, lost = loops_of(law), np.zeros(number), np.zeros(number), np.zeros(number, bool)
+    loops, stored, row = loops_of(law), np.zeros(number), np.zeros(9)
     for j in range(count):
-        m, k = _one(moving, kept, j, kept.samples)
-        loops.advance(m, k, 0.0, np.inf, tolerance[j], np.inf)
+        loops.advance(*_one(moving, kept, j), 0.0, np.inf, tolerance[j], np.inf)
     for array in (*(array for name, array in moving._asdict().items() if name not in OF_MOVING), kept.tally):
         array.reshape(len(tolerances), -1)[1:] = array[:count].reshape(1, -1)
-    begun[:] = kept.tally[:, STORED]
-    until = cycles * period
-    first = until - window * period
-    codes = advance(law, moving, kept, first, tolerance)
-    while (codes == FULL).any():
-        kept = _wider(kept)
-        codes = advance(law, moving, kept, first, tolerance)
-    lost |= codes != FINISHED
+    begun, until = kept.tally[:, STORED].copy(), cycles * period
+    kept, codes = _moved(law, moving, kept, until - window * period, tolerance)
     begin = _ends(moving)
-    times = np.linspace(moving.now[:, 0], until, window * SAMPLES + 1, axis=1)
-    samples = np.zeros((*times.shape, 9))
-    samples[:, :, 0] = times
+    samples = np.zeros((number, window * SAMPLES + 1, 9))
+    samples[:, :, 0] = np.linspace(moving.now[:, 0], until, window * SAMPLES + 1, axis=1)
     kept.tally[:, :WAVES], kept.tally[:, WAVES:POWER], kept.tally[:, HELD:] = -np.inf, 0.0, 0.0
     kept.tally[:, SAMPLE], kept.tally[:, WANTED], kept.tally[:, BEGIN], kept.tally[:, END] = 0, 1, begin[:, 0], until
-    moving.now[:, STEP] *= CLOSER**0.125
-    end, row = np.zeros((number, 4)), np.zeros(9)
+    kept, ended = _moved(law, moving, kept._replace(samples=samples), until, tolerance)
+    end = _ends(moving)
     for j in range(number):
-        m, k = _one(moving, kept, j, samples[j])
-        code = loops.advance(m, k, until[j], np.inf, CLOSER * tolerance[j], np.inf)
-        while code in (FULL, PAUSED):
-            kept = _wider(kept) if code == FULL else kept
-            m, k = _one(moving, kept, j, samples[j])
-            code = loops.advance(m, k, until[j], np.inf, CLOSER * tolerance[j], np.inf)
-        lost[j] |= code != FINISHED
-        end[j] = _ends(moving, slice(j, j + 1))
-        stored[j] = loops.settled(m, k, row)
-    return Motions(moving, kept._replace(samples=samples), begin, end, begun, stored, lost)
+        stored[j] = loops.settled(*_one(moving, kept, j), row)
+    return Motions(moving, kept, begin, end, begun, stored, (codes != FINISHED) | (ended != FINISHED))
+
+
+def _moved(law: str, moving, kept, until, tolerance) -> tuple:
+    """Motions moved on to the times `until` (n,) [s], with room for all their reversals: (kept, codes)."""
+    codes = advance(law, moving, kept, until, tolerance)
+    while (codes == FULL).any():
+        kept = _wider(kept)
+        codes = advance(law, moving, kept, until, tolerance)
+    return kept, codes
 
 
 def _wider(kept: Kept) -> Kept:
@@ -106,11 +96,10 @@ def _stacked(kind, parts, shared, times: int):
                   for name in kind._fields))
 
 
-def _one(moving, kept, j: int, samples) -> tuple:
+def _one(moving, kept, j: int) -> tuple:
     """Moving and Kept of one of many motions, in the same memory."""
     return (Moving(*(array if name in OF_MOVING else array[j] for name, array in moving._asdict().items())),
-            Kept(*(samples if name == "samples" else array if name in OF_KEPT else array[j]
-                   for name, array in kept._asdict().items())))
+            Kept(*(array if name in OF_KEPT else array[j] for name, array in kept._asdict().items())))
 
 
 def _ends(moving, part=slice(None)) -> np.ndarray:

@@ -189,7 +189,7 @@ class Run:
         samples = np.zeros((times.size, self.kept.turns.shape[1]))
         samples[:, 0], self.kept = times, self.kept._replace(samples=samples)
         self.kept.tally[SAMPLE], self.kept.tally[WANTED] = 0, peaks
-        swift = self.swift and not (times.size or peaks) and self.time < time
+        swift = self.swift and self.time < time
         while self.outcome is None:
             end = float(self.wave.ends[int(self.moving.now[PIECE])])
             if self.time >= end:
@@ -205,7 +205,7 @@ class Run:
         return self.kept.samples[:int(self.kept.tally[SAMPLE])]
 
     def _beside(self, time: float) -> int:
-        """Move on to a time [s] where nothing is read inside a step, in one of the lanes of `lanes`."""
+        """Move on to a time [s] in one of the lanes of `lanes`."""
         many, kept = stacked(self.moving, OF_MOVING), stacked(self.kept, OF_KEPT)
         return int(advance(self.element.kernels, many, kept, np.array([time]), np.array([self.tolerance]))[0])
 
@@ -262,8 +262,9 @@ class Run:
         tally, since = self.kept.tally, self.ends()
         tally[:WAVES], tally[WAVES:POWER], tally[HELD:], tolerance = -np.inf, 0.0, 0.0, self.tolerance
         tally[BEGIN], tally[END] = begin, end
-        self.tolerance *= CLOSER  # the extension of a step errs more than the step does
-        self.moving.now[STEP] *= CLOSER**0.125
+        if not self.swift:  # the extension of a step errs more than the step does
+            self.tolerance *= CLOSER
+            self.moving.now[STEP] *= CLOSER**0.125
         count = max(LEAST, round((end - begin) / self.drive.period * SAMPLES) + 1)
         times, rows, after = np.linspace(begin, end, count), [], -np.inf
         for shot in [*[t for t in shots if begin <= t < end], end]:

@@ -3,14 +3,16 @@
 num: limit [N], v_0 [m/s]; no memory.
 """
 
-from math import inf, nan, tanh
+from math import copysign, inf, nan, tanh
 
 from ...compiled.inner import njit
 from ...compiled.series_kernels import gone
 from ..flags_kernels import LEAN, closed, knee, middle
 
 __all__ = ["ahead", "along", "at_end", "begin", "closed", "commit", "finish", "knee", "layer", "mean", "middle",
-           "rate", "shown", "state"]
+           "rate", "share", "shown", "state"]
+
+GROWS, OF_SPEED, MIXED = (1.0, 0.0, -1.0), True, False  # of `share`, as `protocol` has it
 
 
 @njit(error_model="numpy", **LEAN)
@@ -78,14 +80,18 @@ def layer(num):
 
 @njit(error_model="numpy", **LEAN)
 def ahead(num, mem, way):
-    """The four numbers of `along`: limit [N], 1/v_0 [s/m]; no others."""
-    return num[0, 1], 1 / num[0, 2], 0.0, 0.0
+    """The four numbers of `along`: 1/v_0 [s/m], no constant force, limit [N], nothing mixed."""
+    return 1 / num[0, 2], 0.0, num[0, 1], 0.0
 
 
 @njit(error_model="numpy", fastmath={"contract"}, **LEAN)
-def along(limit, scale, none, nothing, dq, v):
-    """Force [N] of eq. 2.4 at the speed v [m/s] without branches: tanh u = g/(2 - g) with g = 1 - exp(-2 u)."""
-    u = abs(v) * scale
-    g = gone(2 * u)
-    force = limit * g / (2 - g)
-    return force if v > 0 else -force
+def share(y):
+    """tanh y without branches: g/(2 - g) with g = 1 - exp(-2 |y|)."""
+    g = gone(2 * abs(y))
+    return copysign(g / (2 - g), y)
+
+
+@njit(error_model="numpy", fastmath={"contract"}, **LEAN)
+def along(scale, none, limit, nothing, dq, v):
+    """Force [N] of eq. 2.4 at the speed v [m/s] without branches."""
+    return limit * share(scale * v)

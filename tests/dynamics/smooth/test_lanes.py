@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from march_paths import OMEGA, one_mode
-from test_smooth import LOAD, MASS, ONE, SINE, THREE, element, numpy_step
+from test_smooth import LOAD, MASS, ONE, SINE, THREE, element
 
 from patchfem import compiled
 from patchfem.core import BaseSine, Start
@@ -46,29 +46,87 @@ def test_exact_forces_without_branches_are_those_of_the_law(name):
         kernels.finish(num, mem, turn, 3e-5 * way, 0.0, none)
 
 
-def test_exact_a_step_of_eight_is_the_method_in_numpy():
-    law, h = element(LAWS["bonds"]), 0.02 * PERIOD
+def of_eight(law, given: dict):
+    """(rows of `lane_step` by name after the series and the step of its lanes, its rows) for numbers `given`."""
     rows = np.zeros((len(lane_step.ROWS), lane_step.LANES))
     at = {name: rows[row] for name, row in lane_step.ROWS.items()}
-    weight = 0.3 * LOAD / 5e-6
-    given = {"stiff": OMEGA**2, "damp": 6e-3 * OMEGA, "gain": 1 / MASS, "push": SINE.acceleration,
-             "pace": OMEGA, "slide": 1.0, "n0": 1 / 5e-6, "n2": weight * 5e-6, "h": h, "allowed": 1.0}
     for name, value in given.items():
         at[name][:] = value
-    at["v0"][:] = np.linspace(0.01, 0.4, 8)
-    start = np.stack([at["z0"], at["v0"]], axis=1)
+    kernels, flat = lane_step.step_of(compiled.load(law.kernels)).module(), rows.ravel()
+    kernels.series(flat)
+    kernels.moved(flat)
+    return at
 
-    def slope(t, y):
-        force = weight * 5e-6 * -np.expm1(-y[0] / 5e-6)
-        return np.array([y[1], -6e-3 * OMEGA * y[1] - OMEGA**2 * y[0] - float(SINE.values(t)) - force / MASS])
 
-    at["a0"][:] = [slope(0.0, one)[1] for one in start]
-    flat = rows.ravel()
-    lane_step.step_of(compiled.load(law.kernels)).module().step(flat)
-    for lane, one in enumerate(start):
-        end = numpy_step(slope, 0.0, one, h)
-        assert [at["z12"][lane], at["v12"][lane]] == pytest.approx(end, rel=1e-12)
-        assert at["a12"][lane] == pytest.approx(slope(h, end)[1], rel=1e-11)
+def numbers_of(law, way: float = 1.0) -> dict:
+    """The rows n0 to n3 of a law that begins to move."""
+    kernels = compiled.load(law.kernels).module()
+    return dict(zip(("n0", "n1", "n2", "n3"), kernels.ahead(law.numbers[None], law.memory[None], way)))
+
+
+def numpy_series(kernels, given: dict, z: float, v: float):
+    """Coefficients of rate and force in units of time: the twin of `lane_step`, by convolutions."""
+    g, order = given, lane_step.ORDER
+    y, w, force, z, v = np.zeros(order), np.zeros(order), np.zeros(order), [z], [v]
+    turn = g["pace"] * g["t"] + g["phase"]
+    for k in range(order):
+        y[k] = g["n0"] * (g["slide"] * (v if kernels.OF_SPEED else z)[k])
+        a, b, c = kernels.GROWS
+        rise = b * w + c * np.convolve(w, w)[:order] + a * (np.arange(order) == 0)
+        own = np.convolve(y[1:] * np.arange(1, order), rise)
+        w[k] = own[k - 1] / k if k else kernels.share(y[0])
+        mixed = y[k] - np.convolve(y, w)[k]
+        force[k] = g["n1"] * (k == 0) + g["n2"] * w[k] + g["n3"] * mixed
+        wave = g["push"] * (g["pace"] * g["unit"])**k / np.prod(np.arange(1.0, k + 1)) * np.sin(turn + k * np.pi / 2)
+        slope = -g["damp"] * v[k] - g["stiff"] * z[k] - g["gain"] * force[k] - wave
+        z.append(g["unit"] * v[k] / (k + 1))
+        v.append(g["unit"] * slope / (k + 1))
+    return np.array(v), force
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_exact_a_series_of_eight_is_that_in_numpy(name):
+    law = element(LAWS[name])
+    kernels = compiled.load(law.kernels).module()
+    given = {"stiff": OMEGA**2, "damp": 6e-3 * OMEGA, "gain": 0.8 / MASS, "push": SINE.acceleration, "pace": OMEGA,
+             "phase": 0.3, "slide": 0.8, "t": 0.7e-3, "unit": 4e-5, "h": 3e-5, "allowed": 1e-9, **numbers_of(law)}
+    starts = np.array([np.linspace(0, 4e-6, 8), np.geomspace(1e-4, 0.02, 8)])
+    at = of_eight(law, given | {"z0": starts[0], "v0": starts[1]})
+    for lane, (z, v) in enumerate(starts.T):
+        rates, force = numpy_series(kernels, given, z, v)
+        for found, wanted in ((at, rates), (at, force)):
+            letter = "v" if wanted is rates else "f"
+            first = 1 if wanted is rates else 0
+            got = np.array([found[f"{letter}{k}"][lane] for k in range(first, len(wanted))])
+            assert got == pytest.approx(wanted[first:], rel=1e-9, abs=1e-12 * abs(wanted).max())
+        rates[1:] = [at[f"v{k}"][lane] for k in range(1, len(rates))]
+        end, powers = 0.75, np.arange(lane_step.ORDER + 1)
+        assert at["v"][lane] == pytest.approx(rates @ end**powers, rel=1e-12)
+        assert at["z"][lane] == pytest.approx(z + 3e-5 * (rates / (powers + 1)) @ end**powers, rel=1e-12)
+
+
+def test_exact_a_step_against_tanh_alone_is_its_closed_form():
+    """m v' = -F tanh(v/w): sinh(v/w) decays as exp(-F t/(m w))."""
+    law, w = element(Rate(0.3, 1e-2)), 1e-2
+    rate = 0.3 * LOAD / (MASS * w)
+    start = np.linspace(0.2, 3.0, 8) * w
+    at = of_eight(law, {"gain": 1 / MASS, "slide": 1.0, "unit": 0.25 / rate, "h": 0.2 / rate, "allowed": 1e-9,
+                        "v0": start, **numbers_of(law)})
+    wanted = w * np.arcsinh(np.sinh(start / w) * np.exp(-0.2))
+    assert at["v"] == pytest.approx(wanted, rel=1e-13)
+    assert MASS * (start**2 - at["v"]**2) / 2 == pytest.approx(at["rub"], rel=1e-11)
+    assert np.all(at["defect"] < 1e-3)
+
+
+def test_exact_a_step_against_fresh_bonds_alone_keeps_their_energy():
+    """m v^2/2 and mu N (z - eps (1 - exp(-z/eps))) of full-grown bonds."""
+    law, eps = element(LAWS["bonds"]), 5e-6
+    start = np.linspace(0.01, 0.03, 8)
+    at = of_eight(law, {"gain": 1 / MASS, "slide": 1.0, "unit": 1e-4, "h": 1e-4, "allowed": 1e-9, "v0": start,
+                        **numbers_of(law)})
+    spent = 0.3 * LOAD * (at["z"] + eps * np.expm1(-at["z"] / eps))
+    assert MASS * (start**2 - at["v"]**2) / 2 == pytest.approx(spent, rel=1e-10)
+    assert at["rub"] == pytest.approx(spent, rel=1e-10)
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -77,7 +135,7 @@ def test_exact_a_lane_moves_as_the_loop_does(name, slide):
     modes = one_mode(OMEGA, 0.003, MASS)
     modes = type(modes)(modes.names, modes.omega, modes.zeta, np.array([slide]), modes.base, modes.output, MASS)
     start = Start(np.array([1e-5]), np.array([0.02]))
-    beside, alone = (Run(modes, SINE, element(LAWS[name]), 12, 1e-11, start=start) for _ in range(2))
+    beside, alone = (Run(modes, SINE, element(LAWS[name]), 12, one, start=start) for one in (1e-11, 1e-13))
     alone.swift = False
     assert beside.swift
     for run in (beside, alone):
@@ -91,8 +149,8 @@ def test_exact_a_lane_moves_as_the_loop_does(name, slide):
     assert len(one) == len(other) > 20
     assert np.all(abs(one - other).max(axis=0) <= 1e-7 * np.maximum(abs(other).max(axis=0), 1e-9))
     one, other = beside.book(), alone.book()
-    for key in ("work_in", "viscous", "power", "friction", "peak_stored"):
-        assert one[key] == pytest.approx(other[key], rel=0.1 if key == "peak_stored" else 1e-7), key
+    for key in ("work_in", "viscous", "power", "friction", "peak_stored"):  # |power| has kinks within steps
+        assert one[key] == pytest.approx(other[key], rel={"peak_stored": 0.1, "power": 1e-3}.get(key, 1e-9)), key
 
 
 def together(runs):

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from ....dynamics.smooth.lanes import fits
+from ....dynamics.smooth.waves import wave_of
 from ....effects import has
 from ....friction.bonds.engines import impossible
 from ....friction.laws.stretch import points_element
@@ -16,6 +18,7 @@ STEP = 2e-6  # seconds
 MORE = 1.5  # times the steps of a march, of which more are not worth their digits
 EASES = 9.0  # steps of a stiff law of the speed per cycle, over those of one that holds: .5 at r = 1.07, .1 at 1.26
 STABLE = 3.0  # times the length over which a state of a law relaxes, in a step
+FARTHER = 7.0  # of a series, whose order is higher
 
 
 def not_smooth(model: Model) -> str:
@@ -60,10 +63,11 @@ def steps_of(model: Model, element: Element) -> float:
     rigid = 0.0 if element.length else element.limit / model.friction.reference_speed * ease * clings(model, element)
     path = 4 * model.speed / omega
     states = path / element.length if element.sizes and element.length else 0.0
+    stable = FARTHER if fits(modes, element, wave_of(rig.drive), rig.travel) else STABLE
     grown = model.friction.slip_growth if has(model.friction.law, "bonds") else None
     if grown:
         states = max(states, path / grown)
-    return 24 + 1.2 * pace * period + (states + rigid * period) / STABLE
+    return 24 + 1.2 * pace * period + (states + rigid * period) / stable
 
 
 def clings(model: Model, element: Element) -> float:
