@@ -7,6 +7,16 @@ from patchfem.dynamics.piecewise.elements import elements_of, paired
 from patchfem.friction.laws.iwan import sliders
 
 
+def test_exact_one_element_is_what_is_left_beside_one_that_carries_nothing():
+    for k, y in ((2.0, 3.0), (1e7, 1e-6)):
+        one, two = elements_of([k], [y]), elements_of([k, 0.0], [y, 1.0])
+        np.testing.assert_array_equal([one.stiffness, one.yield_slide], [two.stiffness, two.yield_slide])
+        assert one.rank.tolist() == [0] and two.rank.tolist() == [0, -1] and not one.stiffness.flags.writeable
+    for k, y in ((0.0, 3.0), (2.0, 0.0)):
+        nothing = elements_of([k], [y])
+        assert nothing.stiffness.size == 0 and nothing.rank.tolist() == [-1]
+
+
 def test_exact_pairs_keep_stiffness_and_limit():
     for count in (1, 2, 7, 8):
         rng = np.random.default_rng(count)
