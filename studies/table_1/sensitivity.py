@@ -6,7 +6,7 @@ to 15 mm by 4 to 9 mm, tilts of 0.01 to 0.3 mrad, yaw dampings of 0.001 to 0.01 
 One at a time each is put at the ends of what it may be, and the four numbers are fitted to 143 Hz again from where they
 stood. Then all are drawn together with the four numbers kept, for Sobol's indices of the two scores.
 
-Run: python studies/table_1/sensitivity.py [draws]      (16; the indices in README.md are of 32)
+Run: python studies/table_1/sensitivity.py [draws]      (8; the indices in README.md are of 32)
 """
 
 import json
@@ -105,4 +105,4 @@ def main(draws: int = 32) -> tuple:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 16)
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 8)
