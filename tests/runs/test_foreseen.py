@@ -101,18 +101,16 @@ def test_refuses_in_one_line_what_the_process_may_not_take(tmp_path, law, least)
 
 @pytest.mark.slow
 def test_always_plans_hold_in_most_scenes(tmp_path):
-    """Time within 1.5 and memory within 1.3 of scenes of all kinds; 9 of 10 are wanted in both.
+    """CPU time within 1.5 and memory within 1.3 of scenes of all kinds in 9 of 10.
 
-    The target is not met, and what is asserted lies below it. Held out when the numbers of `runs.memory` and of the
-    plans were fixed: of 81 scenes from seed 5000 time held in 71 (88 %) and memory in 65 (80 %). Asserted are 85 and
-    75 %, a few scenes below what was seen, for seconds and memory differ a little from machine to machine: so the test
-    holds what was reached, and passing it does not mean that the target is met. What is missed: patches whose mesh
-    climbs (factors .3 to 2.5), masses by loops in Python, and a release under law tanh that the smooth engine does not
-    end within 120 s.
+    Held out when the numbers of `runs.memory`, of the grids foreseen and of the plans were fixed: of 80 scenes from
+    seed 6000 time held in 75 (94 %) and memory in 76 (95 %). What was missed: comparison methods (two of the five in
+    time, two of the four in memory), a march of two masses, and two patches whose mesh climbs further or less far than
+    foreseen.
     """
-    scores = [one.within() for one in plan_trial.told(5000, 80, tmp_path)]
+    scores = [one.within() for one in plan_trial.told(6000, 80, tmp_path)]
     time, memory_ = (sum(column) / len(scores) for column in zip(*scores))
-    assert time >= 0.85 and memory_ >= 0.75
+    assert time >= 0.9 and memory_ >= 0.9
 
 
 def test_always_plans_of_a_few_scenes_hold_in_memory(tmp_path):
