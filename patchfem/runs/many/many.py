@@ -17,8 +17,7 @@ class Batch(NamedTuple):
     """A way to answer many models together.
 
     refuses(model) -> "" or the sentence why not; group(model): equal for models that can share work; solve(models,
-    say) -> Answers of a group, equal to single runs to 1e-12, bars too, whatever else is in the group; of Coulomb's law
-    the bar of a motion that has not settled, told by differences of amplitudes, to 1e-11 of the motion.
+    say) -> Answers of a group, equal to single runs to 1e-12, bars too, whatever else is in the group.
     """
 
     name: str

@@ -104,9 +104,6 @@ def held_against(cases, ones, many, of_bar: float = 0.0) -> None:
             assert many.values[name][case] == pytest.approx(value, rel=0, abs=near, nan_ok=True), (case, name)
             if name not in DIFFERENCES:
                 told = 1e-9 * near + of_bar * abs(value)
-                # by differences of amplitudes; batches in closed form have other last bits of them
-                if name.endswith("_steady") and cases[case].friction.law == "coulomb":
-                    told = 1e-11 * abs(value)
                 if cases[case].friction.law == "iwan":  # a coarser run tells it
                     told = 3 * near
                 same = pytest.approx(bar, rel=1e-11, abs=told, nan_ok=True)
