@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .shared import Json, Out, Quiet, Refused, Sets, Units, model_of, say, scene_of, word
+from .shared import Json, Out, Quiet, Refused, Sets, Units, model_of, note, say, scene_of, word
 
 
 def compare(before: Path, after: Path, /, *other: Path,
@@ -41,7 +41,7 @@ def compare(before: Path, after: Path, /, *other: Path,
         write_json(data, folder.path / "compare.json")
         paper.write_page(folder.path / "report.html", parts, found, pressing)
     for text in data["notes"]:
-        say(f"note: {text}")
+        note(text)
     if json_:
         print(json.dumps(data, ensure_ascii=False, allow_nan=False))
     else:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .shared import Json, Refused, flag, say, texts, word
+from .shared import Json, Refused, flag, note, texts, word
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ def import_(file: Path, /, *, out: Annotated[Path, Parameter(
     if json_:
         print(json.dumps({"file": str(out), **answer}, ensure_ascii=False))
         return
-    for note in answer["notes"]:
-        say(f"note: {note}")
+    for text in answer["notes"]:
+        note(text)
     print(f"{out}: {told}")
 
 

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from .shared import Json, Refused, Units, flag, out_in, say, word
+from .shared import Json, Refused, Units, flag, note, out_in, word
 
 
 def profile(file: Path, /, *more: Path,
@@ -32,7 +32,7 @@ def profile(file: Path, /, *more: Path,
         if not json_:
             print("\n".join(lines_of(report, verbose)))
         for text in report.notes:
-            say(f"note: {text}")
+            note(text)
     from .. import __version__
 
     answer = {"patchfem": __version__, "profiles": [data_of(one) for one in reports]}

@@ -5,7 +5,7 @@ import shlex
 import sys
 from pathlib import Path
 
-from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, progress_bar, say, scene_of
+from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, note, progress_bar, say, scene_of
 
 
 def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False,
@@ -81,7 +81,7 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
         say(f"warning: {text}")
     print("\n".join(table_of(answer["measures"])), flush=True)
     for text in answer["notes"]:
-        say(f"note: {text}")
+        note(text)
     if verbose:
         say("seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in answer["seconds"].items()))
     print(f"results: {target}{page}")

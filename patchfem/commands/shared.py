@@ -7,6 +7,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from .streams import plain
+
 
 def flag(text: str, *names: str) -> type:
     """The type of an option that is named or not, with what it does in words."""
@@ -61,6 +63,11 @@ def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
     except (OSError, ValueError):
         pass
+
+
+def note(text: str) -> None:
+    """A note on stderr; what files wrote into it moves no cursor."""
+    say(plain(f"note: {text}"))
 
 
 def scene_of(path: Path, sets, faults=None):

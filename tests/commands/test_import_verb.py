@@ -29,6 +29,15 @@ def shaken(tmp_path_factory):
         record(TIME, response / 9.80665, 12, id1="tip", ordinate_axis_units_lab="g")])
 
 
+def test_always_a_note_shows_what_a_file_wrote_as_text(tmp_path):
+    """A unit with a NUL byte once came to the screen as it stood, as would any sign that moves the cursor."""
+    tip = record(TIME, driven("acceleration")[1], 12, id1="tip", ordinate_axis_units_lab="NO")
+    path = written(tmp_path / "lab.uff", [SI, tip])
+    path.write_bytes(path.read_bytes().replace(b"NO ", b"N\x1b "))
+    answer = cli("import", path, "-o", tmp_path / "out.csv")
+    assert answer.code == 0 and "its unit 'N?' is not known" in answer.err and "\x1b" not in answer.err
+
+
 def test_exact_modes_of_a_record_are_the_structure_of_a_scene(shaken, tmp_path):
     answer = cli("import", shaken, "-o", tmp_path / "modes.toml", "--json")
     assert answer.code == 0, answer.err
