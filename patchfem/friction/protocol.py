@@ -27,7 +27,7 @@ One without states may offer its force without branches, for motions side by sid
 the speed, where OF_SPEED is true, or times the slide dq, and w = share(y), which obeys dw/dy = a + b w + c w^2 with
 GROWS = (a, b, c), it is along(n0, n1, n2, n3, dq, v) -> n1 + n2 w + n3 y (1 - w) [N], the last term only where MIXED is
 true. ahead(num, mem, way) -> n0 to n3 of a motion that begins, and layer(num) -> speed [m/s] over which the force turns
-with the slide, 0 for none.
+with the slide, 0 for none. Its irreversible part of q turns where q does or the force passes zero.
 """
 
 from typing import NamedTuple

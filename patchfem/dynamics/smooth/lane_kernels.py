@@ -14,6 +14,7 @@ from ...compiled.inner import njit
 from ...compiled.series_kernels import sine
 from ...friction.flags_kernels import INNER, LEAN
 from ...friction.laws import stretch_kernels as law
+from . import crest_kernels as crests
 from . import lane_step as at
 from . import lane_step as stepping
 from . import loop_kernels as loop
@@ -174,7 +175,7 @@ def cycled(rows, own, lane, cycles):
 
 
 @njit(error_model="numpy", **INNER)
-def shown(m, k, rows, own, lane):
+def shown(m, k, rows, lane, room):
     """Read what is asked for inside the step in a lane: samples, and the numbers of the last cycles."""
     h, sample = rows[H + lane], int(k.tally[watching.SAMPLE])
     marked = sample < k.samples.shape[0] and k.samples[sample, 0] <= rows[T + lane] + h
@@ -200,7 +201,9 @@ def shown(m, k, rows, own, lane):
             work[row, 1] = 0.0
     reading.marks(m, h, k)
     if k.tally[watching.WANTED] > 0:
-        reading.peaks(m, h, k)
+        for j in range(at.ORDER):
+            room[crests.FORCE, j] = rows[F0 + at.LANES * j + lane] * c**j
+        crests.peaks(m, h, k, room)
         reading.harmonics(m, h, k)
         reading.mean_of(m, h, k, k.tally[watching.BEGIN], watching.MEANS)
         reading.mean_of(m, h, k, k.tally[watching.END] - k.tally[watching.PERIOD], watching.MEANS + 1)
@@ -249,7 +252,7 @@ def gone_on(many, kept, rows, own, lane, code):
 
 
 @njit(error_model="numpy", **INNER)
-def taken(many, kept, rows, own, lane):
+def taken(many, kept, rows, own, lane, room):
     """Take the step in a lane, or refuse it: GOING, or TURNS at a reversal."""
     if not judged(rows, own, lane):
         return ENDLESS if own[TRIES] > 60 else GOING
@@ -259,7 +262,7 @@ def taken(many, kept, rows, own, lane):
     j = int(own[MOTION])
     if kept.samples.shape[1] > 0 or kept.tally[j, watching.WANTED] > 0:
         m, k = one(many, kept, j)
-        shown(m, k, rows, own, lane)
+        shown(m, k, rows, lane, room)
         accepted(rows, own, lane, k.cycles)
         put_back(m, k, rows, own, lane)
     else:
@@ -278,12 +281,12 @@ def begun(many, kept, rows, own, lane, ahead, until, tolerance):
 
 
 @njit(error_model="numpy", cache=True, nogil=True, **LEAN)
-def advance(many, kept, rows, lanes, until, tolerance, codes):
+def advance(many, kept, rows, lanes, room, until, tolerance, codes):
     """Move n motions that have begun on to the times `until` (n,) [s]; codes (n,): how each ended, as `loop_kernels`.
 
     many, kept: as Moving and Kept with one more dimension of n in front, but for damping, work, room and table; rows
-    (SIZE,), lanes (LANES, 22): room to work in; tolerance (n,): of a step, relative. FULL: the room for reversals is
-    used up, and the motion can go on from there. Returns the rounds.
+    (SIZE,), lanes (LANES, 22), room (ROWS, TERMS + 2) of `crest_kernels`: to work in; tolerance (n,): of a step,
+    relative. FULL: the room for reversals is used up, and the motion can go on from there. Returns the rounds.
     """
     ahead, busy, rounds = 0, 0, 0
     lanes[:, MODE] = IDLE
@@ -317,7 +320,7 @@ def advance(many, kept, rows, lanes, until, tolerance, codes):
             own = lanes[lane]
             if own[MODE] < GO:
                 continue
-            code = taken(many, kept, rows, own, lane)
+            code = taken(many, kept, rows, own, lane, room)
             if code == GOING:
                 continue
             code = gone_on(many, kept, rows, own, lane, code)

@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 
 from ... import compiled
+from .crest_kernels import ROWS, TERMS
 from .lane_step import LANES, SIZE, step_of
 from .waves import SINES
 
@@ -35,6 +36,7 @@ def lanes_of(law: str):
     polynomial = compiled.instance(f"{HERE}.polynomial_kernels", {"steps": parts["steps"]})
     reading = compiled.instance(f"{HERE}.watch_kernels", {"law": parts["law"], "steps": polynomial})
     own = {"stepping": step_of(parts["law"]), "polynomial": polynomial, "reading": reading}
+    own["crests"] = compiled.instance(f"{HERE}.crest_kernels", {"steps": polynomial, "reading": reading})
     return compiled.instance(f"{HERE}.lane_kernels", parts | own)
 
 
@@ -54,7 +56,8 @@ def advance(law: str, many, kept, until, tolerance) -> np.ndarray:
     tolerance (n,): of a step, relative. What kept asks for is read on the way.
     """
     codes = np.zeros(len(until), np.int64)
-    lanes_of(law).advance(many, kept, np.zeros(SIZE), np.zeros((LANES, NUMBERS)), until, tolerance, codes)
+    room = np.zeros(SIZE), np.zeros((LANES, NUMBERS)), np.zeros((ROWS, TERMS + 2))
+    lanes_of(law).advance(many, kept, *room, until, tolerance, codes)
     return codes
 
 
