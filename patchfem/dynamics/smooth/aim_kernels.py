@@ -51,12 +51,10 @@ def first_zero(a, p, b, r):
     return s
 
 
-
 @njit(error_model="numpy", **INNER)
 def still(rows, own, lane):
     """As `loop_kernels.still`."""
     return 4e-16 * (rows[FAST + lane] + own[ROUND] * rows[CREST + lane])
-
 
 
 @njit(error_model="numpy", **INNER)
@@ -74,7 +72,6 @@ def eased(rows, own, lane):
     return max(u + 0.4 * log(tolerance), share * sqrt(u * u + POLE)) * unit
 
 
-
 @njit(error_model="numpy", **INNER)
 def speed_at(rows, lane, c):
     """(rate [m/s], its slope over c) of the series in a lane at a time of c units."""
@@ -83,7 +80,6 @@ def speed_at(rows, lane, c):
         slope = slope * c + v
         v = v * c + rows[V1 + at.LANES * k + lane]
     return rows[V + lane] + c * v, v + c * slope
-
 
 
 @njit(error_model="numpy", **INNER)
@@ -105,7 +101,6 @@ def zero_of(rows, own, lane, c, high):
         if high - low <= 1e-15 * high:
             return c
     return c
-
 
 
 @njit(error_model="numpy", **INNER)
@@ -136,7 +131,6 @@ def lowest(rows, own, lane, c, begin, gain, end, after):
             break
         s = new
     return s if own[WAY] * speed_at(rows, lane, s)[0] < 0 else 0.0
-
 
 
 @njit(error_model="numpy", **INNER)
@@ -171,7 +165,6 @@ def aimed(rows, own, lane):
         return ASTRAY if own[FRESH] == loop.STANDS else ENDLESS
     own[MODE], rows[H + lane] = STOP, unit * zero_of(rows, own, lane, max(share, 1e-12) * c, c)
     return GOING
-
 
 
 @njit(error_model="numpy", **INNER)
