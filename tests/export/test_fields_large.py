@@ -108,7 +108,8 @@ def rubbing(tmp_path_factory):
         seconds = []
         for _ in range(2):
             begin = process_time()
-            bodies.write_fields(SimpleNamespace(patch=pressed.patch, fields=fields, extra={}), folder / NAME)
+            whole = SimpleNamespace(patch=pressed.patch, plan=pressed.plan, fields=fields, extra={})
+            bodies.write_fields(whole, folder / NAME)
             seconds.append(process_time() - begin)
     return pressed, kept["blocks"], folder / NAME, min(seconds)
 

@@ -2,8 +2,6 @@
 
 import numpy as np
 
-from ....dynamics.smooth.lanes import fits
-from ....dynamics.smooth.waves import wave_of
 from ....effects import has
 from ....friction.bonds.engines import impossible
 from ....friction.laws.stretch import points_element
@@ -55,6 +53,9 @@ def element_of(model: Model) -> Element | None:
 def steps_of(model: Model, element: Element) -> float:
     """Steps per cycle to expect: some per radian of the fastest motion, some at every reversal, and those that keep a
     state of the law which relaxes over a short path or time stable."""
+    from ....dynamics.smooth.lanes import fits  # with its compiled parts: not for the rigs that are refused before
+    from ....dynamics.smooth.waves import wave_of
+
     rig, modes = model.rig, model.rig.modes
     omega, period = omega_of(rig.drive), rig.drive.period
     damper = modes.damping if modes.damping is not None else np.diag(2 * modes.zeta * modes.omega)
