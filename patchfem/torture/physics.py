@@ -31,7 +31,8 @@ def energy(trial: Trial) -> None:
         raise Wrong(f"{found.outcome.value} with an energy balance of {balance.value:.3g}")
     if work is not None and work.value is not None and settled and work.value > WORK and not found.warnings:
         raise Wrong(f"{found.outcome.value} with a work check of {work.value:.3g} and no warning")
-    passive(found, tables)
+    if found.outcome.value != "not_converged":  # marked as not to be used
+        passive(found, tables)
 
 
 def passive(found, tables: dict) -> None:
