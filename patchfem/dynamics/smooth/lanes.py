@@ -1,4 +1,4 @@
-"""Motions of one mode under a sine side by side: which may move so, and how they are handed to compiled code."""
+"""Motions of one mode under a sine side by side, handed to compiled code; `waves` says which may move so."""
 
 from functools import cache
 
@@ -7,10 +7,8 @@ import numpy as np
 from ... import compiled
 from .crest_kernels import ROWS, TERMS
 from .lane_step import LANES, SIZE, step_of
-from .waves import SINES
 
 HERE = "dynamics.smooth"
-FREE = 7  # of the numbers of points of bonds: share of the bond length that stretches without damage
 NUMBERS = 22  # of a lane
 
 
@@ -38,15 +36,6 @@ def lanes_of(law: str):
     own = {"stepping": step_of(parts["law"]), "polynomial": polynomial, "reading": reading}
     own["crests"] = compiled.instance(f"{HERE}.crest_kernels", {"steps": polynomial, "reading": reading})
     return compiled.instance(f"{HERE}.lane_kernels", parts | own)
-
-
-def fits(modes, element, wave, travel: float = np.inf) -> bool:
-    """Whether a motion may move side by side with others: one mode with its own damping, one sine without an end, no
-    stop at a travel [m], a law without states of its own and without kinks."""
-    plain = element.form == "speed" or (element.form == "points" and not element.numbers[FREE])
-    sine = wave.kind == SINES and len(wave.pieces) == 1 and wave.pieces[0, 2] != 0
-    return bool(plain and element.sizes == () and modes.omega.size == 1 and modes.damping is None and sine
-                and np.isinf(travel))
 
 
 def advance(law: str, many, kept, until, tolerance) -> np.ndarray:

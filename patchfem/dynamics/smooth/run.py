@@ -11,8 +11,8 @@ from ...friction.laws.stretch import bonds_of
 from ..march.march import MarchResult
 from ..second_book import sampled_work
 from .arrays import Kept, Moving
-from .lanes import OF_KEPT, OF_MOVING, advance, fits, loops_of, stacked
-from .waves import wave_of
+from .lanes import OF_KEPT, OF_MOVING, advance, loops_of, stacked
+from .waves import fits, wave_of
 
 SAMPLES = 400  # per drive cycle in the kept window
 LEAST = 101  # samples of a run that has no cycles

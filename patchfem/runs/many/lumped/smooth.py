@@ -5,9 +5,8 @@ import numpy as np
 from ....compiled import kernels, load
 from ....dynamics.second_book import gap
 from ....dynamics.smooth import run as hub
-from ....dynamics.smooth.lanes import fits
 from ....dynamics.smooth.many import together
-from ....dynamics.smooth.waves import wave_of
+from ....dynamics.smooth.waves import fits, wave_of
 from ....effects import has
 from ....response.errors import tolerance_error
 from ....response.loops import interface_loops

@@ -53,8 +53,7 @@ def element_of(model: Model) -> Element | None:
 def steps_of(model: Model, element: Element) -> float:
     """Steps per cycle to expect: some per radian of the fastest motion, some at every reversal, and those that keep a
     state of the law which relaxes over a short path or time stable."""
-    from ....dynamics.smooth.lanes import fits  # with its compiled parts: not for the rigs that are refused before
-    from ....dynamics.smooth.waves import wave_of
+    from ....dynamics.smooth.waves import fits, wave_of  # not for the rigs that are refused before
 
     rig, modes = model.rig, model.rig.modes
     omega, period = omega_of(rig.drive), rig.drive.period
