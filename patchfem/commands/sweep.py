@@ -103,10 +103,12 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
         raise Ended(130) from None
     line.end()
     if part is not None:
-        print(json.dumps({"cases": line.done, "folder": str(target)}) if json_ else
-              f"shard {by.shard}: {line.done} cases in {target}; when all shards are done: the same with --collect")
+        if json_ or not quiet:
+            print(json.dumps({"cases": line.done, "folder": str(target)}) if json_ else
+                  f"shard {by.shard}: {line.done} cases in {target}; when all shards are done: the same with --collect")
         return
-    _answer(cases, found, target, not no_page, json_, perf_counter() - begin)
+    _answer(cases, found, target, not no_page, "json" if json_ else "faults" if quiet else "words",
+            perf_counter() - begin)
 
 
 class Progress:
@@ -133,7 +135,8 @@ class Progress:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
-def _answer(cases, found, target: Path, page: bool, json_: bool, seconds: float) -> None:
+def _answer(cases, found, target: Path, page: bool, tells: str, seconds: float) -> None:
+    """What came out, as "json", in "words", or the "faults" alone."""
     from collections import Counter
 
     from ..export.pages.sweep import span, turns
@@ -141,10 +144,10 @@ def _answer(cases, found, target: Path, page: bool, json_: bool, seconds: float)
 
     counts = dict(Counter(map(str, found.outcome)).most_common())
     failed = sorted(found.messages)
-    if json_:
+    if tells == "json":
         print(json.dumps({"cases": len(found), "outcomes": counts, "failed": len(failed), "folder": str(target),
                           "seconds": round(seconds, 3)}, ensure_ascii=False))
-    else:
+    elif tells == "words":
         print(f"{len(found)} cases: " + ", ".join(f"{count} {name}" for name, count in counts.items()))
         columns = {name: (values, found.errors[name], found.units[name]) for name, values in found.values.items()}
         for said in (span(columns, found.outcome), turns(columns_of(cases), columns, found.outcome, not cases.rows)):

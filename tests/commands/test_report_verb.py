@@ -88,6 +88,7 @@ def test_refuses_what_cannot_stand_side_by_side(swept, tmp_path):
     (swept / "first" / "kept.nc").rename(swept / "first" / "sweep.nc")
     assert answer.code == 2 and "it has no sweep.nc" in answer.err
     other = swept / "other"
-    assert cli("sweep", swept / "rig.toml", "--over", "normal.load=10 N,20 N", "-o", other, "-q").code == 0
+    answer = cli("sweep", swept / "rig.toml", "--over", "normal.load=10 N,20 N", "-o", other, "-q")
+    assert (answer.code, answer.out, answer.err) == (0, "", ""), "quiet, it says nothing but faults"
     answer = cli("report", swept / "first", other)
     assert answer.code == 2 and "over other keys" in answer.err
