@@ -89,8 +89,9 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     begin, part = perf_counter(), by.part()
     asked, cases = asked_of(scene, set_, (what or Over()).request())
     target = out if out is not None else Path("out") / f"{scene.stem}-sweep"
+    tells = "json" if json_ else "faults" if quiet else "words"
     if by.collect:
-        _answer(cases, collect(asked, cases, target, not no_page), target, not no_page, json_, perf_counter() - begin)
+        _answer(cases, collect(asked, cases, target, not no_page), target, not no_page, tells, perf_counter() - begin)
         return
     line = Progress(quiet)
     try:
@@ -107,8 +108,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
             print(json.dumps({"cases": line.done, "folder": str(target)}) if json_ else
                   f"shard {by.shard}: {line.done} cases in {target}; when all shards are done: the same with --collect")
         return
-    _answer(cases, found, target, not no_page, "json" if json_ else "faults" if quiet else "words",
-            perf_counter() - begin)
+    _answer(cases, found, target, not no_page, tells, perf_counter() - begin)
 
 
 class Progress:

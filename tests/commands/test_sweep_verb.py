@@ -265,7 +265,11 @@ def test_exact_shards_make_the_same_files(swept, scene, tmp_path, monkeypatch):
     assert cli("sweep", scene, *OVER, "-o", out, "--shard", "2/4").code == 0 and len(ran) == count  # it is done
     assert cli("sweep", scene, *OVER, "-o", out, "--shard", "3/4").code == 0 and len(ran) == 6
     (out / "cases" / "0123456789abcdef").mkdir()  # another sweep's, whose shards may still be at work
-    assert cli("sweep", scene, *OVER, "-o", out, "--collect").code == 3
+    collected, quiet, told = (cli("sweep", scene, *OVER, "-o", out, "--collect", *words)
+                              for words in ((), ("-q",), ("--json",)))
+    assert [one.code for one in (collected, quiet, told)] == [3] * 3
+    assert collected.out.startswith("6 cases: ") and f"results: {out / 'sweep.csv'}" in collected.out
+    assert quiet.out == "" and json.loads(told.out)["cases"] == 6
     assert (out / "cases" / "0123456789abcdef").is_dir()
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
