@@ -17,6 +17,7 @@ RATIO = 200  # unpacked to packed size: what is more is a bomb, not a surface
 SMALL = 2**20  # bytes that may unpack at any ratio
 DIRECTORY = 2**20  # bytes of the list of members of a zip file
 HEAD = 4096  # bytes that tell the format
+PIECE = 2**16  # bytes that are counted at a time: larger ones are mapped anew each time
 MARKS = (("gzip", b"\x1f\x8b"), ("zip", b"PK\x03\x04"), ("zip", b"PK\x05\x06"), ("npy", b"\x93NUMPY"),
          ("mat", b"MATLAB 5.0 MAT-file"), ("mat", b"MATLAB 7.3 MAT-file"), ("sdf", b"aISO-1.0"), ("sdf", b"bISO-1.0"),
          ("sdf", b"aBCR-1.0"), ("sdf", b"bBCR-1.0"))  # fmt: skip
@@ -56,7 +57,7 @@ def fetch(path) -> Raw:
         raise Missing(f"{path}: there is no such file") from None
     except (OSError, ValueError) as error:
         raise PatchfemError(f"{path}: the profile cannot be read ({error})") from None
-    _limited(path, kind, data)
+    _limited(path, kind, len(data))
     if kind == "gzip":
         return _inner(there, Path(there.stem), _gunzipped(path, data))
     return _unzipped(Raw(there, kind, suffix, data)) if kind == "zip" else Raw(there, kind, suffix, data)
@@ -85,8 +86,8 @@ def _most(kind: str) -> int:
     return TEXT if kind == "text" else LARGEST
 
 
-def _limited(path, kind: str, data: bytes) -> None:
-    if len(data) > _most(kind):
+def _limited(path, kind: str, size: int) -> None:
+    if size > _most(kind):
         what = f"{TEXT >> 20} MiB of text; keep every few samples of the profile"
         raise PatchfemError(f"{path}: more than " + (what if kind == "text" else f"{LARGEST >> 20} MiB"))
 
@@ -96,25 +97,35 @@ def _inner(path: Path, name: Path, data: bytes) -> Raw:
     kind = _kind(data[:HEAD])
     if kind == "gzip" or (kind == "zip" and path.suffix.lower() == ".zip"):
         raise PatchfemError(f"{path}: packed twice; unpack it once")
-    _limited(path, kind, data)
+    _limited(path, kind, len(data))
     found = Raw(path, kind, name.suffix.lower(), data)
     return _unzipped(found, packed=True) if kind == "zip" else found
 
 
 def _gunzipped(path, data: bytes) -> bytes:
+    """What a gzip file holds, counted before any of it is kept: of a bomb the pages of memory took most of the time."""
     most = min(LARGEST, max(SMALL, RATIO * len(data)))
     try:
         with gzip.open(io.BytesIO(data)) as file:
             head = file.read(HEAD)
             if _kind(head) == "text":
                 most = min(TEXT, most)
-            out = _upto(file, head, most + 1)
+            size = _counted(file, len(head), most + 1)
+            file.seek(0)
+            out = file.read(size) if size <= most else b""
     except BROKEN as error:
         raise PatchfemError(f"{path}: the gzip file is damaged ({reason(error)}); pack it again") from None
-    if len(out) > most:
-        _limited(path, _kind(head), out)
+    if size > most:
+        _limited(path, _kind(head), size)
         raise PatchfemError(f"{path}: unpacks to more than {RATIO} times its size; give the unpacked file")
     return out
+
+
+def _counted(file, size: int, most: int) -> int:
+    """`size` bytes that are read and those that follow them in a file, up to `most` or a few more; none is kept."""
+    while size < most and (part := file.read(PIECE)):
+        size += len(part)
+    return size
 
 
 def _unzipped(raw: Raw, packed: bool = False) -> Raw:
