@@ -12,6 +12,8 @@ from .shared import Json, Out, Quiet, Refused, Sets, Units, model_of, note, say,
 def compare(before: Path, after: Path, /, *other: Path,
             direction: word("x or y, along which the traces run; an areal scan has both") = "",
             units: Units = "",
+            shift: word("known shift: what stands at x before stands at x + shift after, such as \"0 mm\" for traces "
+                        "from one mark") = "",
             scene: Annotated[Path | None, Parameter(name="--scene", help="press the patch of this scene with each "
                                                     "surface, such as rig.toml")] = None,
             set_: Sets = (), out: Out = None, json_: Json = False, quiet: Quiet = False):
@@ -26,8 +28,9 @@ def compare(before: Path, after: Path, /, *other: Path,
     from ..surface.compare.measured import compared_files
     from ..surface.compare.verdict import verdicts
 
+    told = _length("shift", shift) if shift else None
     named = tuple(word.strip() for word in units.split(",")) if units else None
-    parts = compared_files((before, after, *other), direction, named)
+    parts = compared_files((before, after, *other), direction, named, told)
     directions = directions_of(parts)
     found = verdicts(parts, directions)
     target = out if out is not None else Path("out") / f"{before.stem}-{after.stem}"
@@ -47,6 +50,15 @@ def compare(before: Path, after: Path, /, *other: Path,
     else:
         print("\n".join(paper.lines_of(parts, found, pressing)))
         print(f"results: {target}")
+
+
+def _length(name: str, text: str) -> float:
+    from ..scene.keys.quantities import parse
+
+    try:
+        return parse(text, "length")
+    except ValueError as fault:
+        raise Refused(f"compare --{name}: {fault}") from None
 
 
 def _pressed(scene: Path, sets, part, target: Path, quiet: bool):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import ALWAYS, MODULES, cli, loaded
+from command_line import ALWAYS, FROM_SHELL, cli, loaded
 from pairs import UM, pair
 
 import patchfem as pf
@@ -58,7 +58,7 @@ def no_page(monkeypatch):
 
 def test_exact_the_answer_in_one_command(files, compared):
     p, (answer, out) = files[2], compared
-    assert answer.code == 0 and answer.out.splitlines()[0] == "reduced"
+    assert answer.code == 0 and answer.out.splitlines()[0] == "worn, waves reduced"
     assert answer.out.splitlines()[-1] == f"results: {out}"
     found = json.loads((out / "compare.json").read_text())
     assert found["reference"] == "place" and found["direction"] == "y"
@@ -69,7 +69,7 @@ def test_exact_the_answer_in_one_command(files, compared):
     assert found["shift"]["value"] == pytest.approx(p.shift, abs=0.02 * UM)
     assert found["worn_depth_max"]["value"] == pytest.approx(p.worn.max(), abs=0.1 * UM)
     page = (out / "report.html").read_text()
-    assert page.index("Reduced.") < page.index("<figure>")
+    assert page.index("Worn, waves reduced.") < page.index("<figure>")
     assert page.count("<figure>") == 3 == page.count('role="img" aria-label="')
     assert "http" not in page.replace("http://www.w3.org", "")
 
@@ -90,6 +90,7 @@ def test_exact_identical_traces_show_no_change(files, tmp_path, no_page):
     assert found["shift"]["value"] == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_always_a_scene_is_pressed_with_both(files, tmp_path):
     (tmp_path / "patch.toml").write_text(SCENE.replace("before.csv", str(files[0])))
     out = tmp_path / "out"
@@ -111,6 +112,7 @@ def test_always_a_scene_is_pressed_with_both(files, tmp_path):
                                                                                       rel=1e-12)
 
 
+@pytest.mark.slow
 def test_always_a_scene_that_is_longer_than_the_trace_is_told(files, tmp_path):
     (tmp_path / "patch.toml").write_text(SCENE.replace("0.9 mm", "12.7 mm").replace("2 um", "50 um")
                                          .replace("before.csv", str(files[0])))
@@ -118,11 +120,12 @@ def test_always_a_scene_that_is_longer_than_the_trace_is_told(files, tmp_path):
     assert answer.code in (0, 2) and "long, the patch 12.7 mm" in answer.out + answer.err
 
 
+@pytest.mark.slow
 def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
     p = pair(30078, share=0.0)
     across = written(tmp_path / "by.csv", p.before), written(tmp_path / "ay.csv", p.after)
     found = json.loads(cli("compare", *files[:2], *across, "--json", "-o", tmp_path / "out").out)
-    assert found["verdict"] == "reduced along x, no change shown along y"
+    assert found["verdict"] == "worn, waves reduced along x, no change shown along y"
     assert set(found["directions"]) == {"x", "y"} and set(found["anisotropy"]) == {"before", "after"}
     x, y, z = report_area((64, 64), 4 * UM, 1)
     scan = tmp_path / "scan.csv"
@@ -135,7 +138,8 @@ def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
 def test_exact_python_gives_what_the_command_writes(files, compared):
     said = json.loads((compared[1] / "compare.json").read_text("utf-8"))
     found = pf.compare(str(files[0]), files[1], direction="y")
-    assert json.loads(json.dumps(found)) == said and found["direction"] == "y" and found["verdict"] == "reduced"
+    assert json.loads(json.dumps(found)) == said and found["direction"] == "y"
+    assert found["verdict"] == "worn, waves reduced"
 
 
 @pytest.mark.parametrize("count, direction, says", [(3, "", "compare: 3 files; two"), (2, "z", "x or y is wanted")])
@@ -169,8 +173,7 @@ def test_refuses_traces_too_short_for_the_band(tmp_path):
 
 
 def test_exact_neither_meshes_nor_compiled_code_are_imported(files, tmp_path):
-    modules = loaded(f"import sys\nfrom patchfem.__main__ import main\ntry:\n    main(sys.argv[1:])\nexcept SystemExit "
-                     f"as end:\n    assert not end.code\n{MODULES}", "compare", *files[:2], "-o", tmp_path / "out")
+    modules = loaded(FROM_SHELL, "compare", *files[:2], "-o", tmp_path / "out")
     assert not modules & {*ALWAYS, "skfem"}
 
 
@@ -201,3 +204,11 @@ def test_refuses_what_is_not_there(files, tmp_path):
         answer = cli(*words, "-o", tmp_path / "out")
         assert answer.code == 2 and "none.toml: cannot be read: No such file" in answer.err
     assert not (tmp_path / "out").exists()
+
+
+def test_exact_a_told_shift_is_a_length(files, tmp_path, no_page):
+    found = json.loads(cli("compare", *files[:2], "--shift", f"{files[2].shift / UM:.1f} um", "--json", "-o",
+                           tmp_path / "out").out)
+    assert found["reference"] == "place" and found["shift"]["value"] == pytest.approx(files[2].shift, abs=0.02 * UM)
+    answer = cli("compare", *files[:2], "--shift", "0", "-o", tmp_path / "out")
+    assert answer.code == 2 and "compare --shift: '0' is a bare number without a unit" in answer.err

@@ -26,6 +26,7 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "worn_depth_mean": "worn depth, mean", "worn_area": "worn area", "amplitude_ratio": "amplitude ratio",
          "slope_ratio": "slope ratio", "worn_from_before": "worn from, x before", "worn_to_before": "worn to, x before",
          "worn_from_after": "worn from, x after", "worn_to_after": "worn to, x after",
+         "track_from": "track from, x after", "track_to": "track to, x after", "track_depth": "track depth, mean",
          "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
 NOTE = ("Interval: 95 %. Shift, depth and area: of this place, from the noise of the unworn heights. Ratios: of the "
         "surface, as far as one trace before and one after can tell, for Gaussian heights that are alike everywhere; "

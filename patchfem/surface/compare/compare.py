@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array, say
+from ...core import PatchfemError, say
 from ..areal import Areal
 from ..profile import Profile
 from ..roughness.filter import even
@@ -13,15 +13,12 @@ from . import depth as worn_depth
 from .depth import Worn
 from .extent import exchanged, grown
 from .flanks import Flanks, flanks_of
-from .place import CLEAR, Match, matched
+from .place import Match
 from .quantity import SIDE, Quantity, around, refused
-from .ratios import at_step, likeness, ratio, size_along, size_of
-from .registration import Registration, register
-
-# Noise of the registration over the root mean square height, and likeness that goes with it: where valleys agree to
-# 2 %, less likeness will do. A noise above 10 % is no noise: it is wear of the valleys too.
-ENOUGH = ((0.1, CLEAR), (0.02, 2.5))
-SHARE = 0.15  # of the heights, at least, unworn
+from .ratios import Size, at_step, likeness, ratio, size_along, size_of
+from .registration import Registration
+from .same import placed, turned
+from .tracks import Tracks, beside_flanks, pieces_of, tracks_of
 
 SHIFT = "a place at x of the trace before stands at x + shift of the trace after"
 STRETCH = "length of the trace after over that of the trace before, from their unworn valleys"
@@ -35,9 +32,9 @@ class Comparison:
     """What `compared` found for one direction.
 
     before, after: Profile or Areal; direction: "x", "y" or ""; reference: what the worn depth counts from: "place",
-    "flanks" or "" for nothing; match: the search for the same place, None for scans; shift, stretch, tilt, worn_*,
-    amplitude_ratio, slope_ratio, abbott: Quantity; sizes: `Size` before and after; notes: sentences; exchanged: whether
-    the other order of the traces is the likelier one.
+    "flanks" or "" for nothing; match: the search for the same place, None for scans and where the shift was told;
+    shift, stretch, tilt, worn_*, amplitude_ratio, slope_ratio, abbott: Quantity; sizes: `Size` before and after; notes:
+    sentences; exchanged: whether the other order of the traces is the likelier one.
     """
 
     before: Profile | Areal
@@ -57,6 +54,7 @@ class Comparison:
     flanks: Flanks | None = None
     notes: tuple = field(default=())
     exchanged: bool = False
+    tracks: Tracks = field(default=Tracks(()))
 
     @property
     def values(self) -> dict:
@@ -67,85 +65,53 @@ class Comparison:
         if self.worn.extent is not None:
             names = (f"worn_{end}_{when}" for when in ("before", "after") for end in ("from", "to"))
             out.update(zip(names, (*self.worn.extent.before, *self.worn.extent.after)))
+        sizes = zip(("track_from", "track_to", "track_depth"), self.tracks[1:4])
+        out.update((name, one) for name, one in sizes if one is not None)
         return out if self.abbott is None else {**out, "worn_depth_mean_from_abbott": self.abbott}
 
 
-def compared(before: Profile | Areal, after: Profile | Areal, direction: str = "", band: tuple = BAND) -> Comparison:
+def compared(before: Profile | Areal, after: Profile | Areal, direction: str = "", band: tuple = BAND,
+             shift: float | None = None) -> Comparison:
     """Compare two traces of a surface, or two areal scans of it in one direction.
 
-    Where the valleys of both traces agree beyond chance, they are registered on each other (`registration`) and the
-    worn depth is what is missing. Else the worn depth counts from unworn flanks of the trace after (`flanks`), or is
-    refused and the guess from the Abbott curves stands beside it. band [m]: waves of the amplitude ratio. PatchfemError
-    for a trace beside a scan, and traces that cannot show the band.
+    Where valleys or parts of both traces agree beyond chance (`same`), they are registered on each other
+    (`registration`) and the worn depth is what is missing. Else the worn depth counts from unworn flanks of the trace
+    after (`flanks`), or is refused and the guess from the Abbott curves stands beside it. band [m]: waves of the
+    amplitude ratio. shift [m]: where it is known, a place at x of the one is taken to stand at x + shift of the other,
+    give or take half a wave. PatchfemError for a trace beside a scan, a shift of scans, and traces that cannot show
+    the band.
     """
     if isinstance(before, Areal) != isinstance(after, Areal):
         raise PatchfemError(f"{before.source} and {after.source}: a trace and an areal scan; two of a kind are wanted")
     if isinstance(before, Areal):
+        if shift is not None:
+            raise PatchfemError("compare: a shift is told for traces; areal scans are not laid on each other")
         return _scans(before, after, direction or "x", band)
-    return _traces(before, after, direction, band)
+    return _traces(before, after, direction, band, shift)
 
 
-def same_place(before: Profile, after: Profile) -> tuple:
-    """The search for the same place, and the registration where it is the same, else None."""
-    match = matched(before, after)
-    if match.repeats or not match.clear > min(clear for _, clear in ENOUGH):
-        return match, None
-    try:
-        found = register(before, after, match.shift)
-    except PatchfemError:
-        return match, None
-    return match, found if _same(found, match) else None
-
-
-def _same(found: Registration, match: Match) -> bool:
-    """Whether the unworn heights of a registration are so many and so alike that the place is the same."""
-    height = float(np.std(found.first - np.polyval(np.polyfit(found.x, found.first, 1), found.x)))
-    same = any(found.noise < noise * height and match.clear > clear for noise, clear in ENOUGH)
-    return same and bool(found.used.mean() > SHARE)
-
-
-def _turned(before: Profile, after: Profile, shift: float) -> Registration | None:
-    """The first trace registered on the second one."""
-    try:
-        return register(after, before, -shift)
-    except PatchfemError:
-        return None
-
-
-def _likelier(before: Profile, after: Profile, shift: float, other: Registration) -> bool:
-    """Whether the other order is likelier for traces that are too noisy for a place: a worn floor has a place too."""
-    try:
-        found = register(before, after, shift)
-    except PatchfemError:
-        return True
-    worn = worn_depth.of_registration(found)
-    return exchanged(found, other, worn.area, worn.deposited)
-
-
-def _traces(before: Profile, after: Profile, direction: str, band: tuple) -> Comparison:
+def _traces(before: Profile, after: Profile, direction: str, band: tuple, told: float | None) -> Comparison:
     steps = [one.length / (one.x.size - 1) for one in (even(before), even(after))]
-    match, found = same_place(before, after)
-    notes, alike, flanks, abbott = list(before.notes + after.notes), (0.0, 0.0), None, None
+    match, found, why, order = placed(before, after, told)
+    notes, flanks, abbott, tracks = list(before.notes + after.notes), None, None, Tracks(())
+    sides, alike = [[before], [after]], (0.0, 0.0)
     if max(steps) > 1.01 * min(steps):
         notes.append(f"samples lie {say(steps[0])} apart before and {say(steps[1])} after; slopes and amplitudes are "
                      f"read every {say(max(steps))}")
     if found is not None:
-        alike = _alike(found, max(steps), band)
+        tracks = tracks_of(found, worn_depth.neighbours(found), band[1])
+        pieces = pieces_of(found, tracks, band[1])
+        sides, alike = list(zip(*pieces)), _alike(pieces, max(steps), band)
         notes += _told(found)
         shift = around(found.shift, found.errors[2], "m", SHIFT)
         tilt = around(found.slope, found.errors[1], "rad", TILT)
         stretch = around(1 + found.stretch[0], found.stretch[1], "1", STRETCH) if np.isfinite(found.stretch[0]) \
             else refused("1", STRETCH, "too few heights are unworn")
         worn, reference = worn_depth.of_registration(found), "place"
-        other = _turned(before, after, found.shift)
+        other = turned(before, after, found.shift)
         notes += grown(found, other, worn.area.value, worn.deposited)
         order = exchanged(found, other, worn.area, worn.deposited)
     else:
-        why = (f"the surface repeats itself: shifts apart from each other fit alike, {match.likeness:.3f} and "
-               f"{match.second:.3f}") if match.repeats and match.clear > CLEAR else \
-            f"the traces show no common place: chance brings their valleys the likeness of {match.likeness:.2f} too"
-        other = _turned(before, after, match.shift) if match.clear > CLEAR and not match.repeats else None
-        order = other is not None and _same(other, match) and _likelier(before, after, match.shift, other)
         if order:
             notes.append("taken the other way round, as wear of the trace after, the traces show a common place: are "
                          "the two files in the wrong order?")
@@ -154,25 +120,36 @@ def _traces(before: Profile, after: Profile, direction: str, band: tuple) -> Com
         flanks = flanks_of(before, after)
         abbott = None if flanks is not None else worn_depth.abbott_estimate(before, after)
         reference = "flanks" if flanks is not None else ""
+        if flanks is not None:
+            sides[1] = beside_flanks(after, flanks, band[1])
         worn = worn_depth.of_flanks(flanks) if flanks is not None else worn_depth.nowhere(
             why + ", and no unworn flanks stand beside a track; a worn depth wants one or the other")
-    pair = (before, after) if found is None else _common(found)
-    sizes = tuple(size_of(one, max(steps), band) for one in pair)
+    sizes = tuple(_pooled(side, max(steps), band) for side in sides)
     ratios = [ratio(part, text, sizes[1], sizes[0], one) for part, text, one in
               zip(("amplitude", "slope"), (AMPLITUDE, SLOPE), alike)]
     return Comparison(before, after, direction, reference, match, shift, stretch, tilt, worn, *ratios, abbott, sizes,
-                      found, flanks, tuple(notes), order)
+                      found, flanks, tuple(notes), order, tracks)
 
 
-def _alike(found: Registration, step: float, band: tuple) -> tuple:
-    """Likeness of the registered traces at an even step."""
-    pair = [at_step(one, step) for one in _common(found)]
-    return likeness(pair[0][0], pair[1][0], pair[0][1], band)
+def _pooled(pieces: tuple, step: float, band: tuple) -> Size:
+    """Size of the pieces of a trace: mean squares by their lengths; the spectrum is that of the longest."""
+    sizes = [size_of(one, step, band) for one in pieces]
+    share = _shares(pieces)
+    squares = share @ np.array([(one.amplitude**2, one.slope**2) for one in sizes])
+    freedom = tuple(float(each) for each in np.sum([one.freedom for one in sizes], axis=0))
+    return Size(*(float(each) for each in np.sqrt(squares)), freedom, sizes[int(np.argmax(share))].spectrum)
 
 
-def _common(found: Registration) -> tuple:
-    """Both traces over their common part, the second laid on the first."""
-    return tuple(Profile(found.x, frozen_array(z), "the common part") for z in (found.first, found.first - found.rest))
+def _alike(pieces: list, step: float, band: tuple) -> tuple:
+    """Likeness of the registered pieces at an even step, by their lengths."""
+    sides = [[at_step(one, step) for one in pair] for pair in pieces]
+    found = np.array([likeness(first[0], second[0], first[1], band) for first, second in sides])
+    return tuple(float(each) for each in _shares([pair[0] for pair in pieces]) @ found)
+
+
+def _shares(pieces) -> np.ndarray:
+    length = np.array([one.length for one in pieces])
+    return length / length.sum()
 
 
 def _told(found: Registration) -> list:

@@ -44,7 +44,14 @@ def of_registration(found: Registration) -> Worn:
     that hides in the noise: as many heights as are worn by 2.5 to 5 noises, by half a noise each. The largest
     depth is that of `largest`.
     """
-    width = _widths(found.x)
+    area, error, length, deposited = summed(found, np.ones(found.rest.size, bool))
+    return Worn(_largest(found), around(area / length, error / length, "m", MEAN, 0.0),
+                around(area, error, "m2", AREA, 0.0), deposited, extent_of(found, neighbours(found)))
+
+
+def summed(found: Registration, inside) -> tuple:
+    """(worn area [m2], its standard deviation, length [m], deposited area) of the samples inside (n,), all for bool."""
+    width = np.where(inside, _widths(found.x), 0.0)
     length, rest = float(width.sum()), found.rest
     deposit = rest < -DEPOSIT * found.noise
     weight = np.where(deposit, 0.0, width)
@@ -59,9 +66,7 @@ def of_registration(found: Registration) -> Worn:
     error = float(np.hypot(error, SLIGHT * slight * found.noise * length))
     error = max(error, 0.1 * found.noise * float(np.sqrt((width**2).sum())))  # digits, where no height is worn
     area = area if abs(area) > 1e-6 * found.noise * length else 0.0
-    return Worn(_largest(found), around(area / length, error / length, "m", MEAN, 0.0),
-                around(area, error, "m2", AREA, 0.0), float(-(width[deposit] @ rest[deposit])),
-                extent_of(found, _neighbours(found)))
+    return area, error, length, float(-(width[deposit] @ rest[deposit]))
 
 
 def _widths(x) -> np.ndarray:
@@ -73,10 +78,10 @@ def _widths(x) -> np.ndarray:
 def _largest(found: Registration) -> Quantity:
     if float(found.rest.max()) <= 4.5 * found.noise:  # the largest of the noise of the whole trace
         return Quantity(0.0, 0.0, max(float(found.rest.max()), 0.0) + found.noise, "m", MAX)
-    return around(*largest(found, _neighbours(found)), "m", MAX, 0.0)
+    return around(*largest(found, neighbours(found)), "m", MAX, 0.0)
 
 
-def _neighbours(found: Registration) -> float:
+def neighbours(found: Registration) -> float:
     """How many neighbouring heights err alike, with what interpolation between samples does to the next two."""
     rest, used = found.rest, found.used
     total, power = 1.0, max(float(np.mean(rest[used] ** 2)), 1e-300)

@@ -13,6 +13,7 @@ SURE = 5.0  # noises of a mean of neighbours from which they are worn: chance br
 MEANS = (1, 4, 16, 64)  # neighbours
 DEEP, LEAST, MOST = 10.0, 12, 400  # noises at which a flank of the wear ends; samples of it to either side
 MORE = 1.1  # times the unworn heights, from which the other order of the traces is the likelier one
+WORSE = 1.5  # times the noise, from which a fit is none: it runs between worn and unworn heights
 DEPOSITED = 0.05  # of the worn area, what may stand above without a word
 
 
@@ -33,7 +34,7 @@ def extent_of(found: Registration, together: float) -> Extent | None:
     together: how many neighbouring heights err alike.
     """
     rest = np.asarray(found.rest)
-    ends = [_edge(rest, found.noise, together), _edge(rest[::-1], found.noise, together)]
+    ends = [edge(rest, found.noise, together), edge(rest[::-1], found.noise, together)]
     if None in ends:
         return None
     x, last = found.x, rest.size - 1
@@ -51,7 +52,7 @@ def extent_of(found: Registration, together: float) -> Extent | None:
     return Extent(before, after)
 
 
-def _edge(rest, noise: float, together: float):
+def edge(rest, noise: float, together: float):
     """(edge, lowest, highest) index of the first worn height, None without one."""
     worn = None
     for many in MEANS:
@@ -78,7 +79,10 @@ def _edge(rest, noise: float, together: float):
 
 
 def _unworn(found: Registration, other: Registration) -> tuple:
-    """Shares of the heights that are unworn, within the smaller noise of both registrations."""
+    """Shares of the heights that are unworn, within the smaller noise of both registrations; none of the other one
+    where its noise is much the larger."""
+    if other.noise > WORSE * found.noise:
+        return 1.0, 0.0
     reach = REACH * min(found.noise, other.noise)
     return tuple(float(np.mean(np.abs(one.rest) <= reach)) for one in (found, other))
 

@@ -8,7 +8,7 @@ from .registration import Registration
 
 LONGEST = 1025  # samples of a window
 PARTS = 8  # of a window, whose means the parabola must meet
-ALIKE = 2.5
+ALIKE = 2.5  # deviations that a misfit of noise may have: 97 of 100 windows of noise alone fit
 BLUNT = 8.0  # noises below the top within which a depth may be the largest
 DOUBT = 3.0  # deviations that a depth loses in the choice of the largest: a sharper window must show it clearly
 DRAWS = 300

@@ -6,13 +6,15 @@ from ..files.read import read_surface
 from .compare import Comparison, compared
 
 
-def compared_files(paths: tuple, direction: str = "", units: tuple | None = None) -> list[Comparison]:
+def compared_files(paths: tuple, direction: str = "", units: tuple | None = None,
+                   shift: float | None = None) -> list[Comparison]:
     """One `Comparison` for each direction that the files show.
 
     paths: of the surface before and after, along one direction; two more for the other direction, of traces only. An
     areal scan shows both. direction: "x", "y" or "" for two traces of no told direction; with four files or a scan it
-    is that of the first pair, x unless told. units: of x and of z as `read_surface` takes them. PatchfemError for
-    another number of files, another direction, a trace beside a scan and four scans.
+    is that of the first pair, x unless told. units: of x and of z as `read_surface` takes them. shift [m]: where it
+    is known, as `compared` takes it, of two traces alone. PatchfemError for another number of files, another direction,
+    a trace beside a scan, four scans, and a shift of other than two traces.
     """
     if direction not in ("", "x", "y"):
         raise PatchfemError(f"compare: direction {direction!r}: x or y is wanted")
@@ -21,9 +23,11 @@ def compared_files(paths: tuple, direction: str = "", units: tuple | None = None
                             "direction, then before and after along the other")
     files = [read_surface(path, units) for path in paths]
     scans = {isinstance(one, Areal) for one in files}
+    if shift is not None and len(files) != 2:
+        raise PatchfemError("compare: a shift is that of two traces; compare each direction by itself")
     if len(scans) > 1 or (True in scans and len(files) == 4):
         raise PatchfemError("compare: two or four traces are wanted, or two areal scans")
     if len(files) == 2 and True not in scans:
-        return [compared(*files, direction)]
+        return [compared(*files, direction, shift=shift)]
     first = direction or "x"
     return [compared(*files[:2], first), compared(*files[-2:], "y" if first == "x" else "x")]

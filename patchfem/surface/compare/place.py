@@ -36,6 +36,7 @@ class Match(NamedTuple):
         """Whether another shift fits nearly as well, as on a turned surface."""
         return self.second > TWIN or fisher(self.likeness) - fisher(self.second) < APART
 
+
 def matched(before: Profile, after: Profile) -> Match:
     """Search the shift at which the valleys of both traces agree best, and how clearly it stands out.
 
@@ -44,6 +45,20 @@ def matched(before: Profile, after: Profile) -> Match:
     have the spectrum of the first one and random phases tells what chance brings; a surface that repeats itself, such
     as a turned one, shows in the second best shift. PatchfemError for fewer than 16 samples.
     """
+    first, second, step, start = prepared(before, after)
+    search = _Search(first.size, _valleys(second))
+    lag, likeness, second = search.best(_valleys(first))
+    random = np.random.default_rng(SEED)
+    found = np.array([search.best(_valleys(shuffled(first, random)))[1] for _ in range(CHANCE)])
+    z = fisher(found)
+    clear = (fisher(likeness) - z.mean()) / z.std(ddof=1)
+    return Match(start + lag * step, likeness, second, (float(z.mean()), float(z.std(ddof=1))),
+                 float(clear))
+
+
+def prepared(before: Profile, after: Profile) -> tuple:
+    """Heights (n,) [m] of both traces at one even step without their long waves, that step, and the shift of the first
+    samples [m]. PatchfemError for fewer than 16 samples."""
     one, other = even(before), even(after)
     if min(one.x.size, other.x.size) < 16:
         raise PatchfemError(f"{one.source}, {other.source}: 16 samples at least are wanted to compare two traces")
@@ -51,14 +66,14 @@ def matched(before: Profile, after: Profile) -> Match:
     first, second = (_read(each, step) for each in (one, other))
     cutoff = LONGEST * min(first.size, second.size)
     first, second = (z - mean_line(z, cutoff, tilted=True) for z in (first, second))
-    search = _Search(first.size, _valleys(second))
-    lag, likeness, second = search.best(_valleys(first))
-    random = np.random.default_rng(SEED)
-    found = np.array([search.best(_valleys(_shuffled(first, random)))[1] for _ in range(CHANCE)])
-    z = fisher(found)
-    clear = (fisher(likeness) - z.mean()) / z.std(ddof=1)
-    return Match(float(other.x[0] - one.x[0] + lag * step), likeness, second, (float(z.mean()), float(z.std(ddof=1))),
-                 float(clear))
+    return first, second, step, float(other.x[0] - one.x[0])
+
+
+def within(count: int, other: int) -> np.ndarray:
+    """Lags at which two traces of so many samples have enough in common."""
+    lags = np.arange(1 - count, other)
+    common = np.minimum(count, other - lags) - np.maximum(0, -lags)
+    return lags[common >= OVERLAP * min(count, other)]
 
 
 def fisher(likeness):
@@ -80,7 +95,7 @@ def _valleys(z) -> np.ndarray:
     return low - low.mean()
 
 
-def _shuffled(z, random) -> np.ndarray:
+def shuffled(z, random) -> np.ndarray:
     transform = np.fft.rfft(z - z.mean())
     return np.fft.irfft(np.abs(transform) * np.exp(2j * np.pi * random.uniform(size=transform.size)), z.size)
 
@@ -94,9 +109,7 @@ class _Search:
         self.count, self.fixed = count, fixed
         self.size = next_fast_len(count + fixed.size, real=True)
         self.transform, self.squares = rfft(fixed, self.size), rfft(fixed**2, self.size)
-        lags = np.arange(1 - count, fixed.size)
-        common = np.minimum(count, fixed.size - lags) - np.maximum(0, -lags)
-        self.lags = lags[common >= OVERLAP * min(count, fixed.size)]
+        self.lags = within(count, fixed.size)
         self.power = self._through(np.ones(count), self.squares)
 
     def _through(self, moved, transform):

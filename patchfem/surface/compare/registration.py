@@ -69,19 +69,20 @@ class Registration:
         return float(self.x[0] + self.x[-1]) / 2
 
 
-def register(before: Profile, after: Profile, shift: float) -> Registration:
+def register(before: Profile, after: Profile, shift: float, lowest: float = LOWEST) -> Registration:
     """Register `after` on `before` from a first guess of the shift [m], right within a quarter of a wave (`place`).
 
-    Between its samples the first trace is a cubic spline. The fit starts from the one-sided line over the lowest third
-    of the first trace. The noise is 1.4826 times the median of the depths below zero, which no wear makes; heights
-    within 2.5 of it make the next offset, slope and shift, until they stay the same; the first rounds count with the
-    noise of half a step of shift, halved from round to round. Slopes come from
-    parabolas as long as the noise wants. A second fit lets the second trace
-    be longer or shorter by a factor; where that halves the noise, the heights are compared with the factor taken out.
+    Between its samples the first trace is a cubic spline. The fit starts from the one-sided line over the lowest
+    heights of the first trace, a share `lowest` of them: wear spares valleys, unless a track is deeper than they are.
+    The noise is 1.4826 times the median of the depths below zero, which no wear makes; heights within 2.5 of it make
+    the next offset, slope and shift, until they stay the same; the first rounds count with the noise of half a step of
+    shift, halved from round to round. Slopes come from parabolas as long as the noise wants. A second fit lets the
+    second trace be longer or shorter by a factor; where that halves the noise, the heights are compared with the factor
+    taken out.
     PatchfemError where fewer than 12 heights are unworn.
     """
     fit = _Fit(even(before), after, shift)
-    state, used = fit.start(shift)
+    state, used = fit.start(shift, lowest)
     first = _settled(fit, state, used, 4)
     if first is not None:
         fit.smooth_slope(fit.noise(first))
@@ -180,13 +181,13 @@ class _Fit:
     def noise(self, state) -> float:
         return _unworn(self.rest(state)[0], self.least)[0]
 
-    def start(self, shift: float) -> tuple:
-        """State and the unworn heights of the one-sided line over the lowest third."""
+    def start(self, shift: float, lowest: float) -> tuple:
+        """State and the unworn heights of the one-sided line over a share of the heights, the lowest ones."""
         state = np.array([0.0, 0.0, shift, 0.0])
         rest, gradient, inside = self.rest(state)
         x = self.x[inside]
         low = np.interp(x - shift, self.one.x, self.flat)
-        low = low <= np.quantile(low, LOWEST)
+        low = low <= np.quantile(low, lowest)
         self.blur = float(np.std(gradient[:, 2])) * self.scales[2] / 2  # half a step of shift left open
         line = one_sided_line(x[low], rest[low], "above", self.blur)
         state[:2] = -line.at(self.centre), -line.slope * self.half

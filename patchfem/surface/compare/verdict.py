@@ -15,23 +15,27 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     """The headline and the sentences of one or two comparisons.
 
     directions: (when, amplitude ratio x over y, slope ratio) for each time at which both directions are known. The
-    headline is "reduced", "increased" or "no change shown", by the amplitude of the band in each direction. Unchanged
-    surfaces are called "reduced" in 2.5 of 100 cases, and as often "increased". Where the other order of the files is
-    the likelier one, that is said before it.
+    headline is "worn", where a depth is shown, then "reduced", "increased" or "no change shown", by the amplitude of
+    the band in each direction; the first sentence says where and how deep. Unchanged surfaces are called "reduced" in
+    2.5 of 100 cases, and as often "increased". Where the other order of the files is the likelier one, that is said
+    before it.
     """
     words = [changed(one.amplitude_ratio) for one in parts]
     names = [f" along {one.direction}" if one.direction else "" for one in parts]
     same = len(set(words)) == 1
     headline = words[0] if same else ", ".join(word + name for word, name in zip(words, names))
-    if headline == "no change shown":
-        told = ["worn"] * any(_sure(one.worn.mean) for one in parts)
-        told += ["flatter"] * any(changed(one.slope_ratio) == "reduced" for one in parts)
+    worn = ["worn"] * any(_sure(one.worn.mean) for one in parts)
+    if worn and headline != "no change shown":
+        headline = f"worn, waves {headline}"
+    elif headline == "no change shown":
+        told = worn + ["flatter"] * any(changed(one.slope_ratio) == "reduced" for one in parts)
         headline = " and ".join(told) + ", no change of the waves shown" if told else headline
     if any(one.exchanged for one in parts):
         headline = f"{EXCHANGED}; as given: {headline}"
     out = []
     for one, word, name in zip(parts, words, names):
-        out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name), _worn(one, name)]
+        out += [_worn(one, name), _amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name)]
+        out += _apart(one)
     out += [_direction(*each) for each in directions]
     return headline, out
 
@@ -101,13 +105,35 @@ def _worn(one: Comparison, name: str) -> str:
     if not _sure(mean):
         return f"Worn depth{name}: none shown; at most {say(mean.high)} in the mean."
     what = "over the track below its unworn flanks" if one.reference == "flanks" else "over the common length"
-    text = f"Worn{name}: {_length(mean)} in the mean {what}, {_length(one.worn.largest)} at the deepest place."
+    text = (f"Worn{name}: {_track(one)}{_length(mean)} in the mean {what}, {_length(one.worn.largest)} at the deepest "
+            "place.")
     if one.worn.deposited > DEPOSITED * one.worn.area.value:
         text += f" {1e12 * one.worn.deposited:.3g} um^2 stand above the surface before: deposits."
     if one.worn.extent is not None:
         before, after = (_span(*(end.value for end in ends)) for ends in one.worn.extent)
         text += f" Worn from x = {before} of the trace before, that is from {after} of the trace after."
     return text
+
+
+def _track(one: Comparison) -> str:
+    """The longest track as the begin of a sentence."""
+    start, end, depth = one.tracks[1:4]
+    if one.flanks is not None:
+        return f"a track from about x = {_span(one.flanks.start, one.flanks.end)} of the trace after; "
+    if depth is None:
+        return ""
+    return f"a track from x = {_span(start.value, end.value)} of the trace after, {_length(depth)} deep in the mean; "
+
+
+def _apart(one: Comparison) -> list:
+    """What stands beside the wear: edges that the ratios leave out, a valley that is new."""
+    cut = one.tracks.spans or one.flanks is not None
+    out = ["Amplitude and slope leave out the edges of the track."] if cut else []
+    if one.tracks.valley is not None:
+        place, depth = one.tracks.valley
+        out.append(f"A valley {say(depth, 3)} deep at x = {say(place, 4)} is in the trace after only: a scratch or a "
+                   "pit; the worn depths hold it too.")
+    return out
 
 
 def _span(first: float, last: float) -> str:

@@ -41,6 +41,7 @@ def test_always_the_order_of_150_made_traces_is_known():
     assert wrong <= 2 / 150 and right >= 0.8, (wrong, right)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("share", [0.0, 0.5])
 def test_exact_the_headline_names_the_order_first(share):
     """Unworn traces have no order: nothing is said about it either way."""
@@ -53,10 +54,11 @@ def test_exact_the_headline_names_the_order_first(share):
 
 
 def test_always_a_flat_floor_is_no_reason_to_exchange():
-    """Too noisy for a place as given, and the worn floor alone agrees when exchanged: 21 of 100 heights against 76."""
+    """The worn floor alone agrees when exchanged, with less noise: 21 of 100 heights against 76."""
     p = track("band", 95000, 2001)
     found = compared(p.before, p.after)
-    assert found.reference == "flanks" and not found.exchanged
+    assert found.reference == "place" and not found.exchanged
+    assert found.shift.low <= p.shift <= found.shift.high
     assert not any("wrong order" in text for text in found.notes)
     assert compared(p.after, p.before).exchanged
 

@@ -50,6 +50,7 @@ def test_always_200_pairs_hold_the_truth_in_95_of_100_intervals():
     assert (abs(held - 0.95) <= 0.03 + 1e-9).all(), held
 
 
+@pytest.mark.share(0, 2)
 @pytest.mark.parametrize("seed", range(4))
 def test_exact_without_noise(seed):
     p = pair(seed, noise=0.0)
@@ -82,6 +83,7 @@ def test_always_levelling_both_traces_takes_the_wear_away():
     assert found == pytest.approx(p.worn.mean(), abs=0.005 * UM)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [5, pytest.param(24, marks=pytest.mark.slow)])
 def test_always_traces_of_two_places_have_no_depth_but_a_guess(count):
     held, guesses = [], []
@@ -172,6 +174,7 @@ def groove(seed: int, depth: float, rough: float) -> tuple:
             Profile(x, frozen_array(sides[1] - cut + noise[1] - 0.002 * x), "after"), depth * 4 / 3 * 0.3e-3)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("count", [2, pytest.param(10, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("depth, rough, rms", [(10 * UM, 1 * UM, 0.1), (20 * UM, 0.5 * UM, 0.04)])
 def test_always_a_groove_between_unworn_flanks_has_its_area(depth, rough, rms, count):
@@ -187,6 +190,7 @@ def test_always_a_groove_between_unworn_flanks_has_its_area(depth, rough, rms, c
     assert sum(held) >= 0.8 * count and np.sqrt(np.mean(np.square(errors))) < rms
 
 
+@pytest.mark.slow
 def test_exact_a_groove_in_a_straight_line():
     x = np.arange(4001) * 0.5 * UM
     t = (x - 0.9e-3) / 0.3e-3

@@ -31,6 +31,7 @@ def scored(kind: str, count: int) -> tuple:
     return np.array(errors), np.mean(held), np.mean(ends)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_always_the_largest_depth_and_the_place_hold_the_truth(kind):
     """8 seeds: three misses or more have a chance of 0.6 % at 95 of 100; the noise of a depth is 28 nm."""
@@ -57,6 +58,7 @@ def test_exact_without_noise_the_depth_and_the_place():
     assert [one.value for one in worn.extent.before] == pytest.approx(moved, abs=1e-3 * UM)
 
 
+@pytest.mark.share(0, 2)
 @pytest.mark.parametrize("made", [*(track(kind, 90300) for kind in KINDS), pair(90300)], ids=[*KINDS, "peaks"])
 def test_always_files_in_the_wrong_order_are_told_and_others_are_not(made):
     there, back = register(made.before, made.after, made.shift), register(made.after, made.before, -made.shift)

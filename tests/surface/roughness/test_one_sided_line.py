@@ -23,6 +23,7 @@ def test_exact_without_noise(tilt, first, last, side):
     assert line.used[:first].all() and line.used[last:].all() and not line.used[first + 10:last - 10].any()
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("side, sign", [("above", 1), ("below", -1)])
 def test_always_noise_moves_the_line_by_little(side, sign):
     """Half of the trace worn 1 to 4 um deep, 20 nm of noise: 200 traces, tilt and offset without a bias of 3 nm."""

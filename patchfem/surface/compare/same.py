@@ -1,0 +1,168 @@
+"""Whether two traces run over the same place: found by their valleys, part by part, or told; or why they do not."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import PatchfemError, say
+from ..profile import Profile
+from . import depth as worn_depth
+from .extent import exchanged
+from .parts import alone, matched_in_parts
+from .place import CLEAR, Match, matched, prepared
+from .registration import LOWEST, Registration, register, together
+
+# Noise of the registration over the root mean square height, and likeness that goes with it: where valleys agree to
+# 2 %, less likeness will do. A noise above 10 % may be wear of the valleys too, unless it is white: wear moves
+# neighbouring heights alike, noise of the instrument does not.
+ENOUGH = ((0.1, CLEAR), (0.02, 2.5))
+WHITE, NEIGHBOURS = 0.3, 1.5  # noise up to which white noise passes for that of the instrument; how many err alike
+TOLD = 0.5  # white noise up to which a shift that was told is believed
+SHARE = 0.15  # of the heights, at least, unworn
+MARK = "where both traces were measured from the same mark, tell it with --shift '0 mm'"
+
+
+class Place(NamedTuple):
+    """match: the search; found: `Registration`, None where the places are not the same, and why, in words; order:
+    whether the traces show a place when they are taken the other way round."""
+
+    match: Match | None
+    found: Registration | None
+    why: str = ""
+    order: bool = False
+
+
+def placed(before: Profile, after: Profile, shift: float | None = None) -> Place:
+    """Find the place that both traces share, by their valleys (`place`), else part by part (`parts`).
+
+    A place counts where it stands out from chance, only once, and the unworn heights agree there, within 10 % of the
+    root mean square height or within 30 % where their differences are white noise. shift [m]: known from a mark; the
+    search is left out then, and the fit starts there.
+    """
+    if shift is not None:
+        return _told(before, after, shift)
+    match = matched(before, after)
+    found = None if match.repeats else _registered(before, after, match)
+    if found is not None:
+        return Place(match, found)
+    parts, valleys = matched_in_parts(before, after), match
+    if parts is not None and parts.clear > CLEAR and not parts.repeats:
+        match, found = parts, _registered(before, after, parts)
+        if found is not None:
+            return Place(match, found)
+    other = turned(before, after, match.shift) if match.clear > CLEAR and not match.repeats else None
+    order = other is not None and _alike(other, match, _about_line(before.x, before.z)) \
+        and _likelier(before, after, match.shift, other)
+    return Place(match, None, _why(before, after, match, valleys), order)
+
+
+def turned(before: Profile, after: Profile, shift: float) -> Registration | None:
+    """The first trace registered on the second one."""
+    try:
+        return register(after, before, -shift)
+    except PatchfemError:
+        return None
+
+
+def _registered(before: Profile, after: Profile, match: Match) -> Registration | None:
+    """The traces registered at a match; None where their unworn heights do not agree there.
+
+    Where a track is deeper than the valleys, most of the lowest heights may lie in it; the fit starts from all then.
+    """
+    if not match.clear > min(clear for _, clear in ENOUGH):
+        return None
+    for lowest in (LOWEST, 1.0):
+        try:
+            found = register(before, after, match.shift, lowest)
+        except PatchfemError:
+            continue
+        if _same(found, match):
+            return found
+    return None
+
+
+def _told(before: Profile, after: Profile, shift: float) -> Place:
+    """The traces registered from a shift [m] that is known; refused where they do not agree near it."""
+    first, _, step, _ = prepared(before, after)
+    why = f"at the given shift of {say(shift)} "
+    try:
+        found = register(before, after, shift)
+    except PatchfemError:
+        return Place(None, None, why + "hardly any heights of the traces agree; is it the right one?")
+    if abs(found.shift - shift) > alone(first) * step:
+        return Place(None, None, why + f"the traces do not agree; the fit leaves it for {say(found.shift)}")
+    if not (_quiet(found, TOLD) and found.used.mean() > SHARE):
+        return Place(None, None, why + _apart(found) + ": no more than chance brings; is it the right one?")
+    return Place(None, found)
+
+
+def _height(found: Registration) -> float:
+    """Root mean square height [m] of the first trace about its line."""
+    return _about_line(found.x, found.first)
+
+
+def _about_line(x, z) -> float:
+    return float(np.std(z - np.polyval(np.polyfit(x, z, 1), x)))
+
+
+def _same(found: Registration, match: Match) -> bool:
+    """Whether the unworn heights of a registration are so many and so alike that the place is the same."""
+    quiet = match.clear > CLEAR and _quiet(found, WHITE)
+    return _alike(found, match) or (quiet and bool(found.used.mean() > SHARE))
+
+
+def _alike(found: Registration, match: Match, most: float = np.inf) -> bool:
+    """The same for noise that may be wear: a floor that wore evenly is no proof of the other order of the traces.
+
+    most [m]: height that counts at most; a deep track is none of the roughness beside which noise is small.
+    """
+    height = min(_height(found), most)
+    same = any(found.noise < noise * height and match.clear > clear for noise, clear in ENOUGH)
+    return same and bool(found.used.mean() > SHARE)
+
+
+def _quiet(found: Registration, most: float) -> bool:
+    """Whether the noise is below 10 % of the height, or white and below a share of it."""
+    share = found.noise / _height(found)
+    return share < ENOUGH[0][0] or (share < most and together(found.rest, found.used) <= NEIGHBOURS)
+
+
+def _likelier(before: Profile, after: Profile, shift: float, other: Registration) -> bool:
+    """Whether the other order is likelier for traces that are too noisy for a place: a worn floor has a place too."""
+    try:
+        found = register(before, after, shift)
+    except PatchfemError:
+        return True
+    worn = worn_depth.of_registration(found)
+    return exchanged(found, other, worn.area, worn.deposited)
+
+
+def _apart(found: Registration) -> str:
+    return (f"the likest {100 * found.used.mean():.0f} % of the heights still differ by {say(found.noise)}, "
+            f"{100 * found.noise / _height(found):.0f} % of the root mean square height before")
+
+
+def _why(before: Profile, after: Profile, match: Match, valleys: Match) -> str:
+    """Why no place was found, in words to act on."""
+    if valleys.repeats and valleys.clear > CLEAR and match is valleys:
+        return (f"the surface repeats itself, every {say(_period(before, after))}: shifts apart from each other fit "
+                f"alike, {valleys.likeness:.3f} and {valleys.second:.3f}; {MARK}")
+    if match.clear > CLEAR and not match.repeats:
+        try:
+            found = register(before, after, match.shift)
+        except PatchfemError:
+            return f"at the likeliest shift, {say(match.shift)}, hardly any heights are unworn"
+        return (f"the traces show no common place that is unworn: at the likeliest shift, {say(match.shift)}, "
+                f"{_apart(found)}; {MARK}")
+    mean, scatter = valleys.chance
+    return (f"the traces show no common place: the best likeness of their valleys is {valleys.likeness:.2f}, and only "
+            f"above {np.tanh(mean + CLEAR * scatter):.2f} it is no chance; {MARK}")
+
+
+def _period(before: Profile, after: Profile) -> float:
+    """Length [m] after which the first trace is most like itself again."""
+    first, _, step, _ = prepared(before, after)
+    power = np.abs(np.fft.rfft(first, 2 * first.size)) ** 2
+    like = np.fft.irfft(power)[:first.size // 2]
+    start = min(alone(first), like.size - 1)
+    return float(start + np.argmax(like[start:])) * step
