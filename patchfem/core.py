@@ -14,6 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .faults import Missing, NotConverged, PatchfemError
+
+__all__ = ["G_N", "STICK", "BaseSine", "Compliance", "Interface", "Measure", "Missing", "ModalBasis", "NotConverged",
+           "Outcome", "PatchfemError", "Pressure", "Response", "Row", "Segment", "Start", "frozen_array", "rounded",
+           "say"]
+
 STICK = 1e-2  # share of the cycle's peak slip speed below which a memory law counts as sticking
 G_N = 9.80665  # standard gravity [m s-2]
 
@@ -49,36 +55,6 @@ _SENTENCES = {
     Outcome.NO_CONTACT: "The pieces do not touch; raise the load or close the gap.",
     Outcome.NOT_CONVERGED: "A solve did not reach its residual; the result is marked and must not be used.",
 }
-
-
-class PatchfemError(Exception):
-    """A named failure that a person can act on; `code` is the exit code of the command line.
-
-    key: the key of the scene at fault. `model.source.placed` puts its file and line before the text. "" stands for the
-    scene as a whole, None where the text says it all.
-    """
-
-    code = 2
-
-    def __init__(self, text: str = "", key: str | None = None):
-        super().__init__(text)
-        self.key = key
-
-
-class NotConverged(PatchfemError):
-    """A numerical method missed its residual after every fallback.
-
-    so_far: what a run had computed before, as a Result marked not_converged; None for nothing.
-    """
-
-    code = 3
-    so_far = None
-
-
-class Missing(PatchfemError):
-    """A file, package or resource is missing or ran out."""
-
-    code = 4
 
 
 def frozen_array(values, dtype=np.float64) -> np.ndarray:
@@ -271,8 +247,13 @@ class Row(NamedTuple):
     group: str = "motion"
 
 
+MOST_DIGITS = 10  # of a value in a text
+
+
 def rounded(value: float | None, error: float | None = None) -> tuple[str, str]:
-    """Value and error as texts that end at the same digit, the second of the error; six digits of the value at most.
+    """Value and error as texts that end at the same digit, the second of the error; ten digits of the value at most.
+
+    An error in the seventh digit or below is written with its power of ten, and the value without zeros at its end.
 
     A dash stands for no value, an empty text for no error.
     """
@@ -283,7 +264,7 @@ def rounded(value: float | None, error: float | None = None) -> tuple[str, str]:
         return f"{value:.6g}", second
     size, place = floor(log10(abs(value))), int(f"{error:.1e}".split("e")[1]) - 1  # of the first and the last digit
     if place < size - 5:
-        return f"{value:.6g}", second
+        return f"{value:.{min(size - place + 1, MOST_DIGITS)}g}", second
     if not -4 <= size < 6 or place > 0:
         return f"{value:.{max(0, size - place)}e}", f"{error:.1e}"
     return f"{value:.{-place}f}", f"{error:.{-place}f}"

@@ -21,12 +21,12 @@ import sys
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
-from importlib.metadata import version
 from importlib.util import module_from_spec, spec_from_file_location, spec_from_loader
 from operator import add, mul, neg, pos, sub, truediv
 from pathlib import Path
 
 from ..disk import own
+from ..disk.installed import version
 from ..disk.whole import short
 from . import bounded, machine
 

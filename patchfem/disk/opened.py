@@ -14,13 +14,14 @@ PATIENCE = 5.0  # s that a pipe may take to begin
 
 def reading(path: str | Path) -> BinaryIO:
     """The file, open for its bytes; OSError where it cannot be opened, TimeoutError for a pipe that does not begin."""
-    file = open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb")
+    if not hasattr(os, "O_NONBLOCK"):  # Windows, whose pipes have no place among the files
+        return open(path, "rb")
+    file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))  # closed where it fails
     if stat.S_ISFIFO(os.fstat(file.fileno()).st_mode):
         import select
 
         if not select.select([file], [], [], PATIENCE)[0]:
             file.close()
             raise TimeoutError(0, f"a pipe that nobody has written to within {PATIENCE:.0f} s")
-    if hasattr(os, "set_blocking"):
-        os.set_blocking(file.fileno(), True)
+    os.set_blocking(file.fileno(), True)
     return file

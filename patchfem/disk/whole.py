@@ -71,6 +71,16 @@ def write_bytes(path, data) -> None:
         partial.write_bytes(data)
 
 
+def write_inside(path: Path, text: str) -> None:
+    """Write a text into a folder that gets its name when it is whole, so that the file itself need not be; Unwritten as
+    `whole`."""
+    data = text.encode("utf-8", errors="replace")
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise fault(error, path, beside(path), len(data)) from None
+
+
 def begun() -> None:
     """Forget what this process has put in place and kept: a command begins."""
     PLACED.clear()

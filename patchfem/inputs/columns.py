@@ -38,9 +38,9 @@ def read_columns(path, units: Mapping, wanted: tuple, header: str, what: str, re
     """Read a comma-separated table whose header looks like `header`.
 
     units: column -> unit -> factor to SI ("" as unit: the column may stand without one); wanted: columns that must be
-    there; what: a name for the contents, remedy: what to do where there is no file. Columns that `units` does not know
-    may stand without a unit, or with one where `labels` says so; they are kept as text. PatchfemError names file and
-    line, Missing where there is no file.
+    there, one with the names that may stand for it behind it, "displacement slide"; what: a name for the contents,
+    remedy: what to do where there is no file. Columns that `units` does not know may stand without a unit, or with one
+    where `labels` says so; they are kept as text. PatchfemError names file and line, Missing where there is no file.
     """
     path, number = Path(path), 2
     blocks = _blocks(path, what, remedy)
@@ -145,7 +145,7 @@ def _header(path, line: str, units: Mapping, wanted: tuple, header: str, labels:
             factors[name] = units[name][unit or ""]
         elif unit is not None and not labels:
             raise PatchfemError(f"{path}:1: {asked} (with a unit are known: {', '.join(units)})")
-    absent = [name for name in wanted if name not in names]
+    absent = [one for one, *others in map(str.split, wanted) if not {one, *others} & set(names)]
     if absent:
         raise PatchfemError(f"{path}:1: {asked} (no column {', '.join(absent)})")
     return names, factors

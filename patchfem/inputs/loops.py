@@ -1,6 +1,6 @@
 """A measured friction loop: displacement and force row by row, with time and labels where the table has them."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from .columns import read_columns
 from .paths import BESIDE, UNITS, rising
 
 HEADER = "time [s],displacement [um],force [N]"
+OWN = {"displacement": ("slide", "relative_displacement"), "force": ("friction_force",)}  # names in `patchfem export`
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -54,23 +55,37 @@ class Loop:
 def read_loop(path, units: Mapping = UNITS) -> Loop:
     """Read a friction loop from a CSV whose header is like `time [s],displacement [um],force [N]`.
 
-    time may be absent; a column friction_ratio stands in for force. The displacement is counted from its first row.
+    time may be absent; a column friction_ratio stands in for force. Where there is no displacement or no force, the
+    column of `patchfem export` stands for it (`OWN`). The displacement is counted from its first row.
     PatchfemError names file and line of a mistake, Missing where there is no file.
     """
     path = Path(path)
-    found = read_columns(path, {**BESIDE, **units}, ("displacement",), HEADER, "a measured loop", labels=True)
-    read = [name for name in BESIDE if name in found.values]
+    known = {**BESIDE, **units}
+    known |= {name: known[quantity] for quantity, names in OWN.items() for name in names}
+    wanted = " ".join(("displacement", *OWN["displacement"]))
+    found = read_columns(path, known, (wanted,), HEADER, "a measured loop", labels=True)
+    values = {own_name(name, found.values): column for name, column in found.values.items()}
+    read = [name for name in BESIDE if name in values]
     if len(read) != 1:
         raise PatchfemError(f"{path}:1: " + ("force and friction_ratio stand side by side: keep one" if read else
                             f"no column force, a header like `{HEADER}` is wanted (or friction_ratio for the force)"))
-    place, time = found.values["displacement"], found.values.get("time")
+    place, time = values["displacement"], values.get("time")
     if time is not None:
         rising(path, time)
     if not np.ptp(place):
         raise PatchfemError(f"{path}: displacement is the same in every row, so nothing slides")
-    if not found.values[read[0]].any():
+    if not values[read[0]].any():
         raise PatchfemError(f"{path}: {read[0]} is 0 in every row, so there is nothing to fit")
-    return Loop(path, time, place - place[0], found.values[read[0]], read[0], found.labels)
+    return Loop(path, time, place - place[0], values[read[0]], read[0], found.labels)
+
+
+def own_name(name: str, names: Container) -> str:
+    """What a column of `patchfem export` is called in a measured loop, where none of `names` is called so or comes
+    first; any other name as it is."""
+    for quantity, own in OWN.items():
+        if quantity not in names and name == next((one for one in own if one in names), None):
+            return quantity
+    return name
 
 
 def _plain(text: str):

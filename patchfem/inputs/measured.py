@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..core import PatchfemError
+from ..faults import PatchfemError
 
 UNITS = {"frequency": {"Hz": 1.0, "kHz": 1e3},
          "input": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},

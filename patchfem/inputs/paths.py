@@ -14,6 +14,11 @@ from .columns import read_columns
 _LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "mil": 25.4e-6}
 UNITS = {"time": {"s": 1.0, "ms": 1e-3, "us": 1e-6}, "displacement": _LENGTHS, "lateral": _LENGTHS}
 BESIDE = {"force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "kgf": 9.80665}, "friction_ratio": {"": 1.0, "1": 1.0}}
+_ACCELERATIONS = {"m/s^2": 1.0, "g": 9.80665, "mm/s^2": 1e-3, "in/s^2": 0.0254}
+# what a table of a laboratory's records may hold besides time: each reader takes what it needs and passes over the rest
+RECORDED = {"displacement": _LENGTHS, "lateral": _LENGTHS,
+            "velocity": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "in/s": 0.0254},
+            "acceleration": _ACCELERATIONS, "base_acceleration": _ACCELERATIONS, **BESIDE}
 
 
 def read_path(path, units: Mapping = UNITS) -> tuple:
@@ -21,11 +26,12 @@ def read_path(path, units: Mapping = UNITS) -> tuple:
 
     Where a column lateral stands too, (k,) [m], the displacement across, is returned third. units: column -> unit ->
     factor to SI. There must be two rows or more with strictly rising time; the first row is 0 in every column, where
-    the pieces were pressed, and the path leaves it. A measured loop may be given as it is: its force, friction_ratio
-    and columns without a unit are passed over. PatchfemError names file and line, Missing where there is no file.
+    the pieces were pressed, and the path leaves it. A measured loop or a table of `patchfem import` may be given as it
+    is: the other columns of RECORDED and those without a unit are passed over. PatchfemError names file and line,
+    Missing where there is no file.
     """
     path = Path(path)
-    found = read_columns(path, {**BESIDE, **units}, ("time", "displacement"), "time [s],displacement [um]", "a path",
+    found = read_columns(path, {**RECORDED, **units}, ("time", "displacement"), "time [s],displacement [um]", "a path",
                          "; slide.file is relative to the scene")
     columns = [found.values[name] for name in ("time", "displacement", "lateral") if name in found.values]
     _check(path, *columns)
@@ -36,7 +42,8 @@ def _check(path, time, *places) -> None:
     for name, column in zip(("time", "displacement", "lateral"), (time, *places)):
         if (first := column[0]) != 0:
             raise PatchfemError(f"{path}:2: {name} starts at {first:g}: the slide starts at 0, 0, where the pieces are "
-                                f"pressed; subtract the first {name} from the column")
+                                f"pressed; subtract the first {name} from the column, or let `patchfem import --zero` "
+                                "count from the first row")
     rising(path, time)
     if not any(column.any() for column in places):
         raise PatchfemError(f"{path}: displacement is 0 in every row, so nothing slides")

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core import Missing, PatchfemError
 from .columns import read_columns
-from .paths import rising
+from .paths import RECORDED, rising
 
 UNITS = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
@@ -19,14 +19,16 @@ KINDS = {"acceleration": 12, "force": 13}  # data types of a universal file
 def read_signal(path, name: str) -> tuple:
     """Read a recorded drive: time (k,) [s] from 0 and value (k,) in SI; name: acceleration or force.
 
-    CSV with a header like `time [s],acceleration [g]`, or .uff/.unv with one time response of that kind. The signal is
-    taken from its first row on. PatchfemError names file and line, Missing where there is no file.
+    CSV with a header like `time [s],acceleration [g]`, whose other columns of RECORDED are passed over, or .uff/.unv
+    with one time response of that kind. The signal is taken from its first row on. PatchfemError names file and line,
+    Missing where there is no file.
     """
     path = Path(path)
     if path.suffix.lower() in (".uff", ".unv"):
         time, value = _universal(path, name)
     else:
-        table = read_columns(path, UNITS, ("time", name), f"time [s],{name} [{next(iter(UNITS[name]))}]", "a drive",
+        header = f"time [s],{name} [{next(iter(UNITS[name]))}]"
+        table = read_columns(path, {**RECORDED, **UNITS}, ("time", name), header, "a drive",
                              "; drive.file is relative to the scene")
         time, value = table.values["time"], table.values[name]
         rising(path, time)

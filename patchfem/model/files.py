@@ -7,18 +7,19 @@ check otherwise.
 
 from pathlib import Path
 
-from ..core import PatchfemError
+from ..faults import PatchfemError
 from ..scene.scene import files_of, is_there
 
 WHOLE = 2 * 2**20  # bytes of a mesh that is read whole
 STARTS = {".msh": (b"$MeshFormat",), ".vtu": (b"<?xml", b"<VTKFile"), ".inp": (b"*",), ".unv": (b"-1", b"    -1")}
 
 
-def faults(tables, folder: Path, whole: bool = True) -> list:
+def faults(tables, folder: Path, whole: bool = True, notes: list | None = None) -> list:
     """(key, message) of each fault in the files that the tables of a scene name.
 
     whole: the tables have no mistake, so that a file may be held against them; else what is wrong in them is None, and
-    a file is only read. Files that are not there are left out.
+    a file is only read. Files that are not there are left out. notes: takes what a run would say of the files that are
+    right, one sentence each.
     """
     found = []
     for key, file in files_of(tables):
@@ -26,7 +27,9 @@ def faults(tables, folder: Path, whole: bool = True) -> list:
         if not is_there(path):
             continue
         try:
-            READERS[key](path, tables, whole)
+            said = READERS[key](path, tables, whole)
+            if notes is not None:
+                notes += [text.replace(str(path), path.name) for text in said or ()]
         except PatchfemError as error:
             found.append((error.key or key, str(error).removeprefix(f"{key}: ")))
     return found
@@ -44,8 +47,8 @@ def _mesh(path: Path, tables, whole: bool) -> None:
             raise PatchfemError(f"{path}: not a readable {path.suffix} file (it does not start like one)")
 
 
-def _profile(path: Path, tables, whole: bool) -> None:
-    """A trace that covers the interface and is no finer than its elements."""
+def _profile(path: Path, tables, whole: bool) -> tuple:
+    """A trace that covers the interface and is no finer than its elements; what is done to it."""
     import numpy as np
 
     from .patch import AUTOMATIC_CELLS, interface_of, pieces_asked
@@ -54,11 +57,11 @@ def _profile(path: Path, tables, whole: bool) -> None:
     trace_of(path)
     contact = tables.contact
     if not whole or contact.mesh is not None:
-        return
+        return ()
     length = interface_of(pieces_asked(contact))
     size = contact.element_size or length / AUTOMATIC_CELLS
     x = np.linspace(-length / 2, length / 2, max(1, round(length / size)) + 1)
-    profile_gap(path, x, size, contact.asperities is not None, contact.profile.heights == "surface")
+    return profile_gap(path, x, size, contact.asperities is not None, contact.profile.heights == "surface")[1]
 
 
 def _slide(path: Path, tables, whole: bool) -> None:

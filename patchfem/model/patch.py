@@ -2,6 +2,7 @@
 solved."""
 
 from dataclasses import dataclass, replace
+from math import asinh, sinh, sqrt
 from pathlib import Path
 from typing import NamedTuple
 
@@ -129,10 +130,12 @@ class PatchModel:
 
     @property
     def nominal_load(self) -> float:
-        """Load [N] of all pairs; for a prescribed approach that of the layers as bars in series, an upper estimate."""
+        """Load [N] of all pairs; for a prescribed approach that of flat layers as bars in series, which a moment turns
+        about the middle of the patch, an upper estimate."""
         if self.load is not None:
             return self.load
-        return self.approach / bars(self, lambda m: (1 - m.poisson**2) / m.young)
+        flat = self.approach / bars(self, lambda m: (1 - m.poisson**2) / m.young)
+        return turned(flat, self.line_moment or 0.0, self.length) if self.rotates and not self.spring else flat
 
     def sized(self, size: float | None) -> "PatchModel":
         """The patch with another element size [m]; None: the mesh that the tolerance chooses."""
@@ -199,6 +202,21 @@ def bars(patch: PatchModel, softness) -> float:
         total += (piece.height - piece.thickness) * softness(piece.substrate)
         total += piece.thickness * softness(piece.coating.material) if piece.coating else 0.0
     return total / (patch.pairs * patch.length * patch.width)
+
+
+def turned(load: float, moment: float, length: float) -> float:
+    """Load [N] of bars side by side along a length [m], pressed by `load` [N] at no rotation, when a moment [N m]
+    turns them about their middle, which stays at its depth.
+
+    All of them bear up to load * length/6. Beyond, those over u L do: the pressure is a triangle, N = M/(L/2 - u L/3),
+    and with v = u - 1/2 and m = M/(load L) depth and moment give 2 v^3 + (12 m - 3/2) v = 1/2, whose one root is real.
+    """
+    m = abs(moment) / (load * length)
+    if m <= 1 / 6:
+        return load
+    p = 6 * m - 0.75
+    v = 2 * sqrt(p / 3) * sinh(asinh(0.375 / p * sqrt(3 / p)) / 3)
+    return load * m / (1 / 3 - v / 3)
 
 
 def block_shear(patch: PatchModel) -> float:

@@ -120,8 +120,10 @@ def slide_asked(scene) -> SlidePath:
     beside the lateral column of one."""
     slide, corners, across, amplitude = scene.slide, None, None, scene.slide.amplitude or scene.slide.distance
     if slide.kind == "file":
-        path = scene.beside(slide.file)
-        found = rows_of(path)
+        try:
+            found = rows_of(scene.beside(slide.file))
+        except PatchfemError as error:
+            raise type(error)(f"{scene.where('slide.file')}: {error}") from None
         corners, across = found[:2], found[2] if len(found) == 3 else None
         amplitude = float(max(np.ptp(column) for column in found[1:])) / 2
         if across is not None and (reason := sideways(scene.tables())):

@@ -15,6 +15,7 @@ from .keys.tables import Tables
 from .keys.types import Table, choices, keys, kind_of, model_of, parts
 from .lines import counted, pieces_of
 
+_BARE_POINT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.)([eE][-+]?[0-9]+)?")  # .3 and 5., which TOML has no place for
 _PLAIN_TEXT = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')  # a text in quotes without escapes
 _LONG_WORD = re.compile(r"[^\s/\\:]{200,}")  # no key, unit or name of a file is as long
 _LIMITS = {"greater_than": ("gt", ">"), "greater_than_equal": ("ge", ">="), "less_than": ("lt", "<"),
@@ -122,7 +123,7 @@ def apply_set(draft: Draft, assignment: str) -> None:
     place: Any = draft.raw
     for index, piece in enumerate(pieces):
         if isinstance(place, list):
-            pieces[index] = piece = _item(draft, place, piece, ".".join(pieces[: index + 1]))
+            pieces[index] = piece = _item(draft, place, piece, ".".join(pieces[: index + 1]), key)
             if not piece:
                 return
         if index == len(pieces) - 1:
@@ -140,17 +141,23 @@ def apply_set(draft: Draft, assignment: str) -> None:
     draft.sets.add(path)
 
 
-def _item(draft: Draft, items: list[Any], wanted: str, key: str) -> str:
-    """Index of the item of this name (or number) as text; empty, with a mistake noted, if there is none."""
+def _item(draft: Draft, items: list[Any], wanted: str, key: str, written: str) -> str:
+    """Index of the item of this name (or number) as text; empty, with a mistake noted, if there is none.
+
+    written: the whole key, in which a number in brackets counts from one and one behind a dot from zero, as in Python.
+    """
     names = [item.get("name") if isinstance(item, dict) else None for item in items]
     if wanted in names:
         return str(names.index(wanted))
     if wanted.isdecimal() and int(wanted) < len(items):
         return str(int(wanted))
-    known, table = [name for name in names if isinstance(name, str)], key.rpartition(".")[0]
-    there = "such item" if wanted.isdecimal() else f"'{wanted}'"
-    draft.refuse_set(f"{counted(key)}: no {there} here; " + (choices(wanted, known) if known else
-                     f"{table} has {len(items)}, counted from one as in {table}[1]"))
+    known, table = [name for name in names if isinstance(name, str)], counted(key.rpartition(".")[0])
+    number = wanted.isdecimal()
+    dotted = number and f"[{int(wanted) + 1}]" not in written
+    there = "such item" if number else f"'{wanted}'"
+    draft.refuse_set(f"{f'{table}.{wanted}' if dotted else counted(key)}: no {there} here; "
+                     + (choices(wanted, known) if known else f"{table} has {len(items)}, counted from one as in "
+                        f"{table}[1]") + (f"; {table}.0, with a dot, is {table}[1]" if dotted else ""))
     return ""
 
 
@@ -162,7 +169,7 @@ def _set_value(path: str, text: str) -> Any:
     try:
         found = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
-        return text
+        return float(text) if _BARE_POINT.fullmatch(text) and not plain_text else text
     value = found["value"]
     if _ends_in_comment(text):  # a '#' is a sign of the value here, as in 26#
         return text

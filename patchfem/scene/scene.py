@@ -31,6 +31,7 @@ from .rules.methods import method_unused
 from .text import effects, toml
 
 LARGEST = 32 * 2**20  # bytes of a scene
+_VALUE = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")  # a key with a value that opens no quotes and no bracket
 
 
 class SceneError(Exception):
@@ -255,7 +256,26 @@ def _syntax(error: Exception, text: str, path: str | Path) -> str:
     found = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", message)
     line = int(found[1]) if found and found[1] else text.count("\n") + (not text.endswith("\n"))
     where = f" (column {found[2]})" if found and found[2] else " (at the end of the file)" if found else ""
-    return f"{path}:{line}: not valid TOML: {message[: found.start()] if found else message}{where}"
+    message = message[: found.start()] if found else message
+    return f"{path}:{line}: not valid TOML: {message}{where}{_unquoted(text, line)}"
+
+
+def _unquoted(text: str, line: int) -> str:
+    """How a value is written that TOML refuses for want of quotes or of a digit; empty for any other mistake."""
+    found = _VALUE.match([*text.split("\n"), ""][line - 1])
+    if found is None:
+        return ""
+    key, value = found[1], found[2].strip()
+    point = re.fullmatch(r"([-+]?)(\d*)\.(\d*)((?:[eE][-+]?\d+)?)", value)
+    if point and (point[2] or point[3]):
+        return f"; a digit stands on both sides of a point: {key} = {point[1]}{point[2] or 0}.{point[3] or 0}{point[4]}"
+    if re.fullmatch(r"[-+]?\d+,\d+", value):
+        return f"; a decimal is written with a point: {key} = {value.replace(',', '.')}"
+    if value.lower() in ("true", "false"):
+        return f"; {key} = {value.lower()}"
+    quoted = re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE]$)[a-zA-Z%\u00b5\u03bc][a-zA-Z\u00b5\u03bc/^0-9 -]*|"
+                          r"[a-zA-Z][\w./ -]*", value)
+    return f'; a quantity or a word stands in quotes: {key} = "{value}"' if quoted and len(value) < 60 else ""
 
 
 def _finish(found: tables.Tables, kind: str) -> tables.Tables:

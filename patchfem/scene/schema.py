@@ -5,20 +5,25 @@ What an editor cannot know (which keys go together, which files exist) is left t
 
 import re
 
-from .keys.contact import Material
+from .keys.contact import Asperities, Material
 from .keys.materials import MATERIALS
 from .keys.meanings import meaning
 from .keys.quantities import KINDS
-from .keys.tables import Tables
-from .keys.types import Table, keys, kind_of, model_of
+from .keys.tables import Friction, Slide, Tables
+from .keys.types import Table, keys, kind_of, model_of, whole_tables
+from .rules.draft import ASPERITIES, LAWS, SLIDES
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+SELECTORS = (  # of a table: the key that decides which others it wants, and what each value wants and uses
+    (Friction, "law", LAWS), (Slide, "kind", SLIDES), (Asperities, "law", ASPERITIES))
 SPELLED = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ": "[ ·]"}
 
 
 def schema() -> dict:
     """JSON schema (draft 2020-12) of a scene: every table and key with its meaning, limits, default and units."""
+    with whole_tables():
+        _made_whole(Tables)
     found = Tables.model_json_schema(by_alias=True)
     definitions = found.pop("$defs")
     for model in _below(Tables):
@@ -27,6 +32,14 @@ def schema() -> dict:
     whole = _table(Tables, found)
     whole["properties"]["sweep"] = _sweep()
     return {"$schema": DIALECT, "title": "patchfem scene", **whole, "$defs": definitions}
+
+
+def _made_whole(model: type[Table]) -> None:
+    """Make the checks of a table anew, after those of the tables inside it."""
+    for name in keys(model).values():
+        if inner := model_of(model, name):
+            _made_whole(inner)
+    model.model_rebuild(force=True)
 
 
 def _below(model: type[Table]) -> set[type[Table]]:
@@ -52,8 +65,19 @@ def _key(model: type[Table], key: str, given: dict) -> dict:
     if kind := kind_of(model, name):
         _quantities(found, kind)
     if (inner := model_of(model, name)) is None or inner is Material:
-        found["description"] = meaning(model, key)
+        found["description"] = "; ".join(filter(None, (meaning(model, key), _selected(model, key))))
     return found
+
+
+def _selected(model: type[Table], key: str) -> str:
+    """Which keys each value of a selector wants, or which values of its selector want or use a key; "" for others."""
+    selector, values = next((each for table, *each in SELECTORS if issubclass(model, table)), ("", {}))
+    if key == selector:
+        return "; ".join(f"'{value}' wants {', '.join(needs.split())}" for value, (needs, _) in values.items() if needs)
+    wanted, used = ([f"'{value}'" for value, words in values.items() if key in words[place].split()]
+                    for place in (0, 1))  # fmt: skip
+    return "; ".join(f"{verb} {selector} {', '.join(found)}" for verb, found in (("wanted by", wanted),
+                                                                                ("used by", used)) if found)
 
 
 def _quantities(found: dict, kind: str) -> None:

@@ -16,7 +16,7 @@ KINDS = {
     "bench": "a law of friction on one contact point, along a prescribed slide",
     "rig": "a rubbing block on flexures, shaken at one frequency",
     "linear": "a mass on flexures without friction",
-    "misalignment": "a sweep: what a tilt does to a rubbing block",
+    "misalignment": "a sweep: how much tilt the rig of the report allows",
     "wear": "how a tilted patch wears in over many cycles",
 }
 

@@ -8,19 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
-from ..paths import BESIDE
-from ..paths import UNITS as PATHS
+from ..paths import RECORDED
 from ..signals import UNITS as SIGNALS
 
 LARGEST = 256 * 2**20  # bytes of a file
-_ACCELERATIONS = SIGNALS["acceleration"] | {"in/s^2": 0.0254}
-UNITS = {
-    "time": SIGNALS["time"] | {"min": 60.0},
-    "displacement": PATHS["displacement"], "lateral": PATHS["lateral"],
-    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "in/s": 0.0254},
-    "acceleration": _ACCELERATIONS, "base_acceleration": _ACCELERATIONS,
-    **BESIDE,
-}
+UNITS = {"time": SIGNALS["time"] | {"min": 60.0}, **RECORDED}
 SI = {name: next(unit for unit, factor in units.items() if factor == 1.0 and unit) for name, units in UNITS.items()}
 _ASKED = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
 _SAME = {"sec": "s", "seconds": "s", "newton": "N", "newtons": "N", "µm": "um", "μm": "um", "µs": "us", "μs": "us"}

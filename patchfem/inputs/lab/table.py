@@ -7,6 +7,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ..columns import NUMBER, text_of
+from ..loops import own_name
 from .records import UNITS, Channel
 
 _HEAD = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
@@ -14,7 +15,8 @@ WIDEST = 1000  # columns
 
 
 def channels(path: Path) -> list:
-    """`Channel`s of the columns of numbers; one whose name is a quantity (in any letters) is taken as it.
+    """`Channel`s of the columns of numbers; one whose name is a quantity (in any letters), or what `patchfem export`
+    calls it, is taken as it.
 
     Columns with a text in any row are left out. PatchfemError with file and line for a row of another length and for a
     header of numbers, Missing where there is no file.
@@ -33,12 +35,12 @@ def channels(path: Path) -> list:
         if len(cells) != len(names):
             raise PatchfemError(f"{path}:{number}: {len(cells)} cells under {len(names)} columns")
         rows.append(cells)
-    found = []
-    for name, head, column in zip(names, heads, zip(*rows)):
+    found, plain = [], [name.strip().lower().replace(" ", "_") for name in names]
+    ours = [own_name(name, plain) for name in plain]
+    for name, known, head, column in zip(names, ours, heads, zip(*rows)):
         if not all(map(NUMBER.fullmatch, column)):
             _refuse_commas(path, name, column)
             continue
-        known = name.strip().lower().replace(" ", "_")
         found.append(Channel(name, "", known if known in UNITS else "", head[2] or head[3] or "",
                              np.array(column, float)))
     return found

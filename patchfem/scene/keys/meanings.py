@@ -177,8 +177,9 @@ MEANINGS = {
         "acceleration": "acceleration of the base, zero to peak",
         "displacement": "displacement of the base, zero to peak, in place of an acceleration; where a release starts",
         "levels": "accelerations of the base, or forces, one after the other, the state carried over",
-        "onset": "what onset_level means: 'slip' the first irreversible motion, 'distortion' a third harmonic of the "
-                 "acceleration above 3 % of the first, 'gauge' half peak-to-peak at the output above onset_length",
+        "onset": "what onset_level means: 'slip' the first irreversible motion (of what gives way elastically, beyond "
+                 "a thousandth of the slide over which it does), 'distortion' a third harmonic of the acceleration "
+                 "above 3 % of the first, 'gauge' half peak-to-peak at the output above onset_length",
         "onset_length": "half peak-to-peak at the output from which a gauge sees motion",
         "force": "force, zero to peak",
         "mass": "number of the mass on which the force acts; the output unless given",

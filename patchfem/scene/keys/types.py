@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache, partial
@@ -89,10 +91,42 @@ Speed, Acceleration = quantity("velocity", gt=0), quantity("acceleration", gt=0)
 Kelvin, PerMetre = quantity("temperature", gt=0), quantity("participation")
 
 
+ALL = object()
+_OUTER: ContextVar = ContextVar("outer", default=None)  # the table whose checks are being made
+
+
+@contextmanager
+def whole_tables() -> Iterator[None]:
+    """Within it the checks of a table that are made hold those of the tables inside it, as a JSON schema wants."""
+    token = _OUTER.set(ALL)
+    try:
+        yield
+    finally:
+        _OUTER.reset(token)
+
+
 class Table(BaseModel):
-    """Base of all tables: unknown keys refused, frozen; a dict given as context collects the keys that are right."""
+    """Base of all tables: unknown keys refused, frozen; a dict given as context collects the keys that are right.
+
+    A table inside another is checked by itself, when one comes: with all that a scene may hold below them, the tables
+    of a scene would be made four times over.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: Callable) -> Any:
+        if _OUTER.get() is None:
+            token = _OUTER.set(cls)
+            try:
+                return handler(source)
+            finally:
+                _OUTER.reset(token)
+        return handler(source) if _OUTER.get() is ALL else core_schema.no_info_plain_validator_function(cls._as_one)
+
+    @classmethod
+    def _as_one(cls, value: Any) -> Any:
+        return value if isinstance(value, cls) else cls.model_validate(value)
 
     @field_validator("*", mode="after")
     @classmethod

@@ -14,7 +14,7 @@ from .draft import SLIDES, Draft, _needs
 from .drive import check_drive, check_length
 from .friction import _frictions
 from .grooves import check_grooves
-from .structure import check_structure
+from .structure import check_structure, modes_instead
 from .wear import check_wear
 
 
@@ -76,9 +76,11 @@ def _kind(draft: Draft) -> str:
     has = {name for name in ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
            if draft.given(name)}  # fmt: skip
     if draft.given("structure.interface"):
+        instead = modes_instead(draft) if "contact" in has else ""
         for name in sorted(has & {"friction", "normal", "contact"}):
-            draft.say(name, f"[{name}] and [[structure.interface]] exclude each other: an interface carries its own")
-        has |= {"friction", "normal"}
+            draft.say(name, f"[{name}] and [[structure.interface]] exclude each other: an interface carries its own" +
+                      (f"; {instead}" if instead and name == "contact" else ""))
+        has = has - {"contact"} | {"friction", "normal"}  # an interface's load is no [normal] that someone wrote
     if {"contact", "normal"} <= has:
         draft.say("normal", "[contact] and [normal] exclude each other: keep one source of the normal load")
         has.discard("normal")
@@ -106,8 +108,11 @@ def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[st
         others = ", ".join(f"[{name}]" for name in sorted(has))
         draft.lacks_table("friction", f"{others} without it are no kind of run")
     if friction and draft.given("structure.masses") and not draft.given("structure.interface"):
-        draft.lacks("structure.interface", "masses rub at interfaces between two of them: write "
-                                           "[[structure.interface]] with its law and load instead of [friction]")
+        if "contact" in has:
+            draft.say("structure.masses", f"masses do not rub on [contact]; {modes_instead(draft)}")
+        else:
+            draft.lacks("structure.interface", "masses rub at interfaces between two of them: write "
+                                               "[[structure.interface]] with its law and load instead of [friction]")
     if friction and not pressed:
         draft.lacks_table("contact", "friction needs a normal load, [contact] or [normal]")
     if friction and not moves and "slide" not in has:

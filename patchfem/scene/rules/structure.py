@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import pi, sqrt
 from typing import Any
 
 from ...effects import unbuilt
@@ -22,12 +23,16 @@ def check_structure(draft: Draft) -> None:
     if len(forms) > 1:
         draft.say(f"structure.{forms[1]}", f"{' and '.join(forms)} exclude each other: keep one description of the rig")
     if not forms:
-        draft.lacks("structure.mode", "at least one [[structure.mode]] is wanted")
+        draft.lacks("structure.mode", "at least one [[structure.mode]] is wanted; a mass on a spring is one with "
+                                      "frequency sqrt(k/m)/(2 pi)")  # fmt: skip
     if not draft.given("structure.moving_mass") and forms in ([], ["mode"]):
         draft.lacks("structure.moving_mass", "")
     for key in ("spring", "damper", "output_mass"):
         if "masses" not in forms and draft.given(f"structure.{key}"):
-            draft.lacks("structure.masses", f"structure.{key} needs them")
+            if draft.given("contact") and key != "output_mass":
+                draft.say(f"structure.{key}", f"joins masses, which do not rub on [contact]; {modes_instead(draft)}")
+            else:
+                draft.lacks("structure.masses", f"structure.{key} needs them")
     if not {"masses", "file"} & set(forms) and draft.given("structure.interface"):
         draft.lacks("structure.masses", "structure.interface needs them, or structure.file")
     for key in PLACES:
@@ -40,6 +45,26 @@ def check_structure(draft: Draft) -> None:
     _file(draft, structure)
     _bonded(draft, structure)
     _start(draft, structure)
+
+
+def modes_instead(draft: Draft) -> str:
+    """What to write beside [contact] instead of masses: one mass on springs to the base is the mode sqrt(k/m)/(2 pi)
+    with the damping ratio c/(2 sqrt(k m)), in numbers where all of them are there; "" for a rig from a file."""
+    structure = draft.tables.structure
+    if structure is None or draft.given("structure.file"):
+        return ""
+    masses = structure.masses or (structure.moving_mass,)
+    springs, dampers = ([(one.between, getattr(one, value)) for one in getattr(structure, name) or ()]
+                        for name, value in (("spring", "stiffness"), ("damper", "coefficient")))  # fmt: skip
+    k, c = (sum(value or 0.0 for _, value in one) for one in (springs, dampers))
+    pairs = [sorted(pair) if pair else None for pair, _ in springs + dampers]
+    if len(masses) != 1 or not masses[0] or not k or pairs != [[0, 1]] * len(pairs):
+        return ("beside [contact], give the modes of these masses and springs: structure.moving_mass and for each a "
+                "[[structure.mode]] with its frequency, that of one mass on one spring being sqrt(k/m)/(2 pi)")
+    frequency, ratio = sqrt(k / masses[0]) / (2 * pi), c / (2 * sqrt(k * masses[0]))
+    damping = f"damping = {ratio:.3g} (c/(2 sqrt(k m)))" if dampers else "its damping ratio"
+    return (f"beside [contact], give structure.moving_mass = \"{masses[0]:g} kg\" and a [[structure.mode]] with "
+            f"frequency = \"{frequency:.6g} Hz\" (sqrt(k/m)/(2 pi)), {damping} and slide = 1.0")
 
 
 def _modes(draft: Draft) -> None:
