@@ -7,6 +7,7 @@ to round-off for a drive that is smooth inside it; those of modes that are stiff
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from ..core import ModalBasis
 from . import doubling
 
 LEAST, MOST = 8, 48  # Gauss points of a step
+KEPT, FEW = 4, 32  # propagators that are kept, and coordinates of each at most: more take room
 STIFF = 20.0  # radians or decays of the fastest motion in a step, beyond which that many points do not see it
 SHORT = 4.0  # of them in the short step that is doubled then
 
@@ -64,10 +66,21 @@ def propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Pro
     """Coefficients of `steps_per_cycle` equal steps of the drive's period, exact for the modes.
 
     rows: ports (p, n), slide per coordinate; None: the interfaces. Steps of large omega dt take up to 48 Gauss points;
-    where that is not enough, a step is made of short ones.
+    where that is not enough, a step is made of short ones. Those of the last few modes and drives are kept: the runs
+    that show an error march the same ones again.
     """
+    if rows is None and modes.omega.size <= FEW:
+        return _of_interfaces(modes, drive, steps_per_cycle)
+    return _made(modes, drive, steps_per_cycle, np.array(modes.interfaces if rows is None else rows, float))
+
+
+@lru_cache(maxsize=KEPT)
+def _of_interfaces(modes: ModalBasis, drive, steps_per_cycle: int) -> Propagator:
+    return _made(modes, drive, steps_per_cycle, np.array(modes.interfaces, float))
+
+
+def _made(modes: ModalBasis, drive, steps_per_cycle: int, rows) -> Propagator:
     dt = drive.period / steps_per_cycle
-    rows = np.array(modes.interfaces if rows is None else rows, float)
     fastest = max(fastest_rate(modes), 2 * np.pi / drive.period)
     n, coupled = modes.omega.size, modes.damping is not None
     if fastest * dt > STIFF:

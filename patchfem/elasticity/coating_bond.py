@@ -54,6 +54,10 @@ def _bond_edges(cells: Cells) -> tuple:
     ends = np.concatenate([np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2)
                            for block in cells.blocks])
     coat = cells.is_coating[cells.owner()]
+    seen = np.zeros((2, len(cells.points)), bool)
+    seen[0, ends[coat]], seen[1, ends[~coat]] = True, True
+    near = seen.all(axis=0)[ends].all(axis=1)  # the few edges that may be shared
+    ends, coat = ends[near], coat[near]
     key = ends.min(axis=1) * len(cells.points) + ends.max(axis=1)
     mine = ends[coat & np.isin(key, key[~coat])]
     way = cells.points[mine[:, 1]] - cells.points[mine[:, 0]]

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["cho_factor", "cho_solve", "dger", "dpotrf", "dpotri", "dpotrs", "dtrsm", "one_thread"]
+__all__ = ["cho_factor", "cho_solve", "dpotrf", "dpotri", "dpotrs", "dtrsm", "one_thread"]
 
 
 def _module(name: str):
@@ -30,7 +30,7 @@ def _module(name: str):
 
 _LAPACK, _BLAS = _module("_flapack"), _module("_fblas")
 dpotrf, dpotri, dpotrs = _LAPACK.dpotrf, _LAPACK.dpotri, _LAPACK.dpotrs
-dger, dtrsm = _BLAS.dger, _BLAS.dtrsm
+dtrsm = _BLAS.dtrsm
 
 
 def cho_factor(matrix) -> np.ndarray:

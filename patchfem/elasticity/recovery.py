@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from ..core import frozen_array
+from ..mesh.around import Gathered, Patches, patches
 from .elasticity import Layers, hooke, lame, von_mises
 
 SPREAD = 0.1  # determinant of the correlations of (1, x, y) over a patch below which it takes in its neighbours
@@ -52,40 +53,6 @@ def cells_of(piece) -> Cells:
         blocks = tuple(block for block in (mesh.triangles, mesh.quads) if len(block))
         return Cells(mesh.points, blocks, mesh.is_coating, piece.layers)
     return Cells(piece.nodes, (piece.cells,), piece.is_coating, piece.layers)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Patches:
-    """Which cells stand around every place, with weights: starts (s + 1,) into cells and weights (k,), place by place.
-    """
-
-    starts: np.ndarray
-    cells: np.ndarray
-    weights: np.ndarray
-
-    @property
-    def row(self) -> np.ndarray:
-        """The place (k,) of every cell."""
-        return np.repeat(np.arange(self.starts.size - 1), np.diff(self.starts))
-
-    def __matmul__(self, values) -> np.ndarray:
-        """Weighted sums (s, k) over the cells of every place of values (t, k) at the cells."""
-        return np.add.reduceat(self.weights[:, None] * values[self.cells], self.starts[:-1])
-
-    def of(self, places):
-        """The patches of some places (p,)."""
-        counts = np.diff(self.starts)[places]
-        starts = np.append(0, np.cumsum(counts))
-        taken = np.arange(starts[-1]) + np.repeat(self.starts[:-1][places] - starts[:-1], counts)
-        return Patches(starts, self.cells[taken], self.weights[taken])
-
-
-def patches(place, cell, weight=None) -> Patches:
-    """Patches of pairs of a place (k,) and a cell (k,), which may come more than once; every place has a cell."""
-    pairs, first = np.unique(np.asarray(place, np.int64) << 32 | cell, return_index=True)
-    row = pairs >> 32
-    starts = np.append(0, np.cumsum(np.bincount(row)))
-    return Patches(starts, pairs & 0xFFFFFFFF, np.ones(row.size) if weight is None else weight[first])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -250,7 +217,8 @@ def indicator(found: Recovery, u, stress, rules: list | None = None) -> Indicato
     if sides is None:
         each = partial(_by_points, found, quadratures(cells) if rules is None else rules)
     else:
-        each = partial(_by_modes, found, sides)
+        corner = found.place.reshape(-1, 4).T, found.cells.blocks[0].T
+        each = partial(_by_modes, found.fit.gathered(), [np.ascontiguousarray(one) for one in corner], sides)
     material = _of_cells(cells)
     errors, energies = zip(*(each(motion, middle[:, [0, 1, 3]], *material) for motion, middle in zip(u, stress)))
     return Indicator(frozen_array(errors), frozen_array(energies))
@@ -274,19 +242,20 @@ def _sides(cells: Cells) -> tuple | None:
     return (wide, tall) if 1e9 * off < min(wide.min(), tall.min()) else None
 
 
-def _by_modes(found: Recovery, sides: tuple, u, middle, lam, mu) -> tuple:
+def _by_modes(fit: Gathered, corner: list, sides: tuple, u, middle, lam, mu) -> tuple:
     """Squared norms of the error (t,) and of the stress [J/m] of rectangles under one motion.
 
     Both fields are taken apart into 1, xi, eta and xi eta, which are orthogonal with the mean squares 1, 1/3, 1/3 and
     1/9, and into (xx + yy)/(2 sqrt(lam + mu)), (xx - yy)/(2 sqrt(mu)) and xy/sqrt(mu), whose squares add up to the
-    complementary energy. u: (N, 2) [m]; middle: stress xx, yy, xy (t, 3) at the cell middles [Pa]; sides: of `_sides`.
+    complementary energy. fit: of the recovery; corner: the places (4, t) and the nodes (4, t) of the corners of every
+    cell; u: (N, 2) [m]; middle: stress xx, yy, xy (t, 3) at the cell middles [Pa]; sides: of `_sides`.
     """
     bulk, shear, (wide, tall) = np.sqrt(lam + mu), np.sqrt(mu), sides
     xx, yy, xy = middle.T
     whole = np.stack([(xx + yy) / (2 * bulk), (xx - yy) / (2 * shear), xy / shear])
-    smooth = np.ascontiguousarray(found(whole.T).T)  # (3, ...) from here on: loops over three numbers would be slow
-    a, b, c, d = (smooth[:, found.place[k::4]] for k in range(4))
-    one, two, three, four = (u.T[:, nodes] for nodes in found.cells.blocks[0].T)
+    smooth, moves = fit(whole), np.ascontiguousarray(u.T)  # rows: loops over three numbers would be slow
+    a, b, c, d = (smooth.take(places, axis=1) for places in corner[0])
+    one, two, three, four = (moves.take(nodes, axis=1) for nodes in corner[1])
     along, inward = (one - two + three - four) / 2  # twice what goes with xi eta
     xi = np.stack([bulk * inward, -shear * inward, shear * along]) / tall
     eta = np.stack([bulk * along, shear * along, shear * inward]) / wide
@@ -351,7 +320,7 @@ def peak(found: Recovery, stress, of=von_mises, least_depth: float = 0.0) -> Pea
     at = found.cells.points[found.node]
     top = int(np.argmax(np.where(at[:, 1] >= least_depth, value, -np.inf)))
     owner = found.cells.owner()
-    near = owner[np.isin(found.place, np.unique(found.place[np.isin(owner, owner[found.place == top])]))]
+    near = owner[np.isin(found.place, found.place[np.isin(owner, owner[found.place == top])])]
     around = np.unique(found.place[np.isin(owner, near)])
     around = around[found.coating[around] == found.coating[top]]
     found_at, best = _vertex(at[around] - at[top], value[around])

@@ -1,5 +1,9 @@
 """Why a run has no value of a measure: sentences that stand in its place."""
 
+from dataclasses import replace
+
+import numpy as np
+
 from ..core import Measure
 from ..structure.drive_sizes import sinusoidal, whole
 from .rows import TABLE
@@ -7,6 +11,8 @@ from .rows import TABLE
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
 CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
 HOLDS = "the interface holds as a whole throughout the last cycles"
+UNCLOSED = "the loop does not close: what the interface stores changes by more than it dissipates in the last " \
+           "cycles; energy_dissipated is that of the whole run"
 
 
 def without_value(values, window, drive, rubs: bool) -> dict:
@@ -21,6 +27,28 @@ def without_value(values, window, drive, rubs: bool) -> dict:
         lacking["slip_start_phase"] = _of_phase(values, drive)
     return {name: Measure(None, TABLE[name].unit, None, TABLE[name].floor, reason=reason)
             for name, reason in lacking.items() if name not in values}
+
+
+def unclosed(values, window, drive) -> dict:
+    """Loops without a value, with the reason, by name, where they do not close; {} where all do.
+
+    The work of friction per cycle is told as a loss. Where nothing drives the motion to repeat, as after a release, the
+    interface also gives back what it stored, or stores more: beyond what it dissipates the work is not a loss. values:
+    Measure by name; window: Response of the last cycles; drive. The energies of several interfaces are known together
+    only: one of them does not close where it gives back more than it takes while none creates energy.
+    """
+    ledger, loop = window.extra.get("ledger"), values.get("loop_area")
+    if ledger is None or loop is None or sinusoidal(drive):
+        return {}
+    _, stored, lost, created = np.abs(ledger[:, -1] - ledger[:, 0])
+    loops = {name: one for name, one in values.items() if name.startswith("loop_area")}
+    if len(loops) == 1:
+        cycles = (window.time[-1] - window.time[0]) / drive.period
+        opened = ["loop_area"] if stored > max(lost, loop.floor * cycles) else []
+    else:
+        opened = [name for name, one in loops.items() if one.value < -max(one.error or 0.0, one.floor)]
+        opened = opened if created <= 1e-9 * (stored + lost) else []
+    return {name: replace(loops[name], value=None, error=None, reason=UNCLOSED) for name in opened}
 
 
 def _of_phase(values, drive) -> str:

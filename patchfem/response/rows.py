@@ -120,7 +120,9 @@ ROWS = (
         lambda s: s.slip.get("slip_start_phase"), group="friction"),
     Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together", lambda s: s.load,
         group="friction"),
-    Row("loop_area", "J", 1e-10, "work of friction per cycle", lambda s: s.cycle.get("loop_area"), group="energy"),
+    Row("loop_area", "J", 1e-10, "work of friction per cycle; without a value where no sine drives the motion and the "
+        "interface stores or gives back more than it dissipates, so that the loop does not close",
+        lambda s: s.cycle.get("loop_area"), group="energy"),
     Row("equivalent_stiffness", "N m-1", 1.0,
         "part of the friction's first harmonic in phase with the slide over the first harmonic of the slide, negative "
         "where friction holds the spring while stuck", lambda s: s.cycle.get("equivalent_stiffness"), group="friction"),

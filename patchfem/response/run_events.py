@@ -56,8 +56,23 @@ def moving(window, drive, log=None, held: float = 0.0) -> list:
     return [bool(states(window.time, column, drive.period, held)[1].any()) for column in slips.T]
 
 
-def rings(window, modes, drive, log=None, held: float = 0.0) -> tuple:
+def spans_of(window, drive, log=None, held: float = 0.0) -> list:
+    """The sticks [(from, to)] [s] of the window; arguments as in `events_of`."""
+    return sticks(events_of(window, drive, log, held), window.time[0], window.time[-1],
+                  moving(window, drive, log, held))
+
+
+def of_a_cycle(spans, end: float, period: float) -> list:
+    """The sticks [(from, to)] [s] that begin in the last cycle but one before `end` and end before it: all that there
+    are of a motion that repeats, none where it holds for ever."""
+    return [(a, b) for a, b in spans if end - 2 * period <= a < end - period and b < end]
+
+
+def rings(window, modes, drive, log=None, held: float = 0.0, repeats: bool = False) -> tuple:
     """Ringing over the sticks of the window: (ring_frequency and ring_damping by name, their errors).
+
+    repeats: whether each of its cycles is the same, so that the sticks of one tell those of all; what decays is no part
+    of a stick that outlasts such a cycle.
 
     It is read off the acceleration at the output. ({}, {}) where nothing rings, where the drive has no frequency of its
     own (sweep, recorded), or where the samples do not resolve the fastest mode.
@@ -67,8 +82,9 @@ def rings(window, modes, drive, log=None, held: float = 0.0) -> tuple:
     if modes.omega.max() * float(np.median(np.diff(window.time))) > np.pi:
         return {}, {}
     last = drive.segments[-1]
-    spans = sticks(events_of(window, drive, log, held), window.time[0], window.time[-1],
-                   moving(window, drive, log, held))
+    spans = spans_of(window, drive, log, held)
+    if repeats:
+        spans = of_a_cycle(spans, window.time[-1], drive.period)
     if not spans:
         return {}, {}
     return ringing(window.time, window.acceleration, spans, last.omega if last.amplitude else 0.0)

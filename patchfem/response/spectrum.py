@@ -7,21 +7,30 @@ ROUND = 1e-12  # of the largest acceleration of the drive
 READINGS = ("peak", "fundamental", "rms", "lowpass")
 HARMONICS = 64  # that a low pass is taken of
 SAMPLES = 1024  # of a cycle behind it
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
+PLACES, WEIGHTS = np.polynomial.legendre.leggauss(4)
+PLACES, WEIGHTS = (1 + PLACES) / 2, WEIGHTS / 2  # of a step
 
 
-def motion_harmonic(time, value, rate, omega: float) -> complex:
+def waves(time, omega: float) -> list:
+    """What `motion_harmonic` weighs the motion with at the Gauss points of the steps between samples (k,) [s]: weights
+    (k - 1,) [s] and waves exp(-i omega t) (k - 1,), which take most of its time; omega [rad/s]."""
+    step = np.diff(time)
+    return [(weight * step, np.exp(-1j * omega * (time[:-1] + s * step)))
+            for s, weight in zip(PLACES, WEIGHTS)]
+
+
+def motion_harmonic(time, value, rate, omega: float, known: list | None = None) -> complex:
     """First Fourier coefficient 2/T int y exp(-i omega t) dt of the cubics through samples and their rates.
 
     time: (k,) [s], as uneven as it likes; value, rate: (k,); omega [rad/s]. Four Gauss points a step, so that only the
-    cubic is approximate, h^4/384 of the fourth derivative.
+    cubic is approximate, h^4/384 of the fourth derivative. known: the `waves` of these arguments.
     """
     step, rise = np.diff(time), np.diff(value)
     p, q = rate[:-1] * step, rate[1:] * step
     mid, big, total = 3 * rise - 2 * p - q, p + q - 2 * rise, 0j
-    for s, weight in zip((1 + POINTS) / 2, WEIGHTS / 2):
+    for s, (weight, wave) in zip(PLACES, waves(time, omega) if known is None else known):
         y = value[:-1] + s * (p + s * (mid + s * big))
-        total += np.sum(weight * step * y * np.exp(-1j * omega * (time[:-1] + s * step)))
+        total += np.sum(weight * y * wave)
     return complex(2 / (time[-1] - time[0]) * total)
 
 
@@ -31,9 +40,14 @@ def acceleration_harmonic(time, value, rate, omega: float) -> complex:
     The acceleration of a rubbing rig jumps, its motion does not, so nothing is lost at a jump. Arguments as
     `motion_harmonic`.
     """
+    return _by_parts(time, value, rate, omega, motion_harmonic(time, value, rate, omega))
+
+
+def _by_parts(time, value, rate, omega: float, first: complex) -> complex:
+    """`acceleration_harmonic` of a motion with this first Fourier coefficient."""
     span, wave = time[-1] - time[0], np.exp(-1j * omega * time[[0, -1]])
     border = (rate[-1] + 1j * omega * value[-1]) * wave[1] - (rate[0] + 1j * omega * value[0]) * wave[0]
-    return complex(2 / span * border - omega**2 * motion_harmonic(time, value, rate, omega))
+    return complex(2 / span * border - omega**2 * first)
 
 
 def odd_harmonics(window, drive) -> tuple:
@@ -75,11 +89,12 @@ def friction_harmonic(window, modes, drive) -> complex:
     """
     last = [part for part in drive.segments if part.start < window.time[-1]][-1]
     time, omega = window.time, last.omega
+    known, motions = waves(time, omega), list(zip(window.modal.T, window.modal_rate.T))
     wave = np.exp(-1j * omega * time[[0, -1]])
-    first = np.array([motion_harmonic(time, z, v, omega) for z, v in zip(window.modal.T, window.modal_rate.T)])
+    first = np.array([motion_harmonic(time, z, v, omega, known) for z, v in motions])
     ends = 2 / (time[-1] - time[0]) * (window.modal[-1] * wave[1] - window.modal[0] * wave[0])
     rates = ends + 1j * omega * first
-    gains = np.array([acceleration_harmonic(time, z, v, omega) for z, v in zip(window.modal.T, window.modal_rate.T)])
+    gains = np.array([_by_parts(time, z, v, omega, one) for (z, v), one in zip(motions, first)])
     push = -1j * last.amplitude * np.exp(1j * (last.phase - omega * last.start))
     rest = -modes.base * push - gains - modes.dampers @ rates - modes.omega**2 * first
     return complex(modes.mass * (modes.slide @ rest) / (modes.slide @ modes.slide))

@@ -15,9 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..contact.unilateral import INDEFINITE
 from ..core import PatchfemError, frozen_array
-from ..elasticity.lapack import dger, one_thread
+from ..elasticity.lapack import dpotrf, dpotri, one_thread
 
+KERNELS = "slip.yield_kernels"
 SHEAR_MODES = 8  # modes a shear reduction starts from
 BACK = 2.0  # bond lengths: exp(2) of the stiffness at rest
 
@@ -62,6 +64,8 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
     local_length [m]: bond length of the elastic-plastic law (3.12), a local stiffness limit/length in series; 0 for
     Coulomb points. PatchfemError when no point carries load.
     """
+    from ..compiled import kernels  # a static patch has no slip and loads no compiled code
+
     limit = np.asarray(limit, float)
     if not (limit > 0).any():
         raise PatchfemError("contact.shear: no point carries friction")
@@ -73,30 +77,23 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         return JenkinsSet(frozen_array([stiffness]), frozen_array(at), frozen_array(points, np.int64),
                           frozen_array(force), frozen_array(force[:, None] / at), 0)
     c = tangential[np.ix_(points, points)] + np.diag(local_length / force)
-    inverse = np.asfortranarray(np.linalg.inv(c))  # rows and columns of nodes that have yielded are 0 in it
-    stick = np.ones(force.size, bool)
-    carried = np.zeros(force.size)
-    slide, rates, at, reluctant = 0.0, [], [], 0
-    while stick.any():
-        rate = inverse.sum(axis=0)
-        wait = np.where(rate > 0, (force - carried) / np.where(rate > 0, rate, 1.0), np.inf)
-        wait[~stick] = np.inf
-        reluctant = max(reluctant, int(np.sum(stick & (rate <= 0))))
-        first = wait.min()
-        slide += max(first, 0.0)
-        carried[stick] += rate[stick] * max(first, 0.0)
-        going = stick & (wait <= first * (1 + 1e-12))  # nodes that yield at once, as mirrored ones do
-        rates.append(np.where(stick, rate, 0.0))
-        at.append(slide)
-        for node in np.flatnonzero(going)[::-1]:
-            column = inverse[:, node].copy()
-            inverse = dger(-1 / column[node], column, column, a=inverse, overwrite_a=1)
-            inverse[node], inverse[:, node] = 0.0, 0.0
-        carried[going] = force[going]
-        stick[going] = False
-    drop = -np.diff(np.array([*rates, np.zeros(force.size)]), axis=0).T
+    inverse, at, rates = inverse_of(c), np.empty(force.size), np.zeros((force.size + 1, force.size))
+    count, reluctant = kernels(KERNELS).yields(inverse, inverse.sum(axis=0), force.copy(), np.arange(force.size), at,
+                                               rates)
+    if reluctant < 0:
+        raise PatchfemError(INDEFINITE)
+    drop, at = np.ascontiguousarray((rates[:count] - rates[1:count + 1]).T), at[:count]
     return JenkinsSet(frozen_array(drop.sum(axis=0)), frozen_array(at), frozen_array(points, np.int64),
                       frozen_array(force), frozen_array(drop), reluctant)
+
+
+def inverse_of(c: np.ndarray) -> np.ndarray:
+    """Inverse (n, n) of a symmetric positive definite matrix; PatchfemError where it is not, to working precision."""
+    low, fault = dpotrf(c, lower=1)
+    if fault:
+        raise PatchfemError(INDEFINITE)
+    low, _ = dpotri(low, lower=1)
+    return np.tril(low) + np.tril(low, -1).T
 
 
 def scaled(group: JenkinsSet, factor: float) -> JenkinsSet:

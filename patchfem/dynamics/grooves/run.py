@@ -137,13 +137,10 @@ class GroovesRun(Run):
         after = rows[:-1, n + 4] if self.model.set_valued else None
         return sampled_work(rows[:, n], rows[:, n + 2], after)
 
-    def _booked(self, rows) -> np.ndarray:
+    def _parts(self, rows) -> np.ndarray:
         """As of a Run; what is dissipated is friction's own work along the flank."""
         n = 2 * self.modes.omega.size
-        parts = np.stack([self._works(rows), rows[:-1, n + 7], np.zeros(len(rows) - 1)])
-        sums = self.totals[:, None] + np.concatenate([np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1)
-        self.totals = sums[:, -1]
-        return np.concatenate([rows[:, :n + 6], sums.T, rows[:, n + 6:]], axis=1)
+        return np.stack([self._works(rows), rows[:-1, n + 7], np.zeros(len(rows) - 1)])
 
     def _judge(self, status: int) -> None:
         super()._judge(status)

@@ -7,7 +7,8 @@ reduced rank extrapolation, which is exact where a disturbance dies out linearly
 
 import numpy as np
 
-from ..march.march import extremes_of, mark_of
+from ..cycles import extremes_of
+from ..march.march import mark_of
 
 LEAD = 6  # cycles from the start to the first guess
 REST = 2  # cycles after a guess that the memory of the contact takes

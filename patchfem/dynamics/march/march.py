@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core import STICK, BaseSine, ModalBasis, Outcome, Response
+from ...core import BaseSine, ModalBasis, Outcome, Response
+from ..cycles import extremes_of, phasor, thinned
 from ..plant import Plant
 from ..propagator import propagator
 from ..resume import Samples, slot_of
@@ -17,7 +18,6 @@ from .room import keep, lengthened
 FULL = 2  # status of a loop whose list of bonds is full
 GOAL = 1e-11  # residual of the step solve over the friction limit
 MOST_KEPT = 400_000  # samples kept outside the last cycles
-MOST_TURNS = 100  # of them in a cycle
 AT_ONCE, PIECES = 8000, 16  # steps and cycles of a piece of a run of which nothing is kept
 
 
@@ -124,14 +124,14 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
         final = run.done + size >= total
         first, rows, work = run.cycle(size, frames if final else 0, snapshots)
         if whole and len(last) == last.maxlen and count < MOST_KEPT:
-            pick = _thinned(last[0][1], run)
+            pick = thinned(last[0][1], run)
             kept.append(last[0][1][pick])
             kept_at.append(last[0][0] + pick)
             count += len(pick)
         last.append((first, rows, work))
         if whole:
             extremes.append(extremes_of(rows, modes, run.prop.dt))
-            phasors.append(_phasor(rows, modes, first, steps_per_cycle))
+            phasors.append(phasor(rows, modes, first, steps_per_cycle))
         if run.done in asked:
             samples.marks.append((run.fork(run.drive), list(last)[-window:], extremes[-window:]))
             found.append(mark_of(*samples.marks[-1], samples.marks[-1][0]))
@@ -143,7 +143,7 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
     run.check()
     if not whole:
         extremes = [extremes_of(rows, modes, run.prop.dt) for _, rows, _ in last]
-        phasors = [_phasor(rows, modes, first, steps_per_cycle) for first, rows, _ in last]
+        phasors = [phasor(rows, modes, first, steps_per_cycle) for first, rows, _ in last]
     end = mark_of(run, list(last)[-window:], extremes)
     rows, start = _joined(list(last))
     number = np.concatenate([*kept_at, start + np.arange(len(rows))])
@@ -232,7 +232,7 @@ class Run:
         """March to the step of this number in long pieces, of which nothing is kept; whether the run went on so far.
         tell: called after each."""
         while self.done < steps and self.outcome is None:
-            self.cycle(min(steps - self.done, AT_ONCE, PIECES * self.prop.steps), 0, [])
+            self._sums(self._moved(min(steps - self.done, AT_ONCE, PIECES * self.prop.steps), 0, []))
             if tell is not None:
                 tell()
         return self.outcome is None
@@ -242,7 +242,13 @@ class Run:
 
         Returns (first step, rows (steps + 1, width), friction work [J]); snapshots: list to add to.
         """
-        first, before, parts = self.done, self.ledger[8], []
+        first, before, n = self.done, self.ledger[8], 2 * self.modes.omega.size + 6
+        rows = self._moved(size, frames, snapshots)
+        return first, np.concatenate([rows[:, :n], self._sums(rows).T, rows[:, n:]], axis=1), self.ledger[8] - before
+
+    def _moved(self, size: int, frames: int, snapshots: list) -> np.ndarray:
+        """The rows (steps + 1, width) of `size` steps as the loop writes them; arguments as `cycle`."""
+        parts = []
         edges = np.linspace(0, size, max(min(frames, size), 1) + 1).round().astype(int)
         for piece in np.diff(edges) if size else [0]:
             rows = np.empty((piece + 1, self.width))
@@ -261,7 +267,7 @@ class Run:
                 break
         rows = np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:])
         self.second += self._sampled(rows).sum(), np.abs(self._works(rows)).sum()
-        return first, self._booked(rows), self.ledger[8] - before
+        return rows
 
     def _steps(self, count: int, rows) -> tuple:
         """March `count` steps into rows (count + 1, width): (steps done, status)."""
@@ -269,18 +275,29 @@ class Run:
         return self.hub.march(self.model.kind, row, count, self.state, self.plant, table, self.contact,
                               float(GOAL * self.model.limit), float(self.travel), self.ledger, rows)
 
-    def _booked(self, rows) -> np.ndarray:
-        """Rows with the friction work, the energy dissipated and that created since the start [J] as further columns;
-        per step the net of the work and of what the interface stores."""
+    def _sums(self, rows) -> np.ndarray:
+        """Friction work, the energy dissipated and that created since the start (3, steps + 1) [J] at the rows; `cycle`
+        puts them into the rows as further columns."""
+        parts = self._parts(rows)
+        sums = np.empty((3, parts.shape[1] + 1))
+        sums[:, 0] = self.totals
+        np.cumsum(parts, axis=1, out=sums[:, 1:])
+        sums[:, 1:] += self.totals[:, None]
+        self.totals = sums[:, -1].copy()
+        return sums
+
+    def _parts(self, rows) -> np.ndarray:
+        """What `_sums` adds up, of the steps between the rows (3, steps) [J]: the net of the work and of what the
+        interface stores."""
         n = 2 * self.modes.omega.size
-        work = self._works(rows)
-        lost = work - np.diff(rows[:, n + 5])
+        parts = np.zeros((3, len(rows) - 1))
+        parts[0] = self._works(rows)
+        lost = parts[0] - np.diff(rows[:, n + 5])
         # of the step solve, and of the slide's last digit
         noise = self.model.limit * (1e-12 * np.abs(np.diff(rows[:, n])) + 1e-15 * np.abs(rows[:-1, n]))
-        parts = np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])
-        sums = self.totals[:, None] + np.concatenate([np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1)
-        self.totals = sums[:, -1]
-        return np.concatenate([rows[:, :n + 6], sums.T, rows[:, n + 6:]], axis=1)
+        np.copyto(parts[1], lost, where=lost > -noise)
+        np.copyto(parts[2], -lost, where=lost < -noise)
+        return parts
 
     def _works(self, rows) -> np.ndarray:
         """Friction work [J] of the steps between the rows."""
@@ -347,51 +364,3 @@ class Run:
             book |= {"created": float(tally[6]), "dissipated": float(tally[7]), "substeps": float(tally[8]),
                      "strips": float(tally[10])}
         return book
-
-
-def _thinned(rows, run) -> np.ndarray:
-    """Numbers of the samples of a cycle worth keeping: its first, every reversal of the output and of a slide, every
-    stop and release (slip speed below or above 1e-2 of its peak in the cycle)."""
-    n, output = run.modes.omega.size, run.modes.output
-    speeds, slips = run.watched(rows)
-    speeds = np.concatenate([speeds.T, (rows[:, n:2 * n] @ output)[None]])
-    low = 1e-13 * max(speeds.max(), -speeds.min())
-    way = (speeds > low).view(np.int8) - (speeds < -low).view(np.int8)
-    moved = np.abs(slips.T[:, 1:] - slips.T[:, :-1])
-    low = 1e-13 * np.abs(rows[:, :n] @ output).max()
-    slipping = moved > np.maximum(STICK * moved.max(axis=1), low)[:, None]
-    kept = (way[:, 1:] != way[:, :-1]).any(axis=0)
-    kept[1:] |= (slipping[:, 1:] != slipping[:, :-1]).any(axis=0)
-    kept[0] = True
-    return np.flatnonzero(kept)[:MOST_TURNS]
-
-def extremes_of(rows, modes, dt) -> tuple:
-    """(smallest, largest) output of a cycle, found between the samples by the cubic through values and rates."""
-    n = modes.omega.size
-    y, v = rows[:, :n] @ modes.output, rows[:, n:2 * n] @ modes.output
-    return hermite_extremes(y, v, dt)
-
-
-def _phasor(rows, modes, first: int, around: int) -> complex:
-    """Drive-frequency part of the output over a cycle of samples that begins at step number `first`."""
-    y = rows[:-1, :modes.omega.size] @ modes.output
-    return complex(2 * np.mean(y * np.exp(-2j * np.pi * (first + np.arange(y.size)) / around))) if y.size else 0j
-
-
-def hermite_extremes(y, v, dt) -> tuple:
-    """Smallest and largest value of the piecewise cubic through values y (k,) with rates v (k,) at spacing dt [s]."""
-    low, high = float(y.min()), float(y.max())
-    at = np.flatnonzero(v[:-1] * v[1:] < 0)
-    if at.size:
-        a, b, p, q = y[at], y[at + 1], v[at] * dt, v[at + 1] * dt
-        # derivative 3 s^2 A + 2 s B + p of a + p s + B s^2 + A s^3
-        big, mid = 2 * (a - b) + p + q, 3 * (b - a) - 2 * p - q
-        root = np.sqrt(np.maximum(mid**2 - 3 * big * p, 0))
-        for sign in (1, -1):
-            denominator = mid + sign * root
-            s = np.where(denominator != 0, -p / np.where(denominator != 0, denominator, 1), -1.0)
-            inside = (s >= 0) & (s <= 1)
-            value = (a + p * s + mid * s**2 + big * s**3)[inside]
-            if value.size:
-                low, high = min(low, float(value.min())), max(high, float(value.max()))
-    return low, high

@@ -219,7 +219,7 @@ class VaryingLoadRun(Run):
                                model.law.kind, self.rub, self.sets, loads, GOAL * model.limit, float(self.travel),
                                self.room, self.ledger, rows)
 
-    def _booked(self, rows) -> np.ndarray:
+    def _parts(self, rows) -> np.ndarray:
         """As of a Run; the noise is that of the largest force, of the slide's last digit (a sum over the modes) and of
         the stored energy."""
         n = 2 * self.modes.omega.size
@@ -230,10 +230,7 @@ class VaryingLoadRun(Run):
         digit = np.maximum(digit[1:], digit[:-1]) + self.prop.beta[0, 0] * size
         noise = size * (1e-12 * np.abs(np.diff(rows[:, n])) + 2e-15 * digit) \
             + 1e-14 * np.maximum(rows[:-1, n + 5], rows[1:, n + 5])
-        parts = np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])
-        sums = self.totals[:, None] + np.concatenate([np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1)
-        self.totals = sums[:, -1]
-        return np.concatenate([rows[:, :n + 6], sums.T, rows[:, n + 6:]], axis=1)
+        return np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])
 
     def _judge(self, status: int) -> None:
         super()._judge(status)

@@ -54,7 +54,7 @@ class PieceRun:
     mean per cycle [m]; waves: first and third harmonic of the absolute acceleration in the window [m s-2]; end:
     (Start, memory) to go on from; ring: (amplitude [m s-2], frequency [rad/s], damping ratio) of what rings while a
     single element holds, with an amplitude of 0 where nothing does, as behind elements whose sticks are too short for
-    it; None where the samples have to tell.
+    it; None where the samples have to tell; repeats: whether every cycle of the window is the same to the last bit.
     """
 
     response: Response
@@ -75,6 +75,7 @@ class PieceRun:
     cycles_done: float
     end: tuple
     ring: tuple | None = None
+    repeats: bool = False
 
 
 def warm_up(say=None) -> tuple:
@@ -120,10 +121,11 @@ class _Run:
         self.books, self.cycles, self.period = books_of(count, wanted, travel), cycles, drive.period
         self.alone = one.rig_of(self.plant) if one.serves(self.plant, self.clock, travel) else None
         self.lines = one.room_of() if self.alone is not None else None
+        self.last = one.last_of(self.table.reach.shape[1])
         self.width = self.kernels.HEAD + 2 * n + self.kernels.EACH * len(self.groups)
         self.early, self.kept, self.events, self.count = [], 0, [], 0
         self.before, self.outcome, self.snapshots = np.zeros(len(self.groups)), None, []
-        self.passed = False
+        self.passed, self.repeats = False, False
         self.begun = self.kernels.stored(self.motion, self.plant, self.table, self.memory)
         still = self.kernels.stored(np.zeros_like(self.motion), self.plant, self.table, self.memory)
         self.stretched = still - float(np.sum(self.memory.worked - self.memory.lost))  # [J] from before the books began
@@ -157,7 +159,7 @@ class _Run:
             return self.kernels.march(stop, self.motion, self.plant, self.table, self.memory, self.clock, self.books,
                                       self.room, rows)
         return load(f"{ALONE}.one_kernels").march(stop, self.motion, self.alone, self.table, self.memory, self.clock,
-                                                  self.books, self.lines, rows)
+                                                  self.books, self.last, self.lines, rows)
 
     def _note(self, rows) -> np.ndarray:
         """Note stops and releases of all interfaces; which rows (k,) begin with one."""
@@ -191,6 +193,7 @@ class _Run:
         wide = self.until(first, True, progress) if first > begin else []
         late = []
         before = float(self.before[0]) if len(self.before) else 0.0
+        self.repeats = self.alone is not None and bool(self.last[0, one.REPEATS])
         for stop in (first + 1, last):  # the drift asks for the first and the last cycle of the window
             if first < stop < end:
                 late += self.until(stop, True, progress)
@@ -245,7 +248,8 @@ class _Run:
         loops, *moved = self._loops(late)
         return PieceRun(_chain([*parts, window]), window, self.books.extremes[done], phasors, book, self.outcome,
                         loops, starts, float(high), log, self.snapshots, int(self.books.ledger[6]), *moved,
-                        stop / self.period, (Start(*self.motion.copy()), self.memory), self._ring(late, before))
+                        stop / self.period, (Start(*self.motion.copy()), self.memory), self._ring(late, before),
+                        self.repeats)
 
     def log(self) -> EventLog:
         """The last stops and releases."""

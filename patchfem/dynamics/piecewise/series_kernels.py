@@ -197,18 +197,55 @@ def bernstein(poly, low, top, hull):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def far_from_zero(poly, low, top):
-    """Whether the Bernstein coefficients of the first FEW + 1 terms stay above all that the others can add: no root."""
-    rest = 0.0
+def first_look(poly, low, top, hull):
+    """u near which the Bernstein coefficients of the first FEW + 1 terms, in hull, come down to what all others can
+    add; NONE where they stay above it, so that there is no root."""
+    rest, wide = 0.0, FEW // 4 * 4 + 4
     for k in range(low + FEW + 1, top + 1):
         rest += abs(poly[k])
+    for i in range(wide):
+        hull[i] = poly[low]
+    for k in range(1, FEW + 1):
+        part = poly[low + k]
+        for i in range(wide):
+            hull[i] += part * _HULL[FEW, k, i]
     for i in range(FEW + 1):
-        part = poly[low]
-        for k in range(1, FEW + 1):
-            part += poly[low + k] * _HULL[FEW, k, i]
-        if part <= rest:
-            return False
-    return True
+        if hull[i] <= rest:
+            return (i - hull[i] / (hull[i] - hull[i - 1]) if 0 < i and hull[i] < hull[i - 1] else i) / FEW
+    return NONE
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def lone_root(poly, low, top, u, room):
+    """The root that Newton's method finds from u, in (0, 1], where it is proved to be the first one; NONE where not.
+
+    p(r s) with p(r) = 0 is (1 - s) q(s), where the coefficients of q are sums of the last ones of p(r s): as long as q
+    has no root in [0, 1], p has none before r. room: two rows.
+    """
+    last = 1.0
+    for _ in range(9):
+        here, slope = value_and_slope(poly, low, top, u)
+        if not slope < 0.0:
+            return NONE
+        step = here / slope
+        u -= step
+        step = abs(step)
+        if not 0.0 < u <= 1.0:
+            return NONE
+        done = step <= 2 * EPS * u or (step < 0.01 * last and step * (step / last)**2 <= 0.1 * EPS * u)  # as `polish`
+        last = step
+        if done:
+            power, rows, total = 1.0, room[0], 0.0
+            for k in range(low, top + 1):
+                rows[k - low] = power * poly[k]
+                power *= u
+            for k in range(top - low, 0, -1):
+                total -= rows[k]
+                rows[k] = total
+            for k in range(top - low):
+                rows[k] = rows[k + 1]
+            return u if first_look(rows, 0, top - low - 1, room[1]) == NONE else NONE
+    return NONE
 
 
 @njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
@@ -217,11 +254,19 @@ def first_root(poly, low, top, hulls):
 
     A dip of round-off below zero is passed over. hulls: room (DEEP + 2, WIDE).
     """
-    rest = 0.0
+    rest, low, top = 0.0, low & 31, top & 31  # as they are: the compiler then knows that no index is negative
     for k in range(low + 1, top + 1):
         rest += abs(poly[k])
-    if poly[low] > rest or (top - low > FEW + 2 and far_from_zero(poly, low, top)):
+    if poly[low] > rest:
         return NONE
+    if top - low > FEW + 2:
+        u = first_look(poly, low, top, hulls[0])
+        if u < NONE:
+            u = lone_root(poly, low, top, u, hulls)
+        else:
+            return NONE
+        if u < NONE:
+            return u
     noise, degree = 4 * EPS * (rest + abs(poly[low])), top - low
     bernstein(poly, low, top, hulls[0])
     left, width, depth = 0.0, 1.0, 0

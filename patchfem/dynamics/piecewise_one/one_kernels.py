@@ -6,8 +6,6 @@ of the drive and the viscous loss of a long piece follow from its ends, by parts
 
 from math import atan2, cos, pi, sin, sqrt
 
-import numpy as np
-
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from ..piecewise.drive_kernels import AMPLITUDE, CONSTANT, OMEGA, PHASE
@@ -16,10 +14,8 @@ from ..piecewise.memory_kernels import carried, give_way, tangent, threshold, tu
 from ..piecewise.search_kernels import NOTHING, TURNS, YIELDS, heading
 from ..piecewise.series_kernels import (
     _PLACE,
-    _ROOM,
     _WEIGHT,
     EPS,
-    MOST,
     NONE,
     REACH,
     first_root,
@@ -27,44 +23,14 @@ from ..piecewise.series_kernels import (
     value,
     value_and_slope,
 )
+from .line_kernels import moved_to, one_series, order_of
 from .names_kernels import BASE, DAMPING, FACE, MASS, OUTPUT, SQUARE
+from .repeat_kernels import come_back
+from .short_kernels import SHORT, short_energies, short_piece
+from .whole_kernels import COSINE, RATE, SINE, SPAN, TOP, is_of, one_way, series_of, work_out
 
-FINE = 64  # places of a table of orders per unit of piece times rate
-# highest power for a piece of x times the fastest rate, at x FINE rounded up
-_TOPS = np.array([next((k for k in range(4, MOST) if _ROOM[k] >= x / FINE), MOST)
-                  for x in range(int(REACH * FINE) + 2)])
-TWICE = np.array([0.0, 0.0] + [1 / (k * (k - 1)) for k in range(2, MOST + 6)])  # of two integrations
-OVER = np.array([0.0] + [1 / k for k in range(1, MOST + 6)])  # of one integration
 LONG = 0.05  # piece times rate from which the energies follow from its ends
 APART = 1e-6  # of omega^4: so near its resonance they do not
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def order_of(x):
-    """Highest power that a piece of x times the fastest rate needs."""
-    return _TOPS[min(int(x * FINE) + 1, _TOPS.size - 1)]
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def one_series(z, v, gain, beta, alpha, push, side, turned, h, top, c, wave):
-    """Fill c (top + 1,) with the series over u = t/h of z'' = gain - alpha z' - beta (z - z0) + the drive's change, and
-    wave with that of the drive, both beyond the first terms.
-
-    gain: z'' [m s-2] at first but for the damping; push, side: the drive [m s-2] and its quadrature there, turned: its
-    angle in h.
-    """
-    squared, damp, turn = h * h, alpha * h, turned * turned
-    stiff, here, after = squared * beta, h * v, 0.5 * squared * (gain - alpha * v)
-    even, odd = -0.5 * turn * push, turned * side
-    c[0], c[1], c[2], wave[0] = z, here, after, push
-    for k in range(1, top, 2):
-        wave[k], wave[k + 1] = odd, even
-        # in this order what comes from the last term but one is ready when the last term is
-        here, after = after, TWICE[k + 2] * (squared * odd - stiff * here) - damp * OVER[k + 2] * after
-        c[k + 2] = after
-        here, after = after, TWICE[k + 3] * (squared * even - stiff * here) - damp * OVER[k + 3] * after
-        c[k + 3] = after
-        odd, even = -odd * turn * TWICE[k + 2], -even * turn * TWICE[k + 3]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -114,6 +80,15 @@ def by_points(x, h, u, alpha, constant, top, poly, wave):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def closes(regime):
+    """Whether `by_parts` serves these rates."""
+    alpha, beta, _, constant, omega = regime
+    far, most = beta - omega * omega, omega * omega
+    return constant == 0.0 and beta > 1e-3 * most and alpha * alpha < 16 * beta \
+        and far * far + alpha * alpha * most > APART * most * most
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def energies(x, times, regime, ends, top, c, poly, wave):
     """What `by_points` gives, from the ends of a long piece where they tell it.
 
@@ -121,10 +96,7 @@ def energies(x, times, regime, ends, top, c, poly, wave):
     angular frequency; ends as in `by_parts`.
     """
     (span, h, u), (alpha, beta, gain, constant, omega) = times, regime
-    far, most = beta - omega * omega, omega * omega
-    closed = x > LONG and constant == 0.0 and beta > 1e-3 * most and alpha * alpha < 16 * beta \
-        and far * far + alpha * alpha * most > APART * most * most
-    if not closed:
+    if not (x > LONG and closes(regime)):
         return by_points(x, h, u, alpha, constant, top, poly, wave)
     work, lost = by_parts(span, alpha, beta, omega, ends)
     passed = abs(work)
@@ -139,13 +111,6 @@ def energies(x, times, regime, ends, top, c, poly, wave):
         part = by_parts(until, alpha, beta, omega, middle)[0]
         passed = abs(part) + abs(work - part)
     return work, lost, passed
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def moved_to(u, h, top, c):
-    """(way [m] from the start of a piece to u, speed [m/s] there)."""
-    went, slope = value_and_slope(c, 1, top, u)
-    return u * went, (went + u * slope) / h
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -300,15 +265,58 @@ def happens(what, sign, table, memory, clock):
         memory.force[0] = carried(0, table, memory)[0]
 
 
-@njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
-def march(stop, motion, rig, table, memory, clock, books, room, rows):
-    """Run from the clock's time to `stop` (cycle, offset [s]); all as `piecewise.march_kernels.march` has it but for
-    rig (6,), SQUARE to MASS, and room: lines (4, w) and hulls. Segments are sines; the output has no travel.
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def stays(way, went, table, memory):
+    """Whether the same elements slip and hold, clear of round-off, while the slide goes on by `went` [m], one way."""
+    same = memory.slipping[0] == 0 or way == memory.way[0]
+    return same and way * went * (1 + AT_ONCE) < way * (threshold(0, way, table, memory) - memory.place[0])
 
-    Cost: 0.35 us a piece, 0.2 us one of many elements.
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def long_piece(left, slowest, state, regime, size, face, table, memory, clock, room):
+    """(u, length [s] of which u is the share, its product with the fastest rate, highest power, what ends it, its sign,
+    way of the coordinate [m], speed, drive and its quadrature at the end) of any piece; its series stays in room.
+
+    state: coordinate, speed, drive, its quadrature and angle at first; regime as in `energies`.
     """
-    (lines, hulls), now, ledger, used, first = room, clock.now, books.ledger, 0, 1.0
-    c, poly, spare, wave, output, face = lines[0], lines[1], lines[2], lines[3], rig[OUTPUT], rig[FACE]
+    (z, v, push, side, theta), (alpha, beta, gain, _, omega), (lines, hulls, wholes) = state, regime, room
+    c, rests, parts = lines[0], clock.rest[0] == 1.0, (v, gain, push, side)
+    one = wholes[min(memory.slipping[0], wholes.shape[0] - 1)]
+    known = memory.slipping[0] < wholes.shape[0] and closes(regime)
+    if known and not is_of(one, regime, slowest):
+        work_out(one, regime, slowest, lines)
+    if known and left > one[0, SPAN]:
+        way, went, close = one_way(one, parts, rests)
+        if way != 0.0 and stays(way if face > 0.0 else -way, face * went, table, memory):
+            p, q = push * one[0, COSINE] + side * one[0, SINE], side * one[0, COSINE] - push * one[0, SINE]
+            if push * p < 0.0:
+                series_of(one, z, parts, c)
+            h = one[0, SPAN]
+            return 1.0, h, one[0, RATE] * h, int(one[0, TOP]), NOTHING, 0.0, went, close, p, q
+    h, x, near = length(left, slowest, regime, v, side, face, table, memory, rests)
+    top = order_of(x)
+    if known and h == one[0, SPAN]:
+        series_of(one, z, parts, c)
+    else:
+        one_series(z, v, gain, beta, alpha, push, side, omega * h, h, top, c, lines[3])
+    u, what, sign = first_event(top, near, face, c, lines[1], lines[2], hulls, table, memory, rests)
+    went, close = moved_to(u, h, top, c)
+    if known and x * u <= LONG:  # what goes by points wants the drive too
+        one_series(z, v, gain, beta, alpha, push, side, omega * h, h, top, c, lines[3])
+    p, q = turned_by(push, side, omega * u * h, theta + omega * u * h, size)
+    return u, h, x, top, what, sign, went, close, p, q
+
+
+@njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
+def march(stop, motion, rig, table, memory, clock, books, last, room, rows):
+    """Run from the clock's time to `stop` (cycle, offset [s]); all as `piecewise.march_kernels.march` has it but for
+    rig (6,), SQUARE to MASS, room: lines (4, w) and hulls, and last (4, t + 2), the state one period before, from where
+    on a motion that has settled repeats to the last bit. Segments are sines; the output has no travel.
+
+    Cost: 0.35 us a piece, 0.1 us a short one of many elements.
+    """
+    lines, now, ledger, used, first = room[0], clock.now, books.ledger, 0, 1.0
+    c, poly, wave, output, face = lines[0], lines[1], lines[3], rig[OUTPUT], rig[FACE]
     push, side, fresh, soft, slowest = now[3], now[4], now[5] == 0.0, face * face / rig[MASS], 1 / clock.period[0]
     begun, now[5] = carried(0, table, memory)[1] + memory.lost[0] - memory.worked[0], 0.0
     while now[0] < stop[0] or (now[0] == stop[0] and now[1] < stop[1]):
@@ -325,11 +333,12 @@ def march(stop, motion, rig, table, memory, clock, books, room, rows):
         ledger[7] = 1.0 if share >= 0.5 else ledger[7]
         beta, gain = rig[SQUARE] + spring * soft, push + constant - rig[SQUARE] * z - face * memory.force[0] / rig[MASS]
         regime = rig[DAMPING], beta, gain, constant, omega
-        h, x, near = length(left, slowest, regime, v, side, face, table, memory, clock.rest[0] == 1.0)
-        top = order_of(x)
-        one_series(z, v, gain, beta, rig[DAMPING], push, side, omega * h, h, top, c, wave)
-        u, what, sign = first_event(top, near, face, c, poly, spare, hulls, table, memory,
-                                    clock.rest[0] == 1.0)
+        state = z, v, push, side, theta
+        h, sign, went, close, p, q = short_piece(left, state, regime, face, table, memory, clock)
+        short, u, x, top, what = h > 0.0, 1.0, SHORT, order_of(SHORT), YIELDS
+        if not short:
+            u, h, x, top, what, sign, went, close, p, q = long_piece(left, slowest, state, regime, size, face, table,
+                                                                     memory, clock, room)
         if u > 0.0:
             span = u * h
             if now[1] == 0.0:
@@ -338,12 +347,12 @@ def march(stop, motion, rig, table, memory, clock, books, room, rows):
                 write(rows[used], z, v, span, theta % (2 * pi), first, spring, share, limit, memory, clock)
                 used += 1
             if books.wanted[int(now[0])] == 1.0:
+                if short or what == NOTHING:
+                    one_series(z, v, gain, beta, rig[DAMPING], push, side, omega * h, h, top, c, wave)
                 phasor(x, u, h, output, top, c, clock, books)
-            went, close = moved_to(u, h, top, c)
-            p, q = turned_by(push, side, omega * span, theta + omega * span, size)
-            ends = (v, gain - rig[DAMPING] * v, push, side,
-                    close, gain - rig[DAMPING] * close - beta * went + p - push, p, q)
-            work, lost, passed = energies(x * u, (span, h, u), regime, ends, top, c, poly, wave)
+            work, lost, passed = short_energies(span, went, regime, (v, push, side), (close, p, q)) if short else \
+                energies(x * u, (span, h, u), regime, (v, gain - rig[DAMPING] * v, push, side, close, gain
+                         - rig[DAMPING] * close - beta * went + p - push, p, q), top, c, poly, wave)
             ledger[0] += rig[MASS] * work
             ledger[1] += rig[MASS] * lost
             ledger[2] += rig[MASS] * passed
@@ -356,6 +365,8 @@ def march(stop, motion, rig, table, memory, clock, books, room, rows):
                 arrive(clock, stop, left)
             else:
                 now[1] += span
+            if fresh and now[1] == 0.0:
+                come_back(motion, face, 2 * pi / clock.period[0], memory, clock, last)
             ledger[5] = max(ledger[5], 0.5 * rig[MASS] * (close * close + rig[SQUARE] * motion[0, 0]**2) + begun
                             + memory.worked[0] - memory.lost[0])
             ledger[6] += 1

@@ -5,12 +5,13 @@ import numpy as np
 from ...compiled import kernels
 from ..piecewise.elements import Memory, Table
 from ..piecewise.plant import Books, Clock, Plant
-from .names_kernels import DAMPING, FACE, MASS, MOST, NUMBERS, RING, SQUARE, SWING
+from .names_kernels import DAMPING, FACE, MASS, MOST, NUMBERS, REPEATS, RING, SEGMENT, SQUARE, SWING
 
 series, kinds = kernels("dynamics.piecewise.series_kernels"), kernels("dynamics.piecewise.drive_kernels")
-march = kernels("dynamics.piecewise.march_kernels")
+march, wholes = kernels("dynamics.piecewise.march_kernels"), kernels("dynamics.piecewise_one.whole_kernels")
 
-__all__ = ["NUMBERS", "RING", "SWING"]
+WHOLES = 2  # numbers of slipping elements for which whole pieces are known
+__all__ = ["NUMBERS", "REPEATS", "RING", "SWING"]
 # least angle [rad] that what rings turns in a stick: a ring is told of 1.5 periods, and a fit that leaves a tenth of it
 # over is off by tenths of a radian where elements yield one by one and the frequency falls
 RINGS = 0.95 * 3 * np.pi
@@ -29,8 +30,17 @@ def rig_of(plant: Plant) -> np.ndarray:
 
 
 def room_of() -> tuple:
-    """Room of the loop: lines (4, w) and hulls of the search for roots."""
-    return np.zeros((4, series.MOST + 8)), np.zeros((series.DEEP + 2, series.WIDE))
+    """Room of the loop: lines (4, w), hulls of the search for roots, and what is known of whole pieces for the number
+    of elements that slip."""
+    return (np.zeros((4, series.MOST + 8)), np.zeros((series.DEEP + 2, series.WIDE)),
+            np.zeros((WHOLES, wholes.LINES, wholes.LONG)))
+
+
+def last_of(most: int) -> np.ndarray:
+    """Room (4, t + 2) for the state one period before, of at most so many elements: none yet."""
+    last = np.zeros((4, max(most + 2, REPEATS + 1)))
+    last[0, SEGMENT] = -1.0
+    return last
 
 
 def memory_of(most: int) -> Memory:
@@ -52,8 +62,8 @@ def work_of(most: int, cycles: int, wanted, rows: int) -> tuple:
     clock = Clock(np.zeros(6), np.zeros((1, 10)), np.ones(1), np.zeros(2))
     books = Books(np.zeros(8), np.zeros((cycles, 2)), np.zeros((cycles, 2)), np.array(wanted, float),
                   np.array([np.inf, 0.0]))
-    return (table, np.zeros((2, 1)), memory_of(most), clock, books, room_of(),
-            np.zeros((rows, march.HEAD + 2 + march.EACH)), search_room(most))
+    return (table, np.zeros((2, 1)), memory_of(most), clock, books, last_of(most), room_of(),
+            np.zeros((rows, march.HEAD + 2 + march.EACH)), search_room(most), np.zeros(10))
 
 
 def ring_of(rig, stiff, amplitude) -> tuple:

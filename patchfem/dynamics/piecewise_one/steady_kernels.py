@@ -13,8 +13,9 @@ from ..piecewise.drive_kernels import AMPLITUDE, CONSTANT, OMEGA, PHASE
 from ..piecewise.march_kernels import AT_ONCE, MOST_IDLE
 from ..piecewise.memory_kernels import carried, give_way, tangent, turn
 from ..piecewise.search_kernels import TURNS, YIELDS
+from .line_kernels import moved_to, one_series, order_of
 from .names_kernels import AMOUNT, BASE, DAMPING, FACE, LOWEST, MASS, MOST, OUTPUT, RESIDUAL, SQUARE
-from .one_kernels import first_event, length, moved_to, one_series, order_of
+from .one_kernels import first_event, length
 
 STEPS = 40  # of Newton's method
 FAR, GROWN, CLOSED = 1e9, 1e-6, 1e-12  # as in `piecewise.steady`
@@ -73,7 +74,7 @@ def period(point, rig, segment, table, memory, room, slopes, marks, clock, out):
     point moves along; out: least and largest output, smallest depth. False where events pile up or too many turning
     places are remembered.
     """
-    lines, hulls = room
+    lines, hulls, _ = room
     c, poly, spare, wave = lines[0], lines[1], lines[2], lines[3]
     alpha, face, base, output, omega = rig[DAMPING], rig[FACE], rig[BASE], rig[OUTPUT], segment[OMEGA]
     size = 2 + memory.depth[0] - first_turned(memory)

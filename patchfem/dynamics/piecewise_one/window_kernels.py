@@ -10,6 +10,7 @@ from ...friction.flags_kernels import FAST, LEAN
 from ..piecewise.drive_kernels import AMPLITUDE, CONSTANT, OMEGA
 from ..piecewise.march_kernels import HEAD
 from ..piecewise.series_kernels import _PLACE, _WEIGHT, largest, points, value_and_slope
+from .line_kernels import one_series, order_of
 from .names_kernels import (
     A3_COS,
     A3_SIN,
@@ -52,13 +53,14 @@ from .names_kernels import (
     TURNED,
     WORK,
 )
-from .one_kernels import one_series, order_of
 
 SLIPS = 0.5  # share of the slide that is irreversible from which an interface slips
 LASTS = 1e-9  # of a period: a shorter slip is none
 RESTS = 1e-9  # of the largest rate: slower is at rest
 NEAR = 0.003  # of a period: more than a sample of 400 in it
 FACES = HEAD + 2  # column of the force
+# what every cycle adds to
+SUMMED = (STUCK, WORK, TURNED, POWER, PASSED, Q_COS, Q_SIN, F_COS, F_SIN, A_COS, A_SIN, A3_COS, A3_SIN)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -220,19 +222,21 @@ def changes(rows, used, before, period, drive, rig, out):
 
 
 @njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
-def window(rows, used, cycles, final, before, rig, segment, clock, moving, room, out):
-    """Numbers of the last `cycles` cycles to `out` (NUMBERS,).
+def window(rows, counts, final, before, rig, segment, clock, moving, room, out):
+    """Numbers of the last cycles to `out` (NUMBERS,).
 
-    rows (r, w): all of them and no more, used; final (5,): z, v, force, slip, work at the end; before: way of the slip
-    before them; segment: of the drive; clock; moving: 1 where the base moves; room as of `one_kernels.march`.
+    rows (r, w): all of them and no more; counts: (used rows, first one that is summed, cycles): 0, or where all cycles
+    are alike that of the last one, which then stands for all; final (5,): z, v, force, slip, work at the end; before:
+    way of the slip before them; segment: of the drive; clock; moving: 1 where the base moves; room as of
+    `one_kernels.march`.
     """
-    (lines, hulls), period, face = room, clock.period[0], rig[FACE]
+    (lines, hulls, _), period, face, (used, first, cycles) = room, clock.period[0], rig[FACE], counts
     c, poly, wave = lines[0], lines[1], lines[3]
     omega, size, constant = segment[OMEGA], segment[AMPLITUDE], segment[CONSTANT]
     out[:] = 0.0
     out[LOW], out[HIGH], out[SLIP_LOW], out[SLIP_HIGH], out[OUT_LOW], out[OUT_HIGH] = inf, -inf, inf, -inf, inf, -inf
     begin, fastest = rows[0, 5], abs(face * final[1])
-    for j in range(used + 1):
+    for j in range(first, used + 1):
         here = j < used
         z, force = (rows[j, HEAD], rows[j, FACES]) if here else (final[0], final[2])
         slip = rows[j, FACES + 4] if here else final[3]
@@ -240,7 +244,7 @@ def window(rows, used, cycles, final, before, rig, segment, clock, moving, room,
         out[OUT_LOW], out[OUT_HIGH] = min(out[OUT_LOW], rig[OUTPUT] * z), max(out[OUT_HIGH], rig[OUTPUT] * z)
         out[SLIP_LOW], out[SLIP_HIGH] = min(out[SLIP_LOW], slip), max(out[SLIP_HIGH], slip)
         out[FORCE], out[REACH] = max(out[FORCE], abs(force)), max(out[REACH], abs(z))
-        if j > 0:
+        if j > first:
             out[TURNED] += 0.5 * (force + rows[j - 1, FACES]) * face * (z - rows[j - 1, HEAD])
         if not here:
             break
@@ -257,7 +261,11 @@ def window(rows, used, cycles, final, before, rig, segment, clock, moving, room,
         sums(rows[j, 5], cycles, begin, h, top, c, (force, z, spring), (theta, omega, size, constant, moving), rig, out)
         out[ACCELERATION] = peak(h, top, c, wave, constant, moving, rig[BASE], rig[OUTPUT], poly, hulls,
                                  out[ACCELERATION])
-    out[WORK] = final[4] - rows[0, FACES + 5]
+    out[WORK] = final[4] - rows[first, FACES + 5]
+    if first > 0:
+        for k in SUMMED:
+            out[k] *= cycles
+        out[FIRST], out[F_FIRST] = out[LAST], out[F_LAST]
     changes(rows, used, before, period, (omega, size, constant), rig, out)
     end = face * final[0], final[2], face * final[1]
     out[SECANT] = secants(rows, used, cycles, end, face, fastest, period, out)

@@ -6,5 +6,6 @@ with its exponentials of the slide where the bond length is constant. Every reve
 drive is the end of a step. Read `run`, then `loop_kernels`: Runge-Kutta steps of order 8, their length and where they
 end; `step_kernels`: one step; `watch_kernels`: what is read off it. One mode under one sine moves by Taylor series in a
 lane beside seven others: `lanes`, `lane_step`, `aim_kernels`, `lane_kernels`, read through `polynomial_kernels`, its
-peaks by `crest_kernels`; many such motions from start to end: `many`, `reading_kernels`.
+peaks by `crest_kernels`, and in long steps where a force of the speed holds it: `creep_kernels`; many such motions from
+start to end: `many`, `reading_kernels`.
 """

@@ -14,9 +14,9 @@ from . import loop_kernels as loop
 
 GOING, FINISHED, FULL, ENDLESS, TURNS, ASTRAY = -1, 0, 2, 4, 5, 6  # what follows a step; 0 to 4 as a call ends
 IDLE, WAIT, GO, STOP = range(4)  # what a lane does: STOP ends its step at a reversal
-# numbers of a lane beside those of the step
+NUMBERS = 24  # of a lane beside those of the step
 (MODE, MOTION, FRESH, TRIES, CAP, UNTIL, LONGEST, TURNED, WAY, LAYER, FADE, OUTPUT, MASS, PERIOD, ROUND, WORKED, LOST,
- RUBBED, POWER, STORED, DONE, REFUSED) = range(22)
+ RUBBED, POWER, STORED, DONE, REFUSED, STRIDE, CREEPS) = range(NUMBERS)
 EASY = 8.0  # share of the distance to the singularity of tanh in a step, over tolerance^(1/8)
 POLE = 2.5  # (pi/2)^2, its square from the real axis
 SHORTER, FASTER = 0.9, 8.0  # of the length at which the last terms make up the bound; most change of a step
@@ -141,10 +141,13 @@ def aimed(rows, own, lane):
     if room <= 0:
         return FINISHED
     change = rows[CHANGE + lane]
-    h = unit * (min(SHORTER * change, FASTER) if change > 1e-4 else 1e-4)
-    h = min(h, own[LONGEST], own[CAP])
-    if own[LAYER] > 0:
-        h = min(h, eased(rows, own, lane))
+    if own[CREEPS] > 0:
+        h = unit
+    else:
+        h = unit * (min(SHORTER * change, FASTER) if change > 1e-4 else 1e-4)
+        h = min(h, own[LONGEST], own[CAP])
+        if own[LAYER] > 0:
+            h = min(h, eased(rows, own, lane))
     h = room if h >= room * (1 - 1e-9) else h
     own[MODE], begin = GO, way * rows[V + lane]
     for _ in range(2):
@@ -172,7 +175,8 @@ def judged(rows, own, lane):
     """Whether the step in a lane is to be taken; else it is to be tried again, half as long."""
     back = own[MODE] == GO and own[WAY] * rows[VEND + lane] >= 0  # then it is so all the way
     least = own[WAY] * rows[LEAST + lane] if own[WAY] > 0 else own[WAY] * rows[MOST + lane]
-    if rows[DEFECT + lane] <= BEYOND and not (back and least < -still(rows, own, lane)):
+    holds = rows[DEFECT + lane] <= BEYOND or own[CREEPS] > 0  # which is judged by its polynomial
+    if holds and not (back and least < -still(rows, own, lane)):
         return True
     own[TRIES] += 1
     own[REFUSED] += 1

@@ -10,11 +10,12 @@ class Moving(NamedTuple):
 
     rows (5, n): omega, 2 zeta omega, slide, base, output; damping: (n, n) where it couples, else (0, 0). pieces (p, 6):
     of the drive, `waves.Wave`. num, mem of the law, turn (3,) as the law takes it. y (N,): state; work (26, N): slopes
-    of the 16 stages, extension of the step (8), sizes of the law's states, state after a step. now (15,): time [s],
+    of the 16 stages, extension of the step (8), sizes of the law's states, state after a step. now (16,): time [s],
     length of the next step and of the first after a reversal [s], slide at the start of the motion in this direction
     [m], energy lost to friction till then [J], largest coordinate [m] and rate [m/s] of late, rate of the fastest mode
     [1/s], 1 once it has begun and 2 where it was left at a reversal, piece of the drive for which the first slopes
-    stand, mass [kg], kind of the drive, its piece now, 1 where it moves the base, stiffness of the law [N/m].
+    stand, mass [kg], kind of the drive, its piece now, 1 where it moves the base, stiffness of the law [N/m],
+    length of the next step that creeps [s].
     """
 
     rows: np.ndarray

@@ -11,8 +11,9 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import INNER
 from . import polynomial_kernels as steps
 from . import watch_kernels as reading
+from .lane_step import TERMS
 
-TERMS = 17  # of acceleration and force over the share of the step: those of the series, and one that meets the end
+# TERMS of acceleration and force over the share of the step: those of the series, and one that meets the end
 BEGIN, WIDTH = TERMS, TERMS + 1  # of a row of room: the part of the step that it stands for
 FORCE, GAIN, FIRST = 0, 1, 2  # rows of room: coefficients, then the parts still to be looked at
 HALVINGS = 26  # of a step: a share of 1e-8, whose square is round-off

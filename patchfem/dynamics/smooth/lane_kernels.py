@@ -14,6 +14,7 @@ from ...compiled.inner import njit
 from ...compiled.series_kernels import sine
 from ...friction.flags_kernels import INNER, LEAN
 from ...friction.laws import stretch_kernels as law
+from . import creep_kernels as creep
 from . import crest_kernels as crests
 from . import lane_step as at
 from . import lane_step as stepping
@@ -27,6 +28,7 @@ from .aim_kernels import (
     ALLOWED,
     ASTRAY,
     CAP,
+    CREEPS,
     CREST,
     DAMP,
     DONE,
@@ -70,6 +72,7 @@ from .aim_kernels import (
     STIFF,
     STOP,
     STORED,
+    STRIDE,
     TRIES,
     TURNED,
     TURNS,
@@ -122,7 +125,7 @@ def laid(m, k, rows, own, lane):
     own[PERIOD], own[ROUND] = k.tally[watching.PERIOD], m.now[steps.PACE]
     own[LONGEST] = (NEARER if k.tally[watching.WANTED] > 0 else TURN) / m.now[steps.PACE]
     own[FADE], own[CAP], own[TRIES] = 1 / (loop.FORGET * own[PERIOD]), np.inf, 0
-    own[WORKED:REFUSED + 1] = 0.0
+    own[WORKED:REFUSED + 1], own[STRIDE], own[CREEPS] = 0.0, m.now[steps.STRIDE], 0.0
 
 
 @njit(error_model="numpy", **INNER)
@@ -130,7 +133,7 @@ def put_back(m, k, rows, own, lane):
     """Write what has become of a motion in a lane back to its Moving and Kept."""
     m.now[steps.TIME], m.y[0], m.y[1] = rows[T + lane], rows[Z + lane], rows[V + lane]
     m.now[steps.CREST], m.now[steps.CREST_SPEED] = rows[CREST + lane], rows[FAST + lane]
-    m.now[steps.STEP], m.now[steps.TURNED] = rows[UNIT + lane], own[TURNED]
+    m.now[steps.STEP], m.now[steps.TURNED], m.now[steps.STRIDE] = rows[UNIT + lane], own[TURNED], own[STRIDE]
     m.y[2] += own[WORKED]
     m.y[3] += own[LOST]
     m.y[4] += own[RUBBED]
@@ -138,7 +141,7 @@ def put_back(m, k, rows, own, lane):
     k.tally[watching.STORED] = max(k.tally[watching.STORED], own[STORED], watching.stored(m, m.y))
     k.tally[watching.DONE] += own[DONE]
     k.tally[watching.REFUSED] += own[REFUSED]
-    own[WORKED:REFUSED + 1] = 0.0
+    own[WORKED:REFUSED + 1], own[STRIDE], own[CREEPS] = 0.0, m.now[steps.STRIDE], 0.0
 
 
 @njit(error_model="numpy", **INNER)
@@ -276,44 +279,54 @@ def begun(many, kept, rows, own, lane, ahead, until, tolerance):
     own[MOTION], own[UNTIL], rows[ALLOWED + lane] = ahead, until[ahead], tolerance[ahead]
     m, k = one(many, kept, ahead)
     loop.sampled(m, k)
-    own[FRESH], own[MODE] = loop.went_on(m), GO
+    own[FRESH], own[MODE] = loop.went_on(m), WAIT
     laid(m, k, rows, own, lane)
 
 
+@njit(error_model="numpy", **INNER)
+def followed(many, kept, rows, own, lane, code, ahead, until, tolerance, codes):
+    """What comes after a step in a lane that has met `code`: the motion goes on, or the motion `ahead` takes its place.
+
+    Whoever is in the lane then waits for a series of its own; without another motion the lane is idle. Returns the
+    motion that is ahead now.
+    """
+    code, rows[H + lane] = gone_on(many, kept, rows, own, lane, code), 0.0
+    if code == GOING:
+        laid(*one(many, kept, int(own[MOTION])), rows, own, lane)
+        own[MODE] = WAIT
+        return ahead
+    codes[int(own[MOTION])] = code
+    if ahead == until.size:
+        own[MODE] = IDLE
+        return ahead
+    begun(many, kept, rows, own, lane, ahead, until, tolerance)
+    return ahead + 1
+
+
 @njit(error_model="numpy", cache=True, nogil=True, **LEAN)
-def advance(many, kept, rows, lanes, room, until, tolerance, codes):
+def advance(many, kept, rows, lanes, room, nodes, until, tolerance, codes):
     """Move n motions that have begun on to the times `until` (n,) [s]; codes (n,): how each ended, as `loop_kernels`.
 
     many, kept: as Moving and Kept with one more dimension of n in front, but for damping, work, room and table; rows
-    (SIZE,), lanes (LANES, 22), room (ROWS, TERMS + 2) of `crest_kernels`: to work in; tolerance (n,): of a step,
+    (SIZE,), lanes (LANES, NUMBERS), room (ROWS, TERMS + 2) of `crest_kernels`, nodes (ROOM, NODES) of `creep_kernels`:
+    to work in; tolerance (n,): of a step,
     relative. FULL: the room for reversals is used up, and the motion can go on from there. Returns the rounds.
     """
-    ahead, busy, rounds = 0, 0, 0
-    lanes[:, MODE] = IDLE
-    for lane in range(min(at.LANES, until.size)):
-        begun(many, kept, rows, lanes[lane], lane, ahead, until, tolerance)
-        ahead, busy = ahead + 1, busy + 1
+    ahead, rounds = min(at.LANES, until.size), 0
+    busy, lanes[:, MODE] = ahead, IDLE
+    for lane in range(ahead):
+        begun(many, kept, rows, lanes[lane], lane, lane, until, tolerance)
     while busy > 0:
         stepping.series(rows)
         for lane in range(at.LANES):
             own = lanes[lane]
             if own[MODE] == IDLE:
                 continue
+            own[CREEPS] = own[LAYER] > 0 and creep.crept(rows, own, lane, nodes)
             code = aimed(rows, own, lane)
-            if code == GOING:
-                continue
-            code = gone_on(many, kept, rows, own, lane, code)
-            if code == GOING:
-                laid(*one(many, kept, int(own[MOTION])), rows, own, lane)
-                own[MODE], rows[H + lane] = WAIT, 0.0
-                continue
-            codes[int(own[MOTION])] = code
-            own[MODE], rows[H + lane] = IDLE, 0.0
-            if ahead < until.size:
-                begun(many, kept, rows, own, lane, ahead, until, tolerance)
-                own[MODE], ahead = WAIT, ahead + 1
-            else:
-                busy -= 1
+            if code != GOING:
+                ahead = followed(many, kept, rows, own, lane, code, ahead, until, tolerance, codes)
+                busy -= own[MODE] == IDLE
         stepping.moved(rows)
         rounds += 1
         for lane in range(at.LANES):
@@ -321,17 +334,7 @@ def advance(many, kept, rows, lanes, room, until, tolerance, codes):
             if own[MODE] < GO:
                 continue
             code = taken(many, kept, rows, own, lane, room)
-            if code == GOING:
-                continue
-            code = gone_on(many, kept, rows, own, lane, code)
-            if code == GOING:
-                laid(*one(many, kept, int(own[MOTION])), rows, own, lane)
-                continue
-            codes[int(own[MOTION])] = code
-            own[MODE], rows[H + lane] = IDLE, 0.0
-            if ahead < until.size:
-                begun(many, kept, rows, own, lane, ahead, until, tolerance)
-                ahead += 1
-            else:
-                busy -= 1
+            if code != GOING:
+                ahead = followed(many, kept, rows, own, lane, code, ahead, until, tolerance, codes)
+                busy -= own[MODE] == IDLE
     return rounds

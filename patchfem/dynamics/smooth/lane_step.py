@@ -15,6 +15,7 @@ from ... import compiled
 
 LANES = 8  # motions side by side: doubles of the widest vectors
 ORDER = 16  # of the series of the speed: a power of two, for its root
+TERMS = ORDER + 1  # of a step seen as a polynomial in the share of it
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)  # for the energies that pass in a step
 # rows of the array: numbers of a motion
 GIVEN = ("stiff", "damp", "gain", "push", "steady", "pace", "phase", "slide", "origin", "n0", "n1", "n2", "n3",

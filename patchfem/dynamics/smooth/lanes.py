@@ -5,11 +5,13 @@ from functools import cache
 import numpy as np
 
 from ... import compiled
-from .crest_kernels import ROWS, TERMS
-from .lane_step import LANES, SIZE, step_of
+from .lane_step import LANES, SIZE, TERMS, step_of
 
 HERE = "dynamics.smooth"
-NUMBERS = 22  # of a lane
+# read off their texts, for the modules would bring the compiler into every run
+NUMBERS = compiled.kernels(f"{HERE}.aim_kernels").NUMBERS
+ROWS = compiled.kernels(f"{HERE}.crest_kernels").ROWS
+CREEP = compiled.kernels(f"{HERE}.creep_kernels")
 
 
 @cache
@@ -34,6 +36,7 @@ def lanes_of(law: str):
     polynomial = compiled.instance(f"{HERE}.polynomial_kernels", {"steps": parts["steps"]})
     reading = compiled.instance(f"{HERE}.watch_kernels", {"law": parts["law"], "steps": polynomial})
     own = {"stepping": step_of(parts["law"]), "polynomial": polynomial, "reading": reading}
+    own["creep"] = compiled.instance(f"{HERE}.creep_kernels", {"law": parts["law"]})
     own["crests"] = compiled.instance(f"{HERE}.crest_kernels", {"steps": polynomial, "reading": reading})
     return compiled.instance(f"{HERE}.lane_kernels", parts | own)
 
@@ -45,7 +48,8 @@ def advance(law: str, many, kept, until, tolerance) -> np.ndarray:
     tolerance (n,): of a step, relative. What kept asks for is read on the way.
     """
     codes = np.zeros(len(until), np.int64)
-    room = np.zeros(SIZE), np.zeros((LANES, NUMBERS)), np.zeros((ROWS, TERMS + 2))
+    room = (np.zeros(SIZE), np.zeros((LANES, NUMBERS)), np.zeros((ROWS, TERMS + 2)),
+            np.zeros((CREEP.ROOM, CREEP.NODES)))
     lanes_of(law).advance(many, kept, *room, until, tolerance, codes)
     return codes
 

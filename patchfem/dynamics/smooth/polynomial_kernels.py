@@ -7,11 +7,11 @@ hold no slope at an end of the step.
 from ...compiled.inner import njit
 from ...friction.flags_kernels import INNER
 from . import step_kernels as steps
+from .lane_step import TERMS
 
 TIME, ORIGIN, MASS, MOVES, PIECE = steps.TIME, steps.ORIGIN, steps.MASS, steps.MOVES, steps.PIECE
 OMEGA, OUTPUT, TRIAL = steps.OMEGA, steps.OUTPUT, steps.TRIAL
 push, slide_of, slope = steps.push, steps.slide_of, steps.slope
-POWERS = 17  # of the share of the step, without the constant
 
 
 @njit(error_model="numpy", **INNER)
@@ -28,7 +28,7 @@ def between(m, share, out, size):
         if c >= size:
             break
         value = 0.0
-        for power in range(POWERS, 0, -1):
+        for power in range(TERMS, 0, -1):
             value = (value + m.work[row(power), c]) * share
         out[c] = m.y[c] + value
     if size > 2:
@@ -40,7 +40,7 @@ def meant(m, out, size):
     """Write the mean of coordinate and rate over the whole step into out; size: not used."""
     for c in range(2):
         out[c] = m.y[c]
-        for power in range(POWERS, 0, -1):
+        for power in range(TERMS, 0, -1):
             out[c] += m.work[row(power), c] / (power + 1)
 
 

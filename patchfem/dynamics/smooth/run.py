@@ -22,7 +22,7 @@ CLOSER = 0.01  # of the tolerance, that of the last cycles, which are read betwe
 TAIL = 8  # windows whose phasors are kept: a steady amplitude takes five (`response.settling.steady_amplitudes`)
 FIRST = 1e-3  # length of the first step over the shortest time of the rig
 # of Moving.now
-TIME, STEP, TURNED, PACE, STOOD, MASS, KIND, PIECE, MOVES, STIFF = 0, 1, 2, 7, *range(9, 15)
+TIME, STEP, TURNED, PACE, STOOD, MASS, KIND, PIECE, MOVES, STIFF, STRIDE = 0, 1, 2, 7, *range(9, 16)
 # of Kept.tally
 ACCELERATION, FORCE, SLIP, SLIP_LEAST, OUTPUT, OUTPUT_LEAST = range(6)
 WAVES, POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, WANTED, PERIOD = 6, *range(10, 19)
@@ -73,8 +73,8 @@ def started(modes: ModalBasis, drive, wave, element, cycles: float, start=None) 
     if start is not None:
         state[:n], state[n:2 * n] = start.z, start.v
     pace = max(float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)), 2 * np.pi / drive.period)
-    now, tally, work = np.zeros(15), np.zeros(32), np.zeros((26, size))
-    now[[STEP, TURNED, PACE, MASS]] = FIRST / pace, FIRST / pace, pace, modes.mass
+    now, tally, work = np.zeros(16), np.zeros(32), np.zeros((26, size))
+    now[[STEP, TURNED, STRIDE, PACE, MASS]] = FIRST / pace, FIRST / pace, FIRST / pace, pace, modes.mass
     now[STIFF] = element.limit / element.length if element.length else 0.0
     now[[KIND, MOVES]], tally[PERIOD] = (wave.kind, drive.moving), drive.period
     work[24, 2 * n:-3] = element.sizes

@@ -12,10 +12,11 @@ import numpy as np
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, INNER
 from ...friction.laws import stretch_kernels as law
-from .tableau_kernels import BEFORE, FIFTH, INSIDE, PLACES, SHARES, STAGES, THIRD
+from ..tableau_kernels import BEFORE, FIFTH, INSIDE, PLACES, SHARES, STAGES, THIRD
 
 # of now
-TIME, STEP, TURNED, ORIGIN, LEFT, CREST, CREST_SPEED, PACE, BEGUN, STOOD, MASS, KIND, PIECE, MOVES, STIFF = range(15)
+(TIME, STEP, TURNED, ORIGIN, LEFT, CREST, CREST_SPEED, PACE, BEGUN, STOOD, MASS, KIND, PIECE, MOVES, STIFF,
+ STRIDE) = range(16)
 OMEGA, DAMP, SLIDE, BASE, OUTPUT = range(5)  # of Moving.rows
 MEANS = np.array([1 / 2, 1 / 6, 1 / 12, 1 / 30, 1 / 60, 1 / 140, 1 / 280])  # of s, s (1 - s), s^2 (1 - s), ...
 EXTENSION, SIZES, TRIAL = 16, 24, 25  # of Moving.work, whose first rows are the slopes

@@ -1,0 +1,64 @@
+"""What is read off the samples of one cycle of a march: those worth keeping, extremes, the part at its frequency."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from ..core import STICK
+
+SIGNS = np.array([[1.0], [-1.0]])  # of the root of a square
+MOST_TURNS = 100  # samples of a cycle that are kept outside the last ones
+
+
+def thinned(rows, run) -> np.ndarray:
+    """Numbers of the samples of a cycle worth keeping: its first, every reversal of the output and of a slide, every
+    stop and release (slip speed below or above 1e-2 of its peak in the cycle)."""
+    n, output = run.modes.omega.size, run.modes.output
+    speeds, slips = run.watched(rows)
+    speeds = np.concatenate([speeds.T, (rows[:, n:2 * n] @ output)[None]])
+    low = 1e-13 * max(speeds.max(), -speeds.min())
+    way = (speeds > low).view(np.int8) - (speeds < -low).view(np.int8)
+    moved = np.abs(slips.T[:, 1:] - slips.T[:, :-1])
+    low = 1e-13 * np.abs(rows[:, :n] @ output).max()
+    slipping = moved > np.maximum(STICK * moved.max(axis=1), low)[:, None]
+    kept = (way[:, 1:] != way[:, :-1]).any(axis=0)
+    kept[1:] |= (slipping[:, 1:] != slipping[:, :-1]).any(axis=0)
+    kept[0] = True
+    return np.flatnonzero(kept)[:MOST_TURNS]
+
+
+def extremes_of(rows, modes, dt) -> tuple:
+    """(smallest, largest) output of a cycle, found between the samples by the cubic through values and rates."""
+    n = modes.omega.size
+    y, v = rows[:, :n] @ modes.output, rows[:, n:2 * n] @ modes.output
+    return hermite_extremes(y, v, dt)
+
+
+def phasor(rows, modes, first: int, around: int) -> complex:
+    """Drive-frequency part of the output over a cycle of samples that begins at step number `first`."""
+    y = rows[:-1, :modes.omega.size] @ modes.output
+    return complex(2 * (y @ _carrier(first % around, y.size, around)) / y.size) if y.size else 0j
+
+
+@lru_cache(maxsize=4)
+def _carrier(first: int, count: int, around: int) -> np.ndarray:
+    """exp(-i phase) of samples from number `first` on, `around` of them in a cycle."""
+    return np.exp(-2j * np.pi * (first + np.arange(count)) / around)
+
+
+def hermite_extremes(y, v, dt) -> tuple:
+    """Smallest and largest value of the piecewise cubic through values y (k,) with rates v (k,) at spacing dt [s]."""
+    low, high = float(y.min()), float(y.max())
+    at = np.flatnonzero(v[:-1] * v[1:] < 0)
+    if at.size:
+        a, b, p, q = y[at], y[at + 1], v[at] * dt, v[at + 1] * dt
+        # derivative 3 s^2 A + 2 s B + p of a + p s + B s^2 + A s^3
+        big, mid = 2 * (a - b) + p + q, 3 * (b - a) - 2 * p - q
+        root = np.sqrt(np.maximum(mid**2 - 3 * big * p, 0))
+        denominator = mid + SIGNS * root
+        there = denominator != 0
+        s = np.where(there, -p / np.where(there, denominator, 1), -1.0)
+        value = (a + p * s + mid * s**2 + big * s**3)[(s >= 0) & (s <= 1)]
+        if value.size:
+            low, high = min(low, float(value.min())), max(high, float(value.max()))
+    return low, high
