@@ -87,9 +87,9 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None, beside: Beside = N
 
     try:
         found, step_error = _refined(bench, residual, everything, say)
-    except NotConverged:
+    except NotConverged as error:
         if bench.made == 0:
-            raise bench.refused from None
+            raise bench.refused or error from None
         raise
     model = bench(found.values)
     miss = model - loop.reading

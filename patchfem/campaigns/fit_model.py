@@ -56,10 +56,18 @@ class BenchModel:
         """Reading (k,) at the rows; PatchfemError where the values make no scene."""
         count = len(self.wanted)
         beside = dict(zip(self.offsets, values[count:]))
-        model = build(self.scene_at(values[:count]))
+        model = self._model(self.scene_at(values[:count]))
         self.made += 1
         with placed(model.source):
             return self._reading(model, beside.get("displacement", 0.0)) + beside.get("force", 0.0)
+
+    def _model(self, scene: Scene) -> Model:
+        try:
+            with placed(scene):
+                return build(scene)
+        except PatchfemError as error:  # a file of the scene is read here; no other value of the free keys mends it
+            self.refused = self.refused or error
+            raise
 
     def _reading(self, model: Model, offset: float) -> np.ndarray:
         patch = self._patch(model)

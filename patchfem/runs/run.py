@@ -86,7 +86,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         except NotConverged as error:
             if patch is not None and what.kind != "patch":
                 at_rest = of_patch.static(what, patch, coarse, seconds, [*warnings, AT_REST])
-                error.so_far = _whole(replace(at_rest, outcome=Outcome.NOT_CONVERGED), notes, begin)
+                error.so_far = _whole(replace(at_rest, outcome=Outcome.NOT_CONVERGED), notes, begin, coarse)
             raise
         if patch is not None and what.kind != "patch":
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
@@ -95,14 +95,14 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             from .wear.measures import worn
 
             result = replace(worn(result, evolved, estimate), plan=what)
-    return _whole(result, notes, begin)
+    return _whole(result, notes, begin, coarse)
 
 
-def _whole(result: Result, notes: list, begin: float) -> Result:
+def _whole(result: Result, notes: list, begin: float, coarse=()) -> Result:
     """The result with its time since `begin`, its notes, and words that name no folder."""
     result.seconds["total"], model = perf_counter() - begin, result.plan.model
     apart = "strip" if model.patch is not None else "interface"
-    warned, noted = result.warnings + loose(result), [*notes, *result.extra.get("notes", [])]
+    warned, noted = result.warnings + loose(result, coarse), [*notes, *result.extra.get("notes", [])]
     return replace(result, measures=worded(result.measures, apart), warnings=placeless(warned, model.source.path),
                    extra=result.extra | {"notes": placeless(noted, model.source.path)})
 

@@ -8,6 +8,7 @@ from math import prod
 from pathlib import Path
 
 from ...scene.axes import Axis, read
+from ...scene.lines import pieces_of
 from ...scene.scene import SceneError, text_of
 from .asked import Asked
 from .cases import Cases, product
@@ -33,9 +34,15 @@ class Request:
 
 
 def asked_of(path: Path, sets: Sequence[str], request: Request) -> tuple[Asked, Cases]:
-    """The scene in a file and its cases; SceneError as `cases_of`."""
+    """The scene in a file and its cases; SceneError as `cases_of`, and where a key is set for all cases and swept."""
     asked = Asked(Path(path), text_of(path), tuple(sets))
-    return asked, cases_of(asked, request)
+    cases = cases_of(asked, request)
+    swept = {asked.place(axis.key): axis.key for axis in cases.axes}
+    both = [(one, swept.get(asked.place(".".join(pieces_of(one.partition("=")[0]))))) for one in sets]
+    if any(key for _, key in both):
+        raise SceneError([f"--set {one}: {key} is swept, so every case has a value of its own; leave --set out, or the "
+                          "key out of the sweep" for one, key in both if key])
+    return asked, cases
 
 
 def cases_of(asked: Asked, request: Request) -> Cases:

@@ -29,9 +29,10 @@ def estimate(asked: Asked, cases: Cases) -> dict:
     if not plans:
         raise wrong
     alone = [max(one.seconds - ONCE, TOGETHER) for one in plans]
-    shared = [taken(one.model) is not None for one in plans]  # the first of them costs as a single run
-    each = sum(TOGETHER if in_batch else one for one, in_batch in zip(alone, shared)) / len(plans)
-    once = ONCE + max(one * in_batch for one, in_batch in zip(alone, shared))
+    batches = [taken(one.model) for one in plans]
+    each = sum(one if batch is None else max(TOGETHER, batch.share * one) for one, batch in zip(alone, batches))
+    each /= len(plans)
+    once = ONCE + max(one * (batch is not None) for one, batch in zip(alone, batches))  # the first as a single run
     return plans[0].as_json() | {"seconds": round(once + each * len(cases), 2), "seconds_per_case": round(each, 4),
                             "bytes": max(one.bytes for one in plans), "disk_bytes": DISK * len(cases),
                             "cases": len(cases),

@@ -1,4 +1,5 @@
-"""A rigid slide of a law without memory, in closed form: a pressure that rides on the upper piece, a constant load.
+"""A rigid slide of a law without memory, in closed form: a pressure that rides on the upper piece, a constant load,
+over grooves one that swings too.
 
 In every step such a law carries a share of its limit, and the limit is that of the way it slides.
 """
@@ -75,10 +76,10 @@ def climbed(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     if law.holds and not varies:
         own = load[0] * grooves.lost(slide[:-1], slide[1:], law.kinetic)
     else:
-        own = _over_steps(load, slide, move, lambda q: _own(grooves, q, share(q, pace)))
+        own = over_steps(load, slide, move, lambda q: _own(grooves, q, share(q, pace)))
     height = load[0] * grooves.height(slide)
     if varies:
-        height = height[0] + np.append(0.0, np.cumsum(_over_steps(load, slide, move, grooves.slope)))
+        height = height[0] + np.append(0.0, np.cumsum(over_steps(load, slide, move, grooves.slope)))
     rise = np.diff(height) if varies else load[0] * grooves.rise(slide[:-1], slide[1:])
     for k, side in ends_of_rest(model, slide).items():
         ratio[k] = grooves.ratio(slide[k], side, f.static)
@@ -86,7 +87,7 @@ def climbed(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     watch.tell(1.0)
     return Slid(load * ratio, load, slide.copy(), ledger_of(np.append(0.0, np.cumsum(rise + own)), height,
                 np.stack([np.zeros(slide.size), np.append(0.0, own)], axis=1)), at,
-                (load[at] / load[0] * ratio[at] if varies else ratio[at])[:, None] * sigma,
+                (load[at] / model.point.load * ratio[at] if varies else ratio[at])[:, None] * sigma,
                 np.repeat(slide[at, None], sigma.size, axis=1))
 
 
@@ -102,7 +103,7 @@ def _own(grooves, q, phi):
     return phi * (1 + t**2) / (1 - phi * t)
 
 
-def _over_steps(load, slide, move, part) -> np.ndarray:
+def over_steps(load, slide, move, part) -> np.ndarray:
     """int N part(q) dq [J] of every step of the slide (k,) [m], move (k - 1,) [m], under a load (k,) [N] that changes
     evenly in it; part: function of slides (k - 1,) [m]."""
     out = np.zeros_like(move)

@@ -20,6 +20,7 @@ OTHER = 4.0  # time of condensing a grid that is not a tensor grid over that of 
 LEAST_LEVELS = 3  # nested meshes that show an order
 FINE = 1e-3  # tolerance that bilinear meshes meet cheaply
 HELPED = 3.0  # times nearer to the tolerance, from which cells of order 4 end the climb even if they miss it
+MOST_DECADES = 6  # below a tolerance, in which another is looked for
 SPENT = {True: 3.0, False: 0.4}  # predicted seconds of the finest mesh: of a static patch, of one that moves
 
 
@@ -131,6 +132,26 @@ def climbed(asked, tolerance: float, estimate: bool = True, fresh: bool = False)
                 return tuple(out)
         if dear > SPENT[asked.still] or met(found, tolerance):
             return tuple(out)
+
+
+def climbs_at(asked, patches, tolerance: float) -> float | None:
+    """The loosest tenth, hundredth, ... of a tolerance for which a patch climbs beyond its finest mesh.
+
+    patches: as `climbed` returns them for that tolerance. None where the next mesh is dear, or no tolerance asks for
+    it: then the ladder has ended for good.
+    """
+    if seconds_of([finer(grid) for grid in _grids(patches[0])]) > SPENT[asked.still]:
+        return None
+    known = [one for one in patches if one is not None]
+    shares = (10.0**-k for k in range(1, MOST_DECADES + 1))
+    return next((share * tolerance for share in shares
+                 if not met(measures(*known, tolerance=share * tolerance), share * tolerance)), None)
+
+
+def _grids(patch) -> tuple:
+    """The bodies that a patch is pressed on, one where its pieces are alike."""
+    pair = patch.pair
+    return (pair.grid,) if pair.upper is pair.piece else (pair.grid, pair.upper_grid)
 
 
 def _enough(patches: list, tolerance: float, sharp: dict) -> bool:

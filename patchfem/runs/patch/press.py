@@ -13,7 +13,7 @@ from .condensed import Pair, condensed
 RIPPLE = 1e-2  # expected ripple of the pressure on pieces whose nodes do not match, from which it is said
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, weakref_slot=True)
 class Patch:
     """A solved patch; forces, areas and stiffnesses are of all pairs together.
 

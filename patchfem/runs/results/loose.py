@@ -10,10 +10,17 @@ TIGHTER = 0.1  # times the tolerance: a mesh of at least one halving more
 MOST_HALVINGS = 4  # of the steps, as far ahead as an order seen at two of them is trusted
 LEAST_LEFT = 0.2  # share of an allowed error that steps may be asked to meet, where the mesh takes more than the rest
 LEAST_ELEMENTS = 1e-4  # of the length, an element that is still proposed
+# what a run answers first, named before what misses its tolerance by more
+FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_ratio_peak",
+         "pressure_peak", "contact_fraction")
 
 
-def loose(result) -> list:
-    """A warning for the mesh and one for the motion, each with the measure that misses the tolerance most."""
+def loose(result, coarse=()) -> list:
+    """A warning for the mesh and one for the motion, each with the measures that miss the tolerance and the cure.
+
+    Where any that a run answers first, FIRST, do so, these are named and the worst of them is cured. coarse:
+    the patch of the result on the coarser meshes of its ladder, where they are at hand.
+    """
     model = result.plan.model
     tolerance = model.accuracy.tolerance
     wide = {name: min(m.error / max(tolerance * abs(m.value) + m.floor, 1e-300), MOST)
@@ -22,25 +29,38 @@ def loose(result) -> list:
     pressed = TABLE if result.patch is not None else ()
     static = {name: times for name, times in wide.items() if name in pressed}
     moving = {name: times for name, times in wide.items() if name not in pressed}
-    worst = max(static, key=static.get, default="")
-    out = [_said(result, static, _finer_mesh(result, worst, static[worst]))] if static else []
-    worst = max(moving, key=moving.get, default="")
-    return [*out, _said(result, moving, _finer_motion(result, worst, moving[worst]))] if moving else out
+    out = [_said(result, static, _finer_mesh(result, static, coarse))] if static else []
+    return [*out, _said(result, moving, _finer_motion(result, moving, coarse))] if moving else out
+
+
+def _first(result, wide: dict) -> list:
+    """Those of FIRST among `wide` (name -> error over what is allowed) that are not 0 within it, else the worst."""
+    known = result.measures
+    out = [name for name in FIRST if name in wide and known[name].error < abs(known[name].value)]
+    return out or [max(wide, key=wide.get)]
 
 
 def _said(result, wide: dict, remedy: str) -> str:
-    """The worst of the measures `wide` (name -> error over what is allowed), and how many others there are."""
-    name = max(wide, key=wide.get)
-    found, tolerance = result.measures[name], result.plan.model.accuracy.tolerance
-    known = f"to {abs(found.error / found.value):.2g} of its value" if abs(found.error) < abs(found.value) else \
-        f"no better than {found}"
-    others = f" ({len(wide) - 1} other measure{'s' * (len(wide) > 2)} beside it)" if len(wide) > 1 else ""
-    return f"{name} is known {known}, the tolerance is {tolerance:g}{others}; {remedy}"
+    """The measures that speak for `wide` (name -> error over what is allowed), and how many others there are."""
+    tolerance, names = result.plan.model.accuracy.tolerance, _first(result, wide)
+    known, left = [_known(result.measures[name]) for name in names], len(wide) - len(names)
+    more = "".join(f", {name} {one}" for name, one in zip(names[1:], known[1:], strict=True))
+    others = f" ({left} other measure{'s' * (left > 1)} beside {'it' if len(names) == 1 else 'them'})" if left else ""
+    return f"{names[0]} is known {known[0]}{more}, the tolerance is {tolerance:g}{others}; {remedy}"
 
 
-def _finer_mesh(result, name: str, times: float) -> str:
-    """What cures the errors of a mesh that are `times` as large as allowed, most of the measure `name`."""
+def _known(found) -> str:
+    share = abs(found.error) < abs(found.value)
+    return f"to {abs(found.error / found.value):.2g} of its value" if share else f"no better than {found}"
+
+
+def _finer_mesh(result, wide: dict, coarse) -> str:
+    """What cures the errors of a mesh in the measures `wide` (name -> error over what is allowed).
+
+    A tighter tolerance only where a ladder of meshes climbs further for it; a looser one where it is met by all.
+    """
     asked, tolerance = result.plan.model.patch, result.plan.model.accuracy.tolerance
+    times = max(wide.values())
     if asked.mesh is not None:
         return "split the elements of contact.mesh"
     if not asked.chosen:
@@ -50,19 +70,38 @@ def _finer_mesh(result, name: str, times: float) -> str:
     if asked.strips is not None:  # strips leave an error of second order, as the mesh does
         return f"the mesh ({nodes} interface nodes) and the strips share it; set contact.strips.count = " \
                f"{ceil(asked.strips[0] * times**0.5)}, or {wider}"
-    if name not in DECISIVE:
-        return f"the mesh ({nodes} interface nodes) was not chosen for it; {_tighter(tolerance)}"
-    return f"a mesh finer than {nodes} interface nodes would take too long; {wider}"
+    if not wide.keys() - set(DECISIVE):
+        return f"a mesh finer than {nodes} interface nodes would take too long; {wider}"
+    tighter = _climbing(result, coarse)
+    if tighter is None:
+        return f"a mesh finer than {nodes} interface nodes would take too long; read " \
+               f"{'them by their errors' if len(wide) > 1 else 'it by its error'}"
+    return f"the mesh ({nodes} interface nodes) was not chosen for it; accuracy.tolerance = {tighter:.3g} refines it"
 
 
-def _finer_motion(result, name: str, times: float) -> str:
-    """What cures the errors of a motion that are `times` as large as allowed, most of the measure `name`.
+def _climbing(result, coarse) -> float | None:
+    """The tolerance for which the ladder of a patch climbs further; None where it has ended for good.
+
+    Where its coarser meshes are not at hand it is one of at least one halving more.
+    """
+    asked, tolerance = result.plan.model.patch, result.plan.model.accuracy.tolerance
+    if not any(coarse) or asked.meshes is not None:
+        return TIGHTER * tolerance
+    from ..patch.ladder import climbs_at
+
+    return climbs_at(asked, [result.patch, *coarse], asked.mesh_tolerance or tolerance)
+
+
+def _finer_motion(result, wide: dict, coarse) -> str:
+    """What cures the errors of a motion in the measure that speaks for `wide` (name -> error over what is allowed).
 
     Steps where they leave most of it open and it was seen to fall with them, by as many as its order asks for; the mesh
     where that leaves it open. A looser tolerance is met only where it chooses nothing: with a patch it chooses a
     coarser mesh.
     """
     extra, tolerance = result.extra, result.plan.model.accuracy.tolerance
+    name = max(_first(result, wide), key=wide.get)
+    times = wide[name]
     if extra.get("engine") == "harmonic" and extra.get("map") != "march":
         return "raise accuracy.harmonics"
     if name in (rings := extra.get("still_rings", {})):
@@ -72,30 +111,48 @@ def _finer_motion(result, name: str, times: float) -> str:
     if steps is not None and of_steps >= rest:
         order = left["orders"].get(name) if left else 2.0
         if order is None:
-            return f"its change did not fall from {int(steps) // 4} to {int(steps)} steps per cycle, so more steps " \
-                   f"are not known to cure it; {_stepless(result.plan.model) or 'read it by its error'}"
+            return _unproven(result.plan.model, int(steps), name, wide)
         allowed = (of_steps + rest) / times
         share = of_steps / max(allowed - rest, LEAST_LEFT * allowed)  # by which that of the steps is to fall
         halvings = max(1, ceil(log2(share) / order))
         exact = _stepless(result.plan.model) if halvings > MOST_HALVINGS else ""
         return exact or f"set accuracy.steps_per_cycle = {int(steps) * 2**halvings}"
     if result.patch is not None:
-        return _finer_under(result, tolerance)
-    return f"accuracy.tolerance = {_up(tolerance * times):g} would be met" if steps is None else _tighter(tolerance)
+        return _finer_under(result, coarse)
+    if steps is None:
+        return f"accuracy.tolerance = {_up(tolerance * times):g} would be met"
+    return f"accuracy.tolerance = {TIGHTER * tolerance:.3g} refines it"
 
 
-def _finer_under(result, tolerance: float) -> str:
+def _unproven(model, steps: int, name: str, wide: dict) -> str:
+    """What helps where the changes of the measure `name` do not fall with the steps: none, or as many as are chosen.
+
+    Steps that are left out are doubled until the displacement is met.
+    """
+    from ..effort import MOST_STEPS
+
+    seen = f"the change of {name} did not fall from {steps // 4} to {steps} steps per cycle"
+    if exact := _stepless(model):
+        return f"{seen}, so more steps are not known to cure it; {exact}"
+    if model.kind == "rig" and model.accuracy.steps_per_cycle is not None and 2 * steps <= MOST_STEPS and \
+            "relative_displacement_amplitude" in wide:
+        return f"{seen}; leave out accuracy.steps_per_cycle, and they are doubled until the displacement meets the " \
+               "tolerance"
+    return f"{seen}, so more steps are not known to cure it; read it by its error"
+
+
+def _finer_under(result, coarse) -> str:
     """What refines the mesh that leaves a motion open."""
     asked, nodes = result.plan.model.patch, result.patch.x.size
     if asked.mesh is not None:
         return "the mesh leaves it open; split the elements of contact.mesh"
     if not asked.chosen:
         return "the mesh leaves it open; leave out contact.element_size, or make it smaller"
-    return f"the mesh ({nodes} interface nodes) leaves it open; {_tighter(tolerance)}"
-
-
-def _tighter(tolerance: float) -> str:
-    return f"accuracy.tolerance = {TIGHTER * tolerance:.3g} refines it"
+    tighter = _climbing(result, coarse)
+    if tighter is None:
+        return f"the mesh ({nodes} interface nodes) leaves it open, and a finer one would take too long; read it by " \
+               "its error"
+    return f"the mesh ({nodes} interface nodes) leaves it open; accuracy.tolerance = {tighter:.3g} refines it"
 
 
 def _stepless(model) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from ...core import Outcome
 from ...dynamics.comparison import point_laws
 from ...dynamics.comparison.point_laws import Coulomb
-from ...dynamics.march.march import hermite_extremes
+from ...dynamics.cycles import hermite_extremes
 from ...dynamics.march.models import load_kernels
 from ...dynamics.second_book import gap, sampled_work
 from ...effects import has, module_of

@@ -1,6 +1,7 @@
 """From the law, the load and the pressed patch to the contact that a march moves."""
 
 from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -121,9 +122,20 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
     if found.engine != "recursion":
         return models.list_model(law, limit, found.reach(law.order), found.merge)
     if model.soft:
-        reduced = shear_of(patch, law, numerics.shear_modes, model.accuracy.tolerance)
+        reduced = _shear_modes(patch, law, numerics.shear_modes, model.accuracy.tolerance)
         return models.points_model(law, patch.pieces.interface.weight, patch.pressure.sigma_n, reduced)
     if numerics.per_point:
         x, weight, sigma = patch.x, patch.pieces.interface.weight, patch.pressure.sigma_n
         return models.points_model(law, weight, sigma, None, (x, sigma) if model.side == "lower" else None)
     return models.points_model(law, [1.0], [load])
+
+
+def _shear_modes(patch, law, count: int | None, tolerance: float):
+    """`shear_of`, made once for all marches of a pressed patch."""
+    made = _MADE.setdefault(patch, {})
+    if (law, count, tolerance) not in made:
+        made[law, count, tolerance] = shear_of(patch, law, count, tolerance)
+    return made[law, count, tolerance]
+
+
+_MADE = WeakKeyDictionary()  # Patch -> shear modes by what they are made of, for as long as it lives

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 from ...core import Measure
-from ...response.errors import step_error
 from ...response.levels import JUMP, KEPT, Level, bracket, hysteresis, jump, no_onset, past_onset
 from ...response.rows import TABLE
 
@@ -29,13 +28,23 @@ def row(size: float, found: dict, held: float | None) -> Level:
     return Level(size, held is not None and found["slip_amplitude"] < held, kept, {})
 
 
-def with_errors(fine, half, quarter, steps: int) -> tuple:
-    """The levels with the error of the time step, from runs at `steps`, half and a quarter of them per cycle.
+def with_errors(levels, rungs, made: dict) -> tuple:
+    """The levels with what the Rungs of their run leave open at each of them, over what is a level's own.
 
-    The rule is that of `response.errors.step_error`.
+    made: variant -> Solution of the runs that the rungs take. What a coarser run does not reach is as uncertain as it
+    is large.
     """
-    return tuple(replace(a, errors=step_error(a.values, b.values, c.values, steps))
-                 for a, b, c in zip(fine, half, quarter))
+    def seen(variant, number: int) -> dict:
+        found = made[variant].levels
+        return found[number].values if number < len(found) else {}
+
+    def open_at(number: int, level: Level) -> dict:
+        parts = [rung.rule(level.values if rung.beside is None else seen(rung.beside, number),
+                           *(seen(one, number) for one in rung.runs)) for rung in rungs]
+        return {name: level.errors.get(name, 0.0) + sum(part.get(name, abs(value)) for part in parts)
+                for name, value in level.values.items()}
+
+    return tuple(replace(level, errors=open_at(number, level)) for number, level in enumerate(levels))
 
 
 def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
@@ -43,15 +52,19 @@ def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
 
     probe(number of the level before or -1, level) -> Level runs one more level from the state that it left; past(Level)
     -> bool, of slip unless given, as `response.levels.past_onset` makes it.
+
+    The halving goes on until the bracket is `tolerance` of the level, or of the first one beyond where all down to
+    nought are: a law under which every level is past the onset (bonds that chatter) has none to be found.
     """
     past = past_onset("slip") if past is None else past
     found = bracket(levels, past)
     if found is None:
         return None
     before, first = found
-    low, high = levels[before].drive if before >= 0 else 0.0, levels[first].drive
+    first = levels[first]
+    low, high = levels[before].drive if before >= 0 else 0.0, first.drive
     for _ in range(MOST):
-        if high - low <= tolerance * high:
+        if high - low <= tolerance * (high if low else first.drive):
             break
         middle = (low + high) / 2
         if past(probe(before, middle)):
@@ -66,18 +79,20 @@ def drive_with(drive, number: int, level: float):
     return replace(drive, segments=(*drive.segments[:number], replace(drive.segments[number], amplitude=level)))
 
 
-def measures(rig, levels, probe, tolerance: float, rubs: bool, halved=None) -> dict:
+def measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=()) -> dict:
     """Measures over all levels: onset_level, jump_level, level_hysteresis, with a reason where they have no value.
 
-    rig: model.rig, with the kind of onset; probe as in `onset`; rubs: whether an interface bears a load; halved: the
-    Solution at half the steps, None where nothing hangs on steps.
+    rig: model.rig, with the kind of onset; probe as in `onset`; rubs: whether an interface bears a load; coarser: as in
+    Solution; by the distance of the onsets of each pair that of the run may be off.
     """
     unit, size, out = _unit(rig), _size(rig), {}
     past = past_onset(*rig.onset)
     lowest = onset(levels, probe, tolerance, past) if rubs else None
     if lowest is not None:
-        other = onset(halved.levels, halved.probe, tolerance, past) if halved is not None else lowest
-        apart = abs(lowest[0] - other[0]) if other is not None else lowest[0]
+        apart = 0.0
+        for pair in coarser:
+            ends = [lowest if one is None else onset(one.levels, one.probe, tolerance, past) for one in pair]
+            apart += lowest[0] if None in ends else abs(ends[0][0] - ends[1][0])
         out["onset_level"] = Measure(size * lowest[0], unit, size * (lowest[1] + apart), 1e-9)
     elif rubs:
         out["onset_level"] = Measure(None, unit, None, TABLE["onset_level"].floor, reason=no_onset(*rig.onset))

@@ -1,7 +1,7 @@
 """Numerical choices of a coupled run: engine, steps per cycle, shear modes, quadrature, and what they would cost."""
 
 from dataclasses import dataclass, replace
-from math import ceil, log2, pi, sqrt
+from math import ceil, inf, log2, pi, sqrt
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from ...effects import has
 from ...friction.bonds.list_numbers import AGED, SHARES, form_of
 from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
-from ...structure.drive_sizes import largest, omega_of, sinusoidal
+from ...structure.drive_sizes import fastest, largest, omega_of, sinusoidal
 from ..effort import steps_per_cycle
 from .engines import COMPARED, engine_of
 from .pieces.costs import pairs_of
@@ -18,12 +18,19 @@ from .pieces.costs import pairs_of
 COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
 DECAYED = 1e-2  # share of the first stroke of a motion that is released, by which its bonds are summed
 HELD = 1e-4  # share of the drive's stroke that a block makes which the printed law holds (measured: 1e-2 to 1e-4)
-# seconds of a step of it per strip: each of 10 to 50 trial increments splits each strip at u = 0
-HELD_STEP = {SHARES: 5e-7, AGED: 1.5e-6}
-HELD_ANY = 7e-6  # the same of constant length with an order other than 0, 1, 2
+# seconds of a step of it per step before: half of them leave a strip, and each of 4 to 30 trial increments splits each
+# strip at u = 0; half as many of them in 2000 steps and more as in some hundred (measured: 3e-8 to 4e-7, 1e-6 to 1e-5)
+HELD_STEP = {SHARES: 8e-8, AGED: 1.5e-6}
+HELD_ANY = 2e-6  # the same of constant length with an order other than 0, 1, 2
+# and of a released block that stalls: 10 to 50 trial increments where it turns back in every step (measured: 14 s of
+# 2784 steps, 14 s more of four runs with a half and a quarter of them)
+STALLED_STEP = 4e-6
+# and of growing bonds that hold the block, but not fast: it turns back with its drive alone, in 2 or 3 trial increments
+LEANING_STEP = 2e-7
 FAST = 2.0  # D from which a block is held fast: 0.6 and more strips per step, against 0.06 at 1.06 and 0.28 at 1.4
 TURNING = 0.1  # strokes per step from which they are those of the steps
 MOST_CROWDED = 500  # strips of its list, about one per step, from which steps are not halved again: four times the cost
+MOVES, MOST_HALVINGS = 1e-3, 2  # bond lengths of slip from which a block moves; of the steps that were seen: 0 to 3
 MOST_SWING = 2.0  # radians of the block on its bonds in a step
 LEAST_KEPT = 100  # samples of a run that has no cycles
 
@@ -113,23 +120,55 @@ def unique_steps(model: Model) -> int:
 def quadrature_of(model: Model, numerics: Numerics):
     """How the bonds of a nonlocal law are summed, as a Choice of `friction.bonds.engines`.
 
-    The stroke is taken as four times the amplitude that the drive's speed over its frequency gives. That of a motion
-    which is released shrinks, and a list of all its bonds would outgrow any room: it is taken as DECAYED times that of
-    its start. That of a block which the printed law holds is HELD times what the drive would give.
+    The stroke is taken as four times the amplitude that the drive's speed over its frequency gives, or that the bonds
+    of a block give which they hold. That of a motion which is released, or pushed once, shrinks, and a list of all its
+    bonds would outgrow any room: it is taken as DECAYED times that of its start. That of a block which the printed law
+    holds is HELD times what the drive would give.
     """
     if numerics.choice is not None:
         return numerics.choice
     from ...friction.bonds.engines import choose as engine_for
 
     law, accuracy = model.bonds, model.accuracy
-    left = DECAYED if model.rig.kind == "free" else HELD if chatters(model) else 1.0
-    stroke = max(4 * left * model.speed / omega_of(model.rig.drive) / law.length, 1e-9)
+    once = model.rig.kind == "free" or model.rig.waveform == "step"
+    left = HELD if chatters(model) else DECAYED if once else 1.0
+    stroke = max(4 * left * min(model.speed / omega_of(model.rig.drive) / law.length, _stretch(model)), 1e-9)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
     return engine_for(law, accuracy.tolerance, stroke, numerics.steps / 2, accuracy.quadrature, tail, accuracy.merge)
 
 
+def _stretch(model: Model) -> float:
+    """Bond lengths by which a drive moves a block that its bonds hold by their stiffness mu_s N/eps_0; inf where they
+    do not hold it, or the printed law gives them no stiffness."""
+    f, rig = model.friction, model.rig
+    if f.reading == "report" or rig.kind == "free":
+        return inf
+    needed, limit = holding(rig), f.static * model.nominal_load
+    return needed / limit if limit >= FAST * needed else inf
+
+
+def halvings(model: Model) -> int:
+    """How often steps that the scene leaves open will be halved for a block that its bonds hold, which then swings on
+    them faster than its modes and its drive do: until that swing has as many steps as those would get, MOST_HALVINGS
+    times at most. A stretch that is elastic but for a share below MOVES, half of its square, is met at once."""
+    rig, f = model.rig, model.friction
+    if f is None or not has(f.law, "bonds") or model.accuracy.steps_per_cycle is not None:
+        return 0
+    stretch = _stretch(model)
+    if stretch == inf or stretch**2 / 2 < MOVES:
+        return 0
+    quickest = max(fastest(rig.drive) / rig.drive.period, float(rig.frequencies.max()))
+    return min(max(0, ceil(log2(_bond_swing(model) / (2 * pi * quickest)))), MOST_HALVINGS)
+
+
+def _bond_swing(model: Model) -> float:
+    """Circular frequency [rad/s] of the block on its bonds, sqrt(k_t/m)."""
+    f, modes = model.friction, model.rig.modes
+    return sqrt(f.static * model.nominal_load / f.bond_length * float((modes.slide**2).sum()) / modes.mass)
+
+
 def chatters(model: Model) -> bool:
-    """Whether the printed law holds the block, D >= FAST of a drive that repeats.
+    """Whether the printed law holds the block: its limit is FAST times what holding it takes, or more, under a drive.
 
     Its force reaches the limit however small the stroke, so that the stiffness mu_s N/stroke has no bound: the block
     turns back in almost every step, and its list grows by a strip with each.
@@ -137,8 +176,73 @@ def chatters(model: Model) -> bool:
     f, rig = model.friction, model.rig
     if f is None or not has(f.law, "bonds") or f.reading != "report" or rig.kind == "free":
         return False
-    push = rig.force if rig.force else rig.mass * largest(rig.drive)
-    return f.static * model.nominal_load >= FAST * push
+    return f.static * model.nominal_load >= FAST * holding(rig)
+
+
+def stalls(model: Model) -> bool:
+    """Whether growing bonds of the printed law hold a released block from its start on: their limit is FAST times the
+    force of the spring, or more.
+
+    The block then swings on its bonds, or turns back in almost every step as one that `chatters`; which of both, the
+    length of the step decides by chance (at 232 steps per cycle the one, at 230 and 234 the other).
+    """
+    f, rig = model.friction, model.rig
+    if f is None or not has(f.law, "bonds") or f.reading != "report" or rig.kind != "free" or rig.start is None:
+        return False
+    if form_of(model.bonds) != AGED:
+        return False
+    return f.static * model.nominal_load >= FAST * _held_with(rig, 0.0, np.zeros(rig.modes.omega.size),
+                                                              rig.modes.interfaces @ rig.start.z)
+
+
+def lists_grow(model: Model) -> bool:
+    """Whether the printed law holds the block at some time of the run, so that its list grows with every step."""
+    return chatters(model) or stalls(model) or _held_level(model) > 0
+
+
+def _held_level(model: Model) -> float:
+    """Limit of the printed law over what holding its gentlest level takes, where a list grows at that; else 0.
+
+    It grows from FAST on, and from 1 on where bonds grow: each step leaves a strip there, which no path wears away.
+    """
+    f, rig = model.friction, model.rig
+    if f is None or not has(f.law, "bonds") or f.reading != "report" or rig.kind == "free":
+        return 0.0
+    limit, needed = f.static * model.nominal_load, holding(rig, gentlest(rig))
+    least = 1.0 if form_of(model.bonds) == AGED else FAST
+    return limit / needed if needed and limit >= least * needed else 0.0
+
+
+def gentlest(rig) -> float:
+    """Least push [m s-2] that the drive of a Rig stays at: of levels half the first one, where the search of the onset
+    begins, or the least of them."""
+    return min(rig.levels[0] / 2, *rig.levels) if rig.levels else largest(rig.drive)
+
+
+def holding(rig, push: float | None = None) -> float:
+    """Peak force [N] on the first interface that keeps all interfaces of a Rig still under a sine of its drive, of its
+    largest push [m s-2] unless one is given.
+
+    Of one mode it is mass times acceleration times base/slide, whatever the frequency; modes that go on moving behind
+    the interfaces bring their own. inf where nothing holds them: an interface that no mode slides, or an undamped
+    resonance behind it.
+    """
+    modes = rig.modes
+    size = largest(rig.drive) if push is None else push
+    return _held_with(rig, omega_of(rig.drive), modes.base * size, np.zeros(len(modes.interfaces)))
+
+
+def _held_with(rig, omega: float, push, slides) -> float:
+    """Size of the force [N] on the first interface that keeps the slides (i,) [m] of all of them, beside a push (n,)
+    [m s-2] on the modes that goes as exp(i omega t); inf where no forces do."""
+    modes, n = rig.modes, rig.modes.omega.size
+    faces = modes.interfaces
+    moves = np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.dampers
+    whole = np.block([[moves, faces.T / modes.mass], [faces, np.zeros((len(faces), len(faces)))]])
+    try:
+        return float(abs(np.linalg.solve(whole, np.append(push, slides))[n]))
+    except np.linalg.LinAlgError:
+        return inf
 
 
 def crowded(model: Model, numerics: Numerics, book: dict) -> bool:
@@ -147,13 +251,38 @@ def crowded(model: Model, numerics: Numerics, book: dict) -> bool:
     strips = book.get("strips", 0.0)
     if strips <= MOST_CROWDED or model.bonds.reading != "report":
         return False
-    return chatters(model) if form_of(model.bonds) == AGED else strips > TURNING * numerics.cycles * numerics.steps
+    return lists_grow(model) if form_of(model.bonds) == AGED else strips > TURNING * numerics.cycles * numerics.steps
 
 
 def held_cost(model: Model, numerics: Numerics) -> tuple:
-    """Strips at the end of the list of a block that the printed law holds, and the seconds of the run with it."""
+    """Strips at the end of the list of a block that the printed law holds, and the seconds of the run with it: of one
+    that was released the most of both."""
     steps = numerics.cycles * numerics.steps
-    return steps, _held_step(model.bonds) * steps**2 / 2 * (1 + _probes(model))
+    if stalls(model):
+        return steps, STALLED_STEP * steps**2 / 2
+    moving = list_cost(model, numerics)[1] / steps
+    if not model.rig.levels:
+        return steps, _held_seconds(model, largest(model.rig.drive), 0.0, steps, moving)
+    sizes, size = model.rig.levels, model.rig.level_cycles * numerics.steps
+    seconds = sum(_held_seconds(model, push, k * size, (k + 1) * size, moving) for k, push in enumerate(sizes))
+    # the search of the onset begins from nought, with a list of its own
+    return steps, seconds + sum(_held_seconds(model, sizes[0] / 2**k, 0.0, size, moving)
+                                for k in range(1, 1 + _probes(model)))
+
+
+def _held_seconds(model: Model, push: float, first: float, last: float, moving: float) -> float:
+    """Seconds of the steps from number `first` to `last` under a sine of this push [m s-2], each of which counts the
+    strips that those before it have left; moving: seconds of a step of a block that moves, which leaves none."""
+    needed = holding(model.rig, push)
+    ratio = model.friction.static * model.nominal_load / needed if needed else inf
+    if ratio < (1.0 if form_of(model.bonds) == AGED else FAST):
+        return moving * (last - first)
+    return (_held_step(model.bonds) if ratio >= FAST else LEANING_STEP) * (last**2 - first**2) / 2
+
+
+def bonds_cost(model: Model, numerics: Numerics) -> tuple:
+    """Strips of a shared list of bonds and the seconds of the run with it, of a block that is held or moves."""
+    return (held_cost if lists_grow(model) else list_cost)(model, numerics)
 
 
 def _held_step(law) -> float:
@@ -162,10 +291,9 @@ def _held_step(law) -> float:
     return HELD_ANY if any_order else HELD_STEP[form_of(law)]
 
 
-def _probes(model: Model) -> float:
-    """Runs of a level that halve the bracket of the onset down to the tolerance, over the cycles of the run."""
-    rig = model.rig
-    return max(0, ceil(log2(1 / model.accuracy.tolerance))) * rig.level_cycles / rig.cycles if rig.levels else 0.0
+def _probes(model: Model) -> int:
+    """Runs of a level that halve the bracket of the onset from nought down to the tolerance."""
+    return max(0, ceil(log2(1 / model.accuracy.tolerance)))
 
 
 def list_cost(model: Model, numerics: Numerics) -> tuple:
@@ -182,13 +310,12 @@ def refuse_unresolved(model: Model, numerics: Numerics) -> None:
     The motion has nothing to do with the block's then, and every step makes bonds that outlast it: the list grows, and
     the run with its square.
     """
-    f, modes, drive = model.friction, model.rig.modes, model.rig.drive
-    stiff = f.static * model.nominal_load / f.bond_length * float((modes.slide**2).sum()) / modes.mass
-    swing = sqrt(stiff) * drive.period / numerics.steps
+    drive, pace = model.rig.drive, _bond_swing(model)
+    swing = pace * drive.period / numerics.steps
     if swing > MOST_SWING:
-        wanted = ceil(sqrt(stiff) * drive.period)
+        wanted = ceil(pace * drive.period)
         raise Missing(f"a step of {drive.period / numerics.steps:.2g} s does not resolve the block on its bonds, which "
-                      f"swings at {sqrt(stiff) / (2 * pi):.3g} Hz; set accuracy.steps_per_cycle = {wanted}, raise "
+                      f"swings at {pace / (2 * pi):.3g} Hz; set accuracy.steps_per_cycle = {wanted}, raise "
                       "structure.moving_mass or friction.bond_length, or use reading = \"stretch\" with order = 1", "")
 
 
@@ -198,7 +325,7 @@ def refuse_costly(model: Model, numerics: Numerics, limit: float = LONGEST) -> N
     if f is None or not has(f.law, "bonds") or quadrature_of(model, numerics).engine == "recursion":
         return
     refuse_unresolved(model, numerics)
-    entries, seconds = list_cost(model, numerics)
+    entries, seconds = bonds_cost(model, numerics)
     if seconds > limit:
         raise Missing(f"the bond list (about {entries:.0f} entries) would take about {seconds:.0f} s, "
                       f"more than {limit:.0f} s; lower drive.cycles or accuracy.steps_per_cycle, loosen accuracy.tail "

@@ -8,7 +8,7 @@ from ...model.model import Model
 from ...structure.drive_sizes import largest, omega_of
 from ..effort import exact_effort
 from .engines import no_pieces, steady_by
-from .numerics import chatters, choose, held_cost, list_cost, quadrature_of
+from .numerics import bonds_cost, chatters, choose, halvings, lists_grow, quadrature_of, stalls
 from .pieces.costs import pieces, seconds_of_pieces, words
 from .smooth.choice import smooth_cost
 
@@ -43,7 +43,7 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
         each = CLIMB + (4 * _of_modes(numerics, points, unknowns) if soft else 0.0)  # the normal force is searched
     elif f is not None and has(f.law, "bonds"):
         if quadrature_of(model, numerics).engine != "recursion":
-            entries, seconds = (held_cost if chatters(model) else list_cost)(model, numerics)
+            entries, seconds = bonds_cost(model, numerics)
             each, unknowns["bond_list_about"] = seconds / steps, int(entries)
         elif soft:
             each = _of_modes(numerics, points, unknowns)
@@ -53,7 +53,8 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
         each = _of_modes(numerics, points, unknowns)
     elif soft:
         each = 3e-9 * points + 5e-7
-    return numerics.engine, int(steps * 1.75), steps * 1.75 * each
+    passes = 0.75 + 2**(halvings(model) + 1) - 1  # a half and a quarter of the steps, and each halving of them
+    return numerics.engine, int(steps * passes), steps * passes * each
 
 
 def _step(rig, f) -> float:
@@ -113,8 +114,15 @@ def sum_words(model: Model) -> list:
     if not has(model.friction.law, "bonds"):
         return words(model, numerics.engine) if not no_pieces(model) else []
     found = quadrature_of(model, numerics)
-    seconds = 0.0 if found.engine == "recursion" else list_cost(model, numerics)[1]
+    seconds = 0.0 if found.engine == "recursion" else bonds_cost(model, numerics)[1]
     out = ["sum over bonds by " + found.said()]
+    if found.engine != "recursion" and stalls(model):
+        out.append("the printed law holds the block from its release on: it swings on its bonds, or turns back in "
+                   "almost every step, which takes longest and is counted here; reading = \"stretch\" gives it a "
+                   "stiffness")
+    if found.engine != "recursion" and lists_grow(model) and not chatters(model) and not stalls(model):
+        out.append("the printed law holds the block at some level, or just: the list grows with every step; "
+                   "reading = \"stretch\" gives it a stiffness")
     if found.engine != "recursion" and chatters(model):
         out.append("the printed law holds the block, however small its stroke: it turns back in almost every step, and "
                    "the list grows by a strip with each; reading = \"stretch\" gives it a stiffness")

@@ -6,12 +6,13 @@ from math import ceil
 import numpy as np
 
 from ...core import Outcome, PatchfemError
+from ...core import say as length
 from ...effects import has, listed
 from ...friction.record import law_from
 from ...response.coarser import estimate, left_open
 from ...response.errors import with_errors
 from ...response.outcome import changing_note, settle
-from ...response.reasons import without_value
+from ...response.reasons import unclosed, without_value
 from ...response.run_events import events_of, with_own
 from ...response.settling import slip_period
 from ...structure.drive_sizes import sinusoidal, slowest
@@ -22,7 +23,6 @@ from ..results.result import FRAMES, Result, frames_of, still, without_errors
 from ..results.travel import ended, travelled
 from . import levels
 from .engines import ENGINES, Variant, unbalanced
-from .levels import with_errors as level_errors
 from .numerics import choose, crowded, quadrature_of, refuse_costly
 from .solution import borne, curve_measures
 from .start_ring import StartRing, start_ring
@@ -59,7 +59,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     elif numerics.engine not in ("exact", "piecewise", "harmonic"):
         extra |= {"steps_per_cycle": numerics.steps, "iterations": raw.book["iterations"]}
     if raw.levels:
-        found |= levels.measures(rig, raw.levels, raw.probe, model.accuracy.tolerance, f is not None, raw.halved)
+        found |= levels.measures(rig, raw.levels, raw.probe, model.accuracy.tolerance, f is not None, raw.coarser)
         extra |= {"levels": levels.shown(rig, raw.levels)}
     estimated = estimate and raw.outcome is not Outcome.NOT_CONVERGED
     found = with_own(found, raw.own)
@@ -74,7 +74,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     fields = {}
     if patch is not None:
         fields = rig_fields(model, numerics, patch, raw)
-    found |= without_value(found, raw.window, drive, f is not None)
+    found |= unclosed(found, raw.window, drive) | without_value(found, raw.window, drive, f is not None)
     extra |= {"book": raw.book, "period": drive.period, "notes": [*_notes(model, patch, raw), *rings.notes]}
     extra |= _behind(model, numerics, raw.contact)
     warnings = [*warnings, *_said(model, patch, raw, outcome, found)]
@@ -100,6 +100,9 @@ def _behind(model, numerics, contact) -> dict:
 def _notes(model, patch, raw) -> list:
     """What the law of a run means, as far as it has to be said, and what its fields leave out."""
     f, climb = model.friction, climbing_as_one(model, patch)
+    if raw.levels and model.rig.onset[0] == "slip" and raw.held > 0:
+        climb = [*climb, f"onset_level: a slip amplitude counts from {length(raw.held)} on, a thousandth of the slide "
+                 "over which the interface gives way; below it a part of the interface may slip already"]
     if patch is not None and patch.strips is not None and model.soft:
         return ["strips that slip part by part have no common shear stress: the fields hold the pressure"]
     if f is None or not has(f.law, "bonds"):
@@ -177,16 +180,20 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
     def solve(variant):
         return go(model, replace(variant.numerics, whole=False), variant.patch)
 
-    space, spent = estimate(solve, found.values, engine.in_space(model, numerics, patch, coarse, found), made)
+    meshed = engine.in_space(model, numerics, patch, coarse, found)
+    space, spent = estimate(solve, found.values, meshed, made)
     while True:
-        time, more = estimate(solve, found.values, engine.in_time(model, numerics, patch), made)
+        rungs = engine.in_time(model, numerics, patch)
+        time, more = estimate(solve, found.values, rungs, made)
         spent += more
         measures = with_errors(found.values, *time, *space, least=engine.least, size=size)
         if numerics.pairs and not resolved(measures, model.accuracy.tolerance):
             return _solved(model, numerics.finer(), patch, coarse, seconds, say, progress, estimated)
-        if found.levels and time:
-            rung = engine.in_time(model, numerics, patch)[0]
-            found = replace(found, levels=_level_errors(found, rung, made, numerics), halved=made[rung.runs[0]])
+        if found.levels:
+            apart = [one for one in (*rungs, *meshed) if one.runs or found.errors is None]  # else levels have their own
+            found = replace(found, levels=levels.with_errors(found.levels, apart, made),
+                            coarser=tuple((made[one.runs[0]], one.beside and made[one.beside]) for one in apart
+                                          if one.runs and one.runs[0].numerics.choice is None))  # a list has its bound
         if _enough(model, numerics, found, measures) or not time:
             if spent:
                 seconds["error"] = spent
@@ -220,12 +227,6 @@ def _whole_period(model, numerics, found) -> int:
         return 0
     cycles = ceil(slip_period(found.response.time, found.response.slide_rate) / drive.period)
     return cycles if 2 * cycles <= numerics.cycles else 0
-
-
-def _level_errors(found, rung, made: dict, numerics):
-    """The levels of a Solution with the errors of the time step."""
-    half, quarter = (made[variant].levels for variant in rung.runs[:2])
-    return level_errors(found.levels, half, quarter, numerics.steps)
 
 
 def _enough(model, numerics, found, measures) -> bool:

@@ -19,9 +19,10 @@ class Solution:
     interface; book: energies; contact: what the march moved; prepare: seconds of its preparation; levels: of a drive in
     levels, probe: as `levels.onset` asks; log: events of the exact engine; notes: warnings of the method; held: slip
     [m] below which a cycle sticks; own: what the run itself leaves open of its measures; errors: by measure, where the
-    engine has them itself; summed: how bonds are, a Choice, None without a sum; halved: the run of levels at half the
-    steps; extremes (c, 2) [m]: of the output in every cycle of the run, by which the outcome is judged, None where the
-    engine knows it; bounded: the steady amplitude is that of a motion known to exist; extra: for the report.
+    engine has them itself; summed: how bonds are, a Choice, None without a sum; coarser: runs of levels at half the
+    steps and on coarser meshes, each with the one that it is held against, None for this run; extremes (c, 2) [m]: of
+    the output in every cycle of the run, by which the outcome is judged, None where the engine knows it; bounded: the
+    steady amplitude is that of a motion known to exist; extra: for the report.
     """
 
     values: dict
@@ -44,7 +45,7 @@ class Solution:
     own: dict | None = None
     errors: dict | None = None
     summed: object = None
-    halved: object = None
+    coarser: tuple = ()
     extremes: np.ndarray | None = None
     bounded: bool = False
     extra: dict = field(default_factory=dict)

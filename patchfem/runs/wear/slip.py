@@ -8,6 +8,7 @@ import numpy as np
 from ...core import Measure, Outcome
 from ...response.outcome import settle
 from ..bench import bench
+from ..bench.closed import over_steps
 from ..bench.engine import steps_of
 from ..results.travel import ended
 from ..rig.engines import ENGINES
@@ -16,7 +17,6 @@ from ..rig.rig import rig_fields
 
 UNBOUNDED = (Outcome.GROWS, Outcome.EXCEEDS_TRAVEL, Outcome.NOT_CONVERGED)
 LEAST_FRAMES, MOST_FRAMES = 64, 800
-GAUSS = 8  # points in a step over a flank
 
 
 class Rubbed(NamedTuple):
@@ -151,17 +151,10 @@ def along(model, patch, slide, vertical, local, tau) -> tuple:
     g, sigma = model.grooves, patch.pressure.sigma_n
     t = g.slope(slide)[:, None]
     long, carried = np.sqrt(1 + t * t), (vertical / patch.pressure.load)[:, None] * sigma
-    path = np.append(0.0, np.cumsum(_lengths(g, slide[:-1], slide[1:])))
+    steps = over_steps(np.ones(slide.size), slide, np.diff(slide), lambda q: np.hypot(1, g.slope(q)))
+    path = np.append(0.0, np.cumsum(steps))
     worn = np.abs(tau - t * carried) if model.wear.energy else np.maximum(carried + tau * t, 0.0)
     return path[:, None] - (slide[:, None] - local) * long, worn / long
-
-
-def _lengths(grooves, begin, end) -> np.ndarray:
-    """Path along the flank [m] of the slides (k,) from begin to end [m], its sign that of the slide."""
-    out = np.zeros(begin.size)
-    for place, weight in zip(*np.polynomial.legendre.leggauss(GAUSS)):
-        out += 0.5 * weight * np.hypot(1, grooves.slope(0.5 * (1 - place) * begin + 0.5 * (1 + place) * end))
-    return out * (end - begin)
 
 
 def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> Rubbed:

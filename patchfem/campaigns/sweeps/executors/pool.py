@@ -105,6 +105,8 @@ class Pool:
                     if isinstance(taken[2], Died):
                         workers.remove(one)
                         one.end()
+                    elif (chunk := take()) is not None:  # before its answer is written, which takes a while
+                        one.give(chunk)
                     yield taken
         finally:
             for one in workers:

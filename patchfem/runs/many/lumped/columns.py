@@ -30,8 +30,9 @@ class Runs:
     stuck, lost: (n,) whether nothing slipped, and whether a run must be made by itself; errors: measure -> (n,) beside
     `least` of its value; closes: gap of the energy balance beyond which a run has not converged; loads: (n,) of a stuck
     run, whether what it holds still rises; steady: ((n,), (n,)) [m] amplitude and error of the motion that a run is
-    known to settle to, NaN where none is; chosen: what each run chose besides. Extremes and phasors are those of a run
-    by itself to the last bit: what is extrapolated far shows it.
+    known to settle to, NaN where none is; chosen: what each run chose besides; again: whether a run by itself is
+    made again with finer steps where its amplitude misses the tolerance. Extremes and phasors are those of a run by
+    itself to the last bit: what is extrapolated far shows it.
     """
 
     cycles: int
@@ -48,6 +49,7 @@ class Runs:
     loads: np.ndarray | bool = False
     steady: tuple | None = None
     chosen: tuple = ()
+    again: bool = True
 
     @property
     def amplitudes(self) -> np.ndarray:
@@ -85,7 +87,7 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
         row, floor = TABLE[name], floor_of(name, moved)
         wide = there & (errors[name] > tolerance * np.abs(value) + floor)
         loose |= wide & ~grows
-        if name == MAIN:  # a run by itself may be made again with finer steps
+        if name == MAIN and runs.again:
             alone |= wide & ~grows
         if not name.endswith("_steady"):
             resolved &= ~wide

@@ -25,13 +25,20 @@ def refuses(model: Model) -> str:
     if model.heat is not None or rig.load_varies or rig.names or rig.bends or len(rig.interfaces) != 1 \
             or not model.point.load > 0:
         return "its interface is not one point under a constant load"
+    if why := not_one_sine(rig):
+        return why
+    return "" if _kind(model) is not None else _named(KINDS[0]).refuses(model)
+
+
+def not_one_sine(rig) -> str:
+    """Why a rig is not one mode under one sine, seen by one accelerometer; "" where it is."""
     if rig.modes.gauge is not None:
         return "its gauge and its accelerometer do not move alike"
     if rig.modes.omega.size != 1 or not isinstance(rig.drive, BaseSine) or rig.levels or np.isfinite(rig.travel):
         return "it is not one mode under one sine"
     if rig.cycles != int(rig.cycles) or not rig.modes.base[0] or not rig.modes.slide[0] or not rig.modes.output[0]:
         return "it has no whole cycles, or no push, slide or output"
-    return "" if _kind(model) is not None else _named(KINDS[0]).refuses(model)
+    return ""
 
 
 @lru_cache(8)
@@ -70,12 +77,12 @@ def _solved(models, say, pairs: int) -> Answers:
     for cases, solve_again in ((np.flatnonzero(alone & ~finer).tolist(), lambda these: one_by_one.solve(these, say)),
                                (np.flatnonzero(finer).tolist(), lambda these: _solved(these, say, max(0, pairs - 2)))):
         if cases:
-            _forget(found, cases)
+            forget(found, cases)
             found.place(cases, solve_again([models[case] for case in cases]))
     return found
 
 
-def _forget(found: Answers, cases: list) -> None:
+def forget(found: Answers, cases: list) -> None:
     """Take out what was found of cases."""
     for case in cases:
         for columns in (found.values, found.errors, found.floors):

@@ -6,6 +6,8 @@ from math import ceil
 import numpy as np
 
 from ....compiled import load
+from ....core import Start
+from ....dynamics.piecewise import histories
 from ....dynamics.piecewise.elements import paired
 from ....dynamics.piecewise.plant import clock_of
 from ....dynamics.piecewise_one import names_kernels as read
@@ -13,6 +15,7 @@ from ....dynamics.piecewise_one import room as made
 from ....dynamics.second_book import gap
 from ....effects import has
 from ....friction.record import law_from
+from ....response import run_events
 from ....response.errors import cells_error
 from ....response.loops import interface_loops
 from ....response.measures import ROUND, energy_balance
@@ -26,55 +29,87 @@ from .threads import in_threads
 
 KERNELS = "dynamics.piecewise_one.batch_kernels"
 ROOM = 1.5  # times the pieces that a window may have
-LONGEST = 4000  # cycles of a run whose extremes are all held
+CYCLES = 3  # that hold every stick of a cycle whole
+OMEGA = 5  # place of the angular frequency in a segment, as `drive_kernels` has it
+SHORTEST, LONGEST = 20, 4000  # cycles of a run whose extremes are all held
 
 
 def refuses(model) -> str:
     """Why the cases of this kind do not take a model; "" where they do."""
     if not has(model.friction.law, "cells") and model.friction.law != "elastic-plastic":
         return "its law is not made of elements"
-    if not 20 <= model.rig.cycles <= LONGEST:
+    if not SHORTEST <= model.rig.cycles <= LONGEST:
         return "its cycles are too few or too many"
     return "" if engine_of(model) is PIECES else "its engine is not that of pieces"
 
 
-def row_of(model) -> tuple:
+def row_of(model, faces=None, load_: float = 0.0) -> tuple:
     """(rig (6,), start (5,), segment (10,), Elements, (stiffness K, load)) of a model: rig and start by the places of
-    `names_kernels`, the drive as `drive_kernels` has it."""
+    `names_kernels`, the drive as `drive_kernels` has it.
+
+    faces: `rig.pieces.run.Interfaces` under load_ [N], None for those of the model's one point.
+    """
     rig, modes = model.rig, model.rig.modes
-    element = law_from(model.friction, model.point.load).element(model.point.load)
+    if faces is None:
+        load_ = model.point.load
+        element = law_from(model.friction, load_).element(load_)
+        group, held = group_of(element), 1e-3 * element.length
+    else:
+        (group,), held = faces.groups, faces.held
     z, v = (0.0, 0.0) if rig.start is None else (float(rig.start.z[0]), float(rig.start.v[0]))
     numbers = (float(modes.omega[0])**2, float(modes.dampers[0, 0]), float(modes.interfaces[0, 0]),
                float(modes.base[0]), float(modes.output[0]), modes.mass)
-    start = z, v, float(rig.drive.moving), model.accuracy.tolerance, 1e-3 * element.length
-    return (numbers, start, clock_of(rig.drive, 1).segments[0], group_of(element),
-            (rig.stiffness, model.point.load))
+    start = z, v, float(rig.drive.moving), model.accuracy.tolerance, held
+    return numbers, start, clock_of(rig.drive, 1).segments[0], group, (rig.stiffness, load_)
 
 
 def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     """Runs of models of this kind, all of `cycles` cycles from their starts; pairs: as `Numerics` has it."""
-    rows, kernels = [row_of(model) for model in models], load(KERNELS, say)
-    rigs, starts, segments, others = (np.array([row[k] for row in rows]) for k in (0, 1, 2, 4))
-    groups = [row[3] for row in rows]
+    rows = [row_of(model) for model in models]
     for _ in range(pairs):
-        groups = [paired(one) for one in groups]
-    yields = 2 * max(one.stiffness.size for one in groups)
-    most = ceil(ROOM * window * (most_pieces(rigs, [one.rig.drive for one in models], groups) + yields)) + 256
-    found = _solved(kernels, (rigs, starts, segments), groups, (cycles, window), most)
-    out = _read(found, others, cycles, window)
+        rows = _halved(rows)
+    out = moved(rows, cycles, window, say, models=models)
     if has(models[0].friction.law, "cells"):
-        starts = starts.copy()
-        starts[:, read.TOLERANCE] = np.inf  # an error run looks for no steady motion
-        half = _solved(kernels, (rigs, starts, segments), [paired(one) for one in groups], (cycles, window), most)
-        return _with_cells(out, _read(half, others, cycles, window))
+        return _with_cells(out, moved(_halved(rows), cycles, window, say, steady=False))
     return out
 
 
-def most_pieces(rigs, drives: list, groups: list) -> float:
-    """Largest number of pieces in a cycle of n cases: `costs.pieces` of numbers that are there already."""
+def _halved(rows: list) -> list:
+    """Rows whose elements are each two of the given ones."""
+    return [(*row[:3], paired(row[3]), row[4]) for row in rows]
+
+
+def moved(rows: list, cycles: int, window: int, say=None, least: int = 0, steady: bool = True, models=None) -> Runs:
+    """Runs of cases given as rows of `row_of`.
+
+    least: cases of a thread, as `in_threads` has it; steady: whether the motion is sought that a case settles to, as a
+    run for an error does not; models: of the cases, so that one of which samples have to tell what rings is not lost
+    where nothing does.
+    """
+    rigs, starts, segments, others = (np.array([row[k] for row in rows]) for k in (0, 1, 2, 4))
+    groups, kernels = [row[3] for row in rows], load(KERNELS, say)
+    if not steady:
+        starts[:, read.TOLERANCE] = np.inf
+    yields = 2 * max(one.stiffness.size for one in groups)
+    most = ceil(ROOM * window * (most_pieces(rigs, 2 * np.pi / segments[:, OMEGA], groups) + yields)) + 256
+    found = _solved(kernels, (rigs, starts, segments), groups, (cycles, window), most, least)
+    out = _read(found, others, cycles, window)
+    rings = _may_ring(found, out.stuck)
+    for case in np.flatnonzero(rings & ~out.lost & (found.numbers[:, read.ALIKE] == 1)).tolist():
+        if out.values["stick_fraction"][case] == 1:  # a motion that repeats and holds for ever has nothing that decays
+            rings[case] = False
+        elif models is not None:
+            rings[case] = _rings(models[case], groups[case], found.end_of(kernels, case, most))
+    out.lost[rings] = True
+    return out
+
+
+def most_pieces(rigs, periods, groups: list) -> float:
+    """Largest number of pieces in a cycle of n cases of periods (n,) [s]: `costs.pieces` of numbers that are there
+    already."""
     stiff, damping = np.array([one.stiffness.sum() for one in groups]), rigs[:, read.DAMPING]
     square = rigs[:, read.SQUARE] + stiff * rigs[:, read.FACE]**2 / rigs[:, read.MASS]
-    turned = (damping / 2 + np.sqrt(damping**2 / 4 + square)) * np.array([one.period for one in drives])
+    turned = (damping / 2 + np.sqrt(damping**2 / 4 + square)) * periods
     turned = np.maximum(turned, 2 * np.pi)
     return float((turned / REACH + 2 * np.array([one.stiffness.size for one in groups]) + 2).max())
 
@@ -105,24 +140,42 @@ class _Found:
         self.ledgers, self.numbers = np.empty((n, 8)), np.full((n, read.NUMBERS), np.nan)
         self.ends, self.steady = np.full((n, 5), np.nan), np.full((n, 3), np.nan)
         self.slopes, self.codes = np.zeros((n, read.MOST, read.MOST)), np.zeros(n, np.int64)
+        self.shape, self.wanted = (cycles, window), np.zeros(cycles)
+        self.wanted[cycles - 1 - window * np.arange(windows)] = 1.0
+
+    def run(self, kernels, part: slice, most: int) -> tuple:
+        """The compiled call for some cases, with at most so many rows in a window: what it worked in."""
+        given = self.rigs, self.starts, self.segments, self.counts, self.sorts
+        answers = self.extremes, self.phasors, self.ledgers, self.numbers, self.ends, self.steady, self.slopes
+        work = made.work_of(self.sorts.shape[2] - 1, self.shape[0], self.wanted, most)
+        kernels.runs(tuple(one[part] for one in given), self.shape, work, tuple(one[part] for one in answers),
+                     self.codes[part])
+        return work
+
+    def end_of(self, kernels, case: int, most: int) -> tuple:
+        """(Start, memory) at the end of a case, which is run once more for it."""
+        _, motion, memory, *_ = self.run(kernels, slice(case, case + 1), most)
+        return Start(*motion.copy()), memory
 
 
-def _solved(kernels, given, groups: list, shape: tuple, most: int) -> _Found:
+def _solved(kernels, given, groups: list, shape: tuple, most: int, least: int = 0) -> _Found:
     """The compiled call for elements of every case."""
-    (counts, sorts), (cycles, window) = tables_of(groups), shape
-    wide = sorts.shape[2]
-    found = _Found(given, counts, sorts, cycles, window)
-    wanted = np.zeros(cycles)
-    wanted[cycles - 1 - window * np.arange(found.phasors.shape[1])] = 1.0
-
-    def go(part: slice) -> None:
-        answers = (found.extremes, found.phasors, found.ledgers, found.numbers, found.ends, found.steady, found.slopes)
-        cases = (*given, counts, sorts)
-        kernels.runs(tuple(one[part] for one in cases), shape, made.work_of(wide - 1, cycles, wanted, most),
-                     tuple(one[part] for one in answers), found.codes[part])
-
-    in_threads(go, len(groups))
+    found = _Found(given, *tables_of(groups), *shape)
+    in_threads(lambda part: found.run(kernels, part, most), len(groups), least)
     return found
+
+
+def _may_ring(found: _Found, stuck) -> np.ndarray:
+    """Whether the samples of a run behind many elements have to tell what rings, (n,)."""
+    turns = found.numbers[:, read.SWING] >= made.RINGS
+    return (found.counts > 1) & turns & ((found.ledgers[:, 7] > 0) | stuck)
+
+
+def _rings(model, group, end: tuple) -> bool:
+    """Whether a run that repeats rings in the sticks of one more cycle of it. end: (Start, memory) of it."""
+    modes, drive = model.rig.modes, model.rig.drive
+    done = histories.simulate(modes, drive, (group,), CYCLES, CYCLES, start=end[0], memory=end[1])
+    return run_events.rings(done.window, modes, drive, done.log, repeats=True) != ({}, {})
 
 
 def _read(found: _Found, others, cycles: int, window: int) -> Runs:
@@ -130,7 +183,7 @@ def _read(found: _Found, others, cycles: int, window: int) -> Runs:
     x, ends, ledger = found.numbers.T, found.ends.T, found.ledgers.T
     book = dict(zip(("work_in", "viscous", "power"), ledger)) | {"friction": ledger[4]}
     book |= {"stored": ends[read.STORED] - ends[read.BEGUN], "peak_stored": np.maximum(ledger[5], ends[read.BEGUN])}
-    period = 2 * np.pi / found.segments[:, 5]
+    period = 2 * np.pi / found.segments[:, OMEGA]
     with np.errstate(all="ignore"):
         values = _values(found, x, book, others, period, window)
         half = (x[read.SLIP_HIGH] - x[read.SLIP_LOW]) / 2
@@ -143,9 +196,8 @@ def _read(found: _Found, others, cycles: int, window: int) -> Runs:
         slopes = np.linalg.eigvals(found.slopes[settles])
         steady[:, settles] = settled_of(*found.steady[settles][:, [read.AMOUNT, read.RESIDUAL]].T, slopes)
     lost = (found.codes == read.LOST) | ((found.codes == read.UNKNOWN) & ~stuck) | (x[read.EDGE] > 0)
-    rings = (found.counts > 1) & (x[read.SWING] >= made.RINGS) & ((ledger[7] > 0) | stuck)
     errors = {name: np.zeros(len(stuck)) for name in values}
-    return Runs(cycles, window, values, book, found.extremes, found.phasors @ [1, 1j], stuck, lost | rings, errors,
+    return Runs(cycles, window, values, book, found.extremes, found.phasors @ [1, 1j], stuck, lost, errors,
                 PIECES.least, PIECES.closes, loads, tuple(steady))
 
 

@@ -10,9 +10,12 @@ from itertools import pairwise
 LEAST = 32  # cases of a thread: fewer are done before it has begun
 
 
-def in_threads(work: Callable[[slice], None], count: int) -> None:
-    """work(part) for parts that make up range(count), at once where there are cores; it must let other threads run."""
-    parts = max(1, min(cores(), count // LEAST))
+def in_threads(work: Callable[[slice], None], count: int, least: int = 0) -> None:
+    """work(part) for parts that make up range(count), at once where there are cores; it must let other threads run.
+
+    least: cases of a part, 0 for LEAST.
+    """
+    parts = max(1, min(cores(), count // (least or LEAST)))
     ends = [count * k // parts for k in range(parts + 1)]
     pieces = [slice(*pair) for pair in pairwise(ends)]
     work(pieces[0]) if parts == 1 else list(_pool().map(work, pieces))

@@ -46,7 +46,9 @@ def _bearing(x, gap, pressing: float, arm) -> np.ndarray:
     long = float(np.ptp(x))
     if arm is None:
         return gap <= _closing(gap, pressing, long)
-    steep = 8 * (float(np.ptp(gap)) + 4 * pressing / long) / max(long / 2 - abs(arm), long / PLACES)
+    end = max(long / 2 - abs(arm), long / PLACES)  # from the load to the nearer end
+    # from this slope on all springs that bear stand between the load and that end, so their resultant does too
+    steep = 2 * (float(np.ptp(gap)) + pressing / end) / end
     low, high = -steep, steep
     for _ in range(HALVINGS):
         theta = (low + high) / 2

@@ -49,7 +49,7 @@ def solution_of(model, numerics, patch, drive, found, done, seconds: float, **mo
     """The Solution of a PieceRun through Interfaces `found`; more: other fields of it."""
     values = values_of(model, numerics, patch, drive, done)
     if done.ring is None:
-        rings, own = run_events.rings(done.window, model.rig.modes, drive, done.log)
+        rings, own = run_events.rings(done.window, model.rig.modes, drive, done.log, repeats=done.repeats)
     else:
         rings, own = held_ring(*done.ring, done.acceleration), {}
     outcome = done.outcome or (Outcome.STUCK if found.holds(done) else None)

@@ -40,9 +40,12 @@ def not_smooth(model: Model) -> str:
 
 
 def element_of(model: Model) -> Element | None:
-    """The law of the interface as compiled code takes it, None where its bonds have no state."""
+    """The law of the interface as compiled code takes it, None where its bonds have no state or it asks for the
+    pressure behind each point."""
     f = model.friction
     load = model.nominal_load
+    if has(f.law, "averaged"):
+        return None
     if not has(f.law, "bonds"):
         return law_from(f, load).element(load)
     if impossible("recursion", f.reading, 1.0 if f.order is None else f.order):

@@ -1,0 +1,175 @@
+"""Patches that slip part by part, on one mode under a sine: the elements of all cases in one compiled call.
+
+Each patch is pressed and measured as its run does it. Its elements, and those of its coarser mesh for the error, then
+move beside those of the others, `dynamics.piecewise_one`. A case that sticks, or rings in its sticks, is run by itself.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ....core import Measure, Outcome
+from ....effects import has
+from ....model.model import Model
+from ....model.source import placed
+from ....response.errors import change
+from ....response.measures import energy_balance
+from ...patch import result as of_patch
+from ...results.loose import loose
+from ...results.places import placeless
+from ...results.travel import ended, travelled
+from ...rig.engines import PIECES, engine_of
+from ...rig.numerics import choose
+from ...rig.pieces.run import Interfaces
+from .. import one_by_one
+from ..answers import Answers
+from . import pieces
+from .columns import MAIN, Runs, answered
+from .lumped import forget, not_one_sine
+
+TOGETHER = 128  # cases of one compiled call: their elements and histories of cycles are held at once
+LEAST = 2  # cases of a thread: one takes as long as hundreds of a point
+
+
+class _Pressed(NamedTuple):
+    """A case whose patch is pressed: what its motion and its words want of it; patch: for lengths and places alone."""
+
+    fine: Interfaces
+    coarse: Interfaces
+    measures: dict
+    warnings: list
+    notes: list
+    patch: Any
+
+
+class _Plan(NamedTuple):
+    model: Model
+
+
+class _Seen(NamedTuple):
+    """What `loose` asks of a result."""
+
+    plan: _Plan
+    measures: dict
+    patch: Any
+    extra: dict
+
+
+def refuses(model: Model) -> str:
+    """Why the batch does not take a model; "" where it does."""
+    if model.patch is None or not model.soft or model.patch.strips is not None or model.grooves is not None:
+        return "it is no patch that slips part by part"
+    if model.wear is not None or model.measured is not None or model.heat is not None:
+        return "it wears, warms or is held against a measurement"
+    if why := not_one_sine(model.rig):
+        return why
+    if model.friction.law != "elastic-plastic" and (not has(model.friction.law, "set-valued")
+                                                    or has(model.friction.law, "averaged")):
+        return "its points do not yield at a force"
+    if not pieces.SHORTEST <= model.rig.cycles <= pieces.LONGEST:
+        return "its cycles are too few or too many"
+    return "" if engine_of(model) is PIECES else "its engine is not that of pieces"
+
+
+def group(model: Model) -> tuple:
+    """Equal for models of one compiled call."""
+    return int(model.rig.cycles), model.friction.law
+
+
+def solve(models: Sequence[Model], say=None) -> Answers:
+    """Answers of models of one group; a case that needs it is run by itself."""
+    found = Answers.blank(len(models))
+    for first in range(0, len(models), TOGETHER):
+        part = models[first:first + TOGETHER]
+        found.place(range(first, first + len(part)), _solved(part, say))
+    return found
+
+
+def _solved(models, say) -> Answers:
+    begin, out = perf_counter(), Answers.blank(len(models))
+    held = [_pressed(model) for model in models]
+    moves = [case for case, one in enumerate(held) if one is not None]
+    alone = set(range(len(models))) - set(moves)
+    if moves:
+        these = [models[case] for case in moves]
+        answers, lost = _moved(these, [held[case] for case in moves], say)
+        answers.seconds[:] = (perf_counter() - begin) / len(models)
+        alone |= {moves[k] for k in np.flatnonzero(lost)}
+        forget(answers, np.flatnonzero(lost).tolist())
+        out.place(moves, answers)
+    if alone:
+        rest = sorted(alone)
+        out.place(rest, one_by_one.solve([models[case] for case in rest], say))
+    return out
+
+
+def _pressed(model: Model) -> _Pressed | None:
+    """A case with its patch pressed; None of one that is run by itself."""
+    try:
+        with placed(model.source):
+            patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
+            if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT:
+                return None
+            warnings = [*model.source.remarks, *of_patch.strained(model.patch, patch), *patch.notes]
+            numerics = choose(model)
+            return _Pressed(Interfaces(model, numerics, patch), Interfaces(model, numerics, coarse[0]),
+                            of_patch.measured(model, patch, coarse), warnings,
+                            of_patch.left_out(model, patch, coarse), patch)
+    except Exception:  # what is wrong is told by its own run
+        return None
+
+
+def _moved(models, held: list, say) -> tuple:
+    """(Answers of pressed cases, (n,) whether a case must be run by itself)."""
+    cycles = int(models[0].rig.cycles)
+    window = min(10, cycles // 10)
+    rows = [pieces.row_of(model, one.fine, one.patch.pressure.load) for model, one in zip(models, held)]
+    fine = pieces.moved(rows, cycles, window, say, LEAST)
+    coarse = pieces.moved([(*row[:3], one.coarse.groups[0], row[4]) for row, one in zip(rows, held)], cycles, window,
+                          say, LEAST, steady=False)
+    runs = _with_mesh(fine, coarse, tuple({"elements": int(one.fine.contact.reduction.stiffness.size),
+                                           "interface_nodes": int(one.patch.x.size)} for one in held))
+    found, alone, _ = answered(models, runs, pieces.NUMERICS | {"window_cycles": window})
+    alone = alone | runs.stuck | coarse.lost
+    for case in np.flatnonzero(~alone).tolist():
+        _tell(found, case, models[case], held[case], runs.extremes[case])
+    return found, alone
+
+
+def _with_mesh(fine: Runs, coarse: Runs, chosen: tuple) -> Runs:
+    """Runs with the errors that runs on coarser meshes tell."""
+    whole = [one.values | {MAIN: one.amplitudes, "energy_balance": energy_balance(one.book)} for one in (fine, coarse)]
+    for case in range(len(chosen)):
+        a, b = ({name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])} for one in whole)
+        told = change(a, b)
+        for name, value in a.items():
+            fine.errors.setdefault(name, np.zeros(len(chosen)))[case] = told.get(name, abs(value))
+    return replace(fine, chosen=chosen, again=False)
+
+
+def _tell(found: Answers, case: int, model: Model, one: _Pressed, extremes) -> None:
+    """Put the measures of the pressed patch in, and the outcome, warnings and notes as a run of its own has them."""
+    modes = model.rig.modes
+    slide = extremes * (float(modes.interfaces[0, 0]) / float(modes.output[0]))
+    found.outcome[case] = str(ended(Outcome(found.outcome[case]), model.patch, one.patch, slide))
+    known = {name: Measure(float(column[case]), found.units[name], float(found.errors[name][case]),
+                           float(found.floors[name][case]))
+             for name, column in found.values.items() if not np.isnan(found.errors[name][case])}
+    for name, m in one.measures.items():
+        found.measure(name, m.unit)
+        found.values[name][case] = np.nan if m.value is None else m.value
+        found.errors[name][case] = np.nan if m.error is None else m.error
+        found.floors[name][case] = m.floor
+        if m.value is None:
+            found.reasons.setdefault(name, {})[case] = m.reason
+    seen = _Seen(_Plan(model), one.measures | {name: m for name, m in known.items() if name != "normal_load"},
+                 one.patch, {})
+    warned = placeless([*one.warnings, *model.rig.notes, *travelled(one.patch, slide), *loose(seen)], model.source.path)
+    found.warnings.pop(case, None)
+    if warned:
+        found.warnings[case] = warned
+    if noted := placeless(one.notes, model.source.path):
+        found.notes[case] = noted
