@@ -2,31 +2,32 @@
 
 Read the package in this order. A module imports its own entry of the list and the entries before it, nothing after:
 
-1. `core`         the nouns that travel: interface, compliance, pressure, modal basis, response, measure, outcome
-2. `effects`      which key of a scene needs which module and equation
-3. `disk`         files written whole, folders with one writer
-4. `compiled`     where compiled code is kept
-5. `closed_forms` exact answers that tests, studies and users share
-6. `scene`        a TOML file becomes SI values, every mistake named at once
-7. `inputs`       files of measurements: columns, slide paths, signals, loops
-8. `mesh`         two coated pieces as tagged meshes
-9. `surface`      measured or made height profiles as a share of the gap
-10. `elasticity`   the pieces condensed to their interface, fields recovered inside
-11. `contact`     gap shapes, unilateral contact, skins, strips, contact maps
-12. `friction`    laws of friction and the sum over bonds along the path
-13. `slip`        partial slip of the pieces: elements, shear modes, load paths
-14. `structure`   the modes of the rig and what drives it
-15. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
-16. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
-17. `response`    measures of a run, outcome, events, levels, ringing
-18. `wear`        worn depth over many cycles
-19. `runs`        patch, bench and rig: where the pillars meet
-20. `identify`    values from measurements with intervals
-21. `campaigns`   many runs: fits, error against cost, sweeps
-22. `export`      summary, netCDF, VTK, report
-23. `api`         load, build, plan and run from Python
-24. `torture`     seeded attacks on the command line
-25. `commands`    the verbs of the command line
+1. `faults`       named failures: a sentence for a person, the exit code
+2. `core`         the nouns that travel: interface, compliance, pressure, modal basis, response, measure, outcome
+3. `effects`      which key of a scene needs which module and equation
+4. `disk`         files written whole, folders with one writer
+5. `compiled`     where compiled code is kept
+6. `closed_forms` exact answers that tests, studies and users share
+7. `scene`        a TOML file becomes SI values, every mistake named at once
+8. `inputs`       files of measurements: columns, slide paths, signals, loops
+9. `mesh`         two coated pieces as tagged meshes
+10. `surface`     measured or made height profiles as a share of the gap
+11. `elasticity`   the pieces condensed to their interface, fields recovered inside
+12. `contact`     gap shapes, unilateral contact, skins, strips, contact maps
+13. `friction`    laws of friction and the sum over bonds along the path
+14. `slip`        partial slip of the pieces: elements, shear modes, load paths
+15. `structure`   the modes of the rig and what drives it
+16. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
+17. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
+18. `response`    measures of a run, outcome, events, levels, ringing
+19. `wear`        worn depth over many cycles
+20. `runs`        patch, bench and rig: where the pillars meet
+21. `identify`    values from measurements with intervals
+22. `campaigns`   many runs: fits, error against cost, sweeps
+23. `export`      summary, netCDF, VTK, report
+24. `api`         load, build, plan and run from Python
+25. `torture`     seeded attacks on the command line
+26. `commands`    the verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used.
 """

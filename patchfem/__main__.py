@@ -16,9 +16,20 @@ for one in ENDINGS:
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # looking for some costs every command 30 ms
 # everything large holds BLAS to one thread anyway; others would only wait and cost a small run 0.1 s of CPU
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# looking for cycles of objects takes a tenth of a short command, which makes few of them
-gc.set_threshold(50_000, *gc.get_threshold()[1:])
+# looking for cycles of objects takes a tenth of a short command, which makes few of them: 110,000 objects stand at the
+# end of a run of the rig, nearly all of them imported, and what is beyond twice as many is searched
+FIRST, LATER = 200_000, 50_000
 
+
+def _searched(phase: str, _) -> None:
+    """The first search is under way: the others come sooner."""
+    gc.set_threshold(LATER, *gc.get_threshold()[1:])
+    if phase == "stop":
+        gc.callbacks.remove(_searched)
+
+
+gc.set_threshold(FIRST, *gc.get_threshold()[1:])
+gc.callbacks.append(_searched)
 
 
 class _Later(ModuleType):
@@ -57,9 +68,6 @@ from .commands.study import cost, fit  # noqa: E402
 from .commands.sweep import sweep  # noqa: E402
 from .commands.torture import torture_of  # noqa: E402
 
-for one in ENDINGS:
-    signal.signal(one, signal.default_int_handler)
-
 VERBS = (new, demo, check, plan, run, sweep, profile, compare, cost, fit, mesh, import_, export, view, report, schema,
          doctor, cite)
 
@@ -93,11 +101,10 @@ def completion(*, shell: Literal["zsh", "bash", "fish", "powershell"] | None = N
 
 def main(argv: list | None = None) -> None:
     """Entry point: exit codes 0 done, 2 bad input, 3 not converged, 4 missing or out of a resource, 130 interrupted."""
-    if argv is None:
-        ready()
-    code = _guarded(sys.argv[1:] if argv is None else argv)
-    if argv is None:
-        _leave(code)
+    if argv is not None:
+        sys.exit(_guarded(argv))
+    code = _guarded(sys.argv[1:], ready)
+    _leave(code)
     sys.exit(code)
 
 
@@ -105,29 +112,47 @@ def _leave(code: int) -> None:
     """End the process without taking its modules apart, which takes 50 ms and changes nothing; the usual end is left to
     a process in which threads work, which a profiler or a debugger watches, or whose last words cannot be written."""
     gc.freeze()
-    if threading.active_count() > 1 or sys.getprofile() or sys.gettrace() or sys.flags.inspect:
+    if threading.active_count() > 1 or _watched() or sys.flags.inspect:
         return
     try:
         sys.stdout.flush()
         sys.stderr.flush()
+        for one in ENDINGS:
+            signal.signal(one, signal.SIG_IGN)  # all is said and done, and it ends by itself
     except (OSError, ValueError, AttributeError):
         return
+    except KeyboardInterrupt:
+        os._exit(130)
     atexit._run_exitfuncs()
     os._exit(code)
 
 
-def _guarded(words: list) -> int:
+def _watched() -> bool:
+    """Whether a profiler, a debugger or a tool of line coverage watches this process; from Python 3.12 on most of them
+    do it by sys.monitoring, whose six places of tools are looked at."""
+    seen = getattr(sys, "monitoring", None)
+    return bool(sys.getprofile() or sys.gettrace() or (seen and any(map(seen.get_tool, range(6)))))
+
+
+def _guarded(words: list, before=lambda: None) -> int:
     if there := sys.modules.get(f"{__package__}.disk.whole"):
         there.begun()
     if words[:1] == ["help"]:
         say("patchfem: no verb help; `patchfem --help` lists the verbs, `patchfem run --help` explains one")
         return 2
     try:
-        app(words, exit_on_error=False, print_error=False)
+        before()
+        try:
+            app(words, exit_on_error=False, print_error=False)
+        except SystemExit as end:  # how cyclopts ends a verb and its help
+            if end.code or isinstance(end.__context__, BrokenPipeError):
+                raise
         sys.stdout.flush()
         return 0
     except (Refused, CycloptsError) as error:
-        say(plain(f"patchfem: {' '.join(str(error).split())}"))
+        left = getattr(error, "unused_tokens", None)
+        said = f"no place for '{' '.join(left)}'; see `patchfem {words[0]} --help`" if left else str(error)
+        say(plain(f"patchfem: {' '.join(said.split())}"))
         return 2
     except Ended as end:
         return end.code
@@ -159,7 +184,8 @@ def _guarded(words: list) -> int:
         if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
             say(plain(str(error)))
             return code
-        say(plain(f"patchfem: internal fault, please report it: {type(error).__name__}: {error}"))
+        say(plain(f"patchfem: internal fault, please report it: {type(error).__name__}: {error} (send the command, the "
+                  "scene with its files and what `patchfem doctor` says to the project's issue tracker)"))
         if os.environ.get("PATCHFEM_DEBUG"):
             raise
         return 1
@@ -176,6 +202,9 @@ def _interrupted() -> str:
             " and more" * (len(placed) > 3)
     return text + "".join(f"; what is kept in {there.shown(one)} goes on with --resume" for one in kept)
 
+
+for one in ENDINGS:  # as late as can be: from here to the try above there is nothing that waits
+    signal.signal(one, signal.default_int_handler)
 
 if __name__ == "__main__":
     main()

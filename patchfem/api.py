@@ -174,20 +174,21 @@ def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[
 
 
 def compare(before: str | Path, after: str | Path, /, *other: str | Path, direction: str = "",
-            units: tuple[str, str] | None = None) -> dict[str, Any]:
+            units: tuple[str, str] | None = None, shift: float | None = None) -> dict[str, Any]:
     """Compare a measured surface before with the same surface after: the dict that compare.json holds, in SI.
 
     before, after: files of two traces or two areal scans; other: the pair of traces of the other direction. direction:
-    "x" or "y", along which the first two run. units: of x and of z for files that name none, as ("mm", "um"). In the
-    dict `verdict` and `sentences` are words; `shift`, `worn_depth_mean`, `amplitude_ratio` and so on have `value`,
-    `low`, `high`, `unit`, and a `reason` where the value is None. PatchfemError for files that do not fit together.
+    "x" or "y", along which the first two run. units: of x and of z for files that name none, as ("mm", "um").
+    shift [m]: of two traces whose places are known, 0.0 where both start at one mark. In the dict `verdict` and
+    `sentences` are words; `shift`, `worn_depth_mean`, `amplitude_ratio` and so on have `value`, `low`, `high`, `unit`,
+    and a `reason` where the value is None. PatchfemError for files that do not fit together.
     """
     from .export.surfaces.compare import data_of
     from .surface.compare.compare import directions_of
     from .surface.compare.measured import compared_files
     from .surface.compare.verdict import verdicts
 
-    parts = compared_files((before, after, *other), direction, units)
+    parts = compared_files((before, after, *other), direction, units, shift)
     directions = directions_of(parts)
     return data_of(parts, verdicts(parts, directions), directions)
 
@@ -303,11 +304,12 @@ class Result(found.Result):
 
     def _repr_html_(self) -> str:
         """The answer as a notebook shows it: outcome, headline, every measure in its group, warnings."""
+        from .export.pages.released import released
         from .export.pages.words import fragment, verdict
         from .export.summary import cycles_of, summary_of
 
         summary = summary_of(self)
-        return fragment(summary, verdict(summary), cycles_of(self))
+        return fragment(summary, verdict(summary), cycles_of(self), released(self))
 
     @property
     def notes(self) -> list[str]:

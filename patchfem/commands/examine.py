@@ -4,7 +4,8 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import PackageNotFoundError, version
+from shutil import which
 from typing import NamedTuple
 
 PICTURE = """\
@@ -14,6 +15,9 @@ plotter.add_mesh(pyvista.Sphere())
 assert plotter.screenshot(None, return_img=True).std() > 0
 """
 SECONDS = 60  # for a first picture on a slow disk
+# what pyproject.toml names: an installation that was made from an older one does not say so itself
+NEEDED = ("numpy", "scipy", "scikit-fem", "meshio", "pyvista", "numba", "matplotlib", "pydantic", "cyclopts", "rich",
+          "xarray", "h5netcdf", "h5py", "bokeh", "pyuff", "threadpoolctl")
 EXTRAS = {"SurfaceTopography": ("profiles", "files of more instruments"),
           "distributed": ("cluster", "sweeps over several machines"), "trame": ("web", "fields in a browser"),
           "gmsh": ("gmsh", "meshes by gmsh"), "scikit-sparse": ("cholmod", "another factorisation"),
@@ -31,7 +35,7 @@ class Finding(NamedTuple):
 
 def examined() -> list[Finding]:
     """Everything that a run may need, looked at now; a picture is drawn in a process of its own."""
-    return [*_packages(), _cache(), _threads(), _picture(), *_extras()]
+    return [*_packages(), _cache(), _threads(), _picture(), _film(), *_extras()]
 
 
 def _packages() -> Iterator[Finding]:
@@ -39,16 +43,9 @@ def _packages() -> Iterator[Finding]:
 
     yield Finding("python", sys.version_info >= (3, 11), sys.version.split()[0], "")
     yield Finding("patchfem", True, __version__, "")
-    for name in dict.fromkeys(_needed()):
+    for name in NEEDED:
         found = _version(name)
         yield Finding(name, bool(found), found or "not installed", "" if found else f"pip install {name}")
-
-
-def _needed() -> Iterator[str]:
-    """Names of the packages that this one cannot do without."""
-    for line in requires("patchfem") or ():
-        if "extra ==" not in line:
-            yield line.split(";")[0].split(">")[0].split("<")[0].split("=")[0].split("[")[0].strip()
 
 
 def _version(name: str) -> str:
@@ -85,6 +82,14 @@ def _picture() -> Finding:
         fine, why = False, str(error)[:100]
     cure = "" if fine else "apt-get install libgl1 libxrender1, or look at report.html, which needs none"
     return Finding("pictures by OpenGL", fine, "drawn" if fine else why, cure)
+
+
+def _film() -> Finding:
+    """Whether a film of the last cycle can be written as .mp4 (patchfem view -o cycle.mp4)."""
+    program = which("ffmpeg")
+    found = "by ffmpeg" if program else _version("imageio-ffmpeg") and f"imageio-ffmpeg {_version('imageio-ffmpeg')}"
+    return Finding("films (.mp4)", bool(found), found or "neither ffmpeg nor imageio-ffmpeg, optional",
+                   "" if found else "pip install imageio-ffmpeg, or take a .gif or .html, which need none")
 
 
 def _extras() -> Iterator[Finding]:

@@ -66,7 +66,11 @@ def _table(file: Path, out: Path, asked, zero: bool) -> dict:
     units = {name: SI[name] for name in values}
     write_table(out, values, units)
     rows = len(next(iter(values.values())))
-    return {"rows": rows, "units": units, "notes": found.notes, "told": f"{rows} rows of {', '.join(values)}"}
+    moved = [f"{name} starts at {values[name][0]:g} {SI[name]}" for name in ("time", "displacement", "lateral")
+             if "displacement" in values and name in values and values[name][0] != 0]
+    notes = [*found.notes, *([f"{', '.join(moved)}: slide.file wants a table that starts at 0; --zero counts from the "
+                              "first row"] if moved else [])]
+    return {"rows": rows, "units": units, "notes": notes, "told": f"{rows} rows of {', '.join(values)}"}
 
 
 def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:

@@ -65,6 +65,7 @@ def _draw(written, target: Path) -> None:
 
 def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     """The verdict first, then what is known least well, every measure in its group, and where all of it is."""
+    from ..export.pages.released import released
     from ..export.pages.words import headline, least_known, table_of, verdict
     from ..export.summary import cycles_of
 
@@ -72,7 +73,7 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     if answer["title"]:
         print(answer["title"])
     print(f"{answer['outcome']}: {verdict(answer)}")
-    if text := headline(answer, cycles_of(written.result)):
+    if text := headline(answer, cycles_of(written.result), released=released(written.result)):
         print(text)
     sys.stdout.flush()
     if text := least_known(written.result):

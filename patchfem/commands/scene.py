@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ..effects import shown_absent
-from .shared import Json, Refused, Sets, flag, model_of, say, scene_of
+from .shared import Json, Refused, Sets, flag, model_of, note, say, scene_of
 from .sweep import Over
 
 
@@ -17,12 +17,16 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
 
     Example: patchfem check rig.toml
     """
-    found = scene_of(scene, set_, _faults)
+    notes = []
+    found = scene_of(scene, set_, lambda tables, folder, whole: _faults(tables, folder, whole, notes))
+    notes = list(dict.fromkeys(notes))
     cases = len(_swept(scene, set_, Over())[1]) if found.sweep else None
     for remark in found.remarks:
         say(f"{scene}: {remark}")
+    for text in notes:
+        note(text)
     if json_:
-        print(json.dumps({"kind": found.kind, "effects": found.named(), "remarks": found.remarks}
+        print(json.dumps({"kind": found.kind, "effects": found.named(), "remarks": found.remarks, "notes": notes}
                          | ({"cases": cases} if cases else {})))
     else:
         print(f"{scene}: a {found.kind} scene without mistakes" + (f", {cases} cases" if cases else ""))
@@ -35,15 +39,16 @@ def _swept(scene: Path, sets, what: Over) -> tuple:
     return asked_of(scene, sets, what.request())
 
 
-def _faults(tables, folder: Path, whole: bool) -> list:
-    """Faults of the files that a scene names; without such files nothing is imported for them."""
+def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
+    """Faults of the files that a scene names, and into `notes` what a run would say of them; without such files
+    nothing is imported for them."""
     from ..scene.scene import files_of
 
     if not files_of(tables):
         return []
     from ..model.files import faults
 
-    return faults(tables, folder, whole)
+    return faults(tables, folder, whole, notes)
 
 
 def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Json = False,

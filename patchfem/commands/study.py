@@ -73,8 +73,9 @@ class Rows:
 
 
 def fit(scene: Path, /, *, to: Annotated[str, Parameter(
-            help='what was measured: loop.csv of a bench, rows.csv of a rig, compare.json or "worn_depth_max=2.5 '
-                 'um..3.5 um" of a scene with [wear]')],
+            help='what was measured: loop.csv of a bench ("time [s],displacement [um],force [N]", or what export '
+                 'writes), rows.csv of a rig, compare.json or "worn_depth_max=2.5 um..3.5 um" of a scene with '
+                 '[wear]')],
         free: texts('a key to find and its range, such as "friction.static=0.1..0.6"; may be repeated'),
         hold: texts('rows that are only predicted, such as "frequency=135 Hz,150 Hz"') = (),
         offset: texts("of a loop, free besides, such as force (what the record adds to it), displacement (how far its "

@@ -139,7 +139,7 @@ def _answer(cases, found, target: Path, page: bool, tells: str, seconds: float) 
     """What came out, as "json", in "words", or the "faults" alone."""
     from collections import Counter
 
-    from ..export.pages.sweep import span, turns
+    from ..export.pages.sweep import span, turns, within
     from ..export.sweeps.page import columns_of
 
     counts = dict(Counter(map(str, found.outcome)).most_common())
@@ -150,7 +150,8 @@ def _answer(cases, found, target: Path, page: bool, tells: str, seconds: float) 
     elif tells == "words":
         print(f"{len(found)} cases: " + ", ".join(f"{count} {name}" for name, count in counts.items()))
         columns = {name: (values, found.errors[name], found.units[name]) for name, values in found.values.items()}
-        for said in (span(columns, found.outcome), turns(columns_of(cases), columns, found.outcome, not cases.rows)):
+        asked = columns_of(cases), columns, found.outcome, not cases.rows
+        for said in (span(columns, found.outcome), turns(*asked), within(*asked)):
             if said:
                 print(said)
         if page:

@@ -38,7 +38,7 @@ def write(folder: Path, curves: dict) -> Path:
         for knob, runs in curves.items():
             for one in runs:
                 rows.writerow([knob, one.label, f"{one.seconds:.6g}", one.timings,
-                               *(repr(part[name]) if name in part else "" for name in names
+                               *(repr(float(part[name])) if name in part else "" for name in names
                                  for part in (one.values, one.errors, one.distances))])
     return table
 
@@ -95,11 +95,14 @@ def _axis_of(knob: str, runs: list) -> str:
 
 
 def _line(axis, runs: list, part: str, name: str, colour: str) -> None:
-    """The errors or distances of a measure over the values of the knob, and a star for what the tolerance chose."""
+    """The errors or distances of a measure over the values of the knob, and a star for what the tolerance chose.
+
+    The line goes on in time: runs that cost much the same may have changed places by the noise of their seconds.
+    """
     for alone, mark in ((False, "o-"), (True, "*")):
         points = [(one.seconds, getattr(one, part).get(name, 0.0) / abs(one.values[name])) for one in runs
                   if (one.value is None) == alone and one.values.get(name)]
-        points = [point for point in points if point[1] > 0]
+        points = sorted(point for point in points if point[1] > 0)
         if points:
             axis.plot(*zip(*points, strict=True), mark, color=colour, markersize=11 if alone else 4,
                       label=name.replace("_", " ") if not alone else None)

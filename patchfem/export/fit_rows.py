@@ -36,7 +36,7 @@ class Starts:
                 found = json.loads(path.read_text("utf-8"))
             except (ValueError, RecursionError):
                 found = {}
-            if found.get("question") == self.key:
+            if isinstance(found, dict) and found.get("question") == self.key:
                 self.known = found["ends"]
 
     def __call__(self, name: str, ends: list | None = None):

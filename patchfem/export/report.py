@@ -43,7 +43,8 @@ def pressed(data: dict) -> bool:
 def verdict(data: dict) -> str:
     """The answer of a run in a few sentences of HTML, with the error of each number."""
     answer = f"<b>{escape(data['summary']['outcome'])}</b>: {escape(data['sentence'])}"
-    text = headline(data["summary"], data.get("cycles"), lambda number, name: linked(number, name, " class=v"))
+    text = headline(data["summary"], data.get("cycles"), lambda number, name: linked(number, name, " class=v"),
+                    data.get("released", ""))
     return f"{answer}{escape(curves.regime(data.get('steady')))} {text}".strip()
 
 
@@ -53,7 +54,8 @@ def page(data: dict) -> str:
     title = summary["title"] or data.get("name") or "patchfem run"
     motion = f" &middot; {escape(data['driven'])}" if data.get("driven") else ""
     lead = [f"<p class=soft>patchfem {escape(summary['patchfem'])} &middot; {escape(summary['kind'])}{motion} &middot; "
-            f"engine {escape(data['engine'] or 'static')} &middot; {summary['seconds'].get('total', 0):.2f} s</p>",
+            f"engine {escape(data['engine'] or 'static')} &middot; "
+            f"computed in {summary['seconds'].get('total', 0):.2f} s</p>",
             f"<p class=verdict>{verdict(data)}</p>"]
     warnings = [w for w in summary["warnings"] if w != data["sentence"]]
     if warnings:
@@ -187,14 +189,16 @@ def _histories(data: dict) -> Picture | None:
     title = f"The run: {count:.2g} of a cycle" if part_of_cycle(data) else title
     bodies = "block and base" if np.any(window["base"]) else "the block"
     caption = f"Displacement over the whole run; displacement, and acceleration of {bodies}, at its end.{_under(data)}"
-    begin = pictures.whole_from(history["time"], period, w["time"][0])
+    begin, swings = pictures.whole_from(history["time"], period, w["time"][0]), bool(data.get("released"))
     kept = int(np.sum(history["time"] < begin))
     if kept:
         what = "reversals were kept: a band from the lowest to the highest of each cycle." \
             if kept * period > begin else f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
+        what = "turns and stops were kept, which the line joins." if swings else what
         unit, scale = scales.axis_unit(history["time"], "s")
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
-    return Picture(pictures.histories, (history, window, period, title), caption)
+    # a swing that dies down has no band per cycle: its turns are kept, and the line through them shows it
+    return Picture(pictures.histories, (history, window, period, title, swings), caption)
 
 
 def _under(data: dict) -> str:
@@ -322,7 +326,7 @@ def _cost(data: dict) -> Section:
     shared = " The law and the modes share one loop; its time stands with the law." if summary["kind"] == "rig" else ""
     absent = shown_absent(summary["not_in_scene"], summary.get("numerics", {}).get("engine"))
     text = (f"<div class=across><table><tr><th>effect<th>equations<th class=n>seconds</tr>{rows}"
-            f"</table></div><p class=soft>{escape(parts)}.{shared}</p>"
+            f"</table></div><p class=soft>Seconds by the clock on the wall: {escape(parts)}.{shared}</p>"
             f"<details><summary>Not in the scene, so neither imported nor computed</summary><p class=soft>"
             f"{escape(', '.join(absent))}.</p></details>")
     return Section("cost", "What ran and what it cost", text)

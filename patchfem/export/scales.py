@@ -30,3 +30,11 @@ def axis_unit(values, unit: str) -> tuple:
     """
     values = np.asarray(values)
     return step_of(LADDERS[unit], np.abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
+def wide_scale(values) -> bool:
+    """Whether an axis of these values is better logarithmic: the smallest above 0 is under a thousandth of the
+    largest, and none is negative."""
+    values = np.asarray(values, float)
+    above = values[np.isfinite(values) & (values > 0)]
+    return bool(above.size and above.max() > 1e3 * above.min() and not np.any(values < 0))

@@ -10,6 +10,7 @@ from ..runs.results.result import Result
 from ..structure.drive_sizes import largest
 from .histories import largest_multiplier
 from .pages.driven import command, driven
+from .pages.released import released
 from .pages.words import verdict
 from .report import page, picture
 from .summary import cycles_of, summary_of, versions
@@ -23,7 +24,8 @@ def report_data(result: Result) -> dict:
     summary = summary_of(result)
     data = {"name": source.path.stem, "summary": summary, "scene": source.text, "resolved": resolved,
             "driven": driven(scene), "command": command(source.path, source.sets),
-            "sentence": verdict(summary), "cycles": cycles_of(result), "engine": result.extra.get("engine", ""),
+            "sentence": verdict(summary), "released": released(result),
+            "cycles": cycles_of(result), "engine": result.extra.get("engine", ""),
             "fields": result.fields,
             "x": None if result.patch is None else result.patch.x, "versions": versions(),
             "means": {name: one.text for name, one in result.measures.items()}}

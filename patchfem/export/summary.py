@@ -2,20 +2,18 @@
 
 import json
 import math
-import os
-import re
 import sys
 import tomllib
 from functools import cache
 from pathlib import Path
 
 from .. import __version__
+from ..disk.installed import installed
 from ..disk.whole import write_text
 from ..effects import EFFECTS
 from ..runs.results.chosen import chosen
 from ..runs.results.result import Result
 
-METADATA = re.compile(r"(.+?)-(\d[^-]*)(?:\.dist-info|(?:-py\d.*)?\.egg-info)")
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
 
@@ -54,7 +52,7 @@ def read_summary(path: Path) -> dict:
     """The object in summary.json; OSError where it cannot be read, ValueError where it is none that `summary` makes."""
     text = path.read_text(encoding="utf-8")
     try:
-        _shape().model_validate_json(text)
+        _shape().model_validate_json(text, strict=True)
         return json.loads(text)
     except RecursionError:
         raise ValueError("nested deeper than a summary is") from None
@@ -80,13 +78,9 @@ def _shape() -> type:
         total: float
 
     class Summary(BaseModel):
-        patchfem: str
-        title: str
         kind: str
         outcome: str
         measures: dict[str, Number]
-        warnings: list[str]
-        notes: list[str]
         seconds: Seconds
 
     return Summary
@@ -132,22 +126,6 @@ def effects_of(result: Result) -> list:
 
 def versions() -> dict:
     """Versions, by name, of the interpreter and of the packages that compute, those that are there."""
-    found = _installed()
+    found = installed()
     return {"python": ".".join(map(str, sys.version_info[:3]))} | {name: found[name] for name in PACKAGES
                                                                    if name in found}
-
-
-@cache
-def _installed() -> dict:
-    """Versions of the installed packages by name, as the names of their metadata folders say them: importlib.metadata
-    reads a file of each with a parser of mails, for 20 ms in all."""
-    out = {}
-    for folder in sys.path:
-        try:
-            names = os.listdir(folder or ".")
-        except OSError:
-            continue
-        for name in names:
-            if there := METADATA.fullmatch(name):
-                out.setdefault(re.sub("[-_.]+", "-", there[1]).lower(), there[2])  # the first on the path is imported
-    return out

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..scales import axis_unit
+from ..scales import axis_unit, wide_scale
 from .pictures import BLUE, GREY, ORANGE, drawing, styled
 
 G = 9.80665
@@ -106,14 +106,17 @@ def levels(rows: list, onto=None):
     error = np.array([row["errors"].get("relative_displacement_amplitude", 0.0) for row in rows]) * scale
     held = np.array([row["stuck"] for row in rows])
     figure, (axis,) = drawing(1, 3.6, onto)
-    y, seen = amplitude * scale, set()
+    y, seen, log = amplitude * scale, set(), wide_scale(amplitude)
     for k in range(len(rows) - 1):
+        if log and not (y[k] > 0 and y[k + 1] > 0):  # a level without any motion has no place on a logarithmic axis
+            continue
         up = drive[k + 1] >= drive[k]
         colour = BLUE if up else ORANGE
         axis.plot(drive[k:k + 2], y[k:k + 2], "-" if up else "--", color=colour,
                   label=None if up in seen else "raised" if up else "lowered")
         seen.add(up)
-        ends = [((1 - s) * drive[k] + s * drive[k + 1], (1 - s) * y[k] + s * y[k + 1]) for s in (0.45, 0.58)]
+        ends = [((1 - s) * drive[k] + s * drive[k + 1],
+                 y[k]**(1 - s) * y[k + 1]**s if log else (1 - s) * y[k] + s * y[k + 1]) for s in (0.45, 0.58)]
         axis.annotate("", xy=ends[1], xytext=ends[0], arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.2})
     for which, fill, text in ((~held, GREY, "slips"), (held, "white", "stuck")):
         if which.any():
@@ -121,6 +124,9 @@ def levels(rows: list, onto=None):
                           label=text)
     axis.set(xlabel="force [N]" if forced else "base acceleration [g]", ylabel=f"half peak-to-peak [{name}]",
              title="Level by level")
-    axis.set_ylim(bottom=0)
+    if log:
+        axis.set_yscale("log")
+    else:
+        axis.set_ylim(bottom=0)
     axis.legend()
     return figure

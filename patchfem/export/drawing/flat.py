@@ -35,7 +35,7 @@ class Picture:
 
         self.figure = Figure(figsize=size)
         grid = self.figure.add_gridspec(2, 2)
-        self.bodies = [_Bodies(self.figure, self.figure.add_subplot(grid[at]), frame, panel)
+        self.bodies = [_Bodies(self.figure.add_subplot(grid[at]), frame, panel)
                        for at, panel in zip(((slice(None), 0), (0, 1)), shown)]
         axes = self.figure.add_subplot(grid[1, 1])
         self.reach = reach
@@ -47,6 +47,8 @@ class Picture:
             low, high = np.array(reach) * axis_unit(reach, "Pa")[1]
             axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
         axes.legend(loc="best" if reach is None else "upper right")
+        drawn, unit = self.bodies[0].cells[0][2], axis_unit([shown[0].top], "Pa")[0]
+        self.figure.colorbar(drawn, ax=self.bodies[0].axes, label=f"von Mises stress [{unit}]", shrink=0.7)
         self._head(head, shown)
 
     def show(self, frame: Frame, head: str, shown: tuple) -> None:
@@ -69,17 +71,18 @@ class Picture:
             return np.array(canvas.buffer_rgba())[..., :3]
 
     def _head(self, head: str, shown: tuple) -> None:
-        for one, before, panel in zip(self.bodies, (f"{head}\n", "where they touch, "), shown):
-            one.axes.set_title(before + panel.title())
+        whole, close = self.bodies
+        whole.axes.set_title(f"{head}\n{shown[0].title()}")
+        close.axes.set_title(f"where they touch, {shown[1].title(False)}")
 
 
 class _Bodies:
     """The cells of a panel, coloured by their stress, with the borders of the pieces."""
 
-    def __init__(self, figure, axes, frame: Frame, panel: Panel):
+    def __init__(self, axes, frame: Frame, panel: Panel):
         from matplotlib.collections import LineCollection, PolyCollection
 
-        unit, self.scale = axis_unit([panel.top], "Pa")
+        self.scale = axis_unit([panel.top], "Pa")[1]
         self.axes, self.edges = axes, borders(frame, panel.cells)
         self.cells = []  # (which, corners, collection) of triangles and of quadrilaterals
         size = np.diff(frame.offsets)
@@ -97,7 +100,6 @@ class _Bodies:
         left, right, bottom, top = panel.window
         axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
         self.show(frame, panel)
-        figure.colorbar(self.cells[0][2], ax=axes, label=f"von Mises stress [{unit}]", shrink=0.7)
 
     def show(self, frame: Frame, panel: Panel) -> None:
         for mine, corners, drawn in self.cells:

@@ -7,6 +7,7 @@ import numpy as np
 from ..fields.series import Frame
 from ..scales import axis_unit
 
+SHOWN = 0.995  # share of the area of a panel whose stress the colours tell apart
 CLIPPED = 0.8  # share of the largest stress above which the colours reach all the way
 ROUND_OFF = 1e-5  # of the largest motion: what is kept is in single precision, a slide is a difference of two
 VISIBLE = 0.05  # share of the height of a panel that the largest motion or gap in it takes
@@ -30,11 +31,12 @@ class Panel:
     over: bool
     aside: float = 1.0
 
-    def title(self) -> str:
-        """Head of the panel: how much its motion is magnified, and which stress the top colour stands for."""
+    def title(self, scaled: bool = True) -> str:
+        """Head of the panel: how much its motion is magnified, and where `scaled` which stress the top colour stands
+        for."""
         text = "drawn as meshed" if self.factor == 0 else f"motion and gap {self.factor:g} times as large"
         unit, scale = axis_unit([self.top], "Pa")
-        text += f", top colour {self.top * scale:.3g} {unit} and more" if self.over else ""
+        text += f", top colour {self.top * scale:.3g} {unit} and more" if self.over and scaled else ""
         if self.aside != 1:
             return text + f"\nthe slide of {self.slide * 1e3:.3g} um {self.aside:g} times as large"
         return text + (f"\nthe slide of {self.slide * 1e3:.3g} um as it is" if self.slide and self.factor > 1 else "")
@@ -48,8 +50,8 @@ class Panel:
 
 
 def panels(frame: Frame, magnify: float | tuple | None = None, close: tuple | None = None, aside: float = 1.0) -> tuple:
-    """Panels of both pieces whole and of the place where they touch, each with a factor of its own unless `magnify` is
-    given, one for both or one for each.
+    """Panels of both pieces whole and of the place where they touch, with one scale of colours, each with a factor of
+    its own unless `magnify` is given, one for both or one for each.
 
     close: second window [mm], that of `near` unless given; aside: factor of the slide of the upper piece as a whole.
     The upper piece is drawn with the shape of its surface, which lives in the gap and not in the mesh.
@@ -59,11 +61,27 @@ def panels(frame: Frame, magnify: float | tuple | None = None, close: tuple | No
     x, y = frame.points[used, :2].T * 1e3
     whole = (x.min(), x.max(), y.min(), y.max())
     factors = magnify if isinstance(magnify, tuple) else (magnify, magnify)
-    return tuple(_panel(frame, motion, *each)
-                 for each in zip((whole, near(frame) if close is None else close), (0.995, 1.0), factors))
+    windows = (whole, near(frame) if close is None else close)
+    inside = [_inside(frame, window) for window in windows]
+    mises, area = frame.cell_data["von_mises"], areas(frame)
+    top = max(_limit(mises[cells], area[cells]) for cells in inside)  # one scale for what stands side by side
+    return tuple(_panel(frame, motion, *each, top) for each in zip(windows, inside, factors))
 
 
-def _panel(frame: Frame, motion: tuple, window: tuple, share: float, magnify: float | None) -> Panel:
+def _inside(frame: Frame, window: tuple) -> np.ndarray:
+    """Cells (cells,) bool of a window that have a stress."""
+    left, right, bottom, top = window
+    x, y = middles(frame).T
+    return (x >= left) & (x <= right) & (y >= bottom) & (y <= top) & np.isfinite(frame.cell_data["von_mises"])
+
+
+def _limit(mises, area) -> float:
+    """Stress [Pa] at the upper end of the colours of some cells: the largest, unless that stands out in a corner."""
+    largest, most = float(mises.max(initial=0.0)), float(_exceeded(mises, area, SHOWN))
+    return most if most < CLIPPED * largest else largest
+
+
+def _panel(frame: Frame, motion: tuple, window: tuple, here, magnify: float | None, limit: float) -> Panel:
     move, slide, aside = motion
     left, right, bottom, top = window
     x, y = frame.points[:, :2].T * 1e3
@@ -71,12 +89,7 @@ def _panel(frame: Frame, motion: tuple, window: tuple, share: float, magnify: fl
     if magnify is None:
         largest = np.abs(move[mine, 1]).max(initial=0.0) * 1e3
         magnify = rounded(VISIBLE * (top - bottom) / largest) if largest > 0 else 0.0
-    cells, mises = middles(frame), frame.cell_data["von_mises"]
-    here = (cells[:, 0] >= left) & (cells[:, 0] <= right) & (cells[:, 1] >= bottom) & (cells[:, 1] <= top)
-    here &= np.isfinite(mises)
-    largest = float(mises[here].max(initial=0.0))
-    limit = float(_exceeded(mises[here], areas(frame)[here], share))
-    limit = limit if limit < CLIPPED * largest else largest
+    largest = float(frame.cell_data["von_mises"][here].max(initial=0.0))
     whole = np.zeros_like(move)
     whole[upper_points(frame), 0] = slide
     places = (frame.points[:, :2] + min(magnify, 1.0) * aside * whole + magnify * (move - whole)) * 1e3

@@ -21,6 +21,7 @@ SCRIPT = '''\
     pvpython THIS.py            plays the cycle three times
     pvpython THIS.py cycle.png  writes a picture of every frame; .avi or .ogv where ParaView can write films
     paraview --script=THIS.py   opens it
+    xvfb-run -a pvpython THIS.py cycle.png  where there is no display (apt-get install xvfb)
 
 For ParaView 5.11 and later. The fields stand beside this script, in a .pvd of the same name and its folder.
 """
@@ -39,8 +40,22 @@ PRESSURE = {pressure!r}  # Pa, ends of the colours in every frame
 TIMES = 3  # the cycle is played
 PACE = {pace!r}  # frames per second of a film
 
+
+def without_display():
+    """Whether this ParaView draws on an X display and there is none: it would end by a crash."""
+    if not sys.platform.startswith("linux") or os.environ.get("DISPLAY"):
+        return False
+    import vtkmodules.vtkRenderingOpenGL2  # without it the kind of window of this build is not known
+    from vtkmodules.vtkRenderingCore import vtkRenderWindow
+
+    return vtkRenderWindow().GetClassName() == "vtkXOpenGLRenderWindow"
+
+
 if not os.path.isfile(FIELDS):
     raise SystemExit(FIELDS + " is not there; run this script in the folder where it was written")
+if without_display():
+    raise SystemExit("there is no display, without which this ParaView crashes; xvfb-run -a pvpython THIS.py cycle.png "
+                     "writes pictures (apt-get install xvfb), and so does a ParaView built for EGL or OSMesa")
 
 reader = simple.PVDReader(registrationName={fields!r}, FileName=FIELDS)
 bent = simple.WarpByVector(registrationName="motion", Input=reader)

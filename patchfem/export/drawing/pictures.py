@@ -128,7 +128,7 @@ def interface(x, fields: dict, onto=None):
         axes[1].plot(x * mm, tau[frame] * scale, color=ORANGE)
         name, per = axis_unit(fields["time"], "s")
         axes[1].set(ylabel=f"shear stress [{unit}]",
-                    title=f"Shear stress, largest resultant at {fields['time'][frame] * per:.4g} {name}")
+                    title=f"Shear stress, largest resultant {fields['time'][frame] * per:.4g} {name} into the motion")
     for axis in axes:
         axis.set(xlabel=f"x [{along}]", xlim=(part[0] * mm, part[1] * mm))
     return figure
@@ -203,17 +203,19 @@ def loop(slide, force, title: str, measured: tuple | None = None, onto=None):
 
 
 @styled
-def histories(history: dict, window: dict | None, period: float | None, title: str = "Last cycles", onto=None):
+def histories(history: dict, window: dict | None, period: float | None, title: str = "Last cycles",
+              joined: bool = False, onto=None):
     """The whole run beside its last cycles (a rig) or beside its friction force (a bench); onto Axes the first alone.
 
     history: time, displacement, force; window: the last cycles alone, with base and block acceleration;
-    period [s] of the drive, None where every sample was kept. `measured` in history: times [s] and forces [N] read.
+    period [s] of the drive, None where every sample was kept; joined: what was kept before is a line, not a band per
+    cycle. `measured` in history: times [s] and forces [N] read.
     """
     forced = onto is None and window is None and bool(np.any(history["force"]))
     figure, axes = drawing(2 if window or forced else 1, 3.6, onto)
     name, per = axis_unit(history["time"], "s")
     start = window["time"][0] if window else 0.0
-    _whole_run(axes[0], history, period, per, start)
+    _whole_run(axes[0], history, None if joined else period, per, start)
     axes[0].set(xlabel=f"time [{name}]", title="Whole run")
     if forced:
         up, scale = axis_unit(history["force"], "N")

@@ -116,15 +116,15 @@ def _plotter(one: Frame, head: str, magnify, off_screen: bool):
     plotter.set_background("white")
     whole, close = panels(one, magnify)
     plotter.subplot(0, 0)
-    _bodies(plotter, one, whole, f"{head}\n{whole.title()}")
+    _bodies(plotter, one, whole, f"{head}\n{whole.title()}", True)
     plotter.subplot(0, 1)
-    _bodies(plotter, one, close, f"where they touch, {close.title()}")
+    _bodies(plotter, one, close, f"where they touch, {close.title(False)}", False)
     plotter.subplot(1, 1)
     _chart(plotter, one)
     return plotter
 
 
-def _bodies(plotter, one: Frame, panel: Panel, text: str) -> None:
+def _bodies(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
     import pyvista as pv
 
     unit, scale = axis_unit([panel.top], "Pa")
@@ -135,11 +135,10 @@ def _bodies(plotter, one: Frame, panel: Panel, text: str) -> None:
     mesh.cell_data["von Mises"] = one.cell_data["von_mises"][panel.cells] * scale
     plotter.add_mesh(mesh, scalars="von Mises", cmap=COLOURS, clim=(0, max(panel.top * scale, 1e-12)), lighting=False,
                      show_scalar_bar=False)
-    # bars of one title share their range, so each gets a title of its own
-    title = f"von Mises\n[{unit}]\n" + " " * len(plotter.scalar_bars)
-    plotter.add_scalar_bar(title, mapper=plotter.mapper, vertical=True, color="black", title_font_size=FONT,
-                           label_font_size=FONT, fmt="%.3g", n_labels=5, width=0.045, height=0.56, position_x=0.87,
-                           position_y=0.2, unconstrained_font_size=True)
+    if scaled:  # the other panel has the same colours
+        plotter.add_scalar_bar(f"von Mises\n[{unit}]\n", mapper=plotter.mapper, vertical=True, color="black",
+                               title_font_size=FONT, label_font_size=FONT, fmt="%.3g", n_labels=5, width=0.045,
+                               height=0.56, position_x=0.87, position_y=0.2, unconstrained_font_size=True)
     for edges, colour in zip(borders(one, panel.cells), ("black", "white")):
         if len(edges):
             lines = pv.PolyData(places, lines=np.insert(edges, 0, 2, axis=1).ravel())

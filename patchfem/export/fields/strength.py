@@ -5,18 +5,23 @@ import numpy as np
 from ...core import say
 from ...scene.keys.materials import MATERIALS, YIELD
 
+HELD = 0.2  # of a piece's height beside its held far face: nearer, stress grows as elements shrink (test_strength)
+
 
 def beyond_yield(asked, bodies: dict) -> list:
     """A note for each material whose von Mises stress is above its yield strength in some cell and frame.
 
     asked: the patch of a model; bodies: "lower" and "upper" -> {"points" (n, 2) [m], "blocks" of cells, "material"
-    (c,) True for coating, "mises" (f, c) [Pa]}. Materials of a scene's own have no strength here, ceramics none.
+    (c,) True for coating, "mises" (f, c) [Pa]}. Materials of a scene's own have no strength here, ceramics none. What
+    lies beside the held far face is left out: the stress in its corners is that of a rigid hold, without bound.
     """
     found = {}
     for side, body in bodies.items():
         piece = getattr(asked, side)
+        middle = np.concatenate([body["points"][block].mean(axis=1) for block in body["blocks"]])
+        free = np.abs(middle[:, 1]) < (1 - HELD) * np.abs(body["points"][:, 1]).max()
         for coated, kind in ((False, piece.substrate), (True, piece.coating.material if piece.coating else None)):
-            mine = np.flatnonzero(np.asarray(body["material"]) == coated)
+            mine = np.flatnonzero((np.asarray(body["material"]) == coated) & free)
             if kind is None or not mine.size or kind.name not in YIELD:
                 continue
             if (kind.young, kind.poisson) != MATERIALS[kind.name][:2]:  # a name with constants of its own
@@ -24,17 +29,9 @@ def beyond_yield(asked, bodies: dict) -> list:
             highest = body["mises"][:, mine].max(axis=0)
             cell = int(mine[np.argmax(highest)])
             if highest.max() > YIELD[kind.name].strength:
-                found.setdefault(kind.name, []).append((float(highest.max()), side, _middle(body, cell)))
-    return [_told(name, max(places), len(places)) for name, places in found.items()]
-
-
-def _middle(body: dict, cell: int) -> np.ndarray:
-    """Middle (x, y) [m] of a cell, counted through all blocks."""
-    for block in body["blocks"]:
-        if cell < len(block):
-            return body["points"][block[cell]].mean(axis=0)
-        cell -= len(block)
-    raise IndexError(cell)
+                found.setdefault(kind.name, []).append((float(highest.max()), side, middle[cell]))
+    return [_told(name, max(places, key=lambda one: one[0]), len({side for _, side, _ in places}))
+            for name, places in found.items()]
 
 
 def _told(name: str, highest: tuple, pieces: int) -> str:

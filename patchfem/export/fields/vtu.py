@@ -5,8 +5,8 @@ stands in the information key UNITS_LABEL of its array, where VTK keeps units, a
 name of a field array, "unit of gap: m". Codes too, as "code of material: coating" with the code as its value. Both are
 numbers because meshio refuses a file with field arrays of text. ParaView reads TimeValue.
 
-LZMA behind a difference of neighbouring points takes 0.4 of the bytes of zlib, which makes good what base64 and a mesh
-in every frame cost beside fields.vtkhdf. VTK reads it from 8.2 on, ParaView from 5.6.
+LZMA behind a difference of neighbouring points takes 0.4 of the bytes of zlib, in up to twice the time; that makes good
+what base64 and a mesh in every frame cost beside fields.vtkhdf. VTK reads it from 8.2 on, ParaView from 5.6.
 """
 
 import base64
@@ -24,7 +24,7 @@ from .blocks import CODES, NAMES, Block
 from .series import Frame, Series
 
 BLOCK = 1 << 20  # bytes of a compressed block
-PACKING = {"id": lzma.FILTER_LZMA2, "preset": 0, "lc": 0, "lp": 2, "pb": 2}  # numbers of four bytes; zlib takes a third
+PACKING = {"id": lzma.FILTER_LZMA2, "preset": 0, "lc": 0, "lp": 2, "pb": 2}  # for numbers of four bytes
 TYPES = {"f4": "Float32", "f8": "Float64", "i1": "Int8", "i4": "Int32", "i8": "Int64", "u1": "UInt8"}
 ENDINGS = (".pvd", ".vtu", ".csv", ".vtkhdf")
 

@@ -11,8 +11,8 @@ from ...core import Missing, PatchfemError
 from ...inputs.columns import read_columns
 from ...inputs.paths import BESIDE, UNITS
 
-LOOPS = (("relative_displacement", "friction_force"), ("displacement", "force"), ("displacement", "friction_ratio"),
-         ("displacement", "fitted"))  # slide, resistance
+LOOPS = (("slide", "friction_force"), ("relative_displacement", "friction_force"), ("displacement", "force"),
+         ("displacement", "friction_ratio"), ("displacement", "fitted"))  # slide, resistance: the first of one counts
 
 
 class Column(NamedTuple):
@@ -46,8 +46,12 @@ class Histories:
     def loops(self) -> list:
         """(slide, resistance) columns of the friction loops, one per interface."""
         by = {(one.name, one.number): one for one in self.columns}
-        return [(by[slide, number], by[force, number]) for slide, force in LOOPS
-                for number in sorted({number for name, number in by if name == slide}) if (force, number) in by]
+        found = {}
+        for slide, force in LOOPS:
+            for number in sorted(number for name, number in by if name == slide):
+                if (force, number) in by:
+                    found.setdefault((force, number), (by[slide, number], by[force, number]))
+        return list(found.values())
 
 
 def histories_of(folder: Path) -> Histories:

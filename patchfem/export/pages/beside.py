@@ -13,8 +13,9 @@ from ..scales import LADDERS, axis_unit
 from ..summary import read_summary
 from .charts import COLOURS, mark
 from .document import Section, document
-from .sweep import NUMBER, label
+from .sweep import label
 from .words import linked, meaning, pair, units
+from .written import NUMBER
 
 TALL = 410  # pixels of a picture
 POINTS = 4000  # of one line in a picture
@@ -260,4 +261,6 @@ def _share(value: float, first: dict) -> str:
     if abs(first["value"]) <= (first["error"] or 0.0):
         return "&ndash;"
     factor = value / first["value"]
-    return f"&times; {factor:.2g}" if abs(factor) >= MANY else f"{(value - first['value']) / abs(first['value']):+.2%}"
+    if abs(factor) < MANY:
+        return f"{(value - first['value']) / abs(first['value']):+.2%}"
+    return f"&times; {float(f'{factor:.2g}'):.7g}"  # two digits, and 150 as it is

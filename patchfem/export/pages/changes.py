@@ -1,14 +1,15 @@
 """What changes as the key of a sweep grows, and from where on, in one sentence: what comes first stands first."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from .words import NO_SLIP
+from .written import bare, resolved
 
 SHARE = 0.1  # of its first value, beyond the errors of both, from which a measure has changed
-MOST = 3  # changes in the sentence
+MOST, WORDS = 3, 40  # changes in the sentence, and words, which the later changes give way to
 WHOLE = 1 - 1e-12  # a contact fraction of 1 but for round-off
 ENDS = {
     "done": "the run ends as asked", "steady": "the motion settles", "stuck": "the interface holds as a whole",
@@ -18,19 +19,18 @@ ENDS = {
 SLIPS = "the interface slips as a whole"  # from "stuck" to "steady"
 STATES = {  # measure: what its state is called once it has it, and once it has it no longer
     "contact_fraction": ("the contact fraction is below 1", "the whole length is in contact"),
-    "stick_fraction": ("the interface slips as a whole in part of the cycle", "the interface holds all the cycle"),
+    "stick_fraction": ("the interface slips as a whole in part of the cycle", "the interface never slips as a whole"),
     "slip_amplitude": ("slip begins", "there is no slip")}
 
 
 class Change(NamedTuple):
     """One change along a line of cases: what it is; places of the first case that has it and of the last one before it;
-    whether all later ones have it too; the line."""
+    whether all later ones have it too."""
 
     what: str
     at: int
     before: int
     stays: bool
-    line: int
 
 
 def changes(keys: list, measures: dict, outcome: Sequence, grid: bool = True, main: str = "") -> str:
@@ -47,22 +47,43 @@ def changes(keys: list, measures: dict, outcome: Sequence, grid: bool = True, ma
         return ""
     key = max(numbers, key=lambda one: len(set(np.asarray(one["values"]).tolist())))
     others = [one for one in keys if one is not key]
-    lines = _lines(key, others)
+    lines, at = lines_of(key, others), shown_of(key)
     found = {}
-    for number, line in enumerate(lines):
-        for one in _along(line, measures, np.asarray(outcome, str), main, key["texts"]):
-            found.setdefault(one.what, []).append(one._replace(line=number))
+    for line in lines:
+        for one in _along(line, measures, np.asarray(outcome, str), main, at):
+            found.setdefault(one.what, []).append(one)
     order = np.asarray(key["values"], float)
-    parts = sorted(found.values(), key=lambda each: min(order[one.at] for one in each))[:MOST]
-    where = [", ".join(f"{one['name']} {one['texts'][line[0]]}" for one in others) for line in lines]
     told = {}
-    for each in parts:
-        told.setdefault(_where(each, order, key["texts"], where), []).append(each[0].what)
-    said = [f"{place} {' and '.join(what)}" for place, what in told.items()]
-    return f"As {key['name']} grows: {'; '.join(said)}." if said else ""
+    for each in sorted(found.values(), key=lambda each: min(order[one.at] for one in each))[:MOST]:
+        told[each[0].what] = _where(each, order, at, others, len(lines))
+    for count in range(len(told), 0, -1):
+        said = _sentence(key["name"], list(told.items())[:count])
+        if len(said.split()) <= WORDS or count == 1:
+            return said
+    return ""
 
 
-def _lines(key: dict, others: list) -> list:
+def shown_of(key: dict) -> Callable[[int], str]:
+    """A function from a case to the value that a key has in it, as people read it."""
+    values = np.asarray(key["values"], float)
+    sizes = np.unique(values)
+    apart = np.minimum(np.diff(sizes, prepend=-np.inf), np.diff(sizes, append=np.inf))
+
+    def shown(case: int) -> str:
+        return resolved(str(key["texts"][case]), values[case], apart[np.searchsorted(sizes, values[case])])
+
+    return shown
+
+
+def _sentence(name: str, told: list) -> str:
+    """Changes with their places, [(what, where)], as a sentence that names each place once."""
+    places = {}
+    for what, where in told:
+        places.setdefault(where, []).append(what)
+    return f"As {name} grows: {'; '.join(f'{where} ' + ' and '.join(what) for where, what in places.items())}."
+
+
+def lines_of(key: dict, others: list) -> list:
     """The cases of each combination of the other keys, by the size of the key."""
     lines = {}
     for case in np.argsort(np.asarray(key["values"], float), kind="stable").tolist():
@@ -70,7 +91,7 @@ def _lines(key: dict, others: list) -> list:
     return [np.array(line) for line in lines.values()]
 
 
-def _along(line: np.ndarray, measures: dict, outcome: np.ndarray, main: str, texts: Sequence) -> list:
+def _along(line: np.ndarray, measures: dict, outcome: np.ndarray, main: str, at: Callable) -> list:
     """Every change along a line of cases."""
     out = _ends(line, outcome[line])
     for name, states in STATES.items():
@@ -82,7 +103,7 @@ def _along(line: np.ndarray, measures: dict, outcome: np.ndarray, main: str, tex
             out += _turn(line, np.where(there, 1.0, np.where(not_there, 0.0, np.nan)), states)
     out = _once(out)
     if main in measures:
-        out += _departed(line, *(np.asarray(one, float)[line] for one in measures[main][:2]), main, texts)
+        out += _departed(line, *(np.asarray(one, float)[line] for one in measures[main][:2]), main, at)
     return out
 
 
@@ -103,7 +124,7 @@ def _ends(line: np.ndarray, outcome: np.ndarray) -> list:
         first = int(np.argmax(outcome == name))
         if first:
             what = SLIPS if name == "steady" and outcome[0] == "stuck" else ENDS[name]
-            out.append(Change(what, int(line[first]), int(line[first - 1]), bool(np.all(outcome[first:] == name)), 0))
+            out.append(Change(what, int(line[first]), int(line[first - 1]), bool(np.all(outcome[first:] == name))))
     return out
 
 
@@ -115,10 +136,10 @@ def _turn(line: np.ndarray, state: np.ndarray, words: tuple) -> list:
     if not other.size:
         return []
     first = int(other[0])
-    return [Change(words[int(state[0])], int(line[first]), int(line[first - 1]), other.size == state.size - first, 0)]
+    return [Change(words[int(state[0])], int(line[first]), int(line[first - 1]), other.size == state.size - first)]
 
 
-def _departed(line: np.ndarray, values: np.ndarray, errors: np.ndarray, name: str, texts: Sequence) -> list:
+def _departed(line: np.ndarray, values: np.ndarray, errors: np.ndarray, name: str, at: Callable) -> list:
     """Where a measure is a tenth above or below its first value, beyond both errors."""
     known = np.isfinite(values)
     line, values, errors = line[known], values[known], np.nan_to_num(errors[known])
@@ -128,23 +149,31 @@ def _departed(line: np.ndarray, values: np.ndarray, errors: np.ndarray, name: st
     if not far.any():
         return []
     above = values[int(np.argmax(far))] > values[0]
-    what = (f"the {name.replace('_', ' ')} is more than {100 * SHARE:g} % {'above' if above else 'below'} its value at "
-            f"{texts[line[0]]}")
+    what = (f"the {name.replace('_', ' ')} has {'risen' if above else 'fallen'} by more than {100 * SHARE:g} % since "
+            f"{at(line[0])}")
     return _turn(line, np.where(far & ((values > values[0]) == above), 1.0, 0.0), (what, what))
 
 
-def _where(found: list, order: np.ndarray, texts: Sequence, where: list) -> str:
-    """From where on there is a change: of the line that has it first and of the one that has it last."""
+def _where(found: list, order: np.ndarray, at: Callable, others: list, lines: int) -> str:
+    """From where on there is a change: of the line that has it first and of the one that has it last.
+
+    One other key is named with its value on both lines, or with how many of its values have the change; of more keys
+    only the combinations are counted.
+    """
     first, last = (pick(found, key=lambda one: order[one.at]) for pick in (min, max))
-    stays = all(one.stays for one in found)
-
-    def place(one: Change) -> str:
-        return f"from {texts[one.at]} on" if stays else f"first at {texts[one.at]}"
-
-    text = f"{place(first)} (not yet at {texts[first.before]})"
-    if order[first.at] != order[last.at]:
-        text += f" with {where[first.line]}, {place(last)} with {where[last.line]},"
-    elif len(found) == 1 < len(where):
-        text += f" with {where[first.line]}"
-    lacking = len(where) > len(found) > 1
-    return text + (f" (in {len(found)} of {len(where)} combinations of the other keys)" if lacking else "")
+    start, end = ("from", " on") if all(one.stays for one in found) else ("first at", "")
+    early, late = at(first.at), at(last.at)
+    not_yet = f" (not yet at {bare(at(first.before), early)})"
+    one_place, all_lines = order[first.at] == order[last.at], len(found) == lines
+    if len(others) == 1:
+        name, beside, of = others[0]["name"], shown_of(others[0]), f"for {len(found)} of {lines} values of "
+    else:
+        name, beside, of = f"the other {len(others)} keys", None, f"in {len(found)} of {lines} combinations of "
+    if one_place:
+        with_ = "" if all_lines else f" with {name} {beside(first.at)}" if beside and len(found) == 1 else \
+            f", {of}{name},"
+        return f"{start} {early}{end}{not_yet}{with_}"
+    if beside and all_lines:
+        return (f"{start} {early}{end}{not_yet} with {name} {beside(first.at)}, {start} {late}{end} with "
+                f"{beside(last.at)},")
+    return f"{start} {bare(early, late)} to {late}{end}{not_yet}, {'depending on ' if all_lines else of}{name},"

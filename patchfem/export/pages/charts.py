@@ -13,7 +13,7 @@ from ...core import G_N
 from ..drawing import curves
 from ..drawing.pictures import closer, envelope, part_in_contact, whole_from
 from ..drawing.wear import MEASURES, SHOWN
-from ..scales import axis_unit
+from ..scales import axis_unit, wide_scale
 
 LINE, FRAMES = 6000, 24  # points of a line, frames of the shear stress behind the largest one
 FAINT, FEWEST = 400, 200  # points of such a frame, and those that every line keeps
@@ -95,8 +95,9 @@ def interface(x, fields: dict) -> list:
         name, per = axis_unit(fields["time"], "s")
         shown = np.unique(np.linspace(1, len(tau) - 1, min(FRAMES, len(tau) - 1)).round().astype(int))
         frames = [line(x * size, tau[k] * scale, "soft", most=FAINT, width=0.6, alpha=0.6) for k in shown]
-        out.append(chart(f"Shear stress, largest resultant at {fields['time'][frame] * per:.4g} {name}", place,
-                         axis("shear stress", unit), [*frames, line(x * size, tau[frame] * scale, "warm")]))
+        title = f"Shear stress, largest resultant {fields['time'][frame] * per:.4g} {name} into the motion"
+        out.append(chart(title, place, axis("shear stress", unit),
+                         [*frames, line(x * size, tau[frame] * scale, "warm")]))
     return out
 
 
@@ -152,13 +153,20 @@ def loop(slide, force, title: str, measured: tuple | None = None) -> list:
                   [read, line(slide * size, force * scale, "accent", "computed" if read else "")])]
 
 
-def histories(history: dict, window: dict | None, period: float | None, title: str = "Last cycles") -> list:
-    """The whole run, and its last cycles (a rig) or its friction force (a bench)."""
+def histories(history: dict, window: dict | None, period: float | None, title: str = "Last cycles",
+              joined: bool = False) -> list:
+    """The whole run, and its last cycles (a rig) or its friction force (a bench).
+
+    joined: the turns that were kept before are drawn as a line through them, not as a band per cycle.
+    """
     time, value, (name, per) = history["time"], history["displacement"], axis_unit(history["time"], "s")
     unit, scale = axis_unit(value, "m")
     begin = whole_from(time, period, window["time"][0] if window else 0.0) if period else time[0]
     late, marks = time >= begin, []
-    if not late.all():
+    if joined and not late.all():
+        early = slice(0, int(np.argmax(late)) + 1)
+        marks.append(line(time[early] * per, value[early] * scale, "accent", width=1.0))
+    elif not late.all():
         middle, low, high = envelope(time[~late], value[~late], period)
         marks.append(mark("band", "accent", x=middle * per, low=low * scale, high=high * scale))
     marks.append(line(time[late] * per, value[late] * scale, "accent", width=1.0))
@@ -228,23 +236,27 @@ def curve(found: dict) -> list:
 
 
 def levels(rows: list) -> list:
-    """Amplitude after every level, in the order of the test, with arrows upwards and downwards."""
+    """Amplitude after every level, in the order of the test, with arrows upwards and downwards; over more than three
+    decades on a logarithmic axis, on which a level without any motion is not drawn."""
     forced = rows[0].get("unit") == "N"
     drive = np.array([row["drive"] for row in rows]) / (1.0 if forced else G_N)
     amplitude = np.array([row["values"]["relative_displacement_amplitude"] for row in rows])
     name, scale = axis_unit(amplitude, "m")
     error = np.array([row["errors"].get("relative_displacement_amplitude") or 0.0 for row in rows]) * scale
-    held, y = np.array([row["stuck"] for row in rows]), amplitude * scale
-    marks = []
+    held, y, log = np.array([row["stuck"] for row in rows]), amplitude * scale, wide_scale(amplitude)
+    drawn = y > 0 if log else np.isfinite(y)
+    marks, style = [], {"floor": 0.1 * float(y[drawn].min())} if log else {}  # ends of error bars that reach below 0
     for k, (a, b) in enumerate(pairwise(drive)):
         up = b >= a
-        marks.append(mark("arrow", "accent" if up else "warm", "raised" if up else "lowered", x=[a, b],
-                          y=[y[k], y[k + 1]], dash="solid" if up else "dashed"))
-    for which, text, shape in ((~held, "slips", "circle"), (held, "stuck", "square")):
+        if drawn[k] and drawn[k + 1]:
+            marks.append(mark("arrow", "accent" if up else "warm", "raised" if up else "lowered", x=[a, b],
+                              y=[y[k], y[k + 1]], dash="solid" if up else "dashed", **style))
+    for which, text, shape in ((drawn & ~held, "slips", "circle"), (drawn & held, "stuck", "square")):
         if which.any():
-            marks.append(mark("dots", "soft", text, x=drive[which], y=y[which], errors=error[which], shape=shape))
+            marks.append(mark("dots", "soft", text, x=drive[which], y=y[which], errors=error[which], shape=shape,
+                              **style))
     what = axis("force", "N") if forced else axis("base acceleration", "g")
-    return [chart("Level by level", what, axis("half peak-to-peak", name), marks)]
+    return [chart("Level by level", what, axis("half peak-to-peak", name, log), marks)]
 
 
 def wear(x, cycles, pressure, depth, history: dict) -> list:

@@ -17,7 +17,7 @@
     },
     dots(fig, mark) {
       const errors = mark.errors ?? mark.x.map(() => 0), colour = shade(mark.colour);
-      const source = column(mark, {low: mark.y.map((v, k) => v - errors[k]), high: mark.y.map((v, k) => v + errors[k])});
+      const source = column(mark, {low: mark.y.map((v, k) => Math.max(v - errors[k], mark.floor ?? -Infinity)), high: mark.y.map((v, k) => v + errors[k])});
       fig.segment({field: "x"}, {field: "low"}, {field: "x"}, {field: "high"}, {source, line_color: colour});
       return fig.scatter({field: "x"}, {field: "y"}, {source, size: 9, marker: mark.shape ?? "circle",
         fill_color: colour, fill_alpha: 0.6, line_color: colour, ...label(mark)});
@@ -38,8 +38,9 @@
     },
     arrow(fig, mark) {
       const [a, b] = mark.x, [c, d] = mark.y, at = (s, p, q) => p + s * (q - p);
-      fig.add_layout(new Bokeh.Arrow({x_start: at(0.45, a, b), x_end: at(0.58, a, b), y_start: at(0.45, c, d),
-        y_end: at(0.58, c, d), line_color: null, end: new Bokeh.NormalHead({size: 9, fill_color: shade(mark.colour),
+      const up = (s) => mark.floor ? c * (d / c) ** s : at(s, c, d);    // a floor: of a logarithmic axis
+      fig.add_layout(new Bokeh.Arrow({x_start: at(0.45, a, b), x_end: at(0.58, a, b), y_start: up(0.45),
+        y_end: up(0.58), line_color: null, end: new Bokeh.NormalHead({size: 9, fill_color: shade(mark.colour),
           line_color: null})}));
       return kinds.line(fig, mark);
     },

@@ -8,7 +8,7 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const count = data.outcome.length;
   const at = (id) => document.getElementById(id);
-  const {ink, colours, number, within, named, figure, legend, bar, put} = pictures;
+  const {ink, colours, within, named, figure, legend, bar, put} = pictures;
   const bad = (i) => !data.settled.includes(data.outcome[i]);
   const key = (name) => data.keys.find((one) => one.name === name);
 
@@ -51,6 +51,7 @@
       one.values.forEach((v, i) => { if (!seen.has(v)) seen.set(v, one.texts[i]); });
       [...seen].sort((a, b) => a[0] - b[0]).forEach(([v, text]) => option(select, v, text));
       if (old[one.name] !== undefined) select.value = old[one.name];
+      else select.selectedIndex = select.options.length >> 1;      // of the ends, one is often stuck, one runs away
       select.addEventListener("change", draw);
       place.append(label);
     });
@@ -112,9 +113,9 @@
     const half = (a, b) => x.log && a > 0 ? Math.sqrt(a * b) : (a + b) / 2;
     xs.forEach((v, k) => {
       if (!cases.filter((i) => x.values[i] === v).every(bad)) return;
-      fig.add_layout(new Bokeh.BoxAnnotation({left: k ? half(xs[k - 1], v) : null,
-        right: k < xs.length - 1 ? half(v, xs[k + 1]) : null, fill_color: ink("--warm"), fill_alpha: 0.12,
-        line_color: null}));
+      fig.add_layout(new Bokeh.BoxAnnotation({       // a side that is left out is that of the frame
+        ...(k ? {left: half(xs[k - 1], v)} : {}), ...(k < xs.length - 1 ? {right: half(v, xs[k + 1])} : {}),
+        fill_color: ink("--warm"), fill_alpha: 0.12, line_color: null}));
     });
   }
 
@@ -194,24 +195,33 @@
 
   function told(cases, x, beside, m) {           // the picture in words, for those who hear the page
     const found = cases.filter((i) => m.values[i] !== null);
-    if (!found.length) return `${m.label}: no value in these ${cases.length} cases.`;
+    if (!found.length) return `No value in these ${cases.length} cases.`;
     const lowest = found.reduce((a, b) => m.values[b] < m.values[a] ? b : a);
     const highest = found.reduce((a, b) => m.values[b] > m.values[a] ? b : a);
     const where = (i) => `${x.label} ${x.texts[i]}` + (beside ? `, ${beside.label} ${beside.texts[i]}` : "");
     const off = cases.filter(bad).length;
-    return `${m.label} against ${x.label}: lowest ${number(m.values[lowest])} ${m.unit} at ${where(lowest)}; highest ` +
-      `${number(m.values[highest])} ${m.unit} at ${where(highest)}.` + (off ? ` ${off} of ${cases.length} cases did not ` +
+    const value = (i) => `${within(m.values[i], m.errors[i])} ${m.unit}`.trim();
+    return `Against ${x.label}: lowest ${value(lowest)} at ${where(lowest)}; highest ` +
+      `${value(highest)} at ${where(highest)}.` + (off ? ` ${off} of ${cases.length} cases did not ` +
       "settle (shaded or hatched)." : "");
   }
 
   function draw() {
-    const cases = chosen(), x = key(at("along").value), beside = key(at("beside").value);
+    const every = chosen(), x = key(at("along").value), beside = key(at("beside").value);
     const m = data.measures.find((one) => one.name === at("measure").value);
+    const mapped = data.grid && beside && at("shown").value === "map";
+    const axes = [x, ...(beside && (mapped || !data.grid) ? [beside] : [])].filter((one) => one.log);
+    // a logarithmic axis has no place for 0
+    const cases = every.filter((i) => axes.every((one) => one.values[i] > 0));
     const make = () => !data.grid ? cloud(cases, x, beside, m) :
-      beside && at("shown").value === "map" ? map(cases, x, beside, m) : lines(cases, x, beside, m);
-    const words = told(cases, x, beside, m);
+      mapped ? map(cases, x, beside, m) : lines(cases, x, beside, m);
+    const away = every.filter((i) => !cases.includes(i));
+    const value = (i) => `${within(m.values[i], m.errors[i])} ${m.unit}`.trim();
+    const zero = !away.length ? "" : ` Not drawn on a logarithmic axis: ${away.length === 1 ?
+      `the case at ${x.label} ${x.texts[away[0]]}, ${value(away[0])}` : `${away.length} cases at 0`}.`;
+    const words = told(cases, x, beside, m) + zero;
     at("means").textContent = `${m.means ? `${m.means[0].toUpperCase()}${m.means.slice(1)}. ` : ""}${words}`;
-    at("chart").setAttribute("aria-label", words);
+    at("chart").setAttribute("aria-label", `${m.label}: ${words}`);
     put(make, at("chart"));
   }
 

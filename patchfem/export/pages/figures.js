@@ -8,8 +8,10 @@ const pictures = (() => {
   const within = (v, e) => {                     // a value with its error, as many digits as the error allows
     if (v === null) return "no value";
     if (e === null || e === 0) return number(v);
-    const places = Math.min(12, Math.max(0, 1 - Math.floor(Math.log10(Math.abs(e)))));
-    return `${Math.abs(v) >= 1e6 ? number(v) : v.toFixed(places)} ± ${Number(e.toPrecision(2))}`;
+    const places = Math.max(0, 1 - Math.floor(Math.log10(Math.abs(e))));
+    if (Math.abs(v) >= 1e6 || places > 12 || Math.abs(e) < 1e-6 * Math.abs(v))
+      return `${number(v)} ± ${Number(e.toPrecision(2))}`;
+    return `${v.toFixed(places)} ± ${e.toFixed(places)}`;
   };
   const named = (one) => one.unit ? `${one.label} [${one.unit}]` : one.label;
 

@@ -1,31 +1,33 @@
 """The page of a sweep: what came out over the swept keys, explored in the browser, and a table of the cases."""
 
-import re
 from collections import Counter
 from html import escape
 from math import isfinite
 
 import numpy as np
 
+from ...core import Outcome, rounded
 from ..scales import LADDERS, axis_unit
+from . import allowed
 from .changes import changes
 from .document import Section, document
 from .words import linked
+from .written import NUMBER, brief
 
 SETTLED = ("steady", "stuck", "done", "no_contact")
 FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", "onset_level", "pressure_peak")
 DRAWN, LISTED = 20_000, 400  # cases in the pictures and in the table; sweep.csv has them all
-NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?\Z")
 
 
 def page(table: dict) -> str:
     """The whole HTML page of a sweep.
 
-    table: `title`, `version`, `command` (the line that made it), `scene` (its text), `seconds` of work (NaN: unknown);
-    `grid`: whether the cases are all combinations of the keys' values; `keys`: [{`name`, `unit`, `values` (n,) in SI,
-    `texts` (n,) as written, `log`}]; `measures`: {name: {`unit`, `means`, `values` (n,), `errors` (n,)}}, NaN where a
-    case has none; `outcome` (n,); `messages`: {case: why it has no answer}; `folders` (n,): where the cases lie beside
-    the page, or None; `own`: False where sweep.csv does not lie beside the page.
+    table: `title`, `of` (the scene's own title; may be missing), `version`, `command` (the line that made it),
+    `scene` (its text), `seconds` of work (NaN: unknown); `grid`: whether the cases are all combinations of the keys'
+    values; `keys`: [{`name`, `unit`, `values` (n,) in SI, `texts` (n,) as written, `log`}];
+    `measures`: {name: {`unit`, `means`, `values` (n,), `errors` (n,)}}, NaN where a case has none; `outcome` (n,);
+    `messages`: {case: why it has no answer}; `folders` (n,): where the cases lie beside the page, or None; `own`: False
+    where sweep.csv does not lie beside the page.
     """
     outcome, number = list(table["outcome"]), len(table["outcome"])
     drawn = _spread(number, DRAWN)
@@ -38,6 +40,7 @@ def page(table: dict) -> str:
             "links": None if table["folders"] is None else [table["folders"][i] for i in drawn]}
     sections = [Section("answers", "What came out", _explorer(number, len(drawn)) if measures else
                         "<p>No case has a value to draw.</p>"),
+                *_change(table),
                 Section("cases", "Cases", _cases(table)),
                 Section("measures", "What the measures mean", _meanings(table)),
                 Section("again", "The same again", _again(table))]
@@ -48,14 +51,6 @@ def page(table: dict) -> str:
 def _spread(number: int, most: int) -> np.ndarray:
     """At most `most` of so many cases, evenly spread."""
     return np.arange(number) if number <= most else np.unique(np.linspace(0, number - 1, most).astype(int))
-
-
-def brief(text: str) -> str:
-    """A value as written, its number with six digits at most: 3.16227766016838e-06 rad is 3.16228e-06 rad."""
-    found = NUMBER.match(text)
-    if found is None or len(found[1]) < 9:
-        return text
-    return f"{float(found[1]):.6g} {found[2] or ''}".strip()
 
 
 def label(name: str) -> str:
@@ -114,14 +109,15 @@ def span(measures: dict, outcome) -> str:
         if name not in measures or not np.isfinite(measures[name][0]).any():
             continue
         values, errors, unit = measures[name]
-        there = np.isfinite(values)
-        there = there & settled if np.any(there & settled) else there
+        every = np.isfinite(values)
+        there = every & settled if np.any(every & settled) else every
         values, errors = np.asarray(values, float)[there], np.asarray(errors, float)[there]
         low, high = _said(values.min(), unit, 4), _said(values.max(), unit, 4)
         ran = f"is {high} throughout" if low == high else f"runs from {low} to {high}"
         known = errors[np.isfinite(errors)]
         band = f", numerical error at most {_said(known.max(), unit, 1)}" if known.size else ""
-        return f"{label(name).capitalize()} {ran}{band}."
+        whose = "" if every.sum() == there.sum() else " of the settled cases"
+        return f"{label(name).capitalize()}{whose} {ran}{band}."
     return ""
 
 
@@ -137,9 +133,30 @@ def turns(keys: list, measures: dict, outcome, grid: bool = True) -> str:
         settled = np.isin(np.asarray(outcome, str), SETTLED)
         there = settled & np.isfinite(known[main][0])
         known[main] = np.where(settled if there.any() else True, known[main][0], np.nan), known[main][1]
-    named = [one | {"texts": [brief(str(text)) for text in one["texts"]],
-                    "words": not any(NUMBER.match(str(text)) for text in one["texts"])} for one in keys]
-    return changes(named, known, outcome, grid, main)
+    return changes(_named(keys), known, outcome, grid, main)
+
+
+def within(keys: list, measures: dict, outcome, grid: bool = True) -> str:
+    """How far the key may go until each main measure is off by 5 %, as a sentence; "" where none is. As `turns`."""
+    return allowed.sentence(*allowed.allowed(_named(keys), measures, outcome, SETTLED, grid))
+
+
+def _named(keys: list) -> list:
+    """The keys with whether their values are words."""
+    return [one | {"words": not any(NUMBER.match(str(text)) for text in one["texts"])} for one in keys]
+
+
+def _columns(table: dict) -> dict:
+    """The measures of a table as `span` takes them."""
+    return {name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()}
+
+
+def _change(table: dict) -> list:
+    """The section on what each main measure has changed by since the first case; none where no key grows alone."""
+    columns = _columns(table)
+    text = allowed.table(*allowed.allowed(_named(table["keys"]), columns, table["outcome"], SETTLED, table["grid"]),
+                         columns, _said)
+    return [Section("change", "Change against the first case", text)] if text else []
 
 
 def _said(value: float, unit: str, digits: int) -> str:
@@ -153,17 +170,21 @@ def _lead(table: dict) -> str:
     number, over = len(table["outcome"]), " × ".join(one["name"] for one in table["keys"])
     ended = ", ".join(f"{count} {label(name)}" for name, count in Counter(table["outcome"]).most_common())
     text = f"<b>{number} cases</b> over {escape(over)}: {escape(ended)}."
-    columns = {name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()}
-    for said in (span(columns, table["outcome"]), turns(table["keys"], columns, table["outcome"], table["grid"])):
+    columns, outcome, grid = _columns(table), table["outcome"], table["grid"]
+    for said in (span(columns, outcome), turns(table["keys"], columns, outcome, grid),
+                 within(table["keys"], columns, outcome, grid)):
         text += f" {escape(said)}" if said else ""
+    text += "".join(f" <i>{escape(label(one))}</i>: {escape(one.sentence)}" for one in Outcome
+                    if one.value in table["outcome"] and one.value not in SETTLED)
     failed = table["messages"]
     fault = ""
     if failed:
         shown = Counter(failed.values()).most_common(5)
         fault = "<div class='verdict warn'>" + "".join(
             f"<p>{count} case{'s' if count > 1 else ''} failed: {escape(why)}</p>" for why, count in shown) + "</div>"
-    took = f" &middot; {table['seconds']:.2f} s" if isfinite(table["seconds"]) else ""
-    return (f"<p class=soft>patchfem {escape(table['version'])}{took}</p>"
+    took = f" &middot; computed in {table['seconds']:.2f} s, all cases together" if isfinite(table["seconds"]) else ""
+    scene = f"Scene: {escape(table['of'])} &middot; " if "of" in table else ""
+    return (f"<p class=soft>{scene}patchfem {escape(table['version'])}{took}</p>"
             f"<p class=verdict>{text}</p>{fault}")
 
 
@@ -183,7 +204,7 @@ def _cases(table: dict) -> str:
         if table["folders"] is not None:
             said = f'<a href="{escape(table["folders"][i])}">{said}</a>'
         cells += f"<td>{said}</td>" + "".join(
-            f"<td class=n>{_number(one['values'][i])}</td>" for one in columns)
+            f"<td class=n>{_number(one['values'][i], one['errors'][i])}</td>" for one in columns)
         rows.append(f"<tr{'' if outcome in SETTLED else ' class=bad'}>{cells}</tr>")
     number = len(table["outcome"])
     more = f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv has all.</p>" if number > LISTED else ""
@@ -199,8 +220,13 @@ def _changes(values) -> bool:
     return found.size > 0 and np.ptp(found) > 1e-9 * np.abs(found).max()
 
 
-def _number(value: float) -> str:
-    return f"{value:.5g}" if np.isfinite(value) else "&ndash;"
+def _number(value: float, error: float) -> str:
+    """A value rounded by its error and with it; five digits alone where the error is below the last of them."""
+    if not np.isfinite(value):
+        return "&ndash;"
+    if not np.isfinite(error) or error <= 1e-5 * abs(value):
+        return f"{value:.5g}"
+    return " ± ".join(rounded(value, error))
 
 
 def _meanings(table: dict) -> str:

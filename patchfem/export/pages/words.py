@@ -24,6 +24,7 @@ WHOLE_RUN = "over the whole run"
 OF_WHAT = {  # said behind a value that would otherwise be taken for another, or for more than it says
     "loop_area": "per cycle", "friction_work": WHOLE_RUN, "energy_dissipated": WHOLE_RUN, "energy_created": WHOLE_RUN,
     "stick_fraction": "of the interface as a whole"}
+BETWEEN = ("jump_level",)  # known to lie between two levels of the drive, whatever the tolerance
 ROUND = 1e-12  # of the friction force times the motion: work that is round-off
 
 
@@ -105,11 +106,13 @@ def _open(one: dict) -> float:
     return one["floor"] if one["error"] is None else one["error"]
 
 
-def headline(summary: dict, cycles: float | None, number: Callable[[str, str], str] | None = None) -> str:
+def headline(summary: dict, cycles: float | None, number: Callable[[str, str], str] | None = None,
+             released: str = "") -> str:
     """The measures that answer first, as one sentence; "" where there is none.
 
     summary: as summary.json holds it; cycles: of the drive that were run, None where it has none; number: makes of a
-    value with its error, and of the name of its measure, what stands in the text.
+    value with its error, and of the name of its measure, what stands in the text; released: how a released block swung,
+    in place of what is left of that in the last cycles.
     """
     measures, parts = summary["measures"], []
     whole = cycles is None or cycles >= 1 - 1e-6
@@ -121,18 +124,24 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
             parts.append(text.format(value if number is None else number(value, name)))
 
     if summary["outcome"] != "no_contact":
-        said("relative_displacement_amplitude", "the block moves {} half peak-to-peak")
-        said("relative_displacement_amplitude_steady", "it would settle at {}")
-        said("absolute_acceleration_peak", "peak acceleration {}")
+        worn = next((name for name in ("worn_depth_max", "worn_volume") if name in measures), "")
+        said(worn, "{} worn off at the deepest place" if worn == "worn_depth_max" else "{} worn off")
+        if released:
+            parts.append(released)
+            said("friction_work", "friction takes {} in all")
+        else:
+            said("relative_displacement_amplitude", "the block moves {} half peak-to-peak")
+            said("relative_displacement_amplitude_steady", "it would settle at {}")
+            said("absolute_acceleration_peak", "peak acceleration {}")
         if "relative_displacement_amplitude" not in measures:
             said("friction_ratio_peak", "friction ratio peaks at {}")
-        if whole:
+        if whole and not released:
             said("loop_area", "{} dissipated per cycle")
         said("contact_fraction", "contact on {} of the length")
         if summary["kind"] == "patch":
             said("pressure_peak", "peak pressure {}")
     text = "; ".join(parts)
-    if text and not whole:
+    if text and not whole and not released:
         text = f"in {cycles:.2g} of a cycle {text}"
     return f"{text[0].upper() + text[1:]}." if text else ""
 
@@ -142,12 +151,20 @@ def least_known(result: Result) -> str:
     tolerance = result.plan.model.accuracy.tolerance
     wide = {name: one.error / (tolerance * abs(one.value) + one.floor) for name, one in result.measures.items()
             if one.value and one.error is not None}
-    name = max(wide, key=wide.get, default="")
-    if not name or wide[name] > 1:
+    if not wide or max(wide.values()) > 1:
         return ""
-    one = result.measures[name]
-    found = pair(name, {"value": one.value, "error": one.error, "unit": one.unit})
-    return f"Every measure with an error meets the tolerance {tolerance:g}; least well {name}, {found}."
+
+    def known(name: str) -> str:
+        one = result.measures[name]
+        return f"{name}, {pair(name, {'value': one.value, 'error': one.error, 'unit': one.unit})}"
+
+    steps = [name for name in wide if name in BETWEEN]
+    name = max([name for name in wide if name not in BETWEEN], key=wide.get, default="")
+    of_steps = f"{', '.join(map(known, steps))}, is known to the distance of two levels of the drive"
+    if not name:
+        return f"{of_steps}."
+    but = f"; {of_steps}, which the scene sets" if steps else ""
+    return f"Every measure with an error meets the tolerance {tolerance:g}; least well {known(name)}{but}."
 
 
 def linked(text: str, name: str, more: str = "") -> str:
@@ -187,8 +204,8 @@ def table_of(measures: dict) -> list[str]:
     return out
 
 
-def fragment(summary: dict, sentence: str, cycles: float | None) -> str:
-    """The answer as HTML without styles of its own, for a notebook; summary and cycles as `headline` takes them."""
+def fragment(summary: dict, sentence: str, cycles: float | None, released: str = "") -> str:
+    """The answer as HTML without styles of its own, for a notebook; cycles and released as `headline` takes them."""
     rows, measures = [], summary["measures"]
     for line in table_of(measures):
         name, _, value = line.strip().partition(" ")
@@ -196,7 +213,7 @@ def fragment(summary: dict, sentence: str, cycles: float | None) -> str:
         rows.append(f"<tr>{cells if value else f'<th colspan=2>{escape(name)}</th>'}</tr>")
     title = f"<b>{escape(summary['title'])}</b><br>" if summary["title"] else ""
     warnings = "".join(f"<p>&#9888; {escape(text)}</p>" for text in summary["warnings"])
-    answer = escape(f"{summary['outcome']}: {sentence} {headline(summary, cycles)}")
+    answer = escape(f"{summary['outcome']}: {sentence} {headline(summary, cycles, released=released)}")
     return f"<div>{title}{answer}{warnings}<table>{''.join(rows)}</table></div>"
 
 

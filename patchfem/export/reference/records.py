@@ -59,5 +59,5 @@ decides, measure it.
         return "\n\n".join([cls.HEAD.strip(), grid(heads[0], rows), "## Heat", "For the note on how far friction warms "
                             "the faces, beside `[friction.temperature]`.", grid(heads[1], warm), "## Strength",
                             "For the note on pieces whose stress is beyond it, which the run, elastic throughout, "
-                            "leaves out.",
+                            "leaves out. The fifth of a piece beside its held far face does not count.",
                             grid(heads[2], firm)]) + "\n"

@@ -18,7 +18,7 @@ from ...campaigns.sweeps.cases import Cases
 from ...core import Measure, Missing, PatchfemError
 from ...disk.claim import Claim
 from ...disk.exchange import put
-from ...disk.whole import Unwritten, write_text
+from ...disk.whole import Unwritten, write_inside
 from ...effects import EFFECTS
 from ...model.model import Model
 from ...runs.many.answers import FAILED, Answers
@@ -97,7 +97,7 @@ class Folder:
             try:
                 self.claim.take()
             except Missing:
-                for empty in (self.target / CASES, self.target):
+                for empty in () if self.claim.path.exists() else (self.target / CASES, self.target):  # or is another's
                     with suppress(OSError):  # it holds what is older
                         empty.rmdir()
                 raise
@@ -125,7 +125,7 @@ class Folder:
         draft = place.with_name(f".{place.name}.{os.getpid()}")
         try:
             draft.mkdir(exist_ok=True)
-            write_text(draft / SUMMARY, text)
+            write_inside(draft / SUMMARY, text)
             try:
                 os.rename(draft, place)
             except OSError:  # it is there already

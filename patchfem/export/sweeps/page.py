@@ -20,6 +20,7 @@ from ...disk.whole import write_text
 from ...runs.many.answers import Answers
 from ...runs.results.result import meaning
 from ..pages import sweep
+from ..pages.written import NUMBER
 from .tables import names_of
 
 WHOLE, SHORT = "report.html", "summary.json"  # what a click on a case opens: its page where it has one
@@ -36,7 +37,7 @@ def table_of(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Pat
     measures = {name: {"unit": found.units[name], "means": meaning(name), "values": found.values[name],
                        "errors": found.errors[name]}
                 for name in names_of(found) if name not in [axis.name for axis in cases.axes]}
-    return {"title": f"Sweep: {tomllib.loads(asked.text).get('title') or asked.path.stem}", "version": __version__,
+    return {**titles(columns, tomllib.loads(asked.text).get("title") or asked.path.stem), "version": __version__,
             "command": command(asked, cases), "scene": asked.text, "seconds": float(np.sum(found.seconds)),
             "grid": not cases.rows, "keys": columns, "measures": measures,
             "outcome": [str(one) for one in found.outcome],
@@ -49,6 +50,11 @@ def columns_of(cases: Cases) -> list:
     return [{"name": axis.key, "unit": axis.unit or "1", "texts": [axis.texts[k] for k in place],
              "values": numbers([axis.values[k] for k in place]), "log": wide(axis.values)}
             for axis, place in zip(cases.axes, places.T)]
+
+
+def titles(columns: list, of: str) -> dict:
+    """What heads the page: the keys that were swept; the scene's own title tells of the values before they were."""
+    return {"title": f"Sweep of {' × '.join(one['name'] for one in columns)}", "of": of}
 
 
 def opened(folder: Path, key: str) -> str:
@@ -65,8 +71,16 @@ def numbers(values) -> np.ndarray:
 
 
 def wide(values) -> bool:
-    """Whether an axis of these values is better logarithmic: all > 0 and the largest ten times the smallest or more."""
-    return all(isinstance(one, int | float) and one > 0 for one in values) and max(values) >= 10 * min(values)
+    """Whether an axis of these values is better logarithmic: none < 0 and the largest > 0 ten times the smallest.
+
+    A zero has no place on such an axis: the page tells that case in words. Where the second value above it is twice the
+    first or less, as in 0, 1, 2, .. 10, the axis is linear.
+    """
+    if not all(isinstance(one, int | float) and one >= 0 for one in values):
+        return False
+    above = sorted({one for one in values if one > 0})
+    steps = min(values, default=0) == 0 and len(above) > 1 and above[1] <= 2 * above[0]
+    return not steps and bool(above) and above[-1] >= 10 * above[0]
 
 
 def command(asked: Asked, cases: Cases) -> str:
@@ -116,7 +130,7 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
     text, sets = str(file.attrs["scene"]), json.loads(str(file.attrs["sets"]))
     overs = [] if "case" in file.dimensions else [word for one in columns for word in
                                                   ("--over", f"{one['name']}={','.join(dict.fromkeys(one['texts']))}")]
-    return {"title": f"Sweep: {tomllib.loads(text).get('title') or folder.resolve().name}",
+    return {**titles(columns, tomllib.loads(text).get("title") or folder.resolve().name),
             "version": str(file.attrs["source"]).removeprefix("patchfem "), "scene": text, "seconds": float("nan"),
             "command": shlex.join(["patchfem", "sweep", str(file.attrs["scene_file"]),
                                    *(word for one in sets for word in ("--set", one)), *overs]),
@@ -141,7 +155,7 @@ def joined(tables: list, names: list) -> dict:
     for key in keys[0]:
         own = [next(one for one in table["keys"] if one["name"] == key) for table in tables]
         texts = [text for one in own for text in one["texts"]]
-        words = not any(map(sweep.NUMBER.match, texts))  # each table numbered them in its own order
+        words = not any(map(NUMBER.match, texts))  # each table numbered them in its own order
         columns.append({"name": key, "unit": own[0]["unit"], "log": own[0]["log"], "texts": texts, "values":
                         numbers(texts) if words else np.concatenate([one["values"] for one in own])})
     measures, shift = {}, np.cumsum([0, *counts])

@@ -1,0 +1,34 @@
+"""The swing of a block that is released: how far it goes first, and how long until it has come to rest."""
+
+import numpy as np
+
+from ...core import say
+from ...runs.results.result import Result
+
+RESTS = 1e-2  # of the largest distance from where it ends: within it a block has come to rest
+
+
+def released(result: Result) -> str:
+    """What a run with drive.kind = "free" did before its last cycles, without a stop; "" for any other run."""
+    rig, r = result.plan.model.rig, result.response
+    if rig is None or rig.kind != "free" or r is None or r.time.size < 2:
+        return ""
+    return swung(r.time, r.output)
+
+
+def swung(time, output) -> str:
+    """The sentence of `released` from the kept samples (k,) of a motion, turns among them: times [s], output [m]."""
+    end, begin = float(output[-1]), float(output[0])
+    far = np.abs(output - end)
+    if not np.isfinite(far).all() or not far.max() > 0:
+        return f"released at {say(begin, 3)}, the block stays there"
+    turns = 1 + np.flatnonzero(np.diff(np.sign(np.diff(output))) != 0)
+    turns = turns[far[turns] > RESTS * far.max()]
+    way = f"swings to {say(float(output[turns[0]]), 3)} first" if turns.size else f"goes to {say(end, 3)}"
+    first = f"released at {say(begin, 3)}, the block {way}"
+    beyond = int(np.flatnonzero(far > RESTS * far.max())[-1])
+    last = np.ptp(output[time >= time[-1] - 0.1 * (time[-1] - time[0])]) / 2
+    if last > RESTS * far.max():
+        return f"{first} and still by {say(float(last), 3)} half peak-to-peak at the end, {1e3 * time[-1]:.3g} ms"
+    rests = f"comes to rest at {say(end, 3)} after {1e3 * time[beyond + 1]:.3g} ms"
+    return f"{first}, turns {turns.size} times and {rests}" if turns.size else f"{first} and {rests}"
