@@ -29,6 +29,16 @@ def pytest_xdist_auto_num_workers(config):
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
+@pytest.hookimpl(hookwrapper=True)
+def pytest_pycollect_makeitem():
+    """The cases of a test marked `share(places)` that stand at other places than these become slow."""
+    made = (yield).get_result()
+    for place, case in enumerate(made if isinstance(made, list) else ()):
+        mark = case.get_closest_marker("share") if isinstance(case, pytest.Function) else None
+        if mark and place not in [one % len(made) for one in mark.args]:
+            case.add_marker("slow")
+
+
 def pytest_collection_finish(session):
     """What has been imported and collected stays for good: no search for garbage goes through it again."""
     gc.collect()

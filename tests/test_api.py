@@ -76,6 +76,7 @@ def test_exact_the_names_are_all_there():
 
 # ---- the same numbers as the command line
 
+@pytest.mark.share(1, 2, 4)
 @pytest.mark.parametrize("name", KINDS)
 def test_exact_the_numbers_are_those_of_the_command_line(name, runs, tmp_path):
     (tmp_path / "a.toml").write_text(KINDS[name], "utf-8")
@@ -285,6 +286,7 @@ def test_exact_levels_are_drawn():
     assert result.plot.levels(ax=mine) is mine and len(mine.figure.axes) == 1 and mine.get_ylabel()
 
 
+@pytest.mark.slow
 def test_exact_pictures_need_no_window():
     code = f"import patchfem as pf; pf.run({BENCH!r}).plot.loop()\n{MODULES}"
     assert "matplotlib.pyplot" not in loaded(code)

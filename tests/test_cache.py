@@ -183,6 +183,7 @@ def missed(found) -> tuple:
     return sum(found.stats.cache_misses.values()), sum(found.stats.cache_hits.values())
 
 
+@pytest.mark.share(0, 3, 5, 9)
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])
 @pytest.mark.parametrize("harm", ["cut", "emptied", "a bit", "gone", "a folder"])
 def test_always_a_damaged_cache_is_rebuilt_by_itself(tmp_path, monkeypatch, ending, harm):

@@ -96,7 +96,7 @@ class Run(NamedTuple):
 def lobatto(order: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss-Lobatto points and weights on [-1, 1]: ends and zeros of P'_order, w = 2 / (p (p + 1) P_p^2)."""
     legendre_p = legendre.Legendre.basis(order)
-    points = np.concatenate([[-1.0], np.sort(legendre_p.deriv().roots()), [1.0]])
+    points = np.concatenate([[-1.0], np.sort(legendre_p.deriv().roots().real), [1.0]])
     return points, 2 / (order * (order + 1) * legendre_p(points) ** 2)
 
 

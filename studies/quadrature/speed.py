@@ -39,9 +39,9 @@ def path_of(amplitude: float, cycles: int = CYCLES, steps: int = STEPS) -> np.nd
     return amplitude * np.sin(2 * np.pi * np.arange(cycles * steps + 1) / steps)
 
 
-def compiled(model, path, repeats: int = 3) -> tuple:
+def compiled(model, path, dt: float, repeats: int = 3) -> tuple:
     """(seconds per step, strips of the list at the end, 1 without one) of the compiled loop."""
-    hub, best, dt = load_kernels(), np.inf, 2 * np.pi / STEPS
+    hub, best = load_kernels(), np.inf
     for _ in range(repeats):
         spent, runs = 0.0, 0
         while spent < LEAST:
@@ -55,9 +55,9 @@ def compiled(model, path, repeats: int = 3) -> tuple:
     return best / (path.size - 1), max(tally[10] or tally[1] - tally[0], 1.0)
 
 
-def plain(law, path, points: int = 1) -> float:
+def plain(law, path, dt: float, points: int = 1) -> float:
     """Seconds per step of a NumPy law object over the last fiftieth of the path, its bonds made before."""
-    state, sigma, dt = law.start(np.ones(points)), np.ones(points), 2 * np.pi / STEPS
+    state, sigma = law.start(np.ones(points)), np.ones(points)
     steps = np.diff(path)
     split = len(steps) - max(len(steps) // 50, 20)
     for dq in steps[:split]:
@@ -71,23 +71,23 @@ def plain(law, path, points: int = 1) -> float:
     return (process_time() - begin) / (len(steps) - split)
 
 
-def main(cycles: int = CYCLES) -> list:
+def main(cycles: int = CYCLES, steps: int = STEPS) -> list:
     """Rows of the engines at A = 5 bond lengths, 2000 steps a cycle."""
-    rows, path = [], path_of(5.0, cycles)
-    short = path_of(5.0, max(1, cycles // 5))
+    rows, path, dt = [], path_of(5.0, cycles, steps), 2 * np.pi / steps
+    short = path_of(5.0, max(1, cycles // 5), steps)
     for order, reading, growth in ((2.0, "stretch", {}), (0.5, "stretch", {}), (1.0, "report", {}),
                                    (1.0, "report", GROWS), (2.0, "report", GROWS)):
         law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
         name = f"{reading} p = {order:g}{', growing' if growth else ''}"
-        slow = plain(Quadrature(law, 1e-6), short)
+        slow = plain(Quadrature(law, 1e-6), short, dt)
         for engine, merge in (("truncated", 0.0), ("merged .02", 0.02), ("merged .05", 0.05)):
-            seconds, count = compiled(list_model(law, 1.0, cutoff(order, 1e-6), merge), path)
+            seconds, count = compiled(list_model(law, 1.0, cutoff(order, 1e-6), merge), path, dt)
             rows.append(Speed(f"{engine}, {name}", 1e9 * seconds, 1e9 * seconds / count, slow / seconds))
     law = Bonds(1.0, 1.0)
     for points in (1, 2000):
-        seconds, _ = compiled(points_model(law, np.full(points, 1 / points), np.ones(points)), short)
+        seconds, _ = compiled(points_model(law, np.full(points, 1 / points), np.ones(points)), short, dt)
         rows.append(Speed(f"recursion, {points} points", 1e9 * seconds, 1e9 * seconds / points,
-                          plain(Recursion(law), short, points) / seconds))
+                          plain(Recursion(law), short, dt, points) / seconds))
     return rows
 
 

@@ -3,6 +3,7 @@
 import csv
 import json
 
+import numpy as np
 import pytest
 from command_line import cli
 from scene_texts import PIECE
@@ -10,7 +11,7 @@ from scene_texts import PIECE
 import patchfem as pf
 from patchfem.campaigns import knobs
 from patchfem.campaigns.cost import Cost, cheapest, curve, sentence
-from patchfem.export.cost import draw
+from patchfem.export.cost import draw, write
 from patchfem.model.model import build
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -36,6 +37,7 @@ def made(label, seconds, error, distance=None, value=1.0):
                 {"a": 0.0, "b": 0.0}, {"a": "1", "b": "1"}, {} if distance is None else {"a": distance})
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("keys, own", [('element_size = "0.25 mm"', "249 um"), ("", "tolerance 0.03")])
 def test_exact_the_error_at_the_setting_of_the_scene_is_that_of_its_run(keys, own, monkeypatch):
     monkeypatch.setattr(knobs, "TOLERANCES", (1e-1, 1e-2))
@@ -84,6 +86,25 @@ def test_exact_the_sentence_names_the_cheapest_run_or_the_worst_measure():
     assert sentence(bold, 1e-2) == "all measures within 1 % costs 2 s: a knob at 4"
 
 
+def test_exact_the_table_holds_plain_numbers(tmp_path):
+    """Numbers of NumPy stood in it as np.float64(0.25)."""
+    kinds = (np.float64(0.25), np.float32(0.5), 0.125)
+    runs = [made(str(k), 1.0 + k, error, error, value=error) for k, error in enumerate(kinds)]
+    with open(write(tmp_path, {"jumps": runs}), encoding="utf-8") as file:
+        found = list(csv.DictReader(file))
+    numbers = [{name: float(text) for name, text in row.items() if name not in ("knob", "setting") and text}
+               for row in found]
+    assert [(row["error_a"], row["error_b"], row["distance_a"]) for row in numbers] == [(e, e, e) for e in kinds]
+
+
+def test_always_the_line_of_a_picture_goes_on_in_time():
+    """It doubled back where a finer run happened to take less time than a coarser one."""
+    runs = [made("2", 0.43, 4e-2, 3e-2), made("4", 0.36, 4e-2, 3e-2), made("8", 5, 2e-3, 1e-3), made("16", 9, 1e-3)]
+    for axis, ends in zip(draw.figure("jumps", runs, 1e-2, ["a"]).axes, (9, 5), strict=True):
+        seconds = axis.lines[0].get_xdata()
+        assert (np.diff(seconds) > 0).all() and seconds[-1] == ends
+
+
 def test_exact_a_picture_does_not_join_two_kinds_of_error():
     runs = [made("2", 1, 4e-2, 3e-2), made("4", 2, 8e-3, 6e-3), made("8", 5, 2e-3)]
     stated, away = draw.figure("jumps", runs, 1e-2, ["a"]).axes
@@ -101,6 +122,7 @@ def test_refuses_knobs_that_a_scene_does_not_have(tmp_path, words, said):
     assert answer.code == 2 and said in answer.err
 
 
+@pytest.mark.slow
 def test_exact_python_has_the_answer_and_the_files_of_the_command(tmp_path, monkeypatch, capfd):
     scene = tmp_path / "a.toml"
     scene.write_text(TEXT.format(keys='element_size = "0.254 mm"', tolerance=0.05), "utf-8")

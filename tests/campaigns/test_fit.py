@@ -424,6 +424,24 @@ def test_refuses_a_broken_loop_by_line(asked, text, says, tmp_path):
     assert answer.code == 2 and "loop.csv" in answer.err and says in answer.err, answer.err
 
 
+@pytest.mark.parametrize("table, says", [
+    ("time [s],displacement [m]\n0,1e-6\n0.1,2e-6\n", "slide.csv:2: displacement starts at 1e-06"),
+    ("time [s],displacement [m],wobble [N]\n0,0,0\n0.1,2e-6,5\n", "slide.csv:1: a header like"),
+])  # fmt: skip
+def test_refuses_a_faulty_slide_file_as_check_does(tmp_path, table, says):
+    """The reason was lost on the way: an internal fault, for the scene itself was right."""
+    (tmp_path / "slide.csv").write_text(table)
+    scene, loop = tmp_path / "bench.toml", tmp_path / "loop.csv"
+    scene.write_text(POINT + LAWS["coulomb"] + '[slide]\nkind = "file"\nfile = "slide.csv"\n')
+    time, slide = rows(8, 1)
+    np.savetxt(loop, np.c_[time, slide, play(slide, 0.3, 1e-6)], delimiter=",", comments="",
+               header="time [s],displacement [m],force [N]")
+    told = [cli("check", scene), cli("run", scene, "-o", tmp_path / "out"),
+            cli("fit", scene, "--to", loop, "--free", "friction.static=0.1..0.5", "-o", tmp_path / "fit")]
+    assert f"{scene}:8: slide.file: " in told[0].err and says in told[0].err
+    assert told[1:] == told[:1] * 2 and told[0].code == 2
+
+
 def test_refuses_other_requests(asked, tmp_path):
     free = ["--free", "friction.static=0.1..0.7"]
     for words, code, says in (

@@ -24,6 +24,7 @@ def scene(tmp_path):
     return path
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("name", ["worn_depth_max", "worn_depth_mean"])
 def test_exact_the_coefficient_comes_back_from_its_own_depth(scene, tmp_path, name):
     found = pf.run(loads(WORN)).measures

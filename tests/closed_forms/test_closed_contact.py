@@ -89,6 +89,7 @@ def test_exact_rounded_punch_carries_its_load(load):
     assert half > FLAT and total == pytest.approx(load, rel=1e-8)
 
 
+@pytest.mark.share(0, 4, 8, 12, 14)
 @pytest.mark.parametrize("load", LOADS[1:])
 @pytest.mark.parametrize("share", [-0.9, 0.0, 0.2, 0.6, 0.97])
 def test_exact_rounded_punch_follows_its_shape(load, share):
@@ -236,6 +237,7 @@ def test_exact_coating_seen_by_each_scale():
 
 # ---- shear of a crown
 
+@pytest.mark.share(0, 4, 8)
 @pytest.mark.parametrize("share", [-0.9, 0.2, 0.6])
 @pytest.mark.parametrize("place", [-0.7, 0.2, 0.95])
 def test_exact_cattaneo_sticks_inside_and_slips_outside(share, place):

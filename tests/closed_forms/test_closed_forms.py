@@ -111,6 +111,7 @@ def test_refuses_weights_that_do_not_exist():
             exact.growth_factor(*bad)
 
 
+@pytest.mark.share(0, 5, 10, 15, 20, 27)
 @pytest.mark.parametrize("share", [1e-6, 0.01, 0.1, 0.5, 1.0, 5.0, 10.0])
 @pytest.mark.parametrize("order", [-0.5, 0.0, 1.0, 2.0])
 def test_exact_growth_factor_by_many_digit_quadrature(share, order):

@@ -2,14 +2,15 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import pytest
 from command_line import cli
 from scene_texts import JOINT_SHAKEN
 
 from patchfem.commands import shared
-from patchfem.core import Outcome
-from patchfem.export.pages.words import GROUPS, group_of, headline, pair, table_of, verdict
+from patchfem.core import Measure, Outcome, rounded
+from patchfem.export.pages.words import GROUPS, group_of, headline, least_known, pair, table_of, verdict
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
 from patchfem.scene.keys.quantities import KINDS
@@ -62,7 +63,8 @@ def test_always_every_measure_has_its_group():
 
 def test_always_what_misses_the_tolerance_is_said_before_the_table(tmp_path):
     answer = run(tmp_path, "bench", accuracy__steps_per_cycle=100)
-    assert answer.err.startswith("warning: ") and "set accuracy.steps_per_cycle = " in answer.err
+    said = [line for line in answer.err.splitlines() if not line.startswith("compiling the time loop")]  # empty caches
+    assert said[0].startswith("warning: ") and "set accuracy.steps_per_cycle = " in answer.err
     assert "meets the tolerance" not in answer.out
 
 
@@ -89,6 +91,41 @@ def test_exact_a_headline(cycles, text):
     measures = {"friction_ratio_peak": {"value": 0.3, "unit": "1", "error": None},
                 "loop_area": {"value": 2e-3, "unit": "J", "error": 1e-4}}
     assert headline({"kind": "bench", "outcome": "done", "measures": measures}, cycles) == text
+
+
+@pytest.mark.parametrize("worn, text", [
+    ({"worn_depth_max": (2.58e-7, 1e-9, "m"), "worn_volume": (1e-12, 1e-14, "m3")},
+     "258.0 ± 1.0 nm worn off at the deepest place; 2.00 ± 0.10 mJ dissipated per cycle."),
+    ({"worn_volume": (2.0, 0.1, "kg")}, "2.00 ± 0.10 kg worn off; 2.00 ± 0.10 mJ dissipated per cycle.")])
+def test_exact_a_worn_run_answers_with_what_was_worn(worn, text):
+    found = {"loop_area": (2e-3, 1e-4, "J"), **worn}
+    measures = {name: {"value": value, "unit": unit, "error": error} for name, (value, error, unit) in found.items()}
+    assert headline({"kind": "bench", "outcome": "done", "measures": measures}, 2.0) == text
+
+
+def test_exact_a_level_between_two_others_does_not_claim_the_tolerance():
+    """A jump at 5 g between levels 2 g apart; all that the tolerance steers is known to it."""
+    def said(**measures):
+        model = SimpleNamespace(accuracy=SimpleNamespace(tolerance=1e-2))
+        return least_known(SimpleNamespace(plan=SimpleNamespace(model=model), measures=measures))
+
+    jump, fine = Measure(5 * 9.80665, "m s-2", 9.80665, 9.80665), Measure(2.0, "J", 1e-2)
+    between = "jump_level, 5.0 ± 1.0 g, is known to the distance of two levels of the drive"
+    assert said(jump_level=jump, loop_area=fine) == "Every measure with an error meets the tolerance 0.01; least " \
+        f"well loop_area, 2.000 ± 0.010 J; {between}, which the scene sets."
+    assert said(jump_level=jump) == f"{between}."
+    assert said(loop_area=fine).endswith("least well loop_area, 2.000 ± 0.010 J.")
+    assert said(jump_level=jump, loop_area=Measure(2.0, "J", 1.0)) == ""
+
+
+@pytest.mark.parametrize("value, error, texts", [
+    (1.2830634121, 1.3e-9, ("1.283063412", "1.3e-09")), (115.654, 1.2e-5, ("115.654", "1.2e-05")),
+    (1.5, 1e-30, ("1.5", "1e-30")), (7.60859, 4.8e-4, ("7.60859", "0.00048")),
+    (1e6 / 3, 1e-3, ("333333.3333", "0.001")), (2e9 / 3, 10.0, ("666666667", "10")),
+    (2.0, None, ("2", "")), (2.0, 0.0, ("2", "0"))])
+def test_exact_a_value_ends_where_its_error_does(value, error, texts):
+    """At the second digit of the error; a value of more than ten digits ends at its tenth."""
+    assert rounded(value, error) == texts
 
 
 @pytest.mark.parametrize("more, part", [({}, "part of it slips"), ({"contact_fraction": (1.0, 0.0, "1")},

@@ -10,6 +10,10 @@ from command_line import cli
 from lab_files import SI, record, written
 from lab_modes import OMEGA, RESIDUE, TIME, ZETA, driven, free
 
+from patchfem.core import PatchfemError
+from patchfem.inputs.loops import read_loop
+from patchfem.inputs.paths import read_path
+from patchfem.inputs.signals import read_signal
 from patchfem.model.model import build
 from patchfem.scene.scene import loads
 from patchfem.structure import universal
@@ -36,6 +40,27 @@ def test_always_a_note_shows_what_a_file_wrote_as_text(tmp_path):
     path.write_bytes(path.read_bytes().replace(b"NO ", b"N\x1b "))
     answer = cli("import", path, "-o", tmp_path / "out.csv")
     assert answer.code == 0 and "its unit 'N?' is not known" in answer.err and "\x1b" not in answer.err
+
+
+def test_exact_one_table_of_all_channels_serves_slide_drive_and_fit(tmp_path):
+    """Every channel that import knows may stand in it; each reader takes its own and passes over the others."""
+    time = np.arange(9) / 100
+    slide = 1e-5 * np.sin(70 * time + 0.4)
+    table = {"time [s]": time + 2, "displacement [mm]": 1e3 * slide, "velocity [in/s]": time, "force [lbf]": time + 1,
+             "acceleration [in/s^2]": np.cos(time), "base_acceleration [g]": time}
+    source, out = tmp_path / "lab.csv", tmp_path / "table.csv"
+    np.savetxt(source, np.transpose([*table.values()]), delimiter=",", header=",".join(table), comments="")
+    asked = [word for name in table for word in ("--map", f"{name.split()[0]}={name.split()[0]}")]
+    plain = cli("import", source, "-o", out, *asked)
+    assert plain.code == 0 and "time starts at 2 s, displacement starts at 3.89" in plain.err and "--zero" in plain.err
+    with pytest.raises(PatchfemError, match=r"table\.csv:2: time starts at 2: .*patchfem import --zero"):
+        read_path(out)
+    answer = cli("import", source, "-o", out, "--zero", *asked)
+    assert answer.code == 0 and answer.err == ""
+    assert read_path(out) == (pytest.approx(time, abs=1e-12), pytest.approx(slide - slide[0], abs=1e-18))
+    assert read_signal(out, "acceleration")[1] == pytest.approx(0.0254 * np.cos(time), rel=1e-12)
+    assert read_signal(out, "force")[1] == pytest.approx(4.4482216152605 * (time + 1), rel=1e-12)
+    assert read_loop(out).reading == pytest.approx(4.4482216152605 * (time + 1), rel=1e-12)
 
 
 def test_exact_modes_of_a_record_are_the_structure_of_a_scene(shaken, tmp_path):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import ALWAYS, MODULES, cli, loaded
+from command_line import ALWAYS, FROM_SHELL, cli, loaded
 
 from patchfem.surface.roughness.report import report_of
 from patchfem.surface.roughness.rows import TABLE
@@ -109,12 +109,13 @@ def test_refuses_a_text_without_units(tmp_path):
     assert cli("profile", path, "--units", "um,nm").code == 0
 
 
+@pytest.mark.slow
 def test_exact_neither_meshes_nor_compiled_code_are_imported(trace):
-    modules = loaded(f"import sys\nfrom patchfem.__main__ import main\ntry:\n    main(sys.argv[1:])\nexcept SystemExit "
-                     f"as end:\n    assert not end.code\n{MODULES}", "profile", trace, "--cutoff", "0.25 mm")
+    modules = loaded(FROM_SHELL, "profile", trace, "--cutoff", "0.25 mm")
     assert not modules & {*ALWAYS, "skfem", "matplotlib", "patchfem.dynamics"}
 
 
+@pytest.mark.slow
 def test_exact_the_pages_are_the_same_bytes(tmp_path):
     from patchfem.export.surfaces.roughness import page
 

@@ -5,6 +5,8 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 from command_line import cli
@@ -60,7 +62,29 @@ def test_always_the_doctor_tells_what_is_missing(monkeypatch):
     assert found["gmsh (meshes by gmsh)"]["cure"] == 'pip install "patchfem[gmsh]"'
     assert "no display" in found["pictures by OpenGL"]["found"] and found["pictures by OpenGL"]["cure"]
     lines = cli("doctor").out.splitlines()
-    assert len(lines) == len(found) and sum(line.startswith("--") for line in lines) == 3
+    assert len(lines) == len(found)
+    assert [line.split()[1] for line in lines if line.startswith("--")] == ["scipy", "pictures", "gmsh"]
+
+
+def test_always_the_doctor_names_every_package_of_the_project_and_what_writes_films(monkeypatch):
+    monkeypatch.setattr(examine, "PICTURE", "")
+    monkeypatch.setattr(examine, "which", lambda name: None)
+    monkeypatch.setattr(examine, "_version", lambda name: "")
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))["project"]
+    found = {one.name: one for one in examine.examined()}
+    named = {re.match(r"[\w-]+", line)[0] for line in project["dependencies"]}
+    assert set(examine.NEEDED) == named and named <= set(found)
+    assert {extra for extra, _ in examine.EXTRAS.values()} == set(project["optional-dependencies"]) - {"test"}
+    assert not found["films (.mp4)"].fine and "pip install imageio-ffmpeg" in found["films (.mp4)"].cure
+    monkeypatch.setattr(examine, "_version", lambda name: "0.6" if name == "imageio-ffmpeg" else "")
+    assert examine._film()[1:] == (True, "imageio-ffmpeg 0.6", "")
+
+
+def test_always_a_fault_of_the_program_says_what_to_send(monkeypatch):
+    monkeypatch.setattr(examine, "examined", lambda: 1 / 0)
+    answer = cli("doctor")
+    assert answer.code == 1 and "internal fault, please report it: ZeroDivisionError" in answer.err
+    assert "what `patchfem doctor` says to the project's issue tracker" in answer.err
 
 
 def test_always_the_doctor_says_where_compiled_code_cannot_be_kept(monkeypatch, tmp_path):
@@ -112,3 +136,8 @@ def test_always_help_says_what_each_option_does_by_an_example(verb):
     words = shlex.split(" ".join(about[2].split()))
     assert words[:2] == ["patchfem", verb]
     assert app.parse_args(words[1:], exit_on_error=False, print_error=False)[0].__name__.rstrip("_") == verb
+
+
+def test_refuses_words_too_many_by_what_they_are():
+    answer = cli("new", "misalignment", "tilts.toml")
+    assert answer.code == 2 and answer.err == "patchfem: no place for 'tilts.toml'; see `patchfem new --help`\n"

@@ -42,6 +42,7 @@ def test_exact_a_full_stderr_hides_a_mistake_but_not_its_code(tmp_path):
         assert patchfem("check", path, stderr=full).returncode == 2
 
 
+@pytest.mark.slow
 def test_exact_a_stream_of_few_signs_shows_the_others_by_their_codes(scene, tmp_path):
     done = patchfem("run", scene, "-o", tmp_path / "out", "--no-page", capture_output=True,
                     env=os.environ | {"PYTHONIOENCODING": "ascii"})

@@ -89,6 +89,7 @@ def test_exact_a_refused_case_is_a_row_with_its_message(swept):
     assert "case 5 and 1 more: normal.load: must be >= 0" in answer.err
 
 
+@pytest.mark.slow
 def test_exact_the_dataset_has_a_dimension_per_key(swept):
     out, _ = swept
     with xr.open_dataset(out / "sweep.nc") as found:
@@ -289,6 +290,7 @@ def test_always_two_shards_may_put_older_tables_aside_at_once(tmp_path, monkeypa
     assert (tmp_path / "sweep.csv.partial").read_text() == "older" and not (tmp_path / "sweep.csv").exists()
 
 
+@pytest.mark.slow
 def test_exact_whole_results_folders_are_kept(scene, tmp_path):
     out = tmp_path / "swept"
     over = ("--over", "friction.static=-1,0.1")
@@ -303,6 +305,7 @@ def test_exact_whole_results_folders_are_kept(scene, tmp_path):
     assert (out / "sweep.csv").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_exact_pages_are_drawn_where_they_are_asked_for(scene, tmp_path):
     out, over, page = tmp_path / "swept", ("--over", "friction.static=0.1"), "report.html"
     for words, own, each in ((), True, False), (("--no-page",), False, False), (("--keep", "results"), True, False), \
@@ -317,6 +320,7 @@ def test_exact_pages_are_drawn_where_they_are_asked_for(scene, tmp_path):
     assert cli("sweep", scene, *over, "-o", out, "--collect", "--no-page").code == 0 and not (out / page).exists()
 
 
+@pytest.mark.slow
 def test_exact_pages_of_cases_that_are_there_are_drawn(scene, tmp_path):
     """--resume with --keep pages: a case whose folder has no page is answered again, one that has it is not."""
     out, over = tmp_path / "swept", ("--over", "friction.static=0.1,0.2")
@@ -334,6 +338,19 @@ def test_refuses_a_mode_by_its_name_and_by_its_number(scene, tmp_path):
     answer = cli("sweep", scene, *over, "-o", tmp_path / "a")
     assert answer.code == 2 and "structure.mode.0.frequency: stands twice, as structure.mode.axial.frequency too" \
         in answer.err and not (tmp_path / "a").exists()
+
+
+@pytest.mark.parametrize("verb", ["sweep", "plan"])
+@pytest.mark.parametrize("one", ["structure.mode.axial.frequency=90 Hz", "structure.mode[1].frequency=90 Hz"])
+def test_refuses_to_set_what_is_swept(scene, tmp_path, verb, one):
+    """Every case has its own value of a swept key: one that is set would be read and not used."""
+    answer = cli(verb, scene, "--over", "structure.mode.0.frequency=100 Hz,110 Hz", "--set", one,
+                 *(("-o", tmp_path / "a") if verb == "sweep" else ()))
+    assert answer.code == 2 and f"--set {one}: structure.mode.0.frequency is swept" in answer.err
+    own = tmp_path / "own.toml"
+    own.write_text(RIG + '\n[sweep]\n"friction.static" = [0.1, 0.2]\n', "utf-8")
+    answer = cli(verb, own, "--set", "friction.static=0.3")
+    assert answer.code == 2 and "friction.static is swept" in answer.err and not (tmp_path / "a").exists()
 
 
 def test_exact_cases_of_a_file_and_drawn_ones_are_rows(scene, tmp_path):
@@ -368,6 +385,7 @@ def test_refuses_words_that_do_not_stand_together(scene, tmp_path, words, says):
     assert answer.code == 2 and says in answer.err and not (tmp_path / "a").exists()
 
 
+@pytest.mark.share(1, 2)
 @pytest.mark.parametrize("ends, code, says", [
     (["", ""], 0, "2 cases"), (["not_converged", ""], 3, "1 not_converged"), (["", "failed"], 3, "case 2: it broke"),
     (["failed", "failed"], 2, "no case could be run")])

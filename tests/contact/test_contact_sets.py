@@ -148,6 +148,7 @@ def test_exact_many_pivots_do_not_wear_the_tableau():
     assert np.abs(force - sets.at(d, t).forces(d, t)).max() <= 1e-12 * LOAD
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(st.integers(0, 10**6), st.integers(2, 9))
 def test_always_any_definite_operator_is_solved(seed, m):

@@ -39,6 +39,7 @@ def bodies(cells=100):
 
 
 # ---------------------------------------------------------------------------------------------- wedges on rigid bodies
+@pytest.mark.share(2)
 @pytest.mark.parametrize("times", [1.5, 3.0, 12.0])
 def test_exact_wedge_on_the_linear_skin(times):
     """Contact fraction sqrt(2N/(k theta b))/L and centre -(L/2 - c/3) beyond the opening tilt 2p/(kL)."""
@@ -63,6 +64,7 @@ def test_exact_linear_skin_starts_to_open_at_twice_the_mean_pressure_over_k_and_
     assert below.moment == pytest.approx(-1e13 * 0.9999 * opening * (weight @ x**2), rel=1e-12)
 
 
+@pytest.mark.share(3, 4)
 @pytest.mark.parametrize("ratio", [0.01, 1.0, 5.0, 60.0, 1e3])
 def test_exact_wedge_on_the_exponential_skin(ratio):
     """p_mean/p_max = (1 - exp(-B))/B and the centre L(1/2 - 1/B + 1/(exp(B) - 1)) towards the closed end at -x."""
@@ -94,6 +96,7 @@ def test_exact_reference_pressure_only_shifts_the_approach():
     assert one.delta - two.delta == pytest.approx(1e-7 * np.log(1e3), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_exact_load_off_the_middle_opens_a_linear_skin_at_a_sixth_of_the_length():
     """The kern: contact fraction 3(1/2 - e/L), rotation 12 N e/(k b L^3) before; rotation < 0 for a load at +x."""
     x, weight = strip(3000)

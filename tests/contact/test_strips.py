@@ -309,6 +309,7 @@ def test_always_a_thousand_random_strips_are_solved():
         check(state, skin, c, x, weight, gap, roll, load, moment, spring)
 
 
+@pytest.mark.share(0, 1, 2, 4, 5, 6, 8, 9, 10, 11)
 @each_skin
 @each_control
 def test_exact_going_down_the_dual_alone_finds_the_same(skin, control, monkeypatch):

@@ -150,6 +150,15 @@ def test_exact_a_claim_whose_name_has_no_room_leaves_nothing(tmp_path, monkeypat
     assert not names(tmp_path)
 
 
+def test_refuses_a_second_sweep_and_leaves_the_first_its_folder(tmp_path):
+    """It once removed the folder of the cases, which was empty still, and the first one failed at its first case."""
+    with SweepFolder(tmp_path / "out", ["a"]) as first:
+        with pytest.raises(Missing, match="another sweep"), SweepFolder(tmp_path / "out", ["a"]):
+            pass
+        first.put([0], ["{}"])
+    assert names(tmp_path / "out" / "cases" / "a") == {"summary.json"}
+
+
 @pytest.mark.parametrize("can", [True, False], ids=["in one step", "in two"])
 def test_exact_exchange_leaves_nothing_behind(tmp_path, monkeypatch, can):
     if not can:

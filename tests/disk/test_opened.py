@@ -42,3 +42,23 @@ def test_refuses_a_pipe_that_nobody_writes_to(pipe, monkeypatch):
     with pytest.raises(scene.SceneError, match=r"x\.toml: cannot be read: a pipe that nobody has written to within"):
         scene.text_of(pipe)
     assert read(pipe)[1] == [f"{pipe}: cannot be read: a pipe that nobody has written to within 0 s"]
+
+
+def test_always_a_system_without_such_pipes_reads_its_files(tmp_path, monkeypatch):
+    """On Windows set_blocking, there from Python 3.12 on, refuses whatever is no pipe."""
+    def refused(*given):
+        raise OSError(1, "not a pipe")
+
+    monkeypatch.delattr(os, "O_NONBLOCK")
+    monkeypatch.setattr(os, "set_blocking", refused)
+    (tmp_path / "x.toml").write_bytes(b"a = 1\r\n\x1a")
+    with opened.reading(tmp_path / "x.toml") as file:
+        assert file.read() == b"a = 1\r\n\x1a"
+
+
+def test_exact_what_cannot_be_read_is_closed(tmp_path):
+    before = len(os.listdir("/dev/fd"))
+    for _ in range(3):
+        with pytest.raises(IsADirectoryError):
+            opened.reading(tmp_path)
+    assert len(os.listdir("/dev/fd")) == before

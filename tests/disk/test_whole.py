@@ -14,7 +14,7 @@ from limits import limited
 from scene_texts import BENCH, COATED
 
 from patchfem.core import Missing
-from patchfem.disk.whole import PLACED, Overflow, beside, room, sturdy, unfinished, whole, write_text
+from patchfem.disk.whole import PLACED, Overflow, beside, room, sturdy, unfinished, whole, write_inside, write_text
 
 SIZES = [1 << 10, 1 << 14, 1 << 16]
 
@@ -179,3 +179,10 @@ def test_exact_who_is_interrupted_says_what_was_replaced(tmp_path, monkeypatch, 
     assert cli("schema", "-o", "a.json").code == 130
     assert said == ["interrupted; whole and in place: a.json" if after else "interrupted; nothing was replaced"]
     assert (Path("a.json").read_text() == "older") != after and [one.name for one in tmp_path.iterdir()] == ["a.json"]
+
+
+def test_always_a_file_inside_a_draft_without_room_names_need_and_room(tmp_path):
+    with limited(1000), pytest.raises(Missing, match=r"a\.json: no room.*: 2 kB wanted, 1 kB is the limit"):
+        write_inside(tmp_path / "a.json", 2000 * "x")
+    write_inside(tmp_path / "a.json", "\udce4 is no letter")
+    assert (tmp_path / "a.json").read_text() == "? is no letter"

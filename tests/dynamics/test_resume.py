@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 from command_line import cli
 from limits import limited
+from march_paths import share_one_loop
 from scene_texts import BENCH, COATED, DRIVE, FORCED, GROWING, MODE, NONLOCAL, PAIR, PLASTIC, POINT, SECOND
 
 from patchfem.dynamics import resume
@@ -56,9 +57,11 @@ def same(one, two) -> None:
         xr.testing.assert_identical(a, b)
 
 
+@pytest.mark.share(0, 3, 4)
 @pytest.mark.parametrize("kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "bonds that grow"))
                                   for kind in RIGS])
-def test_exact_an_interrupted_march_goes_on_to_the_same_bits(tmp_path, often, kind):
+def test_exact_an_interrupted_march_goes_on_to_the_same_bits(tmp_path, often, kind, monkeypatch):
+    share_one_loop(monkeypatch)
     scene = tmp_path / "scene.toml"
     scene.write_text(RIGS[kind], "utf-8")
     words = ("run", scene, "--no-page", "-o")
@@ -122,6 +125,7 @@ def test_always_a_short_march_keeps_nothing(tmp_path, monkeypatch):
     assert cli("run", tmp_path / "scene.toml", "--no-page", "-o", tmp_path / "out").code == 0
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL, *(
     pytest.param(one, marks=pytest.mark.slow) for one in (signal.SIGHUP, signal.SIGINT))])
 def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):

@@ -309,6 +309,7 @@ def test_exact_a_fine_side_that_is_much_softer_keeps_its_nodes():
     assert named.side == "lower" and 3e-3 <= hertz(named.x, named.nn, 100 * YOUNG, YOUNG)[0] <= 1e-2
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("stiff", [1.0, 0.1, 0.01])
 def test_exact_where_the_coarser_side_changes_the_grid_changes_over(stiff):
     coarse, fine = (refined_middle(1.5 * A, A / count, LENGTH, 6e-3, 1.1).x for count in (16, 40))

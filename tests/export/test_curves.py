@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
+from matplotlib.figure import Figure
 from page_data import charts_of
 from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import Outcome
 from patchfem.export import netcdf, report
 from patchfem.export.drawing import curves
+from patchfem.export.pages import charts
 
 FOLDED = {"frequency": np.array([10.0, 11, 12, 13, 12.5, 12, 11.5, 12.5, 14]),
           "level": np.full(9, 5.0), "amplitude": 1e-5 * np.array([1.0, 2, 4, 7, 6, 5, 3, 2, 1]),
@@ -98,6 +100,7 @@ def test_exact_a_curve_in_the_file():
     assert data.curve_fold.values.tolist() == [13.0, 11.5] and data.curve_fold.attrs["units"] == "Hz"
 
 
+@pytest.mark.slow
 def test_exact_the_regimes_over_a_sweep_of_a_coulomb_rig(written):
     """Stuck while mu N/m stays above a; the page shows the curve and says the regime of the largest motion."""
     folder, data = written(SLIPPING + SWEEP.format(130, 155, 5))
@@ -132,6 +135,7 @@ def test_exact_a_folded_curve_and_the_motion_at_its_top(written):
     assert np.all(data.curve_multiplier.values[~inside] <= 1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_exact_levels_on_the_page(written):
     """A row per level in its order, stuck below 4 g, and a line per step of the test."""
     folder, data = written(LEVELS)
@@ -168,3 +172,23 @@ def test_exact_a_page_without_curve_or_levels_has_neither():
             "x": None, "versions": {}, "summary": {"patchfem": "0", "title": "", "kind": "patch", "outcome": "done",
             "measures": {}, "effects": [], "not_in_scene": [], "warnings": [], "notes": [], "seconds": {}}}  # fmt: skip
     assert "Floquet" not in report.page(data) and "<h2>Levels" not in report.page(data)
+    text = report.page(data | {"summary": data["summary"] | {"seconds": {"total": 0.434, "files": 0.1}}})
+    assert "computed in 0.43 s" in text and "Seconds by the clock on the wall: total 0.434 s, files 0.100 s" in text
+
+
+def test_exact_levels_over_more_than_three_decades_are_drawn_over_their_logarithm():
+    """Microslip of 2 nm beside 40 um of slip, and a level that does not move at all: the first two are drawn."""
+    rows = [{"drive": d, "stuck": d < 2, "unit": "N", "values": {"relative_displacement_amplitude": a},
+             "errors": {"relative_displacement_amplitude": 3e-9}}
+            for d, a in ((1.0, 0.0), (2.0, 2e-9), (3.0, 4e-5), (2.0, 1e-8))]
+    (found,) = charts.levels(rows)
+    dots = [one for one in found["marks"] if one["kind"] == "dots"]
+    arrows = [one["y"] for one in found["marks"] if one["kind"] == "arrow"]
+    assert found["y"]["log"] and [list(one["x"]) for one in dots] == [[2.0, 3.0, 2.0]]
+    assert np.ravel(arrows) == pytest.approx([2e-3, 40.0, 40.0, 1e-2]) and dots[0]["floor"] == pytest.approx(2e-4)
+    few = [row for row in rows if row["values"]["relative_displacement_amplitude"] in (0.0, 4e-5)]
+    assert not charts.levels(few)[0]["y"]["log"]
+    for some, scale in ((rows, "log"), (few, "linear")):
+        axes = Figure().subplots()
+        curves.levels(some, onto=axes)
+        assert axes.get_yscale() == scale

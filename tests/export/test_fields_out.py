@@ -192,6 +192,7 @@ def test_exact_pvd_is_read_by_pyvista_as_named_blocks(tmp_path):
         f"frame_000{number}{end}" for number in (0, 1) for end in (".vtm", *(f"_{name}.vtu" for name in NAMES)))
 
 
+@pytest.mark.slow
 def test_exact_arrays_of_several_blocks_and_none_are_unpacked_by_vtk(tmp_path):
     """Sizes at the edges of a block: the last one empty, full, one byte long."""
     for count in (0, 1, BLOCK // 8 - 1, BLOCK // 8, BLOCK // 8 + 1, 3 * BLOCK // 8):

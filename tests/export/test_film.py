@@ -56,6 +56,7 @@ def test_exact_the_last_cycle_is_without_the_pressed_state():
     assert moving(np.array([0.0])) == (0,) and moving(np.array([0.0, 2.0])) == (0, 1)
 
 
+@pytest.mark.slow
 def test_exact_one_scale_holds_every_frame_and_the_pieces_stay_in_the_window(bench):
     with Series(bench) as series:
         film = film_of(series)
@@ -76,6 +77,7 @@ def test_exact_one_scale_holds_every_frame_and_the_pieces_stay_in_the_window(ben
         assert (places[:, 1].min(), places[:, 1].max()) == (bottom, top)
 
 
+@pytest.mark.slow
 def test_exact_the_slide_is_taken_out_before_the_rest_is_magnified(bench):
     with Series(bench) as series:
         film = film_of(series)
@@ -93,6 +95,7 @@ def test_exact_the_slide_is_taken_out_before_the_rest_is_magnified(bench):
             assert np.abs(aside).max() < 0.1 * length
 
 
+@pytest.mark.slow
 def test_exact_a_shown_frame_is_that_frame_drawn_anew(small, drawn):
     """Moved on from the first picture or drawn by itself, a frame is the same to the last pixel."""
     film, pictures = drawn

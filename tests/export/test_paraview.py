@@ -22,14 +22,20 @@ from patchfem.export.fields.blocks import NAMES
 from patchfem.export.fields.series import Series
 
 
-def played(path, monkeypatch, *words) -> Simple:
-    """The script run as `pvpython PATH WORDS`."""
+def played(path, monkeypatch, *words, kind=None) -> Simple:
+    """The script run as `pvpython PATH WORDS`; kind: of the windows of a ParaView that has no display."""
     simple = Simple()
     package = types.ModuleType("paraview")
     package.simple = simple
     for name, module in (("paraview", package), ("paraview.simple", simple)):
         monkeypatch.setitem(sys.modules, name, module)
     monkeypatch.setattr(sys, "argv", [str(path), *words])
+    if kind is None:
+        monkeypatch.setenv("DISPLAY", ":0")
+    else:
+        monkeypatch.delenv("DISPLAY", raising=False)
+        core = types.SimpleNamespace(vtkRenderWindow=lambda: types.SimpleNamespace(GetClassName=lambda: kind))
+        monkeypatch.setitem(sys.modules, "vtkmodules.vtkRenderingCore", core)
     runpy.run_path(str(path))
     return simple
 
@@ -44,6 +50,7 @@ def written(bench, tmp_path_factory):
     return folder / "the 'last'.py"
 
 
+@pytest.mark.slow
 def test_exact_paraview_warps_to_the_places_that_pictures_draw(bench, written, monkeypatch):
     simple = played(written, monkeypatch)
     (pieces, _), (interface, _), (clock, _) = simple.shown
@@ -65,6 +72,7 @@ def test_exact_paraview_warps_to_the_places_that_pictures_draw(bench, written, m
                     assert np.array_equal(cell_data[name], values)
 
 
+@pytest.mark.slow
 def test_exact_paraview_colours_pressure_and_stress_alike_in_every_frame(bench, written, monkeypatch):
     simple = played(written, monkeypatch)
     with Series(bench) as series:
@@ -93,6 +101,14 @@ def test_exact_paraview_plays_or_writes_the_cycle_from_any_folder(written, tmp_p
     simple = played(written, monkeypatch, "cycle.png")
     assert simple.saved == [("cycle.png", 7)] and ("Play",) not in simple.scene.called
     assert not os.listdir(tmp_path)
+
+
+def test_refuses_to_crash_where_there_is_no_display(written, monkeypatch):
+    """ParaView's windows for X end by signal 11 there; those for EGL and OSMesa need none."""
+    monkeypatch.setattr(sys, "platform", "linux")
+    with pytest.raises(SystemExit, match=r"no display.*xvfb-run -a pvpython"):
+        played(written, monkeypatch, "cycle.png", kind="vtkXOpenGLRenderWindow")
+    assert played(written, monkeypatch, "cycle.png", kind="vtkEGLRenderWindow").saved == [("cycle.png", 7)]
 
 
 def test_refuses_a_script_without_its_fields_or_of_nothing_that_moves(bench, written, tmp_path, monkeypatch):

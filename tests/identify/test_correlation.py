@@ -16,6 +16,7 @@ def process(count, tie, seed):
     return out
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("tie", [0.0, 0.5, 0.8])
 def test_rows_of_a_first_order_process(tie):
     """n (1 - a)/(1 + a) for n large; the median of 200 series lies within three of its own standard errors of that."""

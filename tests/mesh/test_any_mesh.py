@@ -218,11 +218,11 @@ def test_refuses_a_spoilt_mesh_by_name(name, form, tmp_path):
     spoil, message = SPOILT[name]
     m = drawn("quads")
     spoil(m)
-    begin = time.perf_counter()
+    begin = time.process_time()
     with pytest.raises(PatchfemError, match=message) as caught:
         stored(m, tmp_path, form)
     assert str(caught.value).startswith(str(tmp_path)) and "\n" not in str(caught.value)
-    assert time.perf_counter() - begin < 2
+    assert time.process_time() - begin < 2
 
 
 def test_refuses_parts_joined_at_one_node_only(tmp_path):
@@ -293,16 +293,34 @@ def test_refuses_truncations_in_bounded_time(form, tmp_path):
     whole = path.read_bytes()
     for cut in range(0, int(0.9 * len(whole)), max(1, len(whole) // 40)):
         path.write_bytes(whole[:cut])
-        begin = time.perf_counter()
+        begin = time.process_time()
         with pytest.raises(PatchfemError, match="pair"):
             read_pieces(path)
-        assert time.perf_counter() - begin < 2
+        assert time.process_time() - begin < 2
 
 
+CHANGES = st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=4)
+WITHOUT_HASTE = {"deadline": None, "suppress_health_check": [HealthCheck.function_scoped_fixture]}
+
+
+@pytest.mark.share(0, 3, 4, 6)
 @pytest.mark.parametrize("form", FORMATS)
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(changes=st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=4))
+@settings(max_examples=20, **WITHOUT_HASTE)
+@given(changes=CHANGES)
 def test_always_a_spoilt_file_is_read_or_refused(form, changes, tmp_path):
+    spoilt(form, changes, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", FORMATS)
+@settings(max_examples=300, **WITHOUT_HASTE)
+@given(changes=CHANGES)
+def test_always_each_of_many_spoilt_files_is_read_or_refused(form, changes, tmp_path):
+    spoilt(form, changes, tmp_path)
+
+
+def spoilt(form: str, changes: list, tmp_path) -> None:
+    """Bytes of a file of this form changed at shares of its length: read to a mesh without faults, or refused."""
     ending, write = FORMATS[form]
     path = tmp_path / f"pair{ending}"
     write(drawn("mixed"), path)
@@ -310,7 +328,7 @@ def test_always_a_spoilt_file_is_read_or_refused(form, changes, tmp_path):
     for place, byte in changes:
         raw[int(place * len(raw))] = byte
     path.write_bytes(raw)
-    begin = time.perf_counter()
+    begin = time.process_time()
     try:
         pair = read_pieces(path)
     except PatchfemError:
@@ -318,4 +336,4 @@ def test_always_a_spoilt_file_is_read_or_refused(form, changes, tmp_path):
     else:
         for piece in (pair.lower, pair.upper):
             assert piece.areas().min() > 0 and np.isfinite(piece.points).all() and piece.points.min(axis=0)[1] >= 0
-    assert time.perf_counter() - begin < 2
+    assert time.process_time() - begin < 2

@@ -109,6 +109,7 @@ def test_exact_vtu_holds_the_same_cells_and_tags(grid, tmp_path):
     assert np.array_equal(mesh.cell_data_dict["tag"]["line"], pair["edge_tags"])
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(order=st.randoms(use_true_random=False), shift=st.floats(-1.0, 1.0))
 def test_always_numbering_and_place_along_x_do_not_matter(order, shift, tmp_path_factory):
@@ -143,10 +144,10 @@ def test_refuses_a_missing_file_and_a_foreign_ending(tmp_path):
 def test_refuses_garbage_in_bounded_time(content, tmp_path):
     path = tmp_path / "pair.msh"
     path.write_bytes(content)
-    begin = time.perf_counter()
+    begin = time.process_time()
     with pytest.raises(PatchfemError, match=r"pair\.msh"):
         read_grid(path)
-    assert time.perf_counter() - begin < 2
+    assert time.process_time() - begin < 2
 
 
 def test_refuses_every_truncation_in_bounded_time(tmp_path):
@@ -156,10 +157,10 @@ def test_refuses_every_truncation_in_bounded_time(tmp_path):
     cells_end = whole.rindex(b"$EndElements")
     for cut in range(0, cells_end - 1, 61):
         path.write_bytes(whole[:cut])
-        begin = time.perf_counter()
+        begin = time.process_time()
         with pytest.raises(PatchfemError, match=r"pair\.msh"):
             read_grid(path)
-        assert time.perf_counter() - begin < 2
+        assert time.process_time() - begin < 2
 
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -218,10 +219,10 @@ def test_refuses_counts_the_file_cannot_hold_and_keeps_stdout_clean(tmp_path, ca
     content = path.read_bytes()
     at = content.index(b"$Nodes") + 7
     path.write_bytes(content[:at] + b"100000000" + content[content.index(b"\n", at):])
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(PatchfemError, match="announces 100000000"):
         read_grid(path)
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 1.0
 
 
 def test_refuses_cells_without_a_tag_at_the_interface(tmp_path):

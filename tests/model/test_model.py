@@ -134,6 +134,7 @@ CHANGES = {"load": (with_load, 200.0, "contact.load=200 N"), "gap": (with_tilt, 
            "mesh": (with_size, 4e-4, "contact.element_size=0.4 mm")}
 
 
+@pytest.mark.share(0, 1, 2, 3, 4, 5, 6)
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("text, sets", [(SMALL_PATCH, []), (RIG, FEW),
                                         (SMALL_PATCH + SHEAR + COULOMB + SHORT, ["accuracy.steps_per_cycle=100"])],

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from patchfem.response import events
 from patchfem.response.events import Events, detected, states, sticks, stuck_time, table
+from patchfem.response.run_events import of_a_cycle
 
 
 def stick_slip(period=1.0, cycles=3, steps=800, rest=0.25):
@@ -116,3 +117,11 @@ def test_exact_sticks_of_a_window_do_not_hang_on_when_the_list_begins():
                 spans.setdefault(tuple(state), []).append((a, b))
         longest = max(spans.values(), key=lambda one: sum(b - a for a, b in one), default=[])
         assert sticks(table(rows), begin, end, [True, False]) == longest
+
+
+def test_exact_sticks_of_one_cycle_are_whole():
+    """Two a period, of which the first and the last are cut by the window: those of the last cycle but one count;
+    a stick that outlasts its cycle stands for none."""
+    sticks_of_all = [(0.0, 0.2), (0.4, 0.7), (0.9, 1.2), (1.4, 1.7), (1.9, 2.2), (2.4, 2.7), (2.9, 3.0)]
+    assert of_a_cycle(sticks_of_all, 3.0, 1.0) == [(1.4, 1.7), (1.9, 2.2)]
+    assert of_a_cycle([(0.0, 3.0)], 3.0, 1.0) == of_a_cycle([(1.5, 3.0)], 3.0, 1.0) == []

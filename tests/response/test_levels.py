@@ -106,6 +106,7 @@ def test_exact_onset_by_a_gauge_is_where_the_output_passes_its_length():
     assert never["onset_level"].reason == "no level on the way up moves the output by more than 1 m"
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("method", ["", 'method = "march"\nsteps_per_cycle = 200'])
 def test_exact_onset_of_a_force_drive_is_mu_n(method):
     """Levels of a force, in newtons: the held block slips where the force passes mu N."""

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patchfem.core import G_N, BaseSine, Response
-from patchfem.dynamics.march.march import hermite_extremes
+from patchfem.dynamics.cycles import hermite_extremes
 from patchfem.response import measures
 from patchfem.response.rows import ROWS, TABLE, Seen, measures_of
 

@@ -159,6 +159,7 @@ def test_exact_the_median_over_sticks_outvotes_a_stray_one():
     assert ringing(time, np.concatenate(parts), [], 3.0) == ({}, {})
 
 
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize(("length", "hertz"), [(2, 719.326), (5, 468.232), (10, 346.186), (100, 174.323)])
 def test_exact_a_released_block_rings_on_its_bonds(length, hertz):
     """sqrt(omega^2 + mu N/(m eps)); the damper of 0.003 of 143 Hz decays as 0.003 * 143 over the ring's frequency."""

@@ -56,6 +56,7 @@ def both(model, steps, patch=None, frames=0):
 
 # ---- the compiled engines and their twins
 
+@pytest.mark.share(0, 2, 4, 6, 8, 10, 13, 15, 17, 19, 21, 23)
 @pytest.mark.parametrize("slide", SLIDES)
 @pytest.mark.parametrize("law", EXACT)
 def test_exact_a_compiled_bench_is_its_law_step_by_step(law, slide):
@@ -66,18 +67,20 @@ def test_exact_a_compiled_bench_is_its_law_step_by_step(law, slide):
     assert one.ledger == pytest.approx(two.ledger, abs=1e-13 * np.abs(np.diff(two.ledger[0])).sum())
 
 
+@pytest.mark.share(0, 4, 8, 12)
 @pytest.mark.parametrize("reading, order, growth, slide", [
     pytest.param(*law, slide, marks=() if (k + n) % len(SLIDES) == 0 else pytest.mark.slow)
     for k, law in enumerate(SUMS) for n, slide in enumerate(SLIDES)])
 def test_exact_a_list_of_bonds_is_the_numpy_sum_within_its_stated_error(reading, order, growth, slide):
     """1e-5 besides for the two points per strip, which fall with the step; a third of all laws and slides always."""
-    one, two = both(model_of(sum_of(reading, order, growth), slide), 100)
+    one, two = both(model_of(sum_of(reading, order, growth), slide), 60)
     error = one.engine.choice.error + (2e-5 if growth else 1e-5)
     assert one.engine.name.endswith("bond list")
     assert np.abs(one.force - two.force).max() <= error * 30
     assert np.abs(one.ledger - two.ledger).max() <= 3 * error * np.abs(np.diff(two.ledger[0])).sum()
 
 
+@pytest.mark.slow
 def test_exact_samples_at_the_place_of_the_first_bonds_cost_no_work():
     """Every fourth of a sine stands there; the printed force jumps, and its mean over a step beside it must not."""
     for keys in ("order = 0\n", 'reading = "report"\norder = 2\n'):
@@ -98,6 +101,7 @@ def test_exact_frames_of_a_patch_are_those_of_its_points(law):
     assert one.local == pytest.approx(two.local, abs=1e-17)
 
 
+@pytest.mark.slow
 def test_exact_a_long_list_of_bonds_finds_room():
     """Steps of two bond lengths with nothing cut off or merged: far more strips than a list begins with."""
     model = model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=direct", "slide.amplitude=3 mm",
@@ -215,6 +219,7 @@ def test_exact_a_jump_of_the_force_at_a_turn_costs_the_check_nothing():
         assert bench.run(model_of(EXACT[law], "sine"), None, 40).values["work_check"] < 1e-13
 
 
+@pytest.mark.slow
 def test_exact_bonds_that_lose_their_pressure_give_nothing_back():
     """A step into a place without pressure: the mean is that of the force along it, as of many short steps under the
     same pressures; what the bonds stored is dissipated."""
@@ -233,6 +238,7 @@ def test_exact_bonds_that_lose_their_pressure_give_nothing_back():
     assert law.stored(last.state)[0] == 0
 
 
+@pytest.mark.slow
 def test_exact_work_over_a_pressure_that_stays_below_is_the_trapezoid_of_its_force():
     """Orders other than 1 lose bonds at the edges of the contact; energy_balance cannot see what becomes of theirs."""
     text = PATCH.replace("0.02 mrad", "0.0957 mrad").replace("12.7 mm", "4 mm").replace(

@@ -65,6 +65,7 @@ def test_exact_a_linear_curve_is_that_of_the_event_map():
         assert curve["multiplier"][k] == pytest.approx(np.abs(other.multipliers).max(), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_exact_the_balance_follows_a_peak_of_a_damping_of_0_003():
     """Its points are those of an arc: a spring that bends by nothing leaves the linear peak to 1e-3."""
     found = pf.run(RIG + '[structure.stiffening]\ncubic = "1e-6 N/m^3"\n',

@@ -103,6 +103,7 @@ def small(monkeypatch):
     monkeypatch.setattr(ladder, "SPENT", LEAST)
 
 
+@pytest.mark.share(0, 3, 6)
 @pytest.mark.parametrize(("kind", "seed"), [(kind, seed) for kind, seeds in ALWAYS.items() for seed in seeds])
 def test_always_the_errors_hold_the_finer_mesh(kind, seed, small):
     """Scenes that a rule of three meshes alone misses: symmetry up to round-off, full contact, a few nodes."""

@@ -23,6 +23,7 @@ def planned(text, *sets):
     return plan(loads(text, "a.toml", sets))
 
 
+@pytest.mark.share(0, 1, 2, 3, 5)
 @pytest.mark.parametrize("text, sets, key", [
     (PATCH, ["contact.element_size=0.5 um"], "make contact.element_size larger"),
     (RIG, [MARCH, "accuracy.steps_per_cycle=10000000"], "lower accuracy.steps_per_cycle"),
@@ -88,6 +89,7 @@ def test_exact_a_limit_of_the_process_is_seen(monkeypatch):
     assert bare - compiled == pytest.approx(memory.CODE, abs=1e7)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("law, least", [(COULOMB, 150), (TANH, 200), (TANH, 300)])
 def test_refuses_in_one_line_what_the_process_may_not_take(tmp_path, law, least):
     path = tmp_path / "a.toml"
@@ -107,6 +109,11 @@ def test_always_plans_hold_in_most_scenes(tmp_path):
     seed 6000 time held in 75 (94 %) and memory in 76 (95 %). What was missed: comparison methods (two of the five in
     time, two of the four in memory), a march of two masses, and two patches whose mesh climbs further or less far than
     foreseen.
+
+    Held out when the bonds of held blocks were counted anew: of 40 from seed 20261130 time held in 37, of 40 of the
+    grammar as they are in 34, in all 80 within twice, and memory in all 80. What was missed was planned too long. All
+    these plans are as they were before. Of twelve scenes where the printed law holds a block, from the same seed, time
+    held in 5 (in 1 before), in 6 within twice (in 4), and the worst plan is 33 times too long at least.
     """
     scores = [one.within() for one in plan_trial.told(6000, 80, tmp_path)]
     time, memory_ = (sum(column) / len(scores) for column in zip(*scores))

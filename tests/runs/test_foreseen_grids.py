@@ -33,12 +33,12 @@ def test_exact_springs_under_a_crown_bear_over_their_closed_form():
     assert np.abs(X[bears]).max() == pytest.approx(half, abs=CELL)
 
 
-@pytest.mark.parametrize("arm", [1.9e-3, 2.5e-3, 4e-3, 5.5e-3])
+@pytest.mark.parametrize("arm", [1.9e-3, 2.5e-3, 4e-3, 5.5e-3, 5.98e-3])
 def test_exact_springs_under_a_load_off_their_middle_bear_over_three_times_its_distance_from_the_end(arm):
     """Bars under a load at e > L/6 bear over 3 (L/2 - e), whatever their softness; within the middle third over all."""
     bears = contact._bearing(X, np.zeros(X.size), 1e-9, arm)
     length = X[-1] - X[bears].min()
-    assert length == pytest.approx(min(12e-3, 3 * (6e-3 - arm)), abs=3 * CELL)
+    assert length == pytest.approx(min(12e-3, 3 * (6e-3 - arm)), abs=2 * CELL)
 
 
 @pytest.mark.parametrize("text, tolerance, sets", [
@@ -52,17 +52,19 @@ def test_exact_grids_are_those_of_the_run_where_all_or_one_side_of_a_step_bears(
     assert sizes(patch, tolerance).finest == tuple((body.x.size, body.depth.size) for body in bodies)
 
 
-@pytest.mark.parametrize("shape", ['[contact.crown]\nradius = "2 m"\n', '[contact.tilt]\nangle = "0.2 mrad"\n',
-                                   '[contact.load_line]\noffset = "3 mm"\n'])
-def test_always_first_grids_are_nearly_those_that_a_search_finds(shape):
-    """The coarsest grid, by its nodes: springs err in how long a contact is, and columns go with its logarithm."""
+@pytest.mark.parametrize("shape, off", [('[contact.crown]\nradius = "2 m"\n', (2, 1)),
+                                        ('[contact.tilt]\nangle = "0.2 mrad"\n', (0, 0)),
+                                        ('[contact.load_line]\noffset = "3 mm"\n', (0, 0))])
+def test_always_first_grids_are_nearly_those_that_a_search_finds(shape, off):
+    """The coarsest grid, by its nodes: springs err in how long a contact is, and columns go with its logarithm. A
+    contact half or twice as long has two columns or a row more or less than that."""
     from patchfem.runs.patch.grading import base_grids
 
     patch = asked(PIECES + shape, "accuracy.tolerance=0.01")
     columns, rows = sizes(patch, 0.01).finest[0]
     (grid,) = base_grids(patch)
-    first = ((columns - 1) / 4 + 1) * ((rows - 1) / 4 + 1)
-    assert first == pytest.approx(grid.x.size * grid.depth.size, rel=0.25)
+    missed = grid.x.size - ((columns - 1) / 4 + 1), grid.depth.size - ((rows - 1) / 4 + 1)
+    assert 0 <= missed[0] <= off[0] and 0 <= missed[1] <= off[1]
 
 
 def test_refuses_no_plan_for_want_of_a_mesh_as_a_plan_makes_none(monkeypatch):

@@ -51,6 +51,7 @@ DRAWN = [  # random scene, measure, truth of the independent program, half a uni
 ]
 
 
+@pytest.mark.share(2, 3)
 @pytest.mark.parametrize(("seed", "measure", "truth", "digit"), DRAWN)
 def test_exact_a_random_scene_holds_what_the_independent_program_found(seed, measure, truth, digit, tmp_path):
     asked = spec(seed)

@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from scene_texts import BLOCK
 from scipy.integrate import quad
 
 import patchfem as pf
@@ -13,6 +14,7 @@ from patchfem.dynamics.harmonic.point import balance_of
 from patchfem.dynamics.harmonic.point import point as periodic_point
 from patchfem.dynamics.harmonic.starts import one_harmonic
 from patchfem.model.model import build
+from patchfem.runs.bench import bench
 from patchfem.runs.many.many import taken
 from patchfem.runs.rig.numerics import choose
 from patchfem.runs.rig.steady.balance import Balance
@@ -45,15 +47,7 @@ cycles = 30
 [accuracy]
 steps_per_cycle = 100
 """
-PIECES = """
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6 mm"
-load = "115 N"
-substrate = "Ti-8Al-1Mo-1V"
-element_size = "1 mm"
-"""
+PIECES = f'\n{BLOCK}element_size = "1 mm"\n'
 WAVE = 2 * np.pi / 80e-6
 LATER = {"iwan": ["friction.law=iwan", "friction.stiffness=1e7 N/m", "friction.chi=-0.5", "friction.beta=0.5"],
          "bouc-wen": ["friction.law=bouc-wen", "friction.stiffness=1e7 N/m"],
@@ -136,6 +130,7 @@ def test_exact_a_slow_slide_of_a_force_that_follows_the_speed():
     assert value(slow, "loop_area") == pytest.approx(dashpot, rel=1e-6)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("law", LATER)
 def test_always_a_law_of_constant_load_acts_along_the_flank(law):
     """Books close, in a bench and in a rig with a lifted mass; of a stiff law the loop of a slow slide is Coulomb's."""
@@ -189,6 +184,7 @@ def test_exact_flat_grooves_are_the_law_itself(text):
         {name: one.value for name, one in here.measures.items()}
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("law", ['"tanh"\nreference_speed = "1 mm/s"', '"elastic-plastic"\nbond_length = "1 um"'])
 def test_always_harmonic_balance_finds_the_motion_of_the_march(law):
     """With a mass that rises as heavy as half of what slides."""
@@ -242,6 +238,14 @@ def test_exact_a_slow_slide_under_a_load_that_swings():
     assert value(found, "energy_balance") < 1e-12
 
 
+def test_exact_frames_of_a_load_that_swings_carry_its_force():
+    """The load begins at 115 N + 40 N cos 0.7, the pressure of the point is that of the mean."""
+    model = build(loads(BENCH, sets=[f"{key}={one}" for key, one in SWINGS.items()]))
+    found = bench.run(model, None, 200, 8)
+    assert found.frames.size == 8 and np.ptp(found.load) > 70
+    assert found.tau[:, 0] == pytest.approx(found.force[found.frames], rel=1e-14)
+
+
 def test_exact_a_slide_at_rest_under_a_load_that_swings():
     """The friction f along the flank stays until it is mu R of R = N sqrt(1 + t^2) + f t; F = N t + f sqrt(1 + t^2)."""
     text = BENCH.replace('kind = "triangle"\namplitude = "30 um"', 'kind = "dwell"\ndistance = "50 um"\nhold = "0.1 s"')
@@ -256,6 +260,7 @@ def test_exact_a_slide_at_rest_under_a_load_that_swings():
         assert force[k] == pytest.approx(swung(time[k]) * t + f * np.hypot(1, t), rel=1e-9)
 
 
+@pytest.mark.share(0, 1, 2, 3, 4)
 @pytest.mark.parametrize("law", ["coulomb", "tanh", "elastic-plastic", "nonlocal", *LATER])
 def test_always_books_close_under_a_load_that_swings(law):
     """Every law in bench and rig: to 1e-8, and nothing is created."""
@@ -309,14 +314,7 @@ def test_refuses_what_grooves_cannot_stand_beside(text, sets, key, words):
 
 
 def test_refuses_grooves_under_a_static_patch_and_soft_pieces():
-    patch = """
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6 mm"
-load = "115 N"
-substrate = "Ti-8Al-1Mo-1V"
-""" + GROOVES
+    patch = BLOCK + GROOVES
     with pytest.raises(SceneError, match=r"contact\.grooves: .*climbed by what slides"):
         loads(patch)
     soft = BENCH.replace(f'[normal]\nload = "115 N"\n{GROOVES}', patch + "\n[contact.shear]")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scene_texts import BLOCK
 
 import patchfem as pf
 from patchfem.core import Outcome
@@ -57,6 +58,7 @@ def marched(text, cycles=40, steps=400):
     return float(np.ptp(done.amplitudes[-1])) / 2, done.window_work, float(np.abs(done.window.force).max())
 
 
+@pytest.mark.share(1, 4, 6, 7, 10)
 @pytest.mark.parametrize(("law", "frequency"), EVERY)
 def test_always_the_steady_motion_is_that_of_a_march(law, frequency):
     asked = scene(law, f"drive.frequency={frequency} Hz")
@@ -89,6 +91,7 @@ def test_exact_coulombs_steady_motion_closes_to_round_off():
         assert found.measures[name].value == pytest.approx(value, rel=1e-7)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("law", ["elastic-plastic", "tanh"])
 def test_always_multipliers_tell_how_a_march_forgets(law):
     """A march that starts beside the steady motion comes back at the rate of the largest multiplier."""
@@ -116,6 +119,7 @@ def test_exact_the_multipliers_of_next_to_no_friction_are_those_of_the_valley():
     assert ROUGH > 1e-3
 
 
+@pytest.mark.slow
 def test_always_levels_begin_where_the_last_one_ended_and_what_sticks_is_said():
     text = RIG.replace('acceleration = "5 g"', 'waveform = "levels"\nlevels = ["2 g", "5 g", "6 g"]')
     found = pf.run(loads(text))
@@ -142,17 +146,7 @@ def test_always_the_plan_says_how():
 
 def test_always_pieces_that_give_way_move_as_a_march_has_them():
     """Points behind the shear modes of a patch: the march at the same steps."""
-    pieces = """
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6 mm"
-load = "115 N"
-substrate = "Ti-8Al-1Mo-1V"
-element_size = "2 mm"
-grooves = {wavelength = "80 um", amplitude = "7.5 um"}
-[contact.shear]
-"""
+    pieces = BLOCK + 'element_size = "2 mm"\ngrooves = {wavelength = "80 um", amplitude = "7.5 um"}\n[contact.shear]\n'
     text = pieces + RIG[RIG.index("[friction]"):].replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"')
     steps = ["accuracy.steps_per_cycle=100"]
     balanced = pf.run(loads(text, sets=steps))

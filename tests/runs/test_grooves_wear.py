@@ -75,6 +75,7 @@ def test_exact_the_amplitude_by_its_own_differential_equation(share):
     assert history["groove_amplitude"][0] == 7.5e-6 and (np.diff(history["groove_amplitude"]) < 0).all()
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("lifted", ["0 kg", "0.4 kg"])
 def test_exact_a_rig_wears_by_the_work_of_its_friction(lifted):
     """Coulomb: f = mu R along the flank, so kappa int R ds is kappa/mu times friction's own work, the loop's area; with
@@ -88,6 +89,7 @@ def test_exact_a_rig_wears_by_the_work_of_its_friction(lifted):
 SOFT = PIECES.replace("[friction]", "[contact.shear]\n[friction]")
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize(("text", "more"), [
     (SLIDE, {"slide.amplitude": "0.3 um", "contact.grooves.phase": "1 rad"}),
     (RIG, {"drive.acceleration": "5 g", "drive.cycles": 20, "contact.grooves.lifted_mass": "0.4 kg"}),

@@ -5,6 +5,7 @@ from math import asin, cos, pi, sin
 
 import numpy as np
 import pytest
+from march_paths import share_one_loop
 from scene_texts import PIECE
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -48,6 +49,16 @@ def base(acceleration, cycles, ratio=1.0):
 @lru_cache(maxsize=64)
 def result_of(text, *sets, estimate=True):
     return run(plan(loads(text, "a.toml", sets)), estimate=estimate)
+
+
+@pytest.fixture(params=[True, pytest.param(False, marks=pytest.mark.slow)], ids=["shared loop", "own loop"])
+def loop(request, monkeypatch):
+    """Joints march in the loop that knows all laws; in slow tests in the one of theirs alone, 7 s to compile."""
+    if request.param:
+        share_one_loop(monkeypatch)
+    result_of.cache_clear()
+    yield
+    result_of.cache_clear()
 
 
 def value(result, name="relative_displacement_amplitude"):
@@ -144,7 +155,7 @@ def test_exact_below_the_resonance_threshold():
     balanced(long, 1e-10)
 
 
-def test_exact_two_contacts_stop_together():
+def test_exact_two_contacts_stop_together(loop):
     """Two alike masses on alike interfaces, a spring between them: each is the single mass, stops and all."""
     k = W * W
     text = f"""\
@@ -247,6 +258,7 @@ def test_exact_against_another_program(name, method):
         balanced(result, 1e-10 if method == "auto" else 1e-8)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("damping, want", [(0.0, 0.29943104174842751488), (0.003, 0.28704671337871602595)])
 def test_exact_steady_at_resonance(damping, want):
     """Printed numbers of D = 0.8."""
@@ -282,7 +294,7 @@ def test_exact_static_above_kinetic_is_bistable():
     close(marched, "relative_displacement_amplitude", value(moving))
 
 
-def test_exact_a_stiffened_rig_is_bistable():
+def test_exact_a_stiffened_rig_is_bistable(loop):
     """The same drive from rest and from 2 mm: two amplitudes, by DOP853 with an event search at 1e-9."""
     text = rig("static = 0.06", base(20.0, 300, 1.1)).replace("[[structure.mode]]", "[structure.stiffening]\n"
                'cubic = "4e10 N/m^3"\n[[structure.mode]]')
@@ -392,7 +404,7 @@ cycles = 10.5
 
 
 @pytest.mark.parametrize("other, law", [(1, 'elastic-plastic"\nbond_length = "3 um'), (0, "coulomb")])
-def test_always_loops_of_several_interfaces_add_up(other, law):
+def test_always_loops_of_several_interfaces_add_up(other, law, loop):
     """Loop areas of the interfaces, each from its own history, make up the whole; every measure has an error."""
     found = result_of(TWO_MASSES % (other, law))
     w = found.window

@@ -60,6 +60,7 @@ def cheap(monkeypatch):
     monkeypatch.setattr(ladder, "SPENT", {True: 0.1, False: 0.1})
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize(("load", "error"), [(1e-3, 2e-2), (1e-6, 3e-2)])
 def test_exact_a_sharp_crown_obeys_hertz_at_any_load(load, error, cheap):
     """Radius 1 mm, contact 80 nm and 2.4 nm wide: a and p0 grow with the root of the load."""
@@ -188,6 +189,7 @@ def test_always_spikes_and_missing_heights_are_counted_and_bridged(tmp_path):
     assert value(found, "approach") == pytest.approx(value(clean, "approach"), abs=2e-8)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("mesh", [COARSE, "accuracy.tolerance=1e-2"])
 def test_exact_an_approach_that_closes_nothing_carries_nothing(mesh):
     """A crown on a step of -1 um stands 1 um above the flat: 0.9 um of approach leave the pieces apart."""
@@ -275,6 +277,7 @@ GRADED = {
 COATED = {"thin coating": 1e-6, "thick coating": 6.2865e-3}
 
 
+@pytest.mark.share(0, 1, 2, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14)
 @pytest.mark.parametrize("name", [*GRADED, *COATED])
 def test_always_an_automatic_mesh_is_found_and_stays_small(name, cheap):
     text = BLOCKS + COATING.format(250e9, 0.24, COATED[name]) if name in COATED else BLOCKS

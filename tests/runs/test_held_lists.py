@@ -1,10 +1,16 @@
 """A block that the printed law holds: its list of bonds grows by a strip per step, which plan and run both know."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
+from patchfem.core import Missing
 from patchfem.dynamics.march import march
+from patchfem.response.levels import Level
 from patchfem.runs.plan import plan
-from patchfem.runs.rig.numerics import chatters
+from patchfem.runs.rig.levels import measures, onset
+from patchfem.runs.rig.numerics import chatters, holding, lists_grow, stalls
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -33,8 +39,75 @@ tolerance = 0.01
 """
 
 
-def test_always_a_held_block_ends_within_the_steps_that_plan_counts(monkeypatch):
-    scene, counted = loads(RIG.format(reading="report", push=5.739)), [0]
+MASSES = """[structure]
+masses = ["0.7043 kg", "0.9066 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "1131000 N/m"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "428400 N/m"
+[[structure.spring]]
+between = [2, 0]
+stiffness = "115500 N/m"
+[[structure.damper]]
+between = [1, 0]
+coefficient = "35.18 N s/m"
+[[structure.damper]]
+between = [2, 1]
+coefficient = "10.35 N s/m"
+[[structure.interface]]
+between = [1, 0]
+load = "44.91 N"
+law = "nonlocal"
+static = 0.55
+bond_length = "0.5014 um"
+rest_growth = "13.85 m/s^2"
+slip_growth = "0.1675 um"
+reading = "report"
+[drive]
+kind = "base"
+acceleration = "7.711 m/s^2"
+frequency = "176.5 Hz"
+cycles = 5
+[accuracy]
+tolerance = 0.01
+"""
+RELEASED = """[normal]
+load = "133.2 N"
+[friction]
+law = "nonlocal"
+static = 0.53
+bond_length = "0.7974 um"
+kinetic = 0.2185
+rest_speed = "2.446e-06 m/s"
+rest_growth = "12.74 m/s^2"
+slip_growth = "4.361e-08 m"
+reading = "report"
+[structure]
+moving_mass = "0.3877 kg"
+[[structure.mode]]
+name = "m0"
+frequency = "47.05 Hz"
+damping = 0.2
+slide = 1.0
+[structure.bonded]
+stiffness = "176000 N/m"
+[drive]
+kind = "free"
+displacement = "11.82 um"
+cycles = 2
+[accuracy]
+tolerance = 0.003
+"""
+
+
+@pytest.mark.share(0, 1)
+@pytest.mark.parametrize(("text", "more"), [(RIG.format(reading="report", push=5.739), 1.0), (MASSES, 1.0),
+                                            (RELEASED, 1.5)], ids=["mode", "masses", "released"])
+def test_always_a_held_block_ends_within_the_steps_that_plan_counts(monkeypatch, text, more):
+    """more: strips over those foreseen, one per step; steps of a released block are cut into pieces at its start."""
+    scene, counted = loads(text), [0]
     foreseen, old = plan(scene), march.Run._steps
 
     def steps(self, count, rows):
@@ -44,12 +117,84 @@ def test_always_a_held_block_ends_within_the_steps_that_plan_counts(monkeypatch)
 
     monkeypatch.setattr(march.Run, "_steps", steps)
     found = run(scene)
-    assert found.extra["book"]["strips"] <= foreseen.unknowns["bond_list_about"] <= 1.5 * found.extra["book"]["strips"]
+    assert found.extra["book"]["strips"] / more <= foreseen.unknowns["bond_list_about"] \
+        <= 1.5 * found.extra["book"]["strips"]
     assert any("accuracy.steps_per_cycle" in text for text in found.warnings)  # what is not known is said
 
 
-@pytest.mark.parametrize(("reading", "push", "held"), [("report", 31.8, True), ("report", 31.9, False),
+@pytest.mark.parametrize(("reading", "start", "held"), [("report", 168.1, True), ("report", 168.3, False),
+                                                        ("stretch", 11.82, False)])
+def test_exact_the_printed_law_holds_what_a_spring_pulls_with_half_its_limit(reading, start, held):
+    text = RELEASED.replace("11.82", str(start)).replace("report", reading)
+    stiff = 0.3877 * (2 * np.pi * 47.05)**2 + 176000
+    assert (stiff * start * 1e-6 <= 0.53 * 133.2 / 2) == (held or reading == "stretch")
+    assert stalls(plan(loads(text)).model) is held
+
+
+def test_exact_what_holds_a_mass_is_what_its_neighbour_and_the_base_bring():
+    """m1 a, and of the other mass k12 + i w c12 times its own motion beside a mass that stands."""
+    rig = plan(loads(MASSES)).model.rig
+    omega, push = 2 * np.pi * 176.5, 7.711
+    own = 428400 + 115500 - 0.9066 * omega**2 + 1j * omega * 10.35
+    wanted = abs(0.7043 * push + (428400 + 1j * omega * 10.35) * 0.9066 * push / own)
+    assert holding(rig) == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize(("reading", "push", "held"), [("report", 39.8, True), ("report", 39.9, False),
                                                        ("stretch", 5.739, False)])
-def test_exact_the_printed_law_holds_fast_below_half_its_limit_over_the_mass(reading, push, held):
-    model = plan(loads(RIG.format(reading=reading, push=push))).model  # 2 * 31.87 m/s^2 = 0.662 * 54.08 N / 0.5617 kg
+def test_exact_the_printed_law_holds_fast_below_half_its_limit_over_the_pushed_mass(reading, push, held):
+    model = plan(loads(RIG.format(reading=reading, push=push))).model
+    # 2 * 39.84 m/s^2 * 0.8 = 0.662 * 54.08 N / 0.5617 kg, base 0.8
     assert chatters(model) is held
+
+
+LEVELS = MASSES[:MASSES.index("[drive]")] + """[drive]
+kind = "force"
+waveform = "levels"
+mass = 1
+levels = ["7 N", "20 N"]
+frequency = "91.94 Hz"
+cycles = 1
+[accuracy]
+tolerance = 0.2
+"""
+
+
+def test_always_the_list_of_levels_that_growing_bonds_just_hold_is_foreseen():
+    """D 1.2 of the largest level: one strip per step, and one of each piece that a step is cut into."""
+    foreseen, found = plan(loads(LEVELS)), run(loads(LEVELS), estimate=False)
+    book = found.extra["book"]
+    assert lists_grow(foreseen.model) and not chatters(foreseen.model)
+    assert foreseen.unknowns["bond_list_about"] == pytest.approx(book["strips"] - book["substeps"], rel=0.05)
+
+
+def test_refuses_a_held_block_whose_list_the_plan_counts_too_long():
+    scene = loads(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 6000"))
+    assert "run will refuse: the bond list would take about" in str(plan(scene))
+    with pytest.raises(Missing, match=r"the bond list .* would take about"):
+        run(scene)
+
+
+def test_always_a_search_from_nought_ends_where_no_level_is_before_the_onset():
+    """Seven halvings bring a bracket from nought below a hundredth of the level; 40 asked for no more."""
+    asked = []
+
+    def probe(before, drive):
+        asked.append(drive)
+        return Level(drive, False, {}, {})
+
+    found = onset((Level(8.0, False, {}, {}),), probe, 0.01)
+    assert asked == [8.0 / 2**k for k in range(1, 8)]
+    assert found[0] - found[1] == 0.0 and found[0] + found[1] == asked[-1]
+
+
+def test_exact_an_onset_may_be_off_by_what_each_pair_of_coarser_runs_is_apart():
+    def run(at):
+        def probe(_, level):
+            return Level(level, level < at, {"relative_displacement_amplitude": 1e-6}, {})
+        return SimpleNamespace(levels=(probe(0, 1.0), probe(0, 2.0)), probe=probe)
+
+    fine, half, quarter, mesh = map(run, (1.5, 1.52, 1.6, 1.63))
+    rig = SimpleNamespace(kind="base", onset=("slip", None))
+    found = measures(rig, fine.levels, fine.probe, 1e-6, True, ((half, None), (mesh, quarter)))["onset_level"]
+    assert abs(found.value - 1.5) < 1e-5 and abs(found.error - (0.02 + 0.03)) < 1e-5

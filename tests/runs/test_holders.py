@@ -174,6 +174,7 @@ TURNING = {
 }
 
 
+@pytest.mark.share(0, 2, 5)
 @pytest.mark.parametrize("tables", TURNING.values(), ids=TURNING.keys())
 def test_exact_an_approach_with_a_turning_piece_is_the_load_that_reaches_it(tables):
     """The approach that a load gives, asked for in its place, gives that load back, the rotation and the pressure."""

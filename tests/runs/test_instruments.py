@@ -46,6 +46,7 @@ def values(text, *given):
     return found, [found.measures[name] for name in NAMES]
 
 
+@pytest.mark.share(0, 2, 4, 6)
 @pytest.mark.parametrize("law, method", [
     ("elastic-plastic", "auto"), ("elastic-plastic", "march"), ("elastic-plastic", "harmonic"), ("coulomb", "auto"),
     ("coulomb", "harmonic"), ("tanh", "auto"), ("nonlocal", "harmonic")])

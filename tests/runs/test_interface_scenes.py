@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
+from march_paths import share_one_loop
 
 from patchfem.response.events import MEANINGS
 from patchfem.runs.plan import plan
@@ -95,6 +96,11 @@ cycles = 60
 """
 
 
+@pytest.fixture(autouse=True)
+def loop(monkeypatch):
+    share_one_loop(monkeypatch)
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """(scene text, *words) -> (summary, dataset) of a run through the command line, each once."""
@@ -129,6 +135,7 @@ def test_exact_figure_16_of_the_report(written):
     assert data.output_displacement.dims == ("time",) and summary["outcome"] in ("steady", "transient")
 
 
+@pytest.mark.slow
 def test_exact_figure_16_marched(written):
     """The march agrees within its errors, and sees the events of its last cycles where the exact engine has them."""
     exact, events = written(FIG16)
@@ -143,6 +150,7 @@ def test_exact_figure_16_marched(written):
     assert seen.event_time.values[1:] == pytest.approx(events.event_time.values[late][1:], abs=0.1)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("method", ["exact", "march"])
 def test_exact_two_alike_masses_side_by_side_are_one_twice(written, method):
     words = ("--set", f"accuracy.method={method}", "--set", "accuracy.steps_per_cycle=400")
@@ -168,6 +176,7 @@ def test_exact_two_alike_masses_side_by_side_are_one_twice(written, method):
         assert data.event_time.values[mine] == pytest.approx(alone.event_time.values, abs=1e-10)
 
 
+@pytest.mark.slow
 def test_exact_two_interfaces_in_a_chain_marched(written):
     """Each of another load, one of them between the masses: every measure within its error of the exact engine."""
     exact, data = written(CHAIN)

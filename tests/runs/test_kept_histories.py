@@ -73,6 +73,7 @@ def done(tmp_path_factory):
 CASES = [(engine, drive) for engine in ENGINES for drive in DRIVES]
 
 
+@pytest.mark.share(0, 4, 8, 10, 13, 17, 20, 22, 26, 30, 34, 37, 41, 44, 48, 51, 55, 58, 62)
 @pytest.mark.parametrize(("engine", "drive"), CASES)
 def test_always_kept_are_the_ends_and_a_hundred_a_cycle_of_the_last_two(done, engine, drive):
     _, result = done(engine, drive)

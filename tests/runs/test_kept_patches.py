@@ -5,11 +5,13 @@ import pytest
 from scene_texts import COATED, MODE, PLASTIC, SHEAR
 
 import patchfem as pf
+from patchfem.friction.bonds.parameters import Bonds
 from patchfem.runs.many import one_by_one
 from patchfem.runs.many.meshes import meshed
 from patchfem.runs.patch import ladder, press
 from patchfem.runs.patch.shared import kept
 from patchfem.runs.patch.shared.kept import Kept
+from patchfem.runs.rig import interface
 
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
 TEXT = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n' + SHEAR + PLASTIC + MODE + DRIVE
@@ -74,3 +76,22 @@ def test_always_a_file_that_may_change_is_read_again(tmp_path):
     (tmp_path / "a.toml").write_text(TEXT.replace(SHEAR, SHEAR + '[contact.profile]\nfile = "heights.csv"\n'))
     profiled = meshed([pf.build(tmp_path / "a.toml")] * 2)[0].patch
     assert profiled.meshes is not None and not kept.shares(profiled)
+
+
+def test_exact_marches_of_one_patch_share_its_shear_modes(monkeypatch):
+    """Those of another patch, law, number or tolerance are its own; what is kept goes with its patch."""
+    class Pressed:
+        pass
+
+    made = []
+    monkeypatch.setattr(interface, "shear_of", lambda *given: made.append(given[1:]) or object())
+    law, one, other = Bonds(0.3, 1e-6), Pressed(), Pressed()
+    first = interface._shear_modes(one, law, None, 0.01)
+    assert interface._shear_modes(one, Bonds(0.3, 1e-6), None, 0.01) is first and len(made) == 1
+    for given in ((other, law, None, 0.01), (one, Bonds(0.4, 1e-6), None, 0.01), (one, law, 4, 0.01),
+                  (one, law, None, 0.1)):
+        assert interface._shear_modes(*given) is not first
+    assert len(made) == 5
+    kept = len(interface._MADE)
+    del one, other, given
+    assert len(interface._MADE) == kept - 2

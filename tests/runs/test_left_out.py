@@ -153,6 +153,7 @@ def test_exact_the_nearer_of_stop_and_end_of_the_piece_ends_a_growing_motion(tra
     assert ran(text + drive, False).outcome == outcome
 
 
+@pytest.mark.share(1, 2)
 @pytest.mark.parametrize("law, more, engine", [
     (COULOMB, "", "exact"), (COULOMB, '[accuracy]\nmethod = "march"\nsteps_per_cycle = 100\n', "march"),
     (COULOMB.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"'), "", "piecewise"),

@@ -18,6 +18,7 @@ from patchfem.scene.scene import loads
 FEW = (11, 21, 30, 111)  # exact, in pieces, exact, a march
 
 
+@pytest.mark.share(0, 2)
 @pytest.mark.parametrize("seed", FEW)
 def test_always_the_bars_of_a_random_rig_hold_the_independent_program(seed, tmp_path):
     found = compared(seed, tmp_path)
@@ -25,6 +26,7 @@ def test_always_the_bars_of_a_random_rig_hold_the_independent_program(seed, tmp_
     assert not [row for row in found["rows"] if not held(row)]
 
 
+@pytest.mark.slow
 def test_exact_the_independent_program_reads_peaks_between_its_nodes():
     """Against itself with steps of five eighths: a half range between two cycles, and a cycle that ends on a slope
     (5e-8 of the amplitude and 2e-5 of the damping were lost there), a slip that turns inside a step, a crossing."""

@@ -37,6 +37,7 @@ def solved(model):
     return patches, measures(*patches, tolerance=model.accuracy.tolerance)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("setting", TRUTHS)
 def test_bars_of_the_rig_pieces_hold_an_independent_program(setting):
     """All of the decisive measures are within 1e-5, and the bars hold the printed truths."""
@@ -81,15 +82,17 @@ def test_an_edge_that_stands_wrong_is_found_and_taken_out_of_the_stiffnesses():
         assert np.abs(values(off) / right - 1).max() <= 2e-5
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("setting", ["contact.tilt.angle=1e-4 rad", "contact.crown.radius=1 m"])
 def test_always_a_tighter_tolerance_has_no_wider_bar(setting):
-    assert wider(setting) == []
+    """From cells of order one to those of order four, and between two tolerances of these."""
+    assert wider(setting, tolerances=(1e-2, 1e-4, 3e-5)) == []
 
 
-def wider(*settings, text=RIG) -> list:
+def wider(*settings, text=RIG, tolerances=(1e-2, 1e-3, 1e-4, 1e-5)) -> list:
     """(measure, tolerance) of the bars that grow from one tolerance to the next tighter one."""
     last, out = {}, []
-    for tolerance in (1e-2, 1e-3, 1e-4, 1e-5):
+    for tolerance in tolerances:
         _, found = solved(model_of(*settings, text=text, tolerance=tolerance))
         out += [(name, tolerance) for name, m in found.items() if name in last and m.value is not None
                 and last[name] is not None and m.error > last[name] * (1 + 1e-9) + 1e-3 * m.floor]
@@ -112,6 +115,8 @@ def scene(seed: int) -> tuple:
 
 @pytest.mark.slow
 def test_always_a_tighter_tolerance_has_no_wider_bar_on_twenty_scenes():
+    for setting in ("contact.tilt.angle=1e-4 rad", "contact.crown.radius=1 m"):
+        assert wider(setting) == []
     assert [(seed, found) for seed in range(20) if (found := wider(*scene(seed)))] == []
 
 

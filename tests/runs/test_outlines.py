@@ -75,6 +75,7 @@ def graded(patch, x, growth: float = 1.2, halvings: int = 0):
     return solve(patch, *bodies)
 
 
+@pytest.mark.share(0, 2)
 @pytest.mark.parametrize("tables, angles, printed", [
     (NARROW.format("upper"), (90, 180), 0.2260), (UPPER + CHAMFER, (135, 180), None),
     (UPPER + CHAMFER + LOWER + CHAMFER, (135, 135), None),
@@ -187,6 +188,7 @@ def test_exact_the_written_mesh_of_shaped_pieces_is_read_back_as_the_same_patch(
     assert b == pytest.approx(a, rel=1e-8)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("tables", [NARROW.format("upper"), UPPER + 'length = "8 mm"\nend_radius = "2 mm"\n'])
 def test_always_errors_of_what_has_a_bound_hold_on_meshes_that_the_tolerance_chooses(tables):
     model = asked(BLOCK + tables)
@@ -196,6 +198,7 @@ def test_always_errors_of_what_has_a_bound_hold_on_meshes_that_the_tolerance_cho
         assert rough[name].error <= 0.05 * abs(rough[name].value)
 
 
+@pytest.mark.share(1, 4)
 @pytest.mark.parametrize("radius", ["2 um", "0.2 mm", "2 mm"])
 @pytest.mark.parametrize("tilt", ["", TILT.format("")])
 def test_always_the_peak_beside_a_rounding_lies_in_the_bar_of_cells_that_pass_over_it(radius, tilt):

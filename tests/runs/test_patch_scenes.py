@@ -81,6 +81,7 @@ def test_exact_rigid_pieces_on_skins_are_the_wedges_in_closed_form(angle):
                                                           rel=1e-5)
 
 
+@pytest.mark.share(0, 5)
 @pytest.mark.parametrize("law", SKINS)
 @pytest.mark.parametrize("strips", ["", '[contact.strips]\ncount = 3\nroll = "0.01 mrad"\n'])
 def test_exact_normal_stiffness_is_the_slope_of_the_load_over_the_approach(law, strips):

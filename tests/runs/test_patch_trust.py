@@ -36,6 +36,7 @@ def test_always_a_number_behind_a_skin():
     assert found.measures["pressure_peak"].value > 0 and found.measures["pressure_peak"].error is not None
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("angle", TILTED)
 def test_bars_of_a_tilted_rig_patch_hold_an_independent_program(angle):
     """The patch that a motion takes, on its own chosen mesh."""

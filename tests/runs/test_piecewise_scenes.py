@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from march_paths import share_one_loop
 from support.scene_texts import (
     COATED,
     COULOMB,
@@ -49,6 +50,7 @@ def agree(exact, march, *besides):
     return out
 
 
+@pytest.mark.share(1, 3)
 @pytest.mark.parametrize("sets", [
     (), ("drive.cycles=20.3",), ("drive.acceleration=2 g",), ("structure.mode.axial.damping=3",),
 ])
@@ -70,7 +72,8 @@ def test_exact_two_modes_and_a_release():
     assert exact.outcome == march.outcome
 
 
-def test_exact_two_interfaces_between_masses():
+def test_exact_two_interfaces_between_masses(monkeypatch):
+    share_one_loop(monkeypatch)
     exact, march = both(PAIR + FORCED, "accuracy.tolerance=1e-4")
     assert agree(exact, march) == []
     assert exact.measures["slip_amplitude_2"].error <= 1e-9 * exact.measures["slip_amplitude_2"].value
@@ -109,6 +112,24 @@ def test_exact_levels_and_their_onset():
     assert agree(exact, march, "level_hysteresis") == []
     assert len(exact.extra["levels"]) == 3
     assert np.all(np.diff(exact.response.time) > 0)
+
+
+def test_exact_a_level_of_a_patch_carries_the_error_of_its_mesh():
+    """The first level has the bars of a run at its force alone but for what rings on from its start, the last those of
+    the run; the onset lies within the bars of both meshes. The bars were 1e-9 of the values once."""
+    text = '[contact]\nlength = "40 mm"\nwidth = "30 mm"\nheight = "10 mm"\nload = "6 kN"\nsubstrate = "steel"\n' \
+        '[contact.crown]\nradius = "100 m"\n[contact.shear]\n' + COULOMB + KILOGRAM + \
+        '[drive]\nkind = "force"\nfrequency = "90 Hz"\ncycles = 10\n'
+    alone = pf.run(text + 'force = "600 N"\n[accuracy]\ntolerance = 1e-2').measures
+    levels = text + 'waveform = "levels"\nonset = "slip"\nlevels = ["600 N", "1200 N"]\n[accuracy]\ntolerance = '
+    coarse, fine = (pf.run(levels + tolerance) for tolerance in ("1e-2", "1e-3"))
+    first, last = coarse.extra["levels"]
+    for name, value in last.values.items():
+        assert last.errors[name] == pytest.approx(coarse.measures[name].error, rel=1e-6, abs=3e-9 * abs(value)), name
+    assert all(1 / 4 < first.errors[name] / alone[name].error < 4 for name in first.values)
+    a, b = (one.measures["onset_level"] for one in (coarse, fine))
+    assert abs(a.value - b.value) <= a.error + b.error and a.error < 0.05 * a.value
+    assert any("onset_level: a slip amplitude counts from" in note for note in coarse.extra["notes"])
 
 
 def test_always_auto_takes_the_cheaper_engine():

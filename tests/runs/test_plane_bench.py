@@ -44,6 +44,7 @@ def ring(radius, turns, rows):
     return "time [s],displacement [um],lateral [um]\n" + "\n".join(f"{t!r},{x!r},{y!r}" for t, x, y in lines) + "\n"
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("radius, size, lag", [(1, 0.447214, 63.4349), (4, 0.894427, 26.5651), (20, 0.995037, 5.7106)])
 def test_exact_c14_circle_of_a_bench_scene(table, radius, size, lag):
     """r = 0.5, 2, 10 bond lengths of 2 um: |F| and lag of the two resultants against the motion."""
@@ -58,6 +59,7 @@ def test_exact_c14_circle_of_a_bench_scene(table, radius, size, lag):
     assert model.speed == pytest.approx(2e-6 * np.pi * radius, rel=1e-4)
 
 
+@pytest.mark.share(0, 2, 3)
 @pytest.mark.parametrize("keys", ["", "order = 0\n", 'reading = "report"\norder = 2\n',
                                   'kinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "1 um"\n'])
 def test_exact_a_column_of_zeros_is_the_slide_in_one_direction(table, keys):
@@ -77,6 +79,7 @@ def test_exact_a_column_of_zeros_is_the_slide_in_one_direction(table, keys):
     assert fast.values.keys() == two.values.keys()
 
 
+@pytest.mark.share(0, 2)
 @pytest.mark.parametrize("keys", ["", "order = 2\n", 'reading = "report"\n'])
 def test_exact_directions_changed_about(table, keys):
     """The same path with its columns exchanged: forces exchange too, also where the x column never moves."""
@@ -88,6 +91,7 @@ def test_exact_directions_changed_about(table, keys):
     assert (one.time == two.time).all()
 
 
+@pytest.mark.slow
 def test_exact_the_resting_turn_of_a_right_angle(table):
     """After a long leg along x (z = eps) a leg along y: F_x = e^-y/eps, F_y = 1 - e^-y/eps of mu N, by hand."""
     text = "time [ms],displacement [um],lateral [um]\n0,0,0\n20,80,0\n21,80,8\n"

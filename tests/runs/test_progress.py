@@ -15,6 +15,7 @@ def scene(law, *sets):
     return loads(text_of("rig").replace('"coulomb"', f'"{law}"\n{LAWS[law]}'), sets=("drive.cycles=40", *sets))
 
 
+@pytest.mark.share(0, 1, 2, 6)
 @pytest.mark.parametrize("law, sets", [(law, ()) for law in LAWS] + [("coulomb", ("accuracy.method=march",))])
 def test_exact_who_looks_on_sees_the_same_motion(law, sets):
     alone = pf.run(scene(law, *sets))

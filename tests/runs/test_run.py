@@ -97,6 +97,7 @@ class Fields:
 
 # what every run leaves behind
 
+@pytest.mark.share(0, 1, 2, 3, 4, 5)
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_summary(done, name):
     folder, answer = done(name)
@@ -151,6 +152,7 @@ def test_exact_resolved_scene_is_the_scene(done, name):
     assert again.named() == first.named() and again.resolved() == first.resolved()
 
 
+@pytest.mark.share(0, 1, 3, 4, 5)
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_netcdf(done, name):
     folder, answer = done(name)

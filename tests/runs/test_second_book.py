@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from march_paths import share_one_loop
 
 from patchfem.dynamics.second_book import gap, sampled_work
 from patchfem.runs.run import run
@@ -30,6 +31,7 @@ def checked(text, *sets):
     return found.measures["work_check"].value, found
 
 
+@pytest.mark.share(0, 1, 2, 4)
 @pytest.mark.parametrize("law", LAWS)
 def test_order_of_the_second_book_of_a_march_is_two(law):
     """A ledger whose path mean were off by a constant share would stay off by it at any step."""
@@ -52,7 +54,8 @@ def test_exact_a_march_that_holds_more_at_rest_closes_both_books():
     assert found.measures["stick_fraction"].value > 0.02 and value < 1e-3
 
 
-def test_exact_several_interfaces_close_both_books_together():
+def test_exact_several_interfaces_close_both_books_together(monkeypatch):
+    share_one_loop(monkeypatch)
     value, _ = checked(PAIR, "accuracy.steps_per_cycle=800")
     assert 0 < value < 5e-4
 

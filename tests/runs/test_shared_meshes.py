@@ -34,6 +34,7 @@ def family(*angles, **keys):
     return [model(angle, **keys) for angle in angles]
 
 
+@pytest.mark.slow
 def test_exact_a_case_does_not_depend_on_the_order_of_the_others():
     cases = family(1e-6, 1e-4, 1e-3)
     names = {meshed(some)[0].patch.meshes.name for some in (cases, cases[::-1], cases + cases[1:3])}
@@ -53,6 +54,7 @@ def test_exact_a_case_is_the_cold_run_on_the_shared_mesh(angle):
         assert same.error == pytest.approx(m.error, rel=1e-12, abs=1e-12 * abs(m.value)), name
 
 
+@pytest.mark.slow
 def test_always_the_shared_mesh_serves_the_hardest_case():
     cases = family(1e-6, 1e-2)
     for own, shared in zip(cases, meshed(cases), strict=True):

@@ -59,6 +59,7 @@ def test_exact_a_curve_of_two_instruments_shows_each_at_its_own_place():
     assert found["acceleration_fundamental"] == pytest.approx(felt, rel=1e-8)
 
 
+@pytest.mark.share(1)
 @pytest.mark.usefixtures("few")
 @pytest.mark.parametrize("law", [COULOMB, GIVES], ids=["coulomb", "elastic-plastic"])
 def test_exact_a_point_of_a_curve_is_the_run_at_its_sine(law):
@@ -70,6 +71,7 @@ def test_exact_a_point_of_a_curve_is_the_run_at_its_sine(law):
             assert found[column][k] == pytest.approx(run.measures[name].value, rel=1e-9), (k, column)
 
 
+@pytest.mark.slow
 def test_exact_a_balance_over_the_frequency_is_within_its_bars():
     """Elastic-plastic elements by named harmonics against the map from yield to yield, which is exact."""
     drive = HARD.replace('"150 Hz"', '"141 Hz"')
@@ -85,6 +87,7 @@ def test_exact_a_balance_over_the_frequency_is_within_its_bars():
             assert gap <= balance[f"{column}_error"][k] + exact[name].error, (frequency, column)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("law", [COULOMB, PLASTIC], ids=["coulomb", "elastic-plastic"])
 def test_exact_levels_are_those_of_a_long_run(law):
     """Raised from a stuck level and lowered again: every measure of the table as an exact run of 150 cycles a level."""
@@ -133,6 +136,7 @@ def test_exact_a_level_without_a_bounded_motion_is_a_row_that_says_so():
     assert any("1 of 3 levels" in said and "undamped mode" in said for said in with_elements.warnings)
 
 
+@pytest.mark.slow
 def test_exact_the_file_and_the_page_hold_accelerations_and_levels(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(POINT + COULOMB + MODE + LEVELS.format('"3 g", "5 g", "6 g"', 12) +
@@ -180,6 +184,7 @@ def test_always_a_balanced_motion_is_not_steady_where_none_lasts():
     assert levels.outcome == "stuck" and any("1 of 2 levels" in said for said in levels.warnings)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("spring", ['[structure.stiffening]\ncubic = "1e15 N/m^3"\n',
                                     '[structure.bonded]\nstiffness = "3e6 N/m"\nwavelength = "80 um"\n'],
                          ids=["stiffening", "interlock"])

@@ -15,6 +15,7 @@ RIG = '[normal]\nload = "90 N"\n[friction]\nstatic = 0.3\nlaw = "nonlocal"\nbond
 PRINTED = 'reading = "report"\ninitial_bonds = 0\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.4 um"\n'
 
 
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize("knobs", [["accuracy.merge=0.3"], ["accuracy.quadrature=truncated", "accuracy.tail=0.05"]])
 @pytest.mark.parametrize("law", ["order = 0.5\n", PRINTED])
 def test_exact_the_bars_of_a_rig_hold_the_error_of_the_sum(law, knobs):

@@ -21,6 +21,7 @@ def result_of(text, *sets, estimate=False):
     return run(plan(loads(text, "a.toml", sets)), estimate=estimate)
 
 
+@pytest.mark.share(0, 1, 2)
 @pytest.mark.parametrize("law", ['"nonlocal"\nbond_length = "1 um"', '"coulomb"',
                                  '"elastic-plastic"\nbond_length = "1 um"',
                                  '"tanh"\nreference_speed = "1 mm/s"'])

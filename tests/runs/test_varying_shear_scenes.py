@@ -24,6 +24,7 @@ def amplitude(found) -> float:
     return found.measures["relative_displacement_amplitude"].value
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("law", ["friction.law=nonlocal", PLASTIC])
 def test_order_the_amplitude_settles_with_the_number_of_modes(law):
     """Against all 65 modes: 8 modes within 3e-4, 32 within 1e-5, and a piece rigid in shear is far off."""

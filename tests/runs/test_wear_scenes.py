@@ -54,6 +54,7 @@ def test_exact_one_point_wears_by_its_load_and_path(motion):
     assert "worn_depth_max" not in found.measures
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("contact", [POINT, TILTED], ids=["point", "patch"])
 def test_exact_the_error_of_a_march_holds_the_volume_of_the_exact_engine(contact):
     """A march whose steps are halved on the way to its result wears by those of its first pass, and says so."""
@@ -70,16 +71,20 @@ def test_exact_energy_form_is_archard_with_coefficient_times_friction():
         assert two.measures[name].value == pytest.approx(one.measures[name].value, rel=1e-9)
 
 
-def test_always_few_jumps_say_how_wrong_they_are():
+@pytest.mark.slow
+@pytest.mark.parametrize("most, few", [(64, (2, 4, 16)),
+                                       pytest.param(128, (2, 4, 16, 32), marks=pytest.mark.slow)])
+def test_always_few_jumps_say_how_wrong_they_are(most, few):
     """A contact edge that moves far in a jump leaves a peak behind it; the errors of all measures hold the truth."""
     text = TILTED.replace("0.5 mm", "0.1 mm") + COULOMB + SINE + WEAR.replace("135723", "2e6")
-    many = ran(text + "jumps = 128\n").measures
-    for jumps in (2, 4, 16, 32):
+    many = ran(text + f"jumps = {most}\n").measures
+    for jumps in few:
         some = ran(text + f"jumps = {jumps}\n").measures
         for name in ("worn_depth_max", "pressure_peak", "approach", "contact_fraction", "normal_stiffness"):
             assert abs(some[name].value - many[name].value) <= some[name].error + many[name].error, (jumps, name)
 
 
+@pytest.mark.slow
 def test_exact_the_cost_of_jumps_is_a_curve(tmp_path):
     scene = tmp_path / "worn.toml"
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
@@ -90,6 +95,7 @@ def test_exact_the_cost_of_jumps_is_a_curve(tmp_path):
     assert [one["label"] for one in runs] == ["2", "4", "8", "16", "32", "by tolerance"] and away[0] > 3 * away[2]
 
 
+@pytest.mark.share(0, 2, 3, 4)
 @pytest.mark.parametrize("beside", [
     '[contact.asperities]\nlaw = "exponential"\nnormal_stiffness = "1e13 Pa/m"\ndecay_length = "2.5 um"\n',
     '[contact.asperities]\nlaw = "hertz"\nradius = "10 um"\ndensity = "1e10 1/m^2"\nheight_deviation = "0.5 um"\n',
@@ -102,6 +108,7 @@ def test_exact_every_skin_and_shape_wears_by_its_load(beside):
     assert found.measures["worn_volume"].value == pytest.approx(KAPPA * LOAD * 40e-6 * CYCLES, rel=1e-12)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("slide, path", [
     ('kind = "constant"\nspeed = "5 mm/s"\ndistance = "50 um"', 50e-6),
     ('kind = "dwell"\nspeed = "5 mm/s"\ndistance = "50 um"\nhold = "0.1 s"\ndistance_after = "20 um"', 70e-6),
@@ -113,6 +120,7 @@ def test_exact_a_slide_that_does_not_repeat_is_one_cycle(slide, path):
         assert found.value == pytest.approx(KAPPA * LOAD * path * CYCLES, rel=1e-12 if contact == TILTED else 0.06)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("law", ['law = "elastic-plastic"', 'law = "nonlocal"'])
 def test_exact_short_bonds_wear_as_coulomb_friction(law):
     """Energy form: the friction work of a law with memory goes to that of Coulomb as its bond length goes to zero."""
@@ -125,6 +133,7 @@ def test_exact_short_bonds_wear_as_coulomb_friction(law):
     assert 1e-4 < misses[0] < 0.05 and misses[1] < 1e-6
 
 
+@pytest.mark.slow
 def test_always_a_rig_under_partial_slip_wears_where_it_slips():
     """Slip paths of a march with shear modes: local, found anew after every jump, less than the holder's everywhere."""
     found = ran(SOFT_RIG + WEAR, **{"accuracy.tolerance": "1e-2"})
@@ -174,6 +183,7 @@ def test_exact_bodies_close_over_the_worn_gap_in_every_frame(tmp_path):
         assert np.abs((apart - apart[0]) - (expected - expected[0])).max() < 1e-5 * change
 
 
+@pytest.mark.slow
 def test_exact_shakedown_of_a_crown_under_a_tangential_force():
     """Cattaneo-Mindlin with Q = 0.6 mu P: the stick zone c = a0 sqrt(0.4) stays, all pressure moves into it, and its
     middle tends to c/a0 + 0.6 P/(pi c p0) of the Hertz peak: Hertz under 0.4 P and a flat punch under the rest.
@@ -250,6 +260,7 @@ def test_exact_a_scene_without_wear_imports_nothing_of_it(tmp_path):
     assert not {name for name in loaded(code, scene) if name.startswith(("patchfem.wear", "patchfem.runs.wear"))}
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("text, sets", [(TILTED + COULOMB + SINE + WEAR, ()),
                                         (SOFT_RIG + WEAR, ("--set", "accuracy.tolerance=2e-2"))], ids=["bench", "rig"])
 def test_exact_an_interrupted_run_goes_on_to_the_same_bits(tmp_path, monkeypatch, text, sets):

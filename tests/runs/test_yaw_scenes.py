@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from march_paths import share_one_loop
 from scene_texts import DRIVE, MODE, PIECE, mistakes
 
 from patchfem.runs.plan import plan
@@ -32,12 +33,17 @@ method = "{method}"
 """
 
 
+@pytest.fixture
+def one_loop(monkeypatch):
+    share_one_loop(monkeypatch)
+
+
 def found(law="coulomb", keys="", yaw="30 rad/m", roll="0.01 mrad", method="auto"):
     result = run(plan(loads(TEXT.format(law=law, keys=keys, yaw=yaw, roll=roll, method=method))))
     return result, result.measures
 
 
-def test_exact_strips_by_events_and_by_the_march():
+def test_exact_strips_by_events_and_by_the_march(one_loop):
     """Rolled strips, Coulomb: the two engines agree within their errors; the yaw moment is sum y f of the friction."""
     result, exact = found()
     _, march = found(method="march")
@@ -53,10 +59,16 @@ def test_exact_strips_by_events_and_by_the_march():
     assert np.abs(yawed).max() > 1e-4
 
 
-@pytest.mark.parametrize("law, keys", [("coulomb", ""), ("elastic-plastic", 'bond_length = "1 um"'),
-                                       ("nonlocal", 'bond_length = "1 um"')])
-def test_exact_strips_that_do_not_roll_do_not_yaw(law, keys):
-    """Even loads: nothing turns the patch, the motion is that of the patch as one."""
+@pytest.mark.share(2)
+@pytest.mark.parametrize("law, keys, shared", [
+    ("coulomb", "", False), ("elastic-plastic", 'bond_length = "1 um"', False),
+    ("nonlocal", 'bond_length = "1 um"', True),
+    pytest.param("nonlocal", 'bond_length = "1 um"', False, marks=pytest.mark.slow)])
+def test_exact_strips_that_do_not_roll_do_not_yaw(law, keys, shared, monkeypatch):
+    """Even loads: nothing turns the patch, the motion is that of the patch as one; shared: in the loop of all laws, for
+    that of bonds alone takes 5 s to compile."""
+    if shared:
+        share_one_loop(monkeypatch)
     _, turned = found(law, keys, roll="0 rad")
     _, alone = found(law, keys, yaw="0 rad/m", roll="0 rad")
     for name in ("relative_displacement_amplitude", "loop_area", "friction_work"):
@@ -102,7 +114,7 @@ def behind_shear(law, strips="", yaw="", method="march"):
 
 @BEHIND
 @pytest.mark.parametrize("method", ["march", "exact", "harmonic"])
-def test_exact_even_strips_behind_shear_are_the_patch_behind_shear(law, method):
+def test_exact_even_strips_behind_shear_are_the_patch_behind_shear(law, method, one_loop):
     """Every strip is as many times as compliant as the width, under as many parts of the load."""
     whole = behind_shear(law, method=method).measures
     cases = [behind_shear(law, STRIPS.format("0 rad"), method=method)]
@@ -116,7 +128,7 @@ def test_exact_even_strips_behind_shear_are_the_patch_behind_shear(law, method):
 
 @BEHIND
 @pytest.mark.parametrize("roll", ["0.01 mrad", "0.2 mrad"])
-def test_exact_rolled_strips_behind_shear_turn_by_the_forces_of_their_own_elements(law, roll):
+def test_exact_rolled_strips_behind_shear_turn_by_the_forces_of_their_own_elements(law, roll, one_loop):
     """Slide q - y yaw, force of a set of elements made by hand of C = 4 C_t and the strip's own forces, torque
     sum y f, and a yaw mode that this torque alone drives; at 0.2 mrad strips are open."""
     result = behind_shear(law, STRIPS.format(roll), TURNS)

@@ -260,6 +260,25 @@ def test_refuses_a_text_that_is_not_toml(text, start):
     assert only(text).startswith(start)
 
 
+@pytest.mark.parametrize(
+    "text, end",
+    [
+        ("a = 1\nload = 26 lbf\n", 'a quantity or a word stands in quotes: load = "26 lbf"'),
+        ("length = 12.7mm # long\n", 'a quantity or a word stands in quotes: length = "12.7mm"'),
+        ("a = 5 m/s^2\n", 'a quantity or a word stands in quotes: a = "5 m/s^2"'),
+        ("law = coulomb\n", 'a quantity or a word stands in quotes: law = "coulomb"'),
+        ("static = -.5e3\n", "a digit stands on both sides of a point: static = -0.5e3"),
+        ("static = 5.\n", "a digit stands on both sides of a point: static = 5.0"),
+        ("static = 0,3\n", "a decimal is written with a point: static = 0.3"),
+        ("a = True\n", "; a = true"),
+        ("a = 1e", "statement (column 6)"),
+        ("a = 007", "statement (column 6)"),
+    ],
+)
+def test_refuses_a_value_without_its_quotes_or_digits_by_how_it_is_written(text, end):
+    assert only(text).endswith(end) and "not valid TOML" in only(text)
+
+
 def test_refuses_odd_keys_and_huge_numbers_with_one_line_each():
     assert "sum of base^2" in only(RIG, "structure.mode.axial.base=1e40")
     assert "beyond what can be computed with" in only(RIG, "structure.mode.axial.base=1e200")

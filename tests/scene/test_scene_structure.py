@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene_texts import COULOMB, LINEAR, STRUCTURE, line_of, only
+from scene_texts import BLOCK, COULOMB, LINEAR, STRUCTURE, line_of, only
 
 from patchfem.core import PatchfemError
 from patchfem.model.model import build
@@ -294,6 +294,8 @@ MODES = STRUCTURE + '[[structure.mode]]\nname = "3"\nfrequency = "160 Hz"\ndampi
     ("structure.spring[9].stiffness", "structure.spring[9]: no such item here; structure.spring has 2, counted from "
      "one as in structure.spring[1]", MASSES),
     ("structure.mode[9].damping", "structure.mode[9]: no such item here; one of axial, 3", MODES),
+    ("structure.mode.9.damping", "structure.mode.9: no such item here; one of axial, 3; structure.mode.0, with a dot, "
+     "is structure.mode[1]", MODES),  # it once answered structure.mode[10], which nobody had written
     ("structure.mode.axil.damping", "structure.mode.axil: no 'axil' here; did you mean 'axial'?", MODES)])
 def test_exact_items_count_from_one_where_people_read_and_write(key, message, text):
     text = POINT + text if text is MODES else text
@@ -316,3 +318,51 @@ def test_exact_an_item_by_its_number_from_one_is_the_one_that_python_counts_from
     with pytest.raises(PatchfemError, match=r"structure\.interface\[2\]\.law: as structure\.masses\[1\] has$"), \
             placed(build(scene).source):
         raise PatchfemError("as structure.masses.0 has", "structure.interface.1.law")
+
+
+SPRING = """\
+[structure]
+masses = ["3 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "100 kN/m"
+[[structure.spring]]
+between = [0, 1]
+stiffness = "100 kN/m"
+"""
+DAMPER = '[[structure.damper]]\nbetween = [1, 0]\ncoefficient = "12 N s/m"\n'
+PUSH = '[drive]\nkind = "force"\nfrequency = "90 Hz"\nforce = "300 N"\ncycles = 40\n'
+
+
+@pytest.mark.parametrize("rub, key", [
+    ("", "structure.masses"), (RUB.replace("[2, 0]", "[1, 0]"), "contact")])  # fmt: skip
+def test_exact_a_mass_on_springs_beside_a_contact_is_told_as_its_mode(rub, key):
+    """sqrt(k/m)/(2 pi) = 41.0936 Hz and c/(2 sqrt(k m)) = 0.00775 of 3 kg on 200 kN/m with 12 N s/m; one message."""
+    message = only(BLOCK + (rub or COULOMB) + SPRING + DAMPER + PUSH)
+    assert f": {key}: " in message and "moving_mass = \"3 kg\"" in message and "[normal]" not in message
+    assert '[[structure.mode]] with frequency = "41.0936 Hz"' in message and "damping = 0.00775" in message
+    assert "its damping ratio" in only(BLOCK + (rub or COULOMB) + SPRING + PUSH)
+
+
+def test_exact_what_the_message_says_is_the_same_rig():
+    """The mode that is named moves as the mass on the spring does, without friction."""
+    mode = ('[structure]\nmoving_mass = "3 kg"\n[[structure.mode]]\nname = "a"\nfrequency = "41.0936 Hz"\n'
+            'damping = 0.00775\nslide = 1.0\n')  # fmt: skip
+    ours, want = (run(loads(text + PUSH, sets=["drive.cycles=1000"])).measures["relative_displacement_amplitude"].value
+                  for text in (mode, SPRING + DAMPER))
+    assert ours == pytest.approx(want, rel=1e-4)
+
+
+@pytest.mark.parametrize("rest", ['masses = ["1 kg", "2 kg"]\n', 'moving_mass = "3 kg"\n'])
+def test_refuses_other_masses_beside_a_contact_by_the_same_way_out(rest):
+    pair = "[1, 2]" if "masses" in rest else "[1, 0]"
+    spring = f'[[structure.spring]]\nbetween = {pair}\nstiffness = "200 kN/m"\n'
+    found = refusal(BLOCK + COULOMB + "[structure]\n" + rest + spring + PUSH)
+    assert "beside [contact], give" in found and "write [[structure.interface]]" not in found
+    assert ('frequency = "41.0936 Hz"' in found) == ("moving" in rest)
+
+
+def refusal(text: str) -> str:
+    with pytest.raises(SceneError) as caught:
+        loads(text)
+    return str(caught.value)

@@ -71,3 +71,20 @@ def test_always_every_key_says_what_it_means():
         for one in (table, *table.get("anyOf", ())):
             for key, found in one.get("properties", {}).items():
                 assert found.get("description") or "$ref" in str(found), key
+
+
+def test_exact_a_law_is_described_with_the_keys_that_the_program_asks_for():
+    """What a scene with nothing but the law's name is told to be missing is what its description names."""
+    keys = schema()["$defs"]["Friction"]["properties"]
+    named = {law: set(words.split(", ")) for law, words in re.findall(r"'([\w-]+)' wants ([\w, ]+)",
+                                                                       keys["law"]["description"])}
+    for law in keys["law"]["enum"]:
+        try:
+            loads(text_of("bench").replace('"nonlocal"', f'"{law}"').replace("bond_length", "# "))
+            missing = set()
+        except SceneError as error:
+            missing = set(re.findall(r"friction\.(\w+): missing", str(error)))
+        assert missing == named.get(law, set()), law
+        for key in missing:
+            assert f"'{law}'" in keys[key]["description"].partition("wanted by law ")[2], key
+    assert named["elastic-plastic"] == {"bond_length"}

@@ -103,6 +103,7 @@ def test_always_the_contact_set_has_an_m_matrix_and_only_corner_nodes_a_negative
     assert jenkins_set(pair.tangential, limit).reluctant <= 2
 
 
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize("angle", TILTS)
 def test_exact_elements_repeat_the_problem_point_by_point(angle):
     """20 histories of 40 reversals at 101 nodes; the worst difference seen is 9e-15 of mu N."""
@@ -265,6 +266,7 @@ def test_exact_all_modes_hold_the_whole_compliance(angle):
         assert few_modes(modes, limit, 1e-6, slide) == pytest.approx(whole, rel=1e-12)
 
 
+@pytest.mark.share(0, 3, 6)
 @pytest.mark.parametrize("length", [1e-7, 1e-6])
 @pytest.mark.parametrize("angle", TILTS)
 def test_always_more_modes_never_worsen_the_backbone(angle, length):
@@ -275,6 +277,7 @@ def test_always_more_modes_never_worsen_the_backbone(angle, length):
     assert errors[0] > errors[3]
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("angle", [0.0, 1e-4])
 def test_always_short_bonds_have_the_modes_that_they_need(angle):
     """Bonds a hundredth and a thousandth of the slide at which the patch lets go: shares of the limit that fall with

@@ -228,6 +228,7 @@ def unlike(cells=60, height=4e-3):
     return unlike_pair(low, COATED, high, bare((70e9, 0.3)), WIDTH)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("angle", [0.0, 3e-5, -1e-3])
 def test_exact_unlike_pieces_obey_coulomb_in_both_whole_bodies(angle):
     """The forces and holder motions put on both bodies in space axes: gap, stick and slip of the whole faces."""
@@ -331,6 +332,7 @@ def test_exact_parallel_elements_repeat_401_nodes(angle):
             (5e-8 if group.reluctant else 1e-12) * MU * LOAD
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("control", ["shear", "slide"])
 def test_exact_a_thousand_increments_are_one(control):
     pair = coated_pair(60)

@@ -28,6 +28,7 @@ RIGS = {
 }  # fmt: skip
 
 
+@pytest.mark.share(0, 4, 8, 13, 17)
 @pytest.mark.parametrize("power", [0, 1, 2])
 @pytest.mark.parametrize("name", RIGS)
 def test_exact_modes_from_exact_responses(name, power):
@@ -42,6 +43,7 @@ def test_exact_modes_from_exact_responses(name, power):
     assert np.abs(below).max() < 1e-6 * np.abs(A).max() and np.abs(above).max() < 1e-6 * np.abs(fit.data).max()
 
 
+@pytest.mark.share(0, 5, 11)
 @pytest.mark.parametrize("absolute", [False, True])
 @pytest.mark.parametrize("name", RIGS)
 def test_always_noise_of_one_per_cent_moves_them_little(name, absolute):

@@ -38,6 +38,7 @@ def test_exact_interpolated_sections_are_those_solved():
         assert found[n] == pytest.approx(areal.section(x, z, np.pi * n / 1.2e-2, 4), rel=1e-5)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("b", [1.0, 0.5])
 def test_always_the_study_holds_what_it_says_of_hertz(b):
     for cells, bound, pressure in ((8, 1.4e-3, 4e-3), (12, 1e-3, 1.6e-3)):

@@ -36,6 +36,7 @@ def test_one_length_describes_the_plateaus_and_no_law_the_backlash():
     assert 40 < stretch.fitted.found.rows < 90
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("words", [(), ("nothing_here.csv",)])
 def test_refuses_to_run_without_its_record_in_one_line(words):
     script = Path(__file__).parents[2] / "studies" / "damper" / "damper.py"

@@ -95,6 +95,7 @@ def test_exact_the_elastic_range_in_the_virgin_curve(table, share):
     assert force == pytest.approx(1 - (1 - share) * np.exp(share - 0.8), abs=1e-14)
 
 
+@pytest.mark.slow
 def test_always_the_picture_of_the_drift(tmp_path):
     text = study("drift/picture.py").main(tmp_path / "x.svg", (0.1,)).read_text()
     for word in ("drift per cycle [bond lengths]", "b = 0.3", "loop area / 4 A μs N", "elastic range"):

@@ -12,11 +12,13 @@ def targets():
     return study("targets/dynamics.py")
 
 
+@pytest.mark.slow
 def test_exact_what_is_timed_is_right(targets):
     assert targets.cycle_of_events()[1] <= 1e-12
     assert targets.steady_point()[1] <= 1e-10
 
 
+@pytest.mark.slow
 def test_always_many_times_faster_than_others(targets):
     """Measured 80 and 1400 times."""
     seconds, _, plain = targets.steady_point()

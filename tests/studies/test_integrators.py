@@ -48,6 +48,7 @@ def test_exact_the_sentences_on_the_report_s_failure(failure, capsys):
     assert "Newmark" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_exact_the_picture_of_the_failure(failure, tmp_path):
     rows = [failure.solve(*case) for case in failure.CASES if case[0] in failure.DRAWN]
     path = failure.picture(rows, {(1e-3, False): [0.1, 0.2], (1e-3, True): [0.1, 0.01]}, tmp_path / "one.svg")
@@ -166,6 +167,7 @@ def test_exact_ratios_of_power_laws(work):
     assert found["c"][1e-2] == "3" and found["c"][1e-3] == "-"
 
 
+@pytest.mark.slow
 def test_exact_the_picture_of_the_saved_table(work, table, tmp_path):
     text = work.picture(table, tmp_path / "one.svg").read_text()
     assert all(work.TITLES[where] in text for where in work.SHOWN)
@@ -184,6 +186,7 @@ def test_refuses_absent_peers_by_name_and_goes_on(work, engines, monkeypatch, ca
     assert "skipped: Siconos, theta 1/2 is not installed" in said.out
 
 
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize("name, knob, error", [("SUNDIALS CVODE", 1e-8, 5e-6), ("Siconos, theta 1/2", 1000, 5e-4)])
 @pytest.mark.parametrize("where", ["decay", "block", "two"])
 def test_exact_peers_find_the_same_motion(problem, work, rows, name, knob, error, where):
@@ -208,6 +211,7 @@ def test_exact_the_patch_by_two_programs(engines, problem):
     assert events < 202 and one.error(slide) > 1e-2
 
 
+@pytest.mark.slow
 def test_exact_random_rigs_from_yield_to_yield(capsys):
     """Two of the thirty: DOP853 at 1e-12 agrees, and the steps of the march come as near as they say."""
     rows = study("integrators/thirty_rigs.py").main((6, 27))

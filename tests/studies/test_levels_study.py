@@ -10,6 +10,7 @@ def levels():
     return study("levels/levels.py")
 
 
+@pytest.mark.slow
 def test_exact_onset_of_coulomb_is_its_limit(levels, tmp_path):
     """mu N/m: the stuck block carries the whole level; nothing jumps, nothing lags."""
     one = levels.solve("Coulomb", 60)
@@ -21,6 +22,7 @@ def test_exact_onset_of_coulomb_is_its_limit(levels, tmp_path):
     assert "raised" in levels.picture([one], tmp_path / "x.svg").read_text()
 
 
+@pytest.mark.slow
 def test_exact_onset_of_the_elastic_plastic_law_is_the_same(levels):
     one = levels.solve("elastic-plastic", 40)
     assert one.onset[0] == pytest.approx(one.limit, rel=6e-3)

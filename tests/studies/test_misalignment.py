@@ -225,6 +225,7 @@ def test_always_opening_tilt_is_that_of_the_pieces_and_of_the_skin(rough):
         assert own < rough.opening(k, 1) == pytest.approx(own + rigid, rel=0.01)
 
 
+@pytest.mark.slow
 def test_always_the_picture_names_its_curves(tmp_path):
     picture = study("misalignment/picture.py")
     text = picture.main(tmp_path / "x.svg", np.array([1e-5, 1e-4])).read_text()
@@ -252,6 +253,7 @@ def moved(maps):
     return maps.squeeze("contact_load")
 
 
+@pytest.mark.slow
 def test_always_the_motion_hardly_feels_the_tilt_that_the_study_tolerates(moved):
     stuck, slipping = moved.isel(drive_acceleration=0), moved.isel(drive_acceleration=1)
     assert slipping["contact_fraction"].values == pytest.approx([1.0, 0.49, 0.219], rel=0.03)
@@ -282,6 +284,7 @@ def test_always_a_stuck_interface_is_a_little_softer_than_pieces_and_bonds_in_se
     assert (stuck["equivalent_stiffness"].values < both).all()
 
 
+@pytest.mark.slow
 def test_always_the_maps_name_what_they_show(moving, maps, tmp_path):
     text = moving.picture(maps, tmp_path / "x.svg").read_text()
     for word in ("misalignment [mrad]", "26 lbf, 5 g", "rubbed share", "loop energy, to that at 1e-06 rad"):

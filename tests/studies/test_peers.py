@@ -83,6 +83,7 @@ def test_exact_tamaas_finds_the_same_wave(wavy):
     assert 20 <= other.iterations <= 200
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("name, variable, package", [("hertz", GETFEM, "getfem"), ("wavy", TAMAAS, "tamaas")])
 def test_refuses_an_absent_peer_by_name(name, variable, package, monkeypatch, capsys, request):
     module = request.getfixturevalue(name)

@@ -34,6 +34,7 @@ def held(figures, name, run):
     inside(figures.ANSWER, f"{run.acceleration:.1f} g and {run.displacement:.2f} mil for {read}")
 
 
+@pytest.mark.slow
 def test_figure_29_stable_at_5_g_and_unstable_at_8(figures, drawn):
     (stable, unstable), text = drawn
     held(figures, stable.title, stable)

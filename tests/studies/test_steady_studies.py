@@ -10,6 +10,7 @@ def march():
     return study("steady/against_march.py")
 
 
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize("contact, frequency, near", [
     ("Coulomb", 144.0, 4e-4), ("elastic-plastic", 144.0, 4e-4), ("bonds", 150.0, 4e-4),
     ("patch of 41 elements", 150.0, 3e-3)])
@@ -127,6 +128,7 @@ def backbone():
     return study("steady/backbone.py")
 
 
+@pytest.mark.slow
 def test_exact_one_harmonic_is_the_loop_of_the_bench(backbone, tmp_path):
     rows = [backbone.case(name, (0.5, 2.0, 20.0), 400) for name in ("elastic-plastic", "bonds")]
     sharp, soft = rows

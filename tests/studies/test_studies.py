@@ -5,6 +5,7 @@ import pytest
 from study_module import study
 
 
+@pytest.mark.slow
 def test_always_tilt_softens_the_patch_and_hardly_changes_the_rig():
     flat, tilted = study("rig/tilt.py").main((0.0, 1e-3))
     assert flat["contact_fraction"][0] == 1 and tilted["contact_fraction"][0] < 0.03

@@ -24,6 +24,15 @@ result = run(plan(load(sys.argv[1])))
 assert result.measures
 {MODULES}
 """
+FROM_SHELL = f"""\
+import sys
+from patchfem.__main__ import main
+try:
+    main(sys.argv[1:])
+except SystemExit as end:
+    assert not end.code, end.code
+{MODULES}
+"""
 ALWAYS = {"pyvista", "meshio", "numba"}
 
 

@@ -3,10 +3,20 @@
 import numpy as np
 
 from patchfem.core import ModalBasis
+from patchfem.dynamics.march.joints import JointsModel
 from patchfem.dynamics.march.march import GOAL
 from patchfem.dynamics.march.models import load_kernels
 
 OMEGA = 2 * np.pi * 143
+# laws of the one compiled loop of joints that most tests share
+ALL = (*(f"friction.laws.{law}_kernels" for law in ("coulomb", "elastic_plastic", "stretch", "tanh")),
+       "dynamics.contacts.spring_kernels")
+
+
+def share_one_loop(monkeypatch) -> None:
+    """Joints of whatever laws march in the loop of ALL."""
+    own = JointsModel.laws.fget
+    monkeypatch.setattr(JointsModel, "laws", property(lambda model: tuple(sorted({*ALL, *own(model)}))))
 
 
 def one_mode(omega, zeta, mass):

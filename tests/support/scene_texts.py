@@ -9,6 +9,7 @@ from patchfem.scene.scene import SceneError, loads
 # blocks; one scene is a sum of them
 POINT = '[normal]\nload = "26 lbf"\n'
 PIECE = '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\n'
+BLOCK = PIECE.replace("6.35 mm", "6 mm") + 'load = "115 N"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
 COATING = '[contact.coating]\nmaterial = "WC-Co"\nthickness = "6 mil"\n'
 COATED = PIECE + 'load = "26 lbf"\nelement_size = "0.5 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
 SHEAR = "[contact.shear]\n"

@@ -102,6 +102,7 @@ def elastic(lower, upper, reach, worn, jumps, stiff):
     return lower, upper
 
 
+@pytest.mark.slow
 def test_always_stiff_springs_wear_alike():
     """Rigid pieces do not need a law of pressure: springs come to the same shapes, the nearer the stiffer."""
     lower, upper = surfaces((25, 25))
@@ -114,6 +115,7 @@ def test_always_stiff_springs_wear_alike():
     assert (off[1] < off[0] / 1.8).all() and (off[2] < off[1] / 2.2).all() and (off[2] < 0.05 * UM).all()
 
 
+@pytest.mark.slow
 def test_always_smaller_bites_change_less():
     lower, upper = surfaces((60, 60))
     found = [rub(lower, upper, STEP, 3 * STEP, 8 * UM, bite=8 * UM / 12 / count).lower for count in (20, 80, 320, 1280)]

@@ -134,6 +134,7 @@ def crowned(cells=100, radius=0.05):
     return Wearing(pressing(np.array(pair.normal), x, x**2 / 2 / radius), lambda worn: even, area, 1e-13, 135723.0)
 
 
+@pytest.mark.slow
 def test_order_ten_jumps_find_the_depth_of_a_thousand():
     asked = crowned()
     many, _ = evolved(asked, count=1000)
@@ -157,6 +158,7 @@ def test_always_automatic_jumps_meet_the_tolerance():
     assert counts == sorted(counts)
 
 
+@pytest.mark.slow
 def test_order_worn_crown_tends_to_the_closed_half_width():
     asked = crowned(400, 0.05)
     state, _ = evolved(asked)
@@ -189,6 +191,7 @@ def test_exact_wear_coefficient_zero_changes_nothing():
     assert not still.depth.any() and still.error == 0.0
 
 
+@pytest.mark.slow
 def test_order_two_with_a_path_that_follows_the_wear():
     """A slip path that depends on the worn depth, as under partial slip."""
     press, _, area, _, critical = flat()
@@ -198,7 +201,7 @@ def test_order_two_with_a_path_that_follows_the_wear():
         return PATH * lean * np.exp(-worn / 5e-7)
 
     asked = Wearing(press, path, area, KAPPA, 60 * critical)
-    ends = [evolved(asked, count=count)[0].depth for count in (10, 20, 40, 640)]
+    ends = [evolved(asked, count=count)[0].depth for count in (10, 20, 40, 320)]
     errors = [np.abs(depth - ends[-1]).max() / ends[-1].max() for depth in ends[:-1]]
     assert errors[-1] < 1e-3
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2, abs=0.3)

@@ -156,6 +156,7 @@ def test_exact_a_rubbing_rig_is_found_from_its_own_rows(tmp_path, rubbed):
     assert any("steady motions are fitted" in text for text in found.warnings)
 
 
+@pytest.mark.slow
 def test_a_noisy_rubbing_rig_lies_within_its_intervals(tmp_path, rubbed):
     draw = np.random.default_rng(3)
     noisy = [(f, level, *(value * np.exp(0.05 * draw.standard_normal()) for value in (a, y)), flag)
@@ -284,6 +285,7 @@ def test_the_verb_answers_as_the_contract_says(tmp_path):
         again["measures"]["absolute_acceleration_peak"]["value"], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_nulls_have_no_score_where_a_kind_was_never_fitted(tmp_path):
     """Displacements that are held out alone are predicted by the rig, and by nothing without mechanics; no score of
     theirs is that of the accelerations alone."""
@@ -319,6 +321,13 @@ def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
     assert again.runs < half.runs < first.runs == other.runs
     for one in (again, half, other):
         assert np.array_equal(one.fit.values, first.fit.values) and np.array_equal(one.found.rms, first.found.rms)
+
+
+@pytest.mark.parametrize("text", ["[]", "3", "{", "[" * 100_000, '{"ends": {"all/0": [[1], 2]}}'])
+def test_exact_starts_of_another_shape_count_for_nothing(tmp_path, text):
+    """The first two once ended `fit --resume` with an internal fault."""
+    (tmp_path / "starts.json").write_text(text)
+    assert Starts(tmp_path / "starts.json", "one", True).known == {}
 
 
 def test_placebos_are_whole_fits_of_their_own(tmp_path):
@@ -373,6 +382,7 @@ def test_the_table_of_a_fit_holds_what_was_measured_and_computed(tmp_path):
         assert row["held"] == ("1" if f == 160 else "0")
 
 
+@pytest.mark.slow
 def test_always_an_interrupted_fit_keeps_its_starts_for_the_same_table_alone(tmp_path, monkeypatch):
     """Interrupted behind its search and resumed, it makes fewer motions; resumed with other rows it is the fit of
     these."""

@@ -5,7 +5,9 @@ import signal
 import subprocess
 import sys
 import time
+from multiprocessing import Pipe
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from scene_texts import BENCH, COULOMB, POINT, SHORT
 from patchfem.campaigns.sweeps import executors
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.campaigns.sweeps.cases import Cases
+from patchfem.campaigns.sweeps.executors import pool
 from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.here import Here
 from patchfem.campaigns.sweeps.executors.pool import Pool
@@ -108,6 +111,38 @@ def test_exact_what_died_is_tried_alone_after_all_others_and_given_up():
     assert chunks.died([0]) == [] and chunks.take() == [0] and chunks.died([0]) == [0] and chunks.take() is None
 
 
+class Prompt:
+    """A worker that answers before it is asked what; `given`: the chunks of all of them."""
+
+    given: ClassVar = []
+
+    def __init__(self, work, silent):
+        self.chunk, (self.pipe, self.there) = None, Pipe()
+
+    def give(self, chunk):
+        self.chunk = chunk
+        Prompt.given.append(chunk)
+        self.there.send(chunk)
+
+    def taken(self):
+        self.chunk = None
+        return self.pipe.recv(), 0.1, "answer"
+
+    def end(self):
+        self.pipe.close()
+
+
+def test_exact_a_worker_has_its_next_chunk_before_its_answer_is_written(monkeypatch):
+    monkeypatch.setattr(pool, "Worker", Prompt)
+    monkeypatch.setattr(Prompt, "given", [])
+    left = iter([[0], [1], [2], [3]])
+    running = Pool(2).run(None, lambda: next(left, None))
+    seen = [next(running)[0]]
+    assert Prompt.given == [[0], [1], [2]]
+    seen += [chunk for chunk, *_ in running]
+    assert sorted(seen) == Prompt.given == [[0], [1], [2], [3]]
+
+
 def test_exact_a_cluster_answers_as_this_process_does():
     pytest.importorskip("distributed")
     found, _ = all_of(work(), Cluster("", 1))
@@ -128,6 +163,7 @@ def test_refuses_executors_that_are_not_there(monkeypatch):
 KILLED = """\
 import os, signal, sys
 from pathlib import Path
+from typing import ClassVar
 from patchfem.campaigns.sweeps.ask import Request, asked_of
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.export.sweeps.run import Place, sweep_into
@@ -163,6 +199,7 @@ def resumed(whole: tuple, out: Path) -> None:
     assert names(out / "cases") == names(want / "cases") and names(out) == names(want)
 
 
+@pytest.mark.slow
 def test_exact_a_sweep_killed_in_the_middle_goes_on_to_the_same_files(whole, tmp_path):
     path, over, _ = whole
     out = tmp_path / "swept"

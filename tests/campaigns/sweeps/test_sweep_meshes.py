@@ -20,6 +20,7 @@ WORK = Work(Asked(Path("a.toml"), PATCH), Cases(tuple(read(["contact.tilt.angle=
                                                            "contact.load=50 N,100 N"])[0])))
 
 
+@pytest.mark.slow
 def test_exact_a_part_of_a_sweep_has_the_answers_of_the_whole():
     whole = joined(4, [part[:2] for part in solved(WORK, range(4), Here())])
     rest = joined(4, [part[:2] for part in solved(WORK, [3, 1], Here())])

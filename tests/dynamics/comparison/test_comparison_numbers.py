@@ -66,6 +66,7 @@ def test_exact_the_printed_law_runs_away():
     assert found["x20"] == pytest.approx(-91, abs=0.5) and found["x40"] == pytest.approx(-734, abs=2)
 
 
+@pytest.mark.share(0, 1, 2, 3)
 @pytest.mark.parametrize("speed, steps, error", [
     (1e-3, 100, 0.057), (1e-3, 1000, -1.0), (1e-4, 100, 0.26), (1e-4, 1000, -0.011), (1e-4, 10000, -1.0)])
 def test_exact_newmark_gets_worse_as_the_step_falls(speed, steps, error):

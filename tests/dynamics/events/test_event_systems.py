@@ -31,6 +31,7 @@ def slides(modes, phase, tau):
 
 # against other integrators
 
+@pytest.mark.share(1, 2)
 @pytest.mark.parametrize("seed, n, faces, ratio, rigid", [
     (1, 3, 2, 1.0, False), (2, 3, 2, 0.6, False), (7, 2, 1, 0.8, True), (4, 4, 3, 1.0, True), (6, 4, 3, 0.7, False)])
 def test_exact_coupled_systems_against_dop853(seed, n, faces, ratio, rigid):
@@ -386,6 +387,7 @@ def test_exact_log_of_a_stick_slip_run():
     assert np.count_nonzero(np.abs(sliding.log.what) == REVERSAL) > 390
 
 
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize("hertz, level, size, top", [(143, 5, 0.52651, 7.8194), (143, 6, 0.72533, 9.3193),
                                                      (143, 7, 0.89714, 10.6154), (155, 8, 1.13683, 12.4237)])
 def test_table_check_15_bonded_spring(hertz, level, size, top):

@@ -145,6 +145,7 @@ def test_exact_without_damping():
     assert largest(driven(static=0.25, zeta=0.0)) == pytest.approx(228.347458854389, rel=1e-11)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("cycles, peak", [(200, 4.712429928746), (400, 9.030960646705), (800, 17.668022082624)])
 def test_exact_below_the_bounding_ratio(cycles, peak):
     assert largest(driven(static=0.39, zeta=0.0, cycles=cycles)) == pytest.approx(peak, rel=1e-11)
@@ -166,6 +167,7 @@ def test_table_check_4_other_frequencies(frequency, onset, mil):
     assert half_swing(result) * 5 * G_N / W**2 == pytest.approx(mil * 25.4e-6, rel=2e-5)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("level, amplitude", [(8.0, 60.5632260810004979), (6.0, 25.1953787788816),
                                               (7.0, 45.4055793050063), (5.5, 12.3343)])
 def test_table_check_6_sliding_at_resonance(level, amplitude):
@@ -174,6 +176,7 @@ def test_table_check_6_sliding_at_resonance(level, amplitude):
     assert found == pytest.approx(sliding_amplitude(1.0, 4 / level, 0.003), rel=1e-10)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("frequency, level, amplitude", [(135, 6, 4.83011), (150, 7, 6.21040), (155, 8, 4.15965)])
 def test_table_check_7_sliding_beside_resonance(frequency, level, amplitude):
     found = half_swing(driven(frequency=frequency, level=level, cycles=900), level)
@@ -243,6 +246,7 @@ def test_exact_no_drift_while_stuck(modes):
 
 # other laws of motion
 
+@pytest.mark.share(0, 3, 6, 9, 11, 14, 17, 20)
 @pytest.mark.parametrize("frequency, zeta", [(0, 0.0), (0, 0.5), (60, 0.0), (143, 0.0), (143, 1.0), (143, 1.5),
                                              (300, 0.9999999999)])
 @pytest.mark.parametrize("static, kinetic", [(0.4, 0.4), (0.4, 0.15), (0.0, 0.0)])
@@ -328,6 +332,7 @@ def test_exact_one_mode_against_dop853():
     agree(modes_of(W, 0.003), BaseSine(5 * G_N, W), 0.4 * LOAD, 0.4 * LOAD, 30, 1e-9)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("static, kinetic", [(0.4, 0.4), (0.42, 0.3)])
 def test_exact_two_modes_against_dop853(static, kinetic):
     mine = agree(WITH_YAW, BaseSine(5 * G_N, W), static * LOAD, kinetic * LOAD, 30, 1e-8)

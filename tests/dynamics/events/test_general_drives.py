@@ -121,6 +121,7 @@ def agrees(modes, drive, static, ratio, end, count):
     np.testing.assert_allclose([s(found[-1].span) for s in found[-1].modal], states[-1], rtol=0, atol=1e-9 * size)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("number, ratio, faces", [(0, 1.0, 1), (3, 0.5, 2)])
 def test_exact_sweeps_against_dop853(number, ratio, faces):
     modes = random_basis(np.random.default_rng(number), 2, faces)

@@ -76,6 +76,7 @@ def test_exact_stick_slip_at_resonance(compiled):
     assert result.stick / (20 * pi) == pytest.approx(0.213, abs=5e-4)
 
 
+@pytest.mark.share(0, 3, 6, 9)
 @both
 @pytest.mark.parametrize("friction, zeta, cycles, peak", [
     (0.5, 0.003, 200, 59.1676969670915519), (0.5, 0.0, 200, 228.347458854389), (0.78, 0.0, 200, 4.712429928746),
@@ -93,6 +94,7 @@ def test_exact_no_damping(compiled):
         assert swing(driven(0.79, 0.0, cycles=cycles, compiled=compiled)) == pytest.approx(0.435537658848, abs=1e-12)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("above", [1e-3, 3e-4])
 def test_exact_beside_the_bounding_ratio(above):
     """Above pi/4 the motion settles on the closed form of two stops, below it grows by pi - 4 D a cycle."""
@@ -334,6 +336,7 @@ def test_exact_rigid_block_that_slides(friction):
     assert (high - low) / 2 * 1.3**2 == pytest.approx(sqrt(1 - (pi * friction / 2)**2), rel=1e-12)
 
 
+@pytest.mark.share(0, 4)
 @pytest.mark.parametrize("zeta", [0.0, 0.02, 1.0, 3.0, 200.0])
 def test_exact_energy_balance(zeta):
     for friction, ratio in ((0.3, 0.4), (0.6, 1.0), (0.9, 2.0)):

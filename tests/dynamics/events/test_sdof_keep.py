@@ -94,6 +94,7 @@ def test_always_compiled_keeps_what_plain_keeps():
     np.testing.assert_allclose(two.log.slide, one.log.slide, rtol=0, atol=1e-11)
 
 
+@pytest.mark.share(0, 2, 5)
 @pytest.mark.parametrize("zeta, friction", [(0.0, 0.3), (0.003, 0.8), (0.9, 0.1), (1, 0.05), (1.7, 0.02), (40.0, 0.3)])
 def test_exact_compiled_and_plain_have_the_same_bits(zeta, friction):
     """Extremes of all cycles, and the phasors of the last five windows, which tell the steady motion."""

@@ -39,6 +39,7 @@ def same(one, two, time):
     assert energy_balance(one.ledger) < 1e-11
 
 
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize("ratio, friction", [(1.0, 0.3), (0.7, 0.3), (1.0, 5.0), (1.0, 0.0)])
 def test_exact_long_pieces_are_the_short_ones(monkeypatch, ratio, friction):
     modes = basis_of([1.0, 1.7], [0.05, 0.04], [[1.0, 0.5]], [1.0, 0.2], [1.0, -0.4])
@@ -89,6 +90,7 @@ def test_always_what_does_not_die_out_is_not_left_out():
 
 # one mode
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.sampled_from([0.003, 0.05, 0.6, 1.0, 1.0001, 3.0]), st.sampled_from([0.02, 0.004]), st.floats(0.1, 0.95),
        st.sampled_from([1.0, 0.9, 0.4]), st.floats(-1, 1))

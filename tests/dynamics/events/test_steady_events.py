@@ -92,6 +92,7 @@ def test_exact_forty_steady_points_against_runs():
     compare_with_runs([(r, a) for r in np.linspace(0.3, 2.2, 10) for a in (1.1, 1.26, 1.6, 4.0)], 0.03, 400)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("level, ratio, wanted", [(3.0, 0.11, 4), (2.0, 0.06, 8), (2.0, 0.05, 10)])
 def test_exact_many_stops_below_resonance(level, ratio, wanted):
     """A slow drive: several stops per cycle, as the run counts them."""
@@ -127,6 +128,7 @@ def two_faces(seed=2, ratio=1.0):
     return modes, BaseSine(1.0, 1.2), static, ratio * static
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("seed, ratio", [(2, 1.0), (3, 0.7), (5, 1.0)])
 def test_exact_two_interfaces_against_a_run(seed, ratio):
     modes, drive, static, kinetic = two_faces(seed, ratio)
@@ -137,6 +139,7 @@ def test_exact_two_interfaces_against_a_run(seed, ratio):
     np.testing.assert_allclose(again.modal_rate[-1], found.start.v, atol=1e-11 * np.abs(again.modal_rate).max())
 
 
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize("seed, n, faces, ratio", [(1, 3, 2, 1.0), (2, 3, 2, 0.6), (4, 4, 3, 1.0), (6, 4, 3, 0.7)])
 def test_exact_derivative_of_the_map(seed, n, faces, ratio):
     """Pieces and saltations against central differences."""

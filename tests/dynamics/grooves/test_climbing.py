@@ -100,6 +100,7 @@ def test_exact_a_slide_one_way_is_coulombs_beyond_the_bonds(law):
     np.testing.assert_allclose(forces[50:-1, 0], true[50:-1], rtol=0, atol=2e-3 * true.max())
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_flat_grooves_are_the_law_itself(law):
     """Flanks of a slope of 1e-12 and the law of rigs without grooves."""

@@ -96,6 +96,7 @@ def twin(name, grooves, slide, dt, swing=STEADY):
     return np.array(forces), np.array(losses)
 
 
+@pytest.mark.share(0, 1)
 @pytest.mark.parametrize("swing", [STEADY, Swing(40.0, 2 * np.pi * 97, 0.7)])
 @pytest.mark.parametrize("name", NAMES)
 def test_exact_a_slow_slide_by_the_numpy_law(name, swing):
@@ -134,6 +135,7 @@ def test_exact_a_slow_slide_by_the_equation_of_bouc_and_wen():
     assert seen > 30
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("name", NAMES)
 def test_exact_flat_grooves_are_the_law_itself(name):
     """Flanks of a slope of 1e-12 and the law of rigs without grooves."""
@@ -144,6 +146,7 @@ def test_exact_flat_grooves_are_the_law_itself(name):
     np.testing.assert_allclose(on.response.force, alone.response.force, rtol=0, atol=1e-9 * LOAD)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("name", ["elements", "bouc-wen"])
 def test_always_a_stiff_law_is_coulombs_on_the_flank(name):
     """The amplitude goes to that of the exact stops and releases."""
@@ -153,6 +156,7 @@ def test_always_a_stiff_law_is_coulombs_on_the_flank(name):
     assert far > 1.5 * near and near > 1.5 * last and last < 0.03 * true
 
 
+@pytest.mark.share(0, 1)
 @pytest.mark.parametrize("lifted", [0.0, 0.5])
 @pytest.mark.parametrize("name", NAMES)
 def test_order_two_in_the_step_and_the_books_close(name, lifted):

@@ -45,6 +45,7 @@ def test_exact_without_friction_it_is_a_pendulum(angle):
     assert energy_balance(done.ledger) < 1e-9
 
 
+@pytest.mark.share(0, 2)
 @pytest.mark.parametrize("seed", [3, 10, 11, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 4, 5, 7, 8, 12,
                                                                                                 13))])
 def test_exact_a_rig_by_newtons_laws_and_dop853(seed):
@@ -68,6 +69,7 @@ def test_exact_a_rig_by_newtons_laws_and_dop853(seed):
     assert energy_balance(done.ledger) < 1e-9
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize(("seed", "pace"), [(3, 0.7), (13, 3.1), pytest.param(10, 0.7, marks=pytest.mark.slow),
                                             pytest.param(2, 1.0, marks=pytest.mark.slow)])
 def test_exact_a_load_that_swings_by_newtons_laws_and_dop853(seed, pace):
@@ -125,6 +127,7 @@ def runaway(case, cycles: int, steps: int) -> float:
     return high
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("seed", [25, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 4, 7, 10, 11, 12, 13, 15,
                                                                                            22))])
 def test_exact_the_runaway_level_by_newtons_laws_and_dop853(seed):

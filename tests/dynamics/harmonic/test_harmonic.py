@@ -202,6 +202,7 @@ def check_cycle(modes, drive, found, k, w, near, steps=4000):
     assert np.abs(forces - response.force).max() < 10 * near * np.abs(forces).max()
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("omega", [0.7, 1.2, 2.45])
 def test_exact_a_hundred_elements_and_five_modes_march(omega):
     modes, (k, w), drive = five(), many(), BaseSine(1.5, omega)
@@ -218,6 +219,7 @@ def test_exact_the_march_from_rest_ends_there():
     assert np.abs(rows[-301:-1, :5] - z.T).max() < 1e-3 * np.abs(z).max()
 
 
+@pytest.mark.share(0, 1, 2, 3)
 @pytest.mark.parametrize("stiffness, tolerance, near", [(10, 1e-3, 1e-3), (100, 1e-3, 1e-3), (10, 1e-5, 1e-5),
                                                         (100, 1e-5, 1e-5), (1000, 1e-4, 1e-4)])
 def test_exact_peaks_at_resonance(stiffness, tolerance, near):

@@ -90,6 +90,7 @@ def curve():
     return response(RIG, BaseSine(LEVEL, W), STIFF, (120.0, 200.0), stability=True)
 
 
+@pytest.mark.slow
 def test_exact_the_fold_without_friction(curve):
     """One harmonic against its formula, the multipliers turn unstable between the two folds, the peak on the backbone.
 
@@ -149,6 +150,7 @@ def test_exact_both_stable_branches_by_time_integration():
     assert growth == pytest.approx(vector[0][k].real**3, rel=1e-3) and growth > 1.2
 
 
+@pytest.mark.slow
 def test_exact_bistable_starts_with_friction():
     """Friction of 4 N: three motions at 152 Hz; two follow from sweeps up and down, the march confirms both."""
     drive = BaseSine(LEVEL, 2 * np.pi * 152)
@@ -224,6 +226,7 @@ def test_exact_the_determinant_is_liouvilles():
         assert np.linalg.det(monodromy_of(p, modes)) == pytest.approx(np.exp(-trace), rel=1e-5)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("omega", [0.8, 1.2])
 def test_exact_a_perturbed_march_of_elements(omega):
     """Five modes, 40 elements: the map of the modal state, memories as they are, by central differences of a march."""

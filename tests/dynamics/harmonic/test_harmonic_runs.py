@@ -46,6 +46,7 @@ def test_exact_measures_of_a_run_of_a_scene(law):
         assert mine[name] == pytest.approx(found[name].value, rel=near), name
 
 
+@pytest.mark.slow
 def test_exact_forty_points_of_five_modes_and_a_hundred_elements():
     """Each motion, marched for a cycle with its own memory, follows itself and closes."""
     modes, (k, w) = five(), many()

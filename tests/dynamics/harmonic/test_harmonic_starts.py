@@ -25,6 +25,7 @@ def test_exact_two_roots_between_neighbours_of_the_grid(middle, sign):
     assert not _brackets(lambda x: miss(x, -1e-4), grid, [miss(x, -1e-4) for x in grid])
 
 
+@pytest.mark.slow
 def test_exact_three_motions_near_the_end_of_the_upper_branch():
     """Two of them 8 % apart: between neighbours of the scan."""
     w, mass, limit = 2 * np.pi * 143, 0.884, 0.3 * 26 * 4.4482216152605

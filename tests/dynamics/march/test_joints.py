@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from march_paths import ALL
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
@@ -11,7 +12,7 @@ from patchfem.core import BaseSine, ModalBasis, Start
 from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.march.joints import Joint, JointsModel, cubic, interlock
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model, rate_model
+from patchfem.dynamics.march.models import coulomb_model, jenkins_model, list_model, points_model, rate_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws import elastic_plastic_kernels as kernels
 from patchfem.friction.laws.coulomb import Coulomb
@@ -42,11 +43,6 @@ def chain(stiffness, mass=1.0, zeta=0.0, faces=None, base=1.0):
                       shape[0], mass, None, rows, shapes=shape)
 
 
-# of all tests but one, so that they share one compiled loop
-ALL = (*(f"friction.laws.{law}_kernels" for law in ("coulomb", "elastic_plastic", "stretch", "tanh")),
-       "dynamics.contacts.spring_kernels")
-
-
 def coulomb(port, static, kinetic):
     return Joint(port, Coulomb(kinetic, static).element(1.0))
 
@@ -74,19 +70,24 @@ PAIRS = {
     "elastic-plastic": (jenkins_model([39.0 / 2e-6], [2e-6]), lambda: elastic_plastic(0, 39.0, 2e-6)),
     "bonds": (points_model(LAW, [1.0], [98.0]), lambda: bonds(0, LAW, 98.0)),
     "tanh": (rate_model(39.0, 1e-3), lambda: rate(0, 39.0, 1e-3)),
+    "list": (list_model(Bonds(0.4, 2e-6, 1.0, "report"), 39.0, np.inf, 0.0), None),  # which is a patch alone
 }
 
 
 @pytest.mark.parametrize("law, beside", [
-    ("coulomb", True), ("elastic-plastic", True), ("bonds", False), ("tanh", False),
+    ("coulomb", True), ("elastic-plastic", False), ("bonds", False), ("tanh", False),
+    pytest.param("list", True, marks=pytest.mark.slow),
+    pytest.param("elastic-plastic", True, marks=pytest.mark.slow),
     pytest.param("bonds", True, marks=pytest.mark.slow)])
 def test_exact_one_element_is_the_contact_of_its_own_loop(law, beside):
     """Among joints and, beside a spring of no strength, as the patch: patches of other laws differ by the law alone,
-    and each is a loop to compile."""
+    and each is a loop to compile; that of a list grows in test_room."""
     model, element = PAIRS[law]
     alone = march(one(), DRIVE, model, 6, 100, window=6)
-    turns = march(one(), DRIVE, JointsModel(None, (element(),), np.ones((1, 1)), 49.0, ALL), 6, 100, window=6)
-    others = [turns]
+    others = []
+    if element is not None:
+        joint = JointsModel(None, (element(),), np.ones((1, 1)), 49.0, ALL)
+        others.append(march(one(), DRIVE, joint, 6, 100, window=6))
     if beside:
         patch = JointsModel(model, (interlock(0, 1e-9, 1.0),), np.ones((1, 1)), 49.0, ALL if law == "coulomb" else ())
         others.append(march(one(), DRIVE, patch, 6, 100, window=6))

@@ -41,6 +41,7 @@ def test_exact_prescribed_path_of_points_is_the_recursion(growth):
     assert energies[1:, 1] == pytest.approx(run.stored @ area, abs=1e-12)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("order", [0.0, 1.0])
 def test_exact_prescribed_path_of_a_list_is_the_quadrature(order):
     law = Bonds(0.4, 1.0, order, "report", initial=0.0)
@@ -48,8 +49,8 @@ def test_exact_prescribed_path_of_a_list_is_the_quadrature(order):
     forces, _, _, _ = follow(list_model(law, 0.4 * 3.0, 1e9, 0.0), path)
     run = walk(Quadrature(law, tail=0.0), path, upper_pressure([3.0]), 0.3)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-10)
-    fine = np.interp(np.linspace(0, 40, 641), np.arange(41), path)
-    means = walk(Quadrature(law, tail=0.0), fine, upper_pressure([3.0]), 0.3 / 16).mean.reshape(40, 16).mean(axis=1)
+    fine = np.interp(np.linspace(0, 40, 321), np.arange(41), path)
+    means = walk(Quadrature(law, tail=0.0), fine, upper_pressure([3.0]), 0.3 / 8).mean.reshape(40, 8).mean(axis=1)
     assert forces[:-1, 1] == pytest.approx(means, abs=1e-2)  # where a bond's sign turns inside a step
     assert np.median(np.abs(forces[:-1, 1] - means)) < 1e-3
 
@@ -179,6 +180,7 @@ def test_order_of_the_march_with_a_growing_bond_length():
     assert np.log2(errors[0] / errors[2]) / 6 == pytest.approx(2, abs=0.15)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("stiffness, want", [(10, 0.249538145), (100, 0.285786312)])
 def test_order_and_steady_amplitude_of_a_jenkins_oscillator(stiffness, want):
     """Unit oscillator, damping 0.003, at resonance, limit 0.8 of the drive: steady peaks known from DOP853.

@@ -32,6 +32,7 @@ def marched(model, frames=0):
     return march(one_mode(OMEGA, 0.01, 1.0), BaseSine(5 * 9.80665, OMEGA), model, 3, 100, window=3, frames=frames)
 
 
+@pytest.mark.share(0, 1, 2)
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("beside", [False, True])
 def test_exact_a_march_whose_list_grows_is_that_with_room_from_the_start(law, beside):

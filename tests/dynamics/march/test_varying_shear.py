@@ -77,6 +77,7 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
     return np.array(slides), np.array(forces), loads
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("name", ["plastic", "bonds"])
 def test_exact_all_modes_are_the_nodes_themselves(name):
     """Every mode kept, sets that open and close: the march of the nodes behind the dense compliance."""
@@ -93,6 +94,7 @@ def test_exact_all_modes_are_the_nodes_themselves(name):
     assert done.outcome is None and balance(done, basis) <= 1e-11
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("name", ["plastic", "bonds", "growing"])
 def test_exact_a_still_load_is_the_march_on_the_preload(name):
     """normal = 1e-9: bonds as by shear modes of the preloaded set, elastic-plastic as by its exact parallel elements.

@@ -43,6 +43,7 @@ class Follower:
         return kernels.tangent.py_func(0, self.table, self.memory)[2]
 
 
+@pytest.mark.share(0, 4, 8, 11)
 @pytest.mark.parametrize("seed", range(12))
 def test_exact_memory_is_that_of_elements_one_by_one(seed):
     random = np.random.default_rng(seed)

@@ -173,6 +173,7 @@ SWEPT = [Sweep(0.15, 0.35, 30.0, 1.0), Sweep(0.35, 0.1, 25.0, 0.9, None, True), 
          Sweep(0.1, 0.25, 30.0, 0.0, 0.7, True)]
 
 
+@pytest.mark.share(1, 2, 4)
 @pytest.mark.parametrize("drive", [*SWEPT, Recorded(np.array([0.0, 2.0, 3.5, 9.0, 9.5, 20.0]), np.array(
     [0.0, 1.5, -1.0, 0.7, -2.0, 1.0]), 2 * np.pi)], ids=["linear", "log", "displacement", "log displacement", "record"])
 def test_exact_sweeps_and_records_against_dop853(drive):

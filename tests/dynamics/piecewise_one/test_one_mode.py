@@ -6,8 +6,10 @@ import pytest
 from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, Start
 from patchfem.dynamics.piecewise import histories
-from patchfem.dynamics.piecewise.elements import elements_of
+from patchfem.dynamics.piecewise.elements import elements_of, table_of, virgin
+from patchfem.dynamics.piecewise.plant import clock_of
 from patchfem.dynamics.piecewise.steady import settled
+from patchfem.dynamics.piecewise_one import names_kernels as names
 from patchfem.dynamics.piecewise_one import room
 from patchfem.dynamics.piecewise_one.steady import settled_alone
 from patchfem.response.measures import energy_balance
@@ -80,6 +82,85 @@ def test_exact_a_run_that_stops_for_want_of_rows_is_the_run(monkeypatch):
 def test_exact_one_mode_as_any_modes_many(seed):
     modes, drive, k, y = random_run(seed)
     same(modes, drive, [elements_of(k, y)], start=Start(np.array([0.3]), np.array([-0.2])))
+
+
+SETTLING = [(1, 0.3), (24, 0.3), (1, 1.3)]  # elements and frequency of runs that settle within 60 cycles
+
+
+def settling(count: int, omega: float) -> tuple:
+    """(modes, drive, Elements) of a damped mode behind elements that slip."""
+    y = np.linspace(0.1, 0.5, count)
+    return basis(1.0, 0.1), BaseSine(1.5, omega), [elements_of(np.full(count, 2.0 / count), y)]
+
+
+@pytest.mark.parametrize(("count", "omega"), SETTLING)
+def test_exact_a_motion_that_has_settled_repeats_to_the_last_bit(count, omega):
+    """Cycle after cycle is the same, and still that of the loop which never lets it repeat; a push that grows ends
+    it."""
+    modes, drive, groups = settling(count, omega)
+    alone, any_modes = both(modes, drive, groups, 80)
+    last = alone.amplitudes[-10:]
+    np.testing.assert_array_equal(last, np.repeat(last[:1], 10, axis=0))
+    size = np.abs(last).max()
+    np.testing.assert_allclose(alone.amplitudes, any_modes.amplitudes, rtol=0, atol=1e-13 * size)
+    np.testing.assert_allclose(alone.end[0].z, any_modes.end[0].z, rtol=0, atol=1e-13 * size)
+    for name in ("work_in", "viscous", "friction", "stored"):
+        assert alone.ledger[name] == pytest.approx(any_modes.ledger[name], rel=1e-12, abs=1e-13)
+    assert energy_balance(alone.ledger) <= 1e-13
+    grown, other = both(modes, levels([1.5, 1.5 * (1 + 1e-9)], omega, 60, True), groups, 120)
+    assert np.all(np.ptp(grown.amplitudes[55:60], axis=0) == 0) and np.ptp(grown.amplitudes[58:], axis=0).max() > 0
+    np.testing.assert_allclose(grown.amplitudes, other.amplitudes, rtol=0, atol=1e-13 * size)
+
+
+def test_exact_states_a_last_digit_apart_are_one_and_others_not():
+    """By the distance of a state from that a period before, and by how fast it fell; so does a turning place."""
+    come_back = load("dynamics.piecewise_one.repeat_kernels").come_back
+    table = table_of([elements_of([1.0, 2.0], [0.1, 0.3])])
+    for apart, fell, place, same in ((1e-15, 50, 0.0, True), (1e-15, 50, 1e-13, False), (1e-13, 50, 0.0, False),
+                                     (1e-15, 120, 0.0, False), (1e-15, 50, 1e-15, True)):
+        memory, clock = virgin(table, np.array([0.5])), clock_of(BaseSine(1.0, 1.0), 1)
+        last, motion = room.last_of(3), np.array([[1.0], [0.3]])
+        come_back(motion, 1.0, 1.0, memory, clock, last)  # the first state of all
+        assert last[0, names.REPEATS] == 0
+        clock.now[0], motion[0, 0] = fell, 1 + apart
+        memory.at[0, 0] += place
+        come_back(motion, 1.0, 1.0, memory, clock, last)
+        assert last[0, names.REPEATS] == same and (motion[0, 0] == 1.0) == same
+        assert memory.place[0] == (1.0 if same else 0.5) and (memory.at[0, 0] == 0.5) == (same or place == 0.0)
+
+
+@pytest.mark.share(0, 4, 7)
+@pytest.mark.parametrize("seed", range(8))
+def test_exact_short_way_to_a_yield_is_the_closed_form(seed):
+    """Time, speed and drive where the coordinate has gone a way, and the energies until then, beside the sum of free
+    and forced motion; no short way where the coordinate turns first, where it is long, or beyond a border."""
+    short, rng, node = load("dynamics.piecewise_one.short_kernels"), np.random.default_rng(seed), np.polynomial.legendre
+    place, weight = node.leggauss(20)
+    alpha, omega, beta, phase = rng.uniform(0, 0.3), rng.uniform(0.2, 1), rng.uniform(1, 4), rng.uniform(0.2, 2.9)
+    gain, v, constant = rng.uniform(-1, 1), rng.choice([-1, 1]) * rng.uniform(1, 2), rng.uniform(0, 0.5)
+    own, drive = np.sqrt(beta - alpha**2 / 4), np.exp(1j * phase)
+    response, rest = drive / (beta - omega**2 + 1j * alpha * omega), (gain - drive.imag) / beta
+    first = -rest - response.imag
+    second = (v - (1j * omega * response).imag + alpha / 2 * first) / own
+
+    def motion(t):
+        forced, turn = response * np.exp(1j * omega * t), np.exp((1j * own - alpha / 2) * t) * (first - 1j * second)
+        return (rest + forced.imag + turn.real, (1j * omega * forced).imag + ((1j * own - alpha / 2) * turn).real)
+
+    span = rng.uniform(0.005, 0.045) / np.sqrt(beta)
+    regime, went = (alpha, beta, gain, constant, omega), motion(span)[0]
+    push, side = drive.imag, drive.real
+    told = short.to_yield(went, v, push, side, regime, 1.0)
+    later = np.exp(1j * (phase + omega * span))
+    assert told == pytest.approx((span, motion(span)[1], later.imag, later.real), rel=2e-13)
+    assert short.to_yield(went, v, push, side, regime, 0.99 * span)[0] == 0.0
+    assert short.to_yield(-went, v, push, side, regime, 1.0)[0] == 0.0
+    assert short.to_yield(v / np.sqrt(beta), v, push, side, regime, 10.0)[0] == 0.0
+    time = span * (1 + place) / 2
+    speed, power = motion(time)[1], np.sin(phase + omega * time) + constant
+    work, lost = (span / 2 * float(weight @ part) for part in (power * speed, alpha * speed**2))
+    found = short.short_energies(span, went, regime, (v, push, side), (told[1], told[2], told[3]))
+    assert found == pytest.approx((work, lost, abs(work)), rel=1e-12)
 
 
 def test_exact_a_push_that_stays_and_levels_one_after_the_other():

@@ -32,6 +32,7 @@ CASES = {  # law, load, damping, drive over resonance, drive, motion of the base
     "soft": (Bonds(0.3, 4e-5), 60.0, 0.01, 1.1, 30.0, False)}
 
 
+@pytest.mark.share(3, 4)
 @pytest.mark.parametrize("name", CASES)
 def test_exact_peaks_are_those_of_the_motion_seen_closely(name):
     """Of "tanh" the largest acceleration lay in steps that were left out after a look at their ends and middle, and

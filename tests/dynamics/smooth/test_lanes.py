@@ -30,6 +30,7 @@ def test_exact_series_are_sine_and_exponential():
     assert np.array([series.gone(one) for one in x]) == pytest.approx(-np.expm1(-x), rel=4e-15)
 
 
+@pytest.mark.share(0, 1, 3)
 @pytest.mark.parametrize("name", LAWS)
 def test_exact_forces_without_branches_are_those_of_the_law(name):
     law = element(LAWS[name])
@@ -84,6 +85,7 @@ def numpy_series(kernels, given: dict, z: float, v: float):
     return np.array(v), force
 
 
+@pytest.mark.share(0, 1, 3)
 @pytest.mark.parametrize("name", LAWS)
 def test_exact_a_series_of_eight_is_that_in_numpy(name):
     law = element(LAWS[name])
@@ -105,6 +107,7 @@ def test_exact_a_series_of_eight_is_that_in_numpy(name):
         assert at["z"][lane] == pytest.approx(z + 3e-5 * (rates / (powers + 1)) @ end**powers, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_exact_a_step_against_tanh_alone_is_its_closed_form():
     """m v' = -F tanh(v/w): sinh(v/w) decays as exp(-F t/(m w))."""
     law, w = element(Rate(0.3, 1e-2)), 1e-2
@@ -149,8 +152,36 @@ def test_exact_a_lane_moves_as_the_loop_does(name, slide):
     assert len(one) == len(other) > 20
     assert np.all(abs(one - other).max(axis=0) <= 1e-7 * np.maximum(abs(other).max(axis=0), 1e-9))
     one, other = beside.book(), alone.book()
-    for key in ("work_in", "viscous", "power", "friction", "peak_stored"):  # |power| has kinks within steps
-        assert one[key] == pytest.approx(other[key], rel={"peak_stored": 0.1, "power": 1e-3}.get(key, 1e-9)), key
+    for key in ("work_in", "viscous", "friction", "peak_stored"):
+        assert one[key] == pytest.approx(other[key], rel=0.1 if key == "peak_stored" else 1e-9), key
+
+
+def through(run, times):
+    """The energy book [J] of a Run that ends a step at each of the times [s], and its rate [m/s] there (k,)."""
+    rates = []
+    for time in times:
+        run.until(time)
+        rates.append(run.moving.y[1])
+    return run.book(), np.array(rates)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_exact_the_power_of_the_drive_is_summed_on_both_sides_of_its_zeros(name):
+    """Within a step |power| bends only where the drive passes zero: its rate has one sign between two reversals.
+
+    Six Gauss points miss a bend by e(s) h^2 |slope|, at the share s of a step of h; a step ends at each zero: nothing.
+    """
+    zeros = PERIOD / 2 * np.arange(1, 23)
+    runs = [Run(ONE, SINE, element(LAWS[name]), 12, 1e-11) for _ in range(3)]
+    runs[1].swift = False
+    (split, rates), (other, _) = through(runs[0], zeros), through(runs[1], zeros)
+    assert split["power"] == pytest.approx(other["power"], rel=1e-9)
+    runs[2].until(zeros[-1])
+    shares, x, weights = np.linspace(0, 1, 1001), (1 + lane_step.NODES) / 2, lane_step.WEIGHTS / 2
+    missed = abs(abs(x - shares[:, None]) @ weights - (shares**2 + (1 - shares)**2) / 2).max()
+    slopes, longest = MASS * SINE.acceleration * OMEGA * abs(rates[:-1]), 1.2 / OMEGA  # TURN of `lane_kernels`
+    bar = missed * longest**2 * slopes.sum() + 1e-9 * split["power"]
+    assert missed < 0.01 and abs(runs[2].book()["power"] - split["power"]) <= bar < 0.01 * split["power"]
 
 
 def together(runs):
@@ -161,6 +192,7 @@ def together(runs):
                    for name in kind._fields)) for kind, parts, shared in pairs]
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("name", ["bonds", "tanh"])
 def test_exact_one_of_many_moves_as_alone_to_the_last_bit(name):
     """More motions than lanes, of other loads, lengths and tolerances."""
@@ -222,9 +254,45 @@ def test_always_other_motions_stay_with_the_loop(modes, law, drive, travel):
     assert not Run(modes, drive, element(law), 2, 1e-6, travel).swift
 
 
+@pytest.mark.slow
 def test_always_a_force_of_the_speed_is_met_without_refused_tries():
     """tanh with v_0 four thousandths of the peak speed: more than one try in two was refused."""
     run = Run(ONE, BaseSine(49.0, OMEGA * 0.98), Rate(0.3, 5e-3).element(30.0), 60, 1e-9)
     run.until(50 * PERIOD)
     done, refused = run.kept.tally[13:15]
     assert refused < 0.25 * done
+
+
+def test_exact_nodes_of_a_creeping_step_are_those_of_radau():
+    """Polynomials up to their degree are met, integrals at the end up to twice that, and what is stiff dies out."""
+    from patchfem.dynamics.smooth import creep_kernels as creep
+
+    n, places = creep.NODES, creep.PLACES
+    powers = places[:, None]**np.arange(n + 1)
+    k = np.arange(1, n + 1)
+    assert creep.SLOPES @ powers[:, 1:] == pytest.approx(k * powers[1:, :-1], rel=1e-9, abs=1e-10)
+    assert creep.AREAS @ powers == pytest.approx(places[1:, None] * powers[1:] / np.arange(1, n + 2), rel=1e-12)
+    assert creep.POWERS @ powers == pytest.approx(np.eye(n + 1), abs=1e-9)
+    butcher = np.linalg.inv(creep.SLOPES[:, 1:])  # of v' = f(t) from v = 0: the weights stand in its last row
+    high = np.arange(2 * n - 1)
+    assert butcher[-1] @ places[1:, None]**high == pytest.approx(1 / (high + 1), rel=1e-10)
+    assert abs(1 - butcher[-1] @ np.linalg.solve(butcher, np.ones(n))) < 1e-11  # L-stable
+    legendre = np.polynomial.legendre.legvander(2 * places - 1, n)
+    assert creep.LAST @ legendre == pytest.approx(np.eye(n + 1)[-1], abs=1e-12)
+
+
+@pytest.mark.parametrize("push", [30.0, 40.0])
+def test_exact_a_motion_that_creeps_takes_few_steps_and_is_that_of_the_loop(push):
+    """Held by 36 N, with lambda 3e5/s: a series that must follow it took 360 and 210 steps a cycle."""
+    beside, alone = (Run(ONE, BaseSine(push, OMEGA), LAWS["stiff"].element(120.0), 6, one) for one in (1e-9, 1e-12))
+    alone.swift = False
+    for run in (beside, alone):
+        run.until(5.3 * PERIOD)
+    assert beside.kept.tally[13] < (40 if push < 36 else 120) * 5.3
+    size = abs(alone.kept.cycles[:2, :5]).max()
+    assert abs(beside.moving.y[0] - alone.moving.y[0]) < 1e-8 * size
+    assert beside.moving.y[1] == pytest.approx(alone.moving.y[1], rel=1e-6)
+    assert beside.moving.y[2:] == pytest.approx(alone.moving.y[2:], rel=1e-8)
+    one, other = (np.concatenate(run.turns)[:, :5] for run in (beside, alone))
+    assert len(one) == len(other) > 8
+    assert np.all(abs(one - other).max(axis=0) <= 1e-7 * np.maximum(abs(other).max(axis=0), 1e-9))

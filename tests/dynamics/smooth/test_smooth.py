@@ -7,9 +7,9 @@ from march_paths import OMEGA, one_mode
 from scipy.integrate import simpson
 
 from patchfem.core import BaseSine, ModalBasis, Outcome, Start
+from patchfem.dynamics import tableau_kernels as tableau
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
-from patchfem.dynamics.smooth import tableau_kernels as tableau
 from patchfem.dynamics.smooth.run import Run, simulate
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
@@ -94,6 +94,7 @@ def test_exact_growing_bonds_are_their_rate_equations():
     assert motion < 1e-9 and force < 1e-6
 
 
+@pytest.mark.slow
 def test_exact_lugre_is_its_rate_equation():
     motion, force = compared(ONE, LUGRE, ref.lugre)
     assert motion < 1e-9 and force < 1e-5
@@ -108,6 +109,7 @@ def test_exact_other_laws_are_their_rate_equations(law, form, kink):
     assert motion < 1e-9 and force < 1e-7
 
 
+@pytest.mark.share(0, 1, 3)
 @pytest.mark.parametrize("drive", [
     drives.Sweep(100.0, 160.0, 0.02, 49.0), drives.Sweep(160.0, 100.0, 0.02, displacement=6e-5, logarithmic=True),
     drives.levels([30.0, 60.0], OMEGA, 1.0),

@@ -66,6 +66,7 @@ def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
     assert run.moving.y[3] + run.moving.y[4] == pytest.approx(0.5 * 0.7626 * (omega * 4.631e-5)**2, rel=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-11])
 def test_always_a_motion_held_at_a_distance_is_not_refused_for_its_round_off(tolerance):
     """Of a release under a stiff Bouc-Wen law, held 5.7e-5 m away: its rate decays to 1e-13 of omega times that, the

@@ -14,6 +14,33 @@ from scipy.io import loadmat
 from patchfem.core import PatchfemError
 from patchfem.export.lab.series import Column, Histories
 from patchfem.export.lab.universal import write, write_sets
+from patchfem.inputs.loops import read_loop
+
+TWO_MODES = """\
+[normal]
+load = "50 N"
+[friction]
+law = "coulomb"
+static = 0.3
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "axial"
+slide = 1.0
+frequency = "50 Hz"
+damping = 0.05
+[[structure.mode]]
+name = "yaw"
+frequency = "90 Hz"
+damping = 0.05
+slide = 0.4
+output = -0.3
+[drive]
+kind = "base"
+frequency = "40 Hz"
+acceleration = "5 g"
+cycles = 60
+"""
 
 
 def functions(path):
@@ -72,6 +99,27 @@ def test_exact_histories_of_a_run_in_every_format(bench, tmp_path):
     assert units["length"] == units["force"] == 1.0 and units["units_code"] == 1
 
 
+@pytest.mark.share(0)
+@pytest.mark.parametrize("method", ["exact", "march"])
+def test_exact_the_loop_over_the_slide_encloses_the_loop_area(method, tmp_path):
+    """The output moves otherwise than the interface where there are modes besides the first."""
+    (tmp_path / "rig.toml").write_text(TWO_MODES + f'[accuracy]\nmethod = "{method}"\n')
+    answer = cli("run", tmp_path / "rig.toml", "-o", tmp_path / "out", "-q", "--json", "--no-page")
+    assert answer.code == 0, answer.err
+    area = json.loads(answer.out)["measures"]["loop_area"]
+    with h5netcdf.File(tmp_path / "out/result.nc", "r") as file:
+        assert file["slide"].attrs["units"] == "m" and file["slide"].dimensions == ("time",)
+        time, slide, output, force = (np.asarray(file[name][...]) for name in (
+            "time", "slide", "relative_displacement", "friction_force"))
+    last = slice(np.searchsorted(time, time[-1] - 1 / 40 - 1e-9), None)
+    enclosed, other = (np.trapezoid(force[last], x[last]) for x in (slide, output))
+    assert abs(enclosed - area["value"]) <= area["error"] + area["floor"]
+    assert abs(other - area["value"]) > 10 * (area["error"] + area["floor"])
+    assert cli("export", tmp_path / "out", "-o", tmp_path / "a.uff", "--histories").code == 0
+    loops = [one for name, one in functions(tmp_path / "a.uff").items() if " over " in name]
+    assert len(loops) == 1 and loops[0]["id1"] == "friction_force over slide" and np.array_equal(loops[0]["x"], slide)
+
+
 def test_exact_the_announced_bytes_are_those_that_follow(bench, tmp_path):
     """Read by the layout alone: line 1 of a binary dataset counts the bytes after its eleven lines of text."""
     assert cli("export", bench, "-o", tmp_path / "a.uff").code == 0
@@ -121,3 +169,30 @@ def test_refuses_what_the_format_would_change(tmp_path):
     with pytest.raises(PatchfemError, match="force has values that are not finite"):
         write(tmp_path / "a.uff", bad)
     assert cli("export", tmp_path, "-o", tmp_path / "a.uff").code == 0
+
+
+def test_exact_round_trip_of_an_exported_run_to_a_fit_and_an_import(bench, tmp_path):
+    """What a run exports is a measured loop as it stands: its own values come back, by every name of a column."""
+    assert cli("export", bench, "-o", tmp_path / "loop.csv", "--histories").code == 0
+    text = (tmp_path / "loop.csv").read_text()
+    measured = read_loop(tmp_path / "loop.csv")
+    with h5netcdf.File(bench / "result.nc", "r") as file:
+        slide, force = (np.asarray(file[name][...]) for name in ("relative_displacement", "friction_force"))
+    assert np.array_equal(measured.displacement, slide - slide[0]) and np.array_equal(measured.reading, force)
+    assert measured.quantity == "force" and "normal_load" in measured.labels
+    assert cli("import", tmp_path / "loop.csv", "-o", tmp_path / "lab.csv").code == 0
+    again = read_loop(tmp_path / "lab.csv")
+    assert np.array_equal(again.displacement, measured.displacement) and np.array_equal(again.reading, force)
+    assert (tmp_path / "lab.csv").read_text().startswith("time [s],displacement [m],force [N]\n")
+    (tmp_path / "both.csv").write_text(text.replace("relative_velocity [m s-1]", "slide [mm]", 1))
+    own = np.loadtxt(tmp_path / "both.csv", delimiter=",", skiprows=1)[:, 2]
+    assert np.allclose(read_loop(tmp_path / "both.csv").displacement, 1e-3 * (own - own[0]), rtol=1e-12)
+
+
+def test_refuses_a_loop_without_a_displacement_or_a_force(tmp_path):
+    (tmp_path / "a.csv").write_text("time [s],force [N]\n0,0\n1,1\n")
+    with pytest.raises(PatchfemError, match=r"a\.csv:1: a header like .*no column displacement"):
+        read_loop(tmp_path / "a.csv")
+    (tmp_path / "b.csv").write_text("time [s],slide [m]\n0,0\n1,1\n")
+    with pytest.raises(PatchfemError, match=r"b\.csv:1: no column force"):
+        read_loop(tmp_path / "b.csv")

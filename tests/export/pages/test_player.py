@@ -2,6 +2,7 @@
 
 import base64
 import json
+from time import monotonic
 
 import h5netcdf
 import numpy as np
@@ -213,9 +214,15 @@ def test_exact_in_a_browser_the_pointer_reads_values(opened, film):
 
 
 def test_exact_in_a_browser_both_themes_a_narrow_window_and_paper(opened):
-    def shown(dark: bool, media: str = "") -> tuple:
+    def until(read, right):
+        """What is read once it is right, 5 s later at most: a busy browser draws later."""
+        end = monotonic() + 5
+        while not right(found := read()) and monotonic() < end:
+            pass
+        return found
+
+    def shown() -> tuple:
         """The colour of the words, and the mean grey of what is drawn on the canvas of the curve."""
-        opened.themed(dark, media)
         return tuple(opened.js("""new Promise(done => setTimeout(() => {
             const at = document.getElementById('stage-curve'), all = at.getContext('2d').getImageData(0, 0, at.width,
                 at.height).data;
@@ -224,20 +231,26 @@ def test_exact_in_a_browser_both_themes_a_narrow_window_and_paper(opened):
                 sum += all[k + 3] * (all[k] + all[k + 1] + all[k + 2]) / 3; weight += all[k + 3]; }
             done([getComputedStyle(document.getElementById('stage-told')).color, sum / weight]); }, 100))"""))
 
-    light, dark = shown(False), shown(True)
+    opened.themed(False, "")
+    light = until(shown, lambda found: found[0] == "rgb(28, 36, 48)" and found == shown())
+    opened.themed(True, "")
+    dark = until(shown, lambda found: found[0] == "rgb(228, 233, 239)" and found[1] > light[1] + 20)
     assert light[0] == "rgb(28, 36, 48)" and dark[0] == "rgb(228, 233, 239)" and dark[1] > light[1] + 20
-    drawn = opened.js("document.documentElement.dataset.drawn")
-    paper = shown(True, "print")  # dark inks on white paper, whatever the reader's theme is
-    assert drawn == "dark" == opened.js("document.documentElement.dataset.drawn")
+    themed = "document.documentElement.dataset.drawn"
+    assert until(lambda: opened.js(themed), "dark".__eq__) == "dark"
+    opened.themed(True, "print")  # dark inks on white paper, whatever the reader's theme is
+    paper = until(shown, lambda found: found[0] == light[0] and abs(found[1] - light[1]) < 10)
+    assert opened.js(themed) == "dark"
     assert "invert" in opened.js("getComputedStyle(document.querySelector('.chart')).filter")
     assert paper[0] == light[0] and abs(paper[1] - light[1]) < 10, (light, dark, paper)
     assert opened.printed().startswith(b"%PDF")
-    assert shown(False) == light
+    opened.themed(False, "")
+    assert until(shown, lambda found: found == light) == light
     assert opened.js("getComputedStyle(document.querySelector('.chart')).filter") == "none"
     opened.sized(420, 900)
     try:
-        wide = opened.js("new Promise(done => setTimeout(() => done(document.documentElement.scrollWidth), 100))")
-        assert wide <= 420
+        wide = "new Promise(done => setTimeout(() => done(document.documentElement.scrollWidth), 100))"
+        assert until(lambda: opened.js(wide), lambda found: found <= 420) <= 420
     finally:
         opened.sized(1200, 900)
 

@@ -52,10 +52,27 @@ def test_always_texts_from_outside_are_shown_as_texts(table):
     assert whole.count("</script>") == 4
 
 
+@pytest.mark.parametrize("value, error, shown", [
+    (15.3131, 0.02, "15.313 ± 0.020"), (1.0, 1e-9, "1"), (0.0, 0.0, "0"), (2.0422, np.nan, "2.0422"),
+    (np.nan, 0.1, "&ndash;"), (0.12345678, 1e-4, "0.12346 ± 0.00010"), (-3.0, 7.0, "-3.0 ± 7.0")])
+def test_exact_a_case_shows_its_error_where_its_digits_do_not(table, value, error, shown):
+    one = table["measures"]["relative_displacement_amplitude"]
+    one |= {"unit": "1", "values": np.full(12, value), "errors": np.full(12, error)}
+    one["values"][3] = 7.25  # so that the measure changes from case to case
+    assert page(table).count(f"<td class=n>{shown}</td>") >= 11
+
+
+def test_exact_the_scene_is_named_beneath_the_keys_that_were_swept(table):
+    text = own_part(page(table | {"of": "<a> rig tilted by 0.1 mrad"}))
+    assert "<p class=soft>Scene: &lt;a&gt; rig tilted by 0.1 mrad &middot; patchfem " in text
+
+
 def test_always_a_measure_without_any_value_is_not_offered_and_a_failed_case_is_told(table):
     text = page(table)
     assert "loop_area" not in [one["name"] for one in data_of(text)["measures"]]
     assert "<b>12 cases</b> over contact.tilt.angle × normal.load: 10 steady, 1 failed, 1 grows." in text
+    assert "<i>grows</i>: The motion still rises and no bounded steady motion was found" in text
+    assert "<i>steady</i>" not in text and "<i>failed</i>" not in text
     assert "1 case failed: normal.load: &lt;refused&gt;" in text
 
 
@@ -123,6 +140,15 @@ def test_exact_a_script_cannot_end_its_element():
     assert data_of(hostile) == {"x": "</script><!--"}
 
 
+@pytest.mark.parametrize("off", [slice(0, 3), slice(9, 12), slice(None)], ids=["first", "last", "all"])
+def test_always_a_browser_draws_a_sweep_that_does_not_settle_at_an_end(table, browser, off):
+    """A shading without a left or right end once left the picture out."""
+    table["outcome"] = np.array(table["outcome"], object)
+    table["outcome"][off] = "grows"
+    seen = browser(page(table))
+    assert re.search(r'<div id="?chart"?[^>]*>\s*<div', seen), "no picture in its place"
+
+
 @pytest.mark.parametrize("shown", ["lines", "map", "cloud"])
 def test_always_a_browser_draws_it(table, browser, shown):
     table["grid"] = shown != "cloud"
@@ -134,7 +160,7 @@ def test_always_a_browser_draws_it(table, browser, shown):
     words = re.search(r'<p id="?means"?[^>]*>(.*?)</p>', seen, re.S)[1]
     # grid: the loads are lines of their own, so the highest is that of 40 N at 1 mrad: 1e-5 * 5 * 4 = 200 um
     where = "" if shown == "cloud" else ", normal.load 40 N"
-    assert f"highest 200 um at contact.tilt.angle 1 mrad{where}" in words
+    assert f"highest 200.0 ± 2.0 um at contact.tilt.angle 1 mrad{where}" in words
     assert "2 of 12 cases did not settle" in words
     assert re.search(r'<div id="?chart"?[^>]*>\s*<div', seen), "no picture in its place"
 
@@ -144,7 +170,8 @@ def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_error(
     measures = {"loop_area": ([lost] * 3, [lost] * 3, "J"),
                 "pressure_peak": ([2e6, 3.1415926e6, 9e9], [2e3, lost, 1e9], "Pa")}
     outcome = ["steady", "steady", "grows"]
-    assert span(measures, outcome) == "Pressure peak runs from 2 MPa to 3.142 MPa, numerical error at most 2 kPa."
+    assert span(measures, outcome) == "Pressure peak of the settled cases runs from 2 MPa to 3.142 MPa, numerical " \
+        "error at most 2 kPa."
     measures["loop_area"] = ([1e-3, lost, lost], [lost] * 3, "J")
     assert span(measures, outcome) == "Loop area is 1 mJ throughout."
     assert span({"pressure_peak": ([lost, lost, 9e6], [0.0] * 3, "Pa")}, outcome) == \
@@ -181,6 +208,8 @@ def test_exact_a_word_has_one_number_on_the_page_of_several_sweeps(table):
 
 
 @pytest.mark.parametrize("values, log", [((1.0, 10.0), True), ((1.0, 9.9), False), ((-1.0, 10.0), False),
-                                         ((0.0, 1.0), False), (("a", "b"), False), ((5, 1, 60), True)])
+                                         ((0.0, 1.0), False), (("a", "b"), False), ((5, 1, 60), True),
+                                         ((0.0, 1e-6, 1e-5, 1e-4), True), ((1e-3, 0.0, 1e-5), True), ((0.0,), False),
+                                         (tuple(range(21)), False), ((0.0, 1.0, 9.0), False)])
 def test_exact_an_axis_of_a_decade_or_more_is_logarithmic(values, log):
     assert wide(values) is log

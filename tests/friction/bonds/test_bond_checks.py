@@ -80,6 +80,7 @@ def test_order_of_the_fast_start_is_two():
 
 # ---- loops
 
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize("ratio, area", [(0.1, 1.328022e-3), (1, 0.953623), (5, 16.000363), (10, 36.0)])
 def test_exact_stretch_loop_with_any_number_of_steps(ratio, area):
     for per_stroke in (2, 14):
@@ -98,6 +99,7 @@ def test_exact_stretch_loop_by_the_sum_over_bonds(ratio):
     assert work == pytest.approx(want, rel=1e-11) and -end == pytest.approx(force, rel=1e-12)
 
 
+@pytest.mark.share(1, 2)
 @pytest.mark.parametrize("ratio, area, within", [(0.1, 2.659583e-2, 1e-4), (1, 2.149259, 4e-7), (5, 18.0, 4e-7),
                                                  (10, 38.0, 4e-7)])
 def test_exact_printed_loop_of_order_zero(ratio, area, within):
@@ -121,6 +123,7 @@ def test_exact_reading_report_creates_energy():
         assert run.mean[:, 0] @ np.diff(path) / (4 * 0.01 * 20) == pytest.approx(want, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_exact_reading_report_creates_energy_in_a_steady_loop_of_order_two():
     path = triangle(0.1, 75, 2)
     work, _, _ = last_cycle_work(Quadrature(bonds(2.0, "report", 0.0)), path, 4)
@@ -142,6 +145,7 @@ def test_exact_reversal_after_a_long_slide(order, reading, want):
         assert force == pytest.approx(reversal_force(back, 1.0, order, reading), abs=1e-12)
 
 
+@pytest.mark.share(0, 2, 5)
 @pytest.mark.parametrize("order", [0.5, 1.5, 2.0])
 @pytest.mark.parametrize("reading", ["stretch", "report"])
 def test_exact_reversal_of_other_orders(order, reading):

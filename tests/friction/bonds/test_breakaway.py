@@ -22,6 +22,7 @@ def bonds(share, order=1.0, **more):
     return Bonds(1.0, 1.0, order, breakaway=share, **more)
 
 
+@pytest.mark.share(3, 6, 8, 13)
 @pytest.mark.parametrize("share", [0.0, 0.2, 0.7, 0.999])
 @pytest.mark.parametrize("amplitude", [0.1, 0.9, 1.5, 8.0])
 def test_exact_loop_with_breakaway(share, amplitude):
@@ -44,6 +45,7 @@ def test_exact_breakaway_of_the_whole_length_is_elastic_plastic(engine):
     assert soft.mean == pytest.approx(hard.mean, abs=1e-11)
 
 
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize("growth", [{}, GROWTH])
 @pytest.mark.parametrize("share", [0.1, 0.6])
 def test_exact_recursion_with_breakaway_is_the_sum_over_bonds(share, growth):

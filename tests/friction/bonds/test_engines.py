@@ -144,6 +144,7 @@ def test_exact_march_of_a_list_replayed_by_the_numpy_law(reading, order):
     assert book["friction"] == pytest.approx(book["dissipated"] - book["created"], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_exact_march_of_merged_and_direct_lists_agree():
     law = Bonds(0.4, 2e-6, 1.0, "report", 0.6, 10.0, 1e-7, 1e-4, 0.0)
     limit = 0.4 * 98.0665

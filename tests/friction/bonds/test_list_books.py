@@ -41,6 +41,7 @@ def books_close(seed, count, reading, order, engine):
             assert energies[:, 1].min() >= -1e-4
 
 
+@pytest.mark.share(0, 3, 6, 9, 11, 14, 17, 20)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("reading, order", LAWS)
 def test_always_no_step_of_a_stretch_list_creates_and_the_ledger_closes(reading, order, engine):
@@ -56,6 +57,7 @@ def test_always_both_books_on_100_random_paths(reading, order, engine):
     books_close(2, 100, reading, order, engine)
 
 
+@pytest.mark.share(0, 3, 6, 9, 11, 14, 17, 20)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("reading, order", LAWS)
 def test_order_of_the_second_book_of_a_list_is_two(reading, order, engine):

@@ -60,6 +60,7 @@ def test_exact_direct_of_the_printed_law_is_the_quadrature(order, initial):
     assert got.ahead == pytest.approx(got.after, abs=within)
 
 
+@pytest.mark.share(0, 3, 6, 8, 11)
 @pytest.mark.parametrize("order, within",
                          [(0.0, 2e-6), (0.5, 1e-4), (0.25, 2e-4), (1.5, 2e-5), (2.0, 2e-5), (3.0, 1e-5)])
 @pytest.mark.parametrize("growth", [{}, GROWTH])
@@ -94,6 +95,7 @@ def test_exact_direct_of_growing_bonds_is_the_sum_by_hand(order, within, initial
     assert got.ahead == pytest.approx(got.after, abs=within)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("order", [-0.5, -0.9])
 def test_exact_young_growing_bonds_of_negative_order_are_the_sum_by_hand(order):
     """A young bond's length is proportional to its path, so its force is smooth: a rule made for the power of the path
@@ -145,6 +147,7 @@ def test_exact_stored_energy_is_the_sum_by_hand(reading, order, growth):
         assert got.stored[k - 1] == pytest.approx(energy_by_hand(law, path[:k + 1], 0.4), abs=within)
 
 
+@pytest.mark.share(0, 1, 2)
 @pytest.mark.parametrize("reading, order", [("report", 0.0), ("report", 1.0), ("stretch", 2.0), ("stretch", 0.5)])
 def test_exact_mean_is_the_integral_of_the_force(reading, order):
     """Work of a step = integral of the force over it: short steps by Simpson, long ones on doubling panels."""
@@ -214,6 +217,7 @@ def test_order_of_the_merge_width_is_two(reading, order, growth):
     assert held[1] < held[0] < 500 < whole.tally[10]
 
 
+@pytest.mark.share(1, 2, 3, 6, 7, 10, 11)
 @pytest.mark.parametrize("amplitude", [0.01, 0.1, 1.0, 50.0])
 @pytest.mark.parametrize("reading, order, growth",
                          [("stretch", 0.0, {}), ("stretch", 2.0, {}), ("report", 1.0, GROWTH)])
@@ -227,6 +231,7 @@ def test_always_merging_stays_short_and_close_at_any_amplitude(amplitude, readin
     assert np.abs(got.after - whole.after).max() <= (1e-3 if order == 2 else 2.5e-3)
 
 
+@pytest.mark.share(0, 1, 2, 3, 4, 5)
 @pytest.mark.parametrize("order", [0.0, 0.5, 2.0])
 @pytest.mark.parametrize("steps, rest, slip", [(400, 0.003, 0.5), (400, 0.03, 3.0), (1600, 0.03, 3.0)])
 def test_always_merging_of_growing_bonds_keeps_its_bound_at_small_strokes(order, steps, rest, slip):

@@ -40,6 +40,7 @@ def test_exact_c6_reversal(knobs):
     assert got == pytest.approx(2 * np.exp(-2 * np.linspace(0, 3, 121)[1:]) - 1, abs=1e-8)
 
 
+@pytest.mark.share(0, 2, 5)
 @way
 @pytest.mark.parametrize("order", [0, 1])
 def test_exact_c8_healing_under_load(order, knobs):
@@ -50,6 +51,7 @@ def test_exact_c8_healing_under_load(order, knobs):
     assert got == pytest.approx([0.5, 0.81606, 0.93233], abs=1e-3 if order == 0 else 1e-4)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("count", [20_000, pytest.param(100_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("growth", [{}, GROWS])
 def test_always_long_runs_stay_bounded_and_right(growth, count):

@@ -51,6 +51,7 @@ def test_always_bonds_that_grow_fast_at_a_rest_are_not_spread_evenly_while_young
     assert share(law, path, 800, 1e-3)[0] < 1
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("order", [0.1, 0.3, 0.5])
 def test_always_stretched_bonds_whose_length_falls_at_once_keep_the_bound(order):
     """Lengths that fall by three quarters within 0.01: the weight of joined strips, taken as even, moved over to where

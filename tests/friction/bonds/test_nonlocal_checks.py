@@ -37,6 +37,7 @@ OMEGA = 2 * np.pi * 143
 
 # ---- C1, C2: steady sliding
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("speed, printed, want", [
     (5e-4, 0.58, [0.535601, 0.579876, 0.580121, 0.580002]),
     (5e-3, 0.433333, [0.316747, 0.423841, 0.440926, 0.434952]),
@@ -137,6 +138,7 @@ def over_a_pad(engine, depth, width, beyond=0.0, after=0.0):
     return engine.traction(state)
 
 
+@pytest.mark.share(0, 1, 2, 3, 5, 7)
 @pytest.mark.parametrize("order, engine", [(0.0, "printed"), (1.0, "printed"), (1.0, "sum"), (1.0, "state")])
 @pytest.mark.parametrize("width, want", [(5, (0.80134759, 0.60943313)), (10, (0.90000454, 0.80005448)),
                                          (100, (0.99, 0.98))])
@@ -238,6 +240,7 @@ def test_exact_c15_ring_frequency_while_stuck(kind, eps, hertz):
 
 # ---- C16: fast breakaway
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("slip_growth, peak, place, late", [
     (1.0, 0.600263, 1.607, 0.5), (5.0, 0.799602, 2.561, 0.500003), (50.0, 0.955895, 4.617, 0.652589)])
 def test_exact_c16_breakaway_peak_its_place_and_the_force_far_on(slip_growth, peak, place, late):
@@ -293,6 +296,7 @@ def test_exact_c17_plain_iteration_fails_beyond_the_contraction_limit_and_newton
 
 # ---- C20: engines on one path
 
+@pytest.mark.slow
 def test_exact_c20_engines_on_one_harmonic_path():
     """A = 3, a_s/(omega^2 A) = 0.3, l_k = 0.05, eps_k = 0.5, 200 steps a cycle: state = sum, merged = unmerged list."""
     law = Bonds(1.0, 1.0, ratio=0.5, rest_growth=0.9, slip_growth=0.05, rest_speed=1e-2)
@@ -458,11 +462,12 @@ def test_always_the_compiled_stretch_is_passive_on_20000_random_paths():
 GROWTH = {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 1e-2}
 
 
-@pytest.mark.parametrize("length", [1e-9, 1.0])
+@pytest.mark.share(0, 2)
 @pytest.mark.parametrize("reading, order", [("stretch", 1.0), ("stretch", 2.0), ("report", -0.9), ("report", 0.0),
                                             ("report", 20.0)])
-def test_exact_bond_lengths_of_a_nanometre_and_a_metre_are_one_law(reading, order, length):
+def test_exact_bond_lengths_of_a_nanometre_and_a_metre_are_one_law(reading, order):
     """Lengths scale with eps_0 and l_k, speeds too: the tractions are those of eps_0 = 1."""
+    length = 1e-9
     rng = np.random.default_rng(5)
     path = np.concatenate([[0], np.cumsum(rng.normal(0, 1.5, 24))])
     laws = [Quadrature, Recursion] if (reading, order) == ("stretch", 1.0) else [Quadrature]
@@ -492,6 +497,7 @@ def test_exact_extreme_orders_of_the_printed_law(order):
         == pytest.approx(1e-9, rel=1e-6)
 
 
+@pytest.mark.share(0, 2, 5, 7)
 @pytest.mark.parametrize("speed", [0.0, 1e-300, -1e-300, 5e-324])
 @pytest.mark.parametrize("growth", [{}, GROWTH])
 def test_exact_speeds_of_nothing_are_a_dwell(speed, growth):
@@ -525,6 +531,7 @@ def test_exact_speeds_of_nothing_are_a_dwell(speed, growth):
     assert point_kernels.bond_mean(0.8, 0.3, speed, 1.0, 1.0)[0] == pytest.approx(0.3, abs=1e-15)
 
 
+@pytest.mark.share(0, 1)
 @pytest.mark.parametrize("reading, order", [("stretch", 1.0), ("stretch", 0.0), ("stretch", 2.0)])
 def test_exact_static_equal_to_kinetic_never_changes_the_length(reading, order):
     path = np.concatenate([[0], np.cumsum(np.random.default_rng(6).normal(0, 1, 60))])

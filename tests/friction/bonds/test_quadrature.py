@@ -76,6 +76,7 @@ def test_exact_bare_places_hold_only_the_bonds_formed_since(reading):
 
 # ---- both readings
 
+@pytest.mark.share(1, 3, 6)
 @pytest.mark.parametrize("order", [0.0, 0.5, 1.0, 2.0])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_exact_readings_agree_without_a_reversal(order, sign):
@@ -135,6 +136,7 @@ def test_exact_printed_law_pushes_back_while_it_heals(order):
     assert force == pytest.approx([0.5, 0.81606, 0.93233], abs=5e-4)
 
 
+@pytest.mark.share(0, 2, 4, 7, 9)
 @pytest.mark.parametrize("reading, order, growth", [("report", 0.0, {}), ("report", 1.0, GROWTH), ("stretch", 0.5, {}),
                                                     ("stretch", 1.0, GROWTH), ("stretch", 2.0, GROWTH)])
 @pytest.mark.parametrize("tail", [0.0, 1e-2])
@@ -151,6 +153,7 @@ def test_exact_bonds_that_are_only_carried_are_those_of_a_step(reading, order, g
 
 # ---- cut-off
 
+@pytest.mark.share(0, 2, 3)
 @pytest.mark.parametrize("reading, order, growth", [("report", 0.0, {}), ("report", 2.0, {}), ("stretch", 1.0, {}),
                                                     ("stretch", 1.0, GROWTH), ("stretch", 2.0, {}),
                                                     ("report", 1.0, GROWTH)])
@@ -175,6 +178,7 @@ def test_exact_cut_off_is_the_tail_of_the_gamma_function(order):
 
 # ---- far ends
 
+@pytest.mark.share(0, 3, 4, 6, 9)
 @pytest.mark.parametrize("reading, order", [("report", -0.5), ("report", 0.0), ("report", 2.0), ("stretch", 0.0),
                                             ("stretch", 2.0)])
 @pytest.mark.parametrize("growth", [{}, GROWTH])

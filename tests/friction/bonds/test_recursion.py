@@ -30,6 +30,7 @@ def growths(draw):
 
 # ---- recursion = sum
 
+@pytest.mark.share(0, 4, 8, 9, 13, 17)
 @pytest.mark.parametrize("piece", ["upper", "lower", "lower with bare places"])
 @pytest.mark.parametrize("growth", GROWTH)
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -137,6 +138,7 @@ def test_always_the_sum_over_bonds_gives_no_energy_away(steps, growth):
     assert run.dissipated.min() >= -1e-12 * total and run.stored.min() >= 0
 
 
+@pytest.mark.share(1, 3)
 @pytest.mark.parametrize("order", [0.0, 0.5, 2.0])
 @pytest.mark.parametrize("growth", GROWTH)
 def test_always_other_orders_of_the_stretch_give_no_energy_on_a_closed_path(order, growth):

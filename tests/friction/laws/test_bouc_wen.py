@@ -49,6 +49,7 @@ def test_exact_closed_loops(exponent):
     assert found.ledger[0, -1] - found.ledger[0, -1001] == pytest.approx(2 * half, rel=1e-9)
 
 
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize("exponent, shape", [(1.0, 0.5), (2.0, 0.8), (1.5, 0.2), (4.0, 1.0)])
 def test_exact_a_bench_loop_is_the_equation(exponent, shape):
     time, slide = shrinking(60)
@@ -82,6 +83,7 @@ def test_exact_the_compiled_bench_is_the_plain_law(exponent, shape):
         assert found.ledger[2, k + 1] - found.ledger[2, k] == pytest.approx(step.dissipated[0], abs=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exponent", [1.0, 2.5])
 def test_exact_a_march_settles_on_the_harmonic_balance(exponent):
     marched, steady = rig(law_of(exponent, 0.5)), rig(law_of(exponent, 0.5), "accuracy.method=harmonic")

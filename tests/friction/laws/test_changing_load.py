@@ -80,6 +80,7 @@ def test_exact_lost_contact_takes_force_and_memory(law):
         state, new = a.state, b.state
 
 
+@pytest.mark.share(0, 1, 2, 3, 4, 5, 6)
 @pytest.mark.parametrize("law", [law for law in LAWS if not isinstance(law, (Coulomb, Rate))])
 @pytest.mark.parametrize("size", [0.1, 0.2])
 def test_exact_no_drift_under_a_load_dither_at_half_the_limit(law, size):
@@ -123,6 +124,7 @@ def test_order_work_of_coulomb_under_a_swinging_load(amplitude):
         assert (found.load == 0).any() and found.values["friction_ratio_peak"] == pytest.approx(0.3)
 
 
+@pytest.mark.slow
 def test_order_stretch_under_a_swinging_load_is_its_differential_equation():
     """At v: m = N, z' = v (N - z/eps), s2' = v (2 z - s2/eps), the rule for a falling N in between: order 1."""
     model = build(bench('law = "nonlocal"\nbond_length = "2 um"', CONSTANT, SWING))
@@ -155,6 +157,7 @@ def test_exact_samples_hold_the_instants_without_load():
     assert slide == pytest.approx(1e-3 * time, abs=1e-18) and (np.diff(time) > 0).all()
 
 
+@pytest.mark.slow
 def test_exact_a_scene_under_a_swinging_load_runs_with_errors():
     result = run(plan(bench('law = "elastic-plastic"\nbond_length = "2 um"',
                             'kind = "sine"\namplitude = "10 um"\nfrequency = "50 Hz"\ncycles = 3', SWING)))

@@ -102,6 +102,7 @@ def lower(nodes, sigma):
     return lambda q: np.interp(nodes + q, nodes, sigma, left=0.0, right=0.0)
 
 
+@pytest.mark.share(0, 3, 5)
 @pytest.mark.parametrize("law, order", [(Recursion, 1), (Quadrature, 1), (Quadrature, 0), (Quadrature, 2)])
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_exact_a_long_slide_over_a_pressure_below_settles_to_the_average(law, order, way):
@@ -223,6 +224,7 @@ def test_exact_force_of_a_patch_bench_is_the_resultant_of_the_average(order):
     assert found.values["energy_balance"] < 1e-12 and found.slip == pytest.approx(found.slide)
 
 
+@pytest.mark.slow
 def test_exact_a_long_nonlocal_bench_over_a_pressure_below_ends_at_the_average():
     """Two laws of the same scene: after ten bond lengths 2.17 and the average agree but for steps and edges."""
     slide = '[slide]\nkind = "constant"\nspeed = "1 mm/s"\ndistance = "1 mm"\n'

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from law_runs import LOAD, bench_along, fitted, masses, rig, shrinking
+from march_paths import share_one_loop
 from scene_texts import COATED, DRIVE, MODE, mistakes, only
 
 from patchfem.friction.laws.iwan import Iwan, from_keys, largest, sliders
@@ -98,7 +99,8 @@ def test_exact_a_march_settles_on_the_harmonic_balance():
     assert marched.measures["energy_created"].value <= 1e-12 * marched.measures["energy_dissipated"].value
 
 
-def test_exact_two_alike_interfaces_move_alike():
+def test_exact_two_alike_interfaces_move_alike(monkeypatch):
+    share_one_loop(monkeypatch)
     both = masses(LAW, 2)
     slides, alone = both.response.extra["slides"], masses(LAW, 1).response.slide
     assert slides[:, 0] == pytest.approx(slides[:, 1], abs=1e-12 * np.abs(slides).max())

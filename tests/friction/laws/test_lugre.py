@@ -102,6 +102,7 @@ def test_exact_the_compiled_bench_is_the_plain_law():
     assert law.stored(jump.state)[0] == pytest.approx(KINETIC**2 / STIFFNESS / 2, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [DAHL, DAMPED])
 def test_exact_a_march_settles_on_the_harmonic_balance(law):
     marched, steady = rig(law), rig(law, "accuracy.method=harmonic")

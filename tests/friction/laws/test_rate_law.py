@@ -70,6 +70,7 @@ def reference(speed, level, cycles, tolerance=1e-10):
     return np.ptp(y) / 2
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("speed, level", [(1e-2, 49.03), (1e-3, 49.03), (1e-3, 20.0)])
 def test_order_the_march_is_the_differential_equation(speed, level):
     exact, errors = reference(speed, level, 20), []

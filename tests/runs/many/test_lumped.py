@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from batch_beside import held_against
 from scene_texts import MODE
 
 from patchfem.api import base_of, build, load
@@ -21,9 +22,6 @@ SMOOTH = {"tanh": 'law = "tanh"\nstatic = 0.3\nreference_speed = "2 mm/s"',
 LAWS |= SMOOTH
 OF_RUNS = 2e-15  # of a value, round-off of the difference of two runs that its bar is
 SIZES = {"base": 'acceleration = "5 g"', "force": 'force = "5 N"'}
-LOOPS = ("loop_area", "equivalent_damping", "friction_work")
-BITS = ("relative_displacement_amplitude", "relative_displacement_amplitude_steady")  # by extremes and phasors alone
-DIFFERENCES = ("drift_per_cycle", "energy_balance", "work_check")  # of larger terms: known to their round-off
 
 
 def models(law: str, seed: int, count: int) -> list:
@@ -60,58 +58,7 @@ def batch(cases):
     return found
 
 
-def passed(found, case: int, name: str) -> float:
-    """Friction force times the slide of all cycles [J], or for the damping [1] the share of it in 2 pi K A^2."""
-    size = 40 * found.values["friction_force_peak"][case] * found.values["relative_displacement_amplitude"][case]
-    loop = found.values["loop_area"][case]
-    if name == "equivalent_damping":
-        return abs(found.values[name][case] / loop) * size if loop else 1.0
-    return size
-
-
-def conditioned(found, case: int) -> float:
-    """How much round-off of the coordinate counts in the slip: static displacement of the drive over the slip."""
-    slip = found.values["slip_amplitude"][case]
-    return max(1.0, 1e-6 / slip) if slip > 0 else 1.0
-
-
-def held_against(cases, ones, many, of_bar: float = 0.0) -> None:
-    """Assert that a batch gave what single runs give: values and bars to 1e-12, all words the same; but for smooth
-    laws, amplitudes and steady estimates to the last bit, and their bars but for Iwan's.
-
-    of_bar: share of a value that its bar may be off besides.
-    """
-    assert list(many.outcome) == list(ones.outcome)
-    assert many.warnings == ones.warnings and many.notes == ones.notes and many.numerics == ones.numerics
-    for case in range(len(cases)):
-        for name in {*ones.values, *many.values}:
-            assert many.has(name, case) == (name in ones.values and ones.has(name, case)), (case, name)
-            assert many.reasons.get(name, {}).get(case) == ones.reasons.get(name, {}).get(case), (case, name)
-            if not ones.has(name, case):
-                continue
-            if name in BITS and not of_bar:
-                told_apart = cases[case].friction.law == "iwan"  # by a coarser run, not of the batch
-                for one, other in ((ones.values, many.values), (ones.errors, many.errors))[:1 if told_apart else 2]:
-                    np.testing.assert_array_equal(other[name][case], one[name][case], f"{case}, {name}")
-            value, bar = ones.values[name][case], ones.errors[name][case]
-            near = 1e-12 * conditioned(ones, case) * abs(value)
-            if name in LOOPS:  # of the work that goes to and fro
-                near += 1e-14 * passed(ones, case, name)
-            if name in DIFFERENCES:  # other orders of the same sums leave another round-off, which either bar may know
-                theirs = min(many.errors[name][case], 1e-13)
-                near += max(bar, theirs, 1e-14) if np.isfinite(bar) else 1e-12
-            elif name == "acceleration_distortion":
-                near += 1e-13  # of the first harmonic: round-off of the phase omega t
-            assert many.floors[name][case] == ones.floors[name][case]
-            assert many.values[name][case] == pytest.approx(value, rel=0, abs=near, nan_ok=True), (case, name)
-            if name not in DIFFERENCES:
-                told = 1e-9 * near + of_bar * abs(value)
-                if cases[case].friction.law == "iwan":  # a coarser run tells it
-                    told = 3 * near
-                same = pytest.approx(bar, rel=1e-11, abs=told, nan_ok=True)
-                assert many.errors[name][case] == same, (case, name)
-
-
+@pytest.mark.share(0, 1, 2, 3, 5, 6, 7)
 @pytest.mark.parametrize(("law", "count"), [(law, 6 if law == "iwan" else 8 if law in SMOOTH else 20) for law in LAWS])
 def test_exact_batch_is_the_single_runs(law, count):
     cases = models(law, 1, count)
@@ -183,6 +130,60 @@ def test_exact_what_is_extrapolated_far_is_that_of_a_single_run(monkeypatch):
     held_against(cases, ones, batch(cases))
 
 
+@pytest.mark.parametrize("law", ["elastic-plastic", "iwan"])
+def test_exact_cycles_that_repeat_are_counted_at_once(law, monkeypatch):
+    """Damped cases that settle long before their last cycles: one cycle stands for all that are left, with the bits of
+    single runs, which move through every one of them."""
+    from patchfem.dynamics.piecewise_one import names_kernels as names
+    from patchfem.runs.many.lumped import pieces
+
+    base = base_of(load(SCENE.format(law=LAWS[law], kind="base", kind_size=SIZES["base"])))
+    shared = ["drive.cycles=120", "structure.mode.axial.damping=0.1"]
+    cases = [build(base.changed([*shared, f"normal.load={load} N"])) for load in ("30", "80")]
+    works, made = [], pieces.made.work_of
+    monkeypatch.setattr(pieces.made, "work_of", lambda *given: works.append(made(*given)) or works[-1])
+    many = [lumped.solve([case]) for case in cases]
+    assert all(work[5][0, names.REPEATS] == 1 and work[3].now[0] == 120 for work in works)
+    monkeypatch.undo()
+    assert list(many[0].outcome) == ["steady"]
+    held_against(cases, one_by_one.solve(cases), batch(cases))
+
+
+def test_exact_a_stick_in_which_nothing_rings_is_told_by_the_batch(monkeypatch):
+    """Cells that hold so long that what rings could turn a few times: the samples of one more cycle say that nothing
+    does, as those of ten cycles say in a single run, without one."""
+    from patchfem.response import ringing
+
+    base = base_of(load(SCENE.format(law=LAWS["iwan"], kind="base", kind_size=SIZES["base"])))
+    shared = ["normal.load=104.4 N", "structure.moving_mass=0.884 kg", "structure.mode.axial.frequency=143 Hz",
+              "drive.frequency=143 Hz", "drive.cycles=100", "friction.stiffness=1e7 N/m", "friction.beta=0.5"]
+    cases = [build(base.changed([*shared, "drive.acceleration=30 m/s^2"]))]
+    looked, ring = [], ringing.ring
+    monkeypatch.setattr(ringing, "ring", lambda *given: looked.append(ring(*given)) or looked[-1])
+    ones = one_by_one.solve(cases)
+    assert looked and len(looked) <= 6 and not any(looked)  # of one cycle, of the run and of that for its error
+    looked.clear()
+    monkeypatch.setattr(one_by_one, "solve", None)
+    held_against(cases, ones, batch(cases))
+    assert looked
+
+
+def test_exact_nothing_rings_in_a_motion_that_holds_and_repeats(monkeypatch):
+    """Cells of which less than half ever slip: what decays has gone when every cycle is the same, so neither a single
+    run nor a batch looks for it, however long the stick."""
+    from patchfem.response import ringing
+
+    base = base_of(load(SCENE.format(law=LAWS["iwan"], kind="base", kind_size=SIZES["base"])))
+    cases = [build(base.changed(["normal.load=100 N", "drive.cycles=100", "structure.mode.axial.damping=0.1",
+                                 f"drive.acceleration={push} m/s^2"])) for push in (2, 8)]
+    monkeypatch.setattr(ringing, "ring", None)
+    ones = one_by_one.solve(cases)
+    assert list(ones.values["stick_fraction"]) == [1, 1] and "ring_frequency" not in ones.values
+    monkeypatch.setattr(one_by_one, "solve", None)
+    many = batch(cases)
+    held_against(cases, ones, many)
+
+
 def test_exact_elements_of_all_cases_are_those_of_each():
     """Sums and numbers of pieces that are made for all cases at once, beside those of one after the other."""
     from patchfem.dynamics.piecewise.elements import elements_of, table_of
@@ -204,7 +205,7 @@ def test_exact_elements_of_all_cases_are_those_of_each():
         for _ in range(pieces.coarsened(case)):
             group = pieces.paired(group)
         told = costs.pieces(case) + 2 * (group.stiffness.size - (all_of >> pieces.coarsened(case)))  # an odd one stays
-        assert pieces.most_pieces(np.array([rig]), [case.rig.drive], [group]) == pytest.approx(told, rel=1e-12)
+        assert pieces.most_pieces(np.array([rig]), case.rig.drive.period, [group]) == pytest.approx(told, rel=1e-12)
 
 
 def test_always_few_cells_are_told_from_many():

@@ -91,6 +91,7 @@ def alike(model):
     return found
 
 
+@pytest.mark.share(0, 1, 2, 3, 4, 6, 7, 8, 10, 12, 14)
 @pytest.mark.parametrize("kind", KINDS)
 def test_exact_a_case_of_any_kind_is_its_single_run(kind):
     alike(build(loads(KINDS[kind])))

@@ -1,0 +1,76 @@
+"""The headline of a block that is released: its first swing, when it rests, and the work of friction in all."""
+
+import re
+from math import pi
+
+import numpy as np
+import pytest
+from command_line import cli
+
+from patchfem.export.pages.charts import histories
+from patchfem.export.pages.released import swung
+from patchfem.export.pages.words import headline
+from patchfem.export.report import _histories
+from patchfem.scene.starting import text_of
+
+
+def test_exact_a_block_on_a_rubbing_spring_turns_where_the_closed_form_says(tmp_path):
+    """Every half swing takes 2 mu N/k off the amplitude; the block rests where the spring no longer pulls it on."""
+    scene = tmp_path / "free.toml"
+    text = text_of("rig")
+    text = re.sub(r"\[drive\].*?(?=\n\[)", '[drive]\nkind = "free"\nduration = "0.3 s"\n[structure.start]\n'
+                  'displacement = ["0.5 mm"]\n', text, flags=re.S)
+    scene.write_text(re.sub(r"damping = \S+", "damping = 0", text), "utf-8")
+    answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
+    said = next(line for line in answer.out.splitlines() if line.startswith("Released at "))
+    found = re.match(r"Released at 500 um, the block swings to -(\S+) um first, turns (\d+) times and comes to rest at "
+                     r"(\S+) um after (\S+) ms; friction takes (\S+) ± \S+ (\S+) in all\.$", said)
+    assert found, said
+    load, mass, static = (float(re.search(pattern, text)[1]) for pattern in
+                          (r'load = "(\S+) N"', r'moving_mass = "(\S+) kg"', r"static = (\S+)"))
+    stiffness = mass * (2 * pi * 143)**2
+    far = static * load / stiffness
+    turns = [5e-4]
+    while turns[-1] > far:
+        turns.append(turns[-1] - 2 * far)
+    rest = abs(turns[-1])
+    assert float(found[1]) * 1e-6 == pytest.approx(turns[1], rel=5e-3)
+    assert abs(abs(float(found[3])) * 1e-6 - rest) < 5e-3 * 5e-4
+    assert int(found[2]) in (len(turns) - 2, len(turns) - 1)  # the last may be within a hundredth of the rest
+    assert float(found[4]) == pytest.approx(1e3 * (len(turns) - 1) / (2 * 143), rel=5e-3)
+    work = stiffness * (5e-4**2 - rest**2) / 2
+    assert float(found[5]) * {"mJ": 1e-3, "J": 1.0}[found[6]] == pytest.approx(work, rel=1e-3)
+    assert "± 0" not in said and "half peak-to-peak" not in said
+
+
+def test_exact_a_motion_that_has_not_come_to_rest():
+    time = np.linspace(0, 1, 2001)
+    said = swung(time, 1e-3 * np.cos(2 * pi * 20 * time) * np.exp(-time))
+    assert said.startswith("released at 1 mm, the block swings to -975 um first and still by ")
+    assert swung(time, np.full(2001, 5e-4)) == "released at 500 um, the block stays there"
+    assert swung(time, 1e-3 * np.exp(-50 * time)).startswith("released at 1 mm, the block goes to ")
+
+
+def test_exact_what_the_last_cycles_leave_is_no_headline_of_a_release():
+    zero = {"value": 0.0, "unit": "m", "error": 0.0}
+    summary = {"kind": "rig", "outcome": "stuck", "measures": {
+        "relative_displacement_amplitude": zero, "loop_area": zero | {"unit": "J"},
+        "friction_work": {"value": 0.5, "unit": "J", "error": 0.01}}}
+    assert headline(summary, 40.0, released="released it rests") == \
+        "Released it rests; friction takes 500 ± 10 mJ in all."
+
+
+def test_exact_the_picture_of_the_whole_run_shows_every_turn():
+    """Six kept samples of a swing, a rest, and the last cycles sample by sample: one line from the release on."""
+    late = np.linspace(0.27, 0.3, 5001)  # more than a line of the page has points
+    time, swing = np.r_[0, 3.5, 7, 10.5, 14, 17.5] * 1e-3, np.array([500, -399, 299, -200, 102, -5]) * 1e-6
+    still = np.zeros(late.size)
+    history = {"time": np.r_[time, late], "displacement": np.r_[swing, still - 5e-6], "force": np.zeros(5007)}
+    window = {"time": late, "displacement": still - 5e-6, "acceleration": still, "base": still}
+    data = {"history": history, "window": window, "loop": {"period": 1 / 143}, "cycles": 43.0, "released": "released"}
+    found = _histories(data)
+    early, last = histories(*found.values)[0]["marks"]
+    assert {early["kind"], last["kind"]} == {"line"} and early["x"].size == 7 and early["x"][-1] == last["x"][0]
+    assert np.allclose(early["y"][:6], 1e6 * swing) and "turns and stops were kept" in found.caption
+    whole = found.draw.figure(*found.values).axes[0].lines[0].get_ydata()
+    assert np.allclose(whole[:6], 1e6 * swing)

@@ -1,0 +1,120 @@
+"""Why a run has no value of a measure: loops that do not close."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from patchfem.core import BaseSine, Measure, Segment
+from patchfem.response.reasons import UNCLOSED, unclosed
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
+
+FREE = SimpleNamespace(segments=(Segment(0.0),), period=0.1)
+RELEASED = """[normal]
+load = "100 N"
+[friction]
+law = "elastic-plastic"
+static = 0.5
+bond_length = "50 um"
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "m0"
+frequency = "100 Hz"
+damping = 0.01
+slide = 1.0
+[drive]
+kind = "free"
+displacement = "{start}"
+cycles = {cycles}
+"""
+DRIFTING = """[normal]
+load = "349.7 N"
+[friction]
+law = "bouc-wen"
+static = 0.494
+stiffness = "2928000.0 N/m"
+[structure]
+moving_mass = "0.4829 kg"
+[[structure.mode]]
+name = "m0"
+frequency = "152.9 Hz"
+damping = 0.01
+slide = 1.0
+[drive]
+kind = "free"
+displacement = "0.9605 mm"
+cycles = {cycles}
+[accuracy]
+tolerance = 0.003
+"""
+
+
+def seen(stored: float, lost: float) -> SimpleNamespace:
+    """Two cycles in which an interface stores and dissipates so much [J]."""
+    time, rise = np.linspace(0.3, 0.5, 5), np.linspace(0, 1, 5)
+    ledger = np.stack([(stored + lost) * rise, 7.0 + stored * rise, 2.0 + lost * rise, 0 * rise])
+    return SimpleNamespace(time=time, extra={"ledger": ledger})
+
+
+@pytest.mark.parametrize(("stored", "lost", "open_"), [
+    (-3e-6, 2e-6, True), (3e-6, 2e-6, True), (-2e-6, 3e-6, False), (2e-6, 3e-6, False), (0.0, 0.0, False),
+    (-1.9e-10, 0.0, False), (-2.1e-10, 0.0, True)])  # the floor is 1e-10 J a cycle
+def test_exact_a_loop_closes_that_stores_no_more_than_it_dissipates(stored, lost, open_):
+    area = Measure((stored + lost) / 2, "J", 0.0, 1e-10)
+    found = unclosed({"loop_area": area}, seen(stored, lost), FREE)
+    assert set(found) == ({"loop_area"} if open_ else set())
+    if open_:
+        one = found["loop_area"]
+        assert (one.value, one.error, one.unit, one.floor, one.reason) == (None, None, "J", 1e-10, UNCLOSED)
+
+
+def test_exact_a_sine_keeps_its_loop():
+    area = Measure(-1e-6, "J", 0.0, 1e-10)
+    assert unclosed({"loop_area": area}, seen(-3e-6, 1e-6), BaseSine(1.0, 20 * np.pi)) == {}
+    assert unclosed({}, seen(-3e-6, 1e-6), FREE) == {}
+
+
+@pytest.mark.parametrize(("second", "created", "opened"), [(-1e-6, 0.0, True), (1e-6, 0.0, False), (-1e-8, 0.0, False),
+                                                           (-1e-6, 1e-6, False)])
+def test_exact_one_of_several_loops_does_not_close_where_it_gives_back_more_than_it_takes(second, created, opened):
+    window = seen(-3e-6, 4e-6)
+    window.extra["ledger"][3] = np.linspace(0, created, 5)
+    loops = {"loop_area": Measure(2e-6, "J", 0.0, 1e-10), "loop_area_2": Measure(second, "J", 2e-8, 1e-10)}
+    assert set(unclosed(loops, window, FREE)) == ({"loop_area_2"} if opened else set())
+
+
+def measures(text: str):
+    """Measures and friction work by cycle of a scene."""
+    found = run(loads(text))
+    assert found.outcome.value in ("steady", "stuck", "transient")
+    return found.measures, found
+
+
+@pytest.mark.parametrize("cycles", [15, 15.3])
+def test_exact_an_interface_that_only_springs_back_has_no_loop(cycles):
+    """Released within its elastic range it dissipates nothing: its work is k (x1^2 - x0^2)/2 of a decaying ring."""
+    found, _ = measures(RELEASED.format(start="20 um", cycles=cycles))
+    assert found["energy_dissipated"].value == pytest.approx(0.0, abs=1e-15)
+    assert found["loop_area"].value is None and found["loop_area"].reason == UNCLOSED
+
+
+@pytest.mark.slow
+def test_exact_a_drift_of_a_release_is_no_negative_loss():
+    """The work of its last cycle is -17.7 uJ: the interface gives back what it stored."""
+    found, result = measures(DRIFTING.format(cycles=15))
+    book = result.window.extra["ledger"]
+    assert book[0, -1] - book[0, 0] == pytest.approx(-1.772e-5, rel=1e-3)
+    assert 0 < book[2, -1] - book[2, 0] < book[1, 0] - book[1, -1]
+    assert found["loop_area"].value is None and "loop does not close" in found["loop_area"].reason
+    assert found["energy_dissipated"].value > 0.199
+
+
+@pytest.mark.slow
+def test_exact_a_release_that_slides_keeps_its_loop():
+    """In its second cycle the block of the same rig slides by several bond lengths: most of the work is loss."""
+    found, result = measures(DRIFTING.format(cycles=2))
+    book = result.window.extra["ledger"]
+    assert book[2, -1] - book[2, 0] > abs(book[1, -1] - book[1, 0])
+    assert found["loop_area"].value == pytest.approx(book[0, -1] - book[0, 0], rel=1e-9)
