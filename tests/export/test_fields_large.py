@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import zlib
 from time import process_time
 from types import SimpleNamespace
 
@@ -92,7 +93,8 @@ def test_exact_rounding_to_a_step_is_to_the_nearest_multiple(power):
 @pytest.fixture(scope="module")
 def rubbing(tmp_path_factory):
     """A tilted pair of some 21 000 cells under a shear that reverses: the run, the blocks of its fields, their packed
-    file, and the seconds that both took."""
+    file, and the seconds of a CPU that both took beside those of zlib alone with the stress as it came, least of
+    three."""
     folder = tmp_path_factory.mktemp("rubbing")
     scene = folder / "scene.toml"
     scene.write_text(re.sub("element_size = .*", 'element_size = "40 um"', COATED) +
@@ -106,12 +108,16 @@ def rubbing(tmp_path_factory):
         changed.setattr(bodies, "write_series", lambda path, blocks, times, units, steps: kept.update(
             blocks=blocks) or write(path, blocks, times, units, steps))
         seconds = []
-        for _ in range(2):
+        for _ in range(3):
             begin = process_time()
             whole = SimpleNamespace(patch=pressed.patch, plan=pressed.plan, fields=fields, extra={})
             bodies.write_fields(whole, folder / NAME)
-            seconds.append(process_time() - begin)
-    return pressed, kept["blocks"], folder / NAME, min(seconds)
+            seconds.append([process_time() - begin])
+            begin = process_time()
+            for side in ("lower", "upper"):
+                zlib.compress(kept["blocks"][side].cell_data["stress"].tobytes(), 1)
+            seconds[-1].append(process_time() - begin)
+    return pressed, kept["blocks"], folder / NAME, np.min(seconds, axis=0)
 
 
 def test_always_packing_errs_as_little_as_it_says_and_less_than_the_elements(rubbing):
@@ -149,17 +155,17 @@ def test_always_packing_errs_as_little_as_it_says_and_less_than_the_elements(rub
     assert number == 8 and total > 0
 
 
-def test_always_packed_stress_takes_a_share_of_200_megabytes_and_25_seconds(rubbing):
-    """Of 200 frames of 100 000 cells: bytes and seconds of a CPU for each cell in each frame, with all that leads to
-    them: twice as long is allowed, for nine frames share what 200 share, and other programs run beside a test."""
-    _, blocks, path, seconds = rubbing
+def test_always_packed_stress_takes_a_share_of_200_megabytes_and_six_times_as_long_as_zlib(rubbing):
+    """Of 200 frames of 100 000 cells: bytes for each cell in each frame. Seconds of a CPU, with all that leads to the
+    file, against those of zlib alone in the same run, 3.3 times where 25 s for 200 frames are met; machines differ."""
+    _, blocks, path, (seconds, packing) = rubbing
     with h5py.File(path) as file:
         size = sum(array.id.get_storage_size() for side in ("lower", "upper") for kind in ("PointData", "CellData")
                    for array in file[f"VTKHDF/{side}/{kind}"].values())
         frames = int(file["VTKHDF/Steps"].attrs["NSteps"])
     cells = sum(len(blocks[side].types) for side in ("lower", "upper"))
     assert cells > 15_000 and size / frames / cells < 200e6 / 200 / 1e5
-    assert seconds / frames / cells < 2 * 25 / 200 / 1e5
+    assert seconds < 6 * packing
 
 
 def test_exact_a_large_series_holds_every_frame_rounded_as_it_says(tmp_path, monkeypatch):

@@ -16,7 +16,9 @@ from patchfem.closed_forms import hertz_half_width, hertz_peak
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity.elasticity import assemble, interface_compliance
+from patchfem.model.model import build
 from patchfem.runs.key import key_of
+from patchfem.runs.patch.result import solve_all
 from patchfem.runs.wear import evolve, keep
 from patchfem.scene.scene import loads
 from patchfem.slip.partial_slip import Step, advance, operators_of, start
@@ -292,6 +294,15 @@ def test_exact_an_interrupted_run_goes_on_to_the_same_bits(tmp_path, monkeypatch
             xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as b:
         assert a.worn_depth.equals(b.worn_depth) and a.wear_pressure_peak.equals(b.wear_pressure_peak)
     assert not (tmp_path / "out" / "wear.npz").exists() and not (tmp_path / "out.partial").exists()
+
+
+def test_exact_a_motion_that_wear_cannot_change_has_its_bits_wherever_a_run_goes_on():
+    """Found on the worn patch, where a run went on from, the path differed by rounding."""
+    model = build(loads(TILTED + COULOMB + SINE + WEAR, "wear.toml"))
+    patch = solve_all(model.patch, model.accuracy.tolerance)[0]
+    worn = np.random.default_rng(1).uniform(0, 1e-7, (20, patch.x.size))
+    paths = {evolve._Motion(model, patch)(depth).tobytes() for depth in worn}
+    assert len(paths) == 1
 
 
 @pytest.mark.parametrize("quiet, state, told", [((), "wear.npz", 1), (("-q",), "wear.npz", 0), ((), "", 0)])

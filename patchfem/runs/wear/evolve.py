@@ -56,7 +56,8 @@ class _Unbounded(Exception):
 
 
 class _Motion:
-    """Slip paths of a model on its worn patch, each found once; a motion that wear cannot change is found once."""
+    """Slip paths of a model on its worn patch, each found once; a motion that wear cannot change is found once, on the
+    patch before any wear, so that a run that goes on from a kept state has its bits too."""
 
     def __init__(self, model, patch):
         self.model, self.pair = model, patch.pair
@@ -66,6 +67,7 @@ class _Motion:
 
     def __call__(self, worn) -> np.ndarray:
         if self.last is None or not self.same:
+            worn = np.zeros_like(worn) if self.same else worn
             patch = pressed(self.model.patch, self.pair, worn)
             found = rubbed(lowered(self.model, patch, worn), patch, self.frames)
             if found.outcome is not None:
