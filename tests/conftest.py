@@ -4,6 +4,7 @@ PATCHFEM_SEARCH=1 draws new ones."""
 
 import gc
 import os
+import sys
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported, here and in child processes
@@ -14,6 +15,11 @@ from hypothesis import settings
 from patchfem.compiled import UNKEPT, cache_folder
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))  # else an edited kernel runs as its old self
+
+if sys.dont_write_bytecode:  # hundreds of child processes would each compile all that they import
+    sys.dont_write_bytecode, sys.pycache_prefix = False, str(cache_folder() / "bytecode")
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 settings.register_profile("patchfem", deadline=None, derandomize="PATCHFEM_SEARCH" not in os.environ)
 settings.load_profile("patchfem")
