@@ -136,3 +136,9 @@ def _stepped_seconds(model, slide, points: int) -> float:
     moved = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
     strips = min(slide.size / 2, 40 * f.bond_length / moved + 64)
     return (3 if model.load_varies else 1) * (1.2e-3 + 2e-6 * strips + 8e-9 * strips * points)
+
+
+def slips_by_elements(model) -> bool:
+    """Whether the slide of a model moves parallel elements, one for each node that slips."""
+    simple = model.grooves is None and model.slide.across is None
+    return model.soft and simple and not has(model.friction.law, "bonds")

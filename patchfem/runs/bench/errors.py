@@ -1,5 +1,6 @@
 """What a bench leaves open: its steps, its mesh and its sum over bonds."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -9,7 +10,7 @@ from ...effects import listed
 from ...response.coarser import Rung, estimate, left_open, space_rung
 from ...response.errors import change, step_error
 from . import bench
-from .engine import LIST, PLANE, STEPPED
+from .engine import LIST, PLANE, STEPPED, slips_by_elements
 from .law import tail_of
 from .watch import Watch
 
@@ -18,11 +19,12 @@ MERGED = 2.0  # times its change: where merging is of second order 4/3 would do
 
 
 class Variant(NamedTuple):
-    """A coarser pass: steps per cycle, on the coarser mesh or not, how the bonds are summed."""
+    """A pass beside: steps per cycle, on the coarser mesh or not, how bonds are summed, the springs of a `Watch`."""
 
     steps: int
     rough: bool
     choice: object
+    springs: Callable | None = None
 
 
 def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
@@ -30,16 +32,16 @@ def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
     `ladder_of`; coarse: the patch on the coarser mesh or None."""
     def solve(variant: Variant):
         on = coarse if variant.rough else patch
-        return bench.run(model, on, variant.steps, watch=Watch(variant.choice, say))
+        return bench.run(model, on, variant.steps, watch=Watch(variant.choice, say, springs=variant.springs))
 
-    ladder, made = ladder_of(model, coarse is not None, fine, steps), {}
+    ladder, made = ladder_of(model, patch, coarse, fine, steps), {}
     errors, seconds = estimate(solve, fine.values, ladder, made)
     errors += [stated(model, fine)] if sum_error(model, fine.engine) else []
     runs = [fine.values, *(made[one].values for one in ladder[0].runs)]
     return errors, seconds, left_open(errors[:1], errors[1:], runs)
 
 
-def ladder_of(model, meshed: bool, fine, steps: int) -> list:
+def ladder_of(model, patch, coarse, fine, steps: int) -> list:
     """Rungs of a bench: half and a quarter of the steps; at a quarter of them the coarser mesh, where there is one, and
     for a merged list of bonds narrower strips."""
     choice = fine.engine.choice
@@ -49,8 +51,12 @@ def ladder_of(model, meshed: bool, fine, steps: int) -> list:
     def rule(*values) -> dict:
         return {name: times * error for name, error in step_error(*values, steps).items()}
 
-    out = [Rung((half, few), rule)]
-    if meshed:
+    out, meshed = [Rung((half, few), rule)], coarse is not None
+    if meshed and slips_by_elements(model):
+        from .shear import mesh_rung
+
+        out.append(mesh_rung(model, patch, coarse, few))
+    elif meshed:
         out.append(space_rung(few._replace(rough=True), few))
     if fine.engine.kind == LIST and choice.merge > 0:
         narrow = few._replace(choice=replace(choice, merge=FINER * choice.merge))

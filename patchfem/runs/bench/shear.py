@@ -1,4 +1,5 @@
-"""A slide behind the pieces' own shear: the exact set of elements, or bond points behind the shear modes."""
+"""A slide behind the pieces' own shear: the exact set of elements, or bond points behind the shear modes; what the mesh
+leaves open of the former: its change, its grain and its stiffness."""
 
 import numpy as np
 
@@ -6,12 +7,19 @@ from ...core import NotConverged
 from ...dynamics.march.models import jenkins_model, points_model
 from ...effects import has
 from ...friction.record import law_from
+from ...response.coarser import Rung
+from ...response.errors import GAPS, change
 from ...slip.fields import element_fields, point_fields, shear_of
+from ...slip.grain import spread, stiffer
 from ..patch.shared.kept import elements
 from .follow import follow
 from .ledger import Slid
 from .rigid import climbing
 from .watch import Watch
+
+# times the change by a coarser mesh, by the grain of the nodes and by the change of the stiffness: 97 % of 420 errors
+# of 60 random joints lay below the largest of these, 81 % below the first alone and once
+MESH, GRAIN, STIFF = 2.0, 2.0, 3.0
 
 
 def with_shear(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
@@ -28,7 +36,8 @@ def _elements(model, patch, time, slide, frames, watch) -> Slid:
     f = model.friction
     length = law_from(f).element(1.0).length
     found = elements(patch, f.static, length)
-    done = follow(jenkins_model(found.stiffness, found.yield_slide), time, slide, frames, watch)
+    springs = found.stiffness, found.yield_slide
+    done = follow(jenkins_model(*(watch.springs(*springs) if watch.springs else springs)), time, slide, frames, watch)
     tau, local = element_fields(patch, found, done.states, length)
     return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)
 
@@ -72,3 +81,22 @@ def _points(model, patch, time, slide, frames, watch) -> Slid:
     refuse_missed(done)
     tau, local = point_fields(patch, law, shear, done.states)
     return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)
+
+
+def mesh_rung(model, patch, coarse, few) -> Rung:
+    """The rung of the mesh of a bench of elements; patch, coarse: on both meshes; few: variant of `errors` beside."""
+    length = law_from(model.friction).element(1.0).length
+    stiff = stiffer(*(elements(one, model.friction.static, length).stiffness.sum() for one in (patch, coarse)))
+    runs = few._replace(rough=True), few._replace(springs=spread), few._replace(springs=stiff)
+    return Rung(runs, mesh_error, few)
+
+
+def mesh_error(fine: dict, rough: dict, spread: dict, stiff: dict) -> dict:
+    """Error by name of the measures of a run: the change by a coarser mesh, which can be small by chance, or what the
+    grain of the nodes or the change of the stiffness would do, where that is more.
+
+    rough: on the coarser mesh; spread, stiff: with the elements of `slip.grain`; all measures by name.
+    """
+    found, grain, stiffness = (change(fine, one) for one in (rough, spread, stiff))
+    return {name: gap if name in GAPS else max(MESH * gap, GRAIN * grain.get(name, 0.0),
+                                               STIFF * stiffness.get(name, 0.0)) for name, gap in found.items()}
