@@ -29,22 +29,20 @@ def ran(text: str):
 
 @pytest.mark.parametrize("steps", [400, 1600])
 def test_exact_a_joint_that_holds_has_the_stiffness_of_its_pieces(steps):
-    """Nothing slips, so the secant is the tangential stiffness, whatever the steps; its bar says so, as three times the
-    change by a coarser mesh does, .1 %."""
+    """Nothing slips, so the secant is the tangential stiffness, whatever the steps; its bar says so."""
     found = ran(BENCH.format(steps=steps))
     secant, elastic = (found.measures[name] for name in ("secant_stiffness", "tangential_stiffness"))
     assert abs(secant.value - elastic.value) <= secant.error + elastic.error
-    assert secant.error <= 4e-3 * secant.value and not found.warnings
+    assert secant.error <= 2e-3 * secant.value and not found.warnings
 
 
 def test_always_what_the_mesh_leaves_open_is_not_laid_on_the_steps():
     """The edge slip of a bowed joint does not change with the steps; a finer mesh, as advised, tells it better."""
-    text = BENCH.replace("45 nm", "90 nm").format(steps=100) + BOWED
-    first = ran(text)
+    first = ran(BENCH.format(steps=100) + BOWED)
     said = [text for text in first.warnings if text.startswith("loop_area")]
     assert len(said) == 1 and "steps_per_cycle" not in said[0] and "interface nodes) leaves it open" in said[0]
     advised = re.search(r"accuracy.tolerance = (\S+) refines it", said[0])[1]
-    again = ran(text.replace("tolerance = 1e-2", f"tolerance = {advised}"))
+    again = ran(BENCH.format(steps=100).replace("tolerance = 1e-2", f"tolerance = {advised}") + BOWED)
     for name in ("friction_ratio_end", "loop_area"):
         assert again.measures[name].error < first.measures[name].error / 2
         assert abs(again.measures[name].value - first.measures[name].value) < first.measures[name].error
