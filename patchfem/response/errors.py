@@ -38,6 +38,10 @@ FALLS = 0.5  # least order at which an error falls with the step
 GAPS = ("energy_balance", "work_check")
 LAST = 1e-13  # of the amplitude, the last digits of a mean over it
 APART = ("friction_force_peak", "friction_work", "energy_stored", "energy_dissipated")  # not of the last cycles
+OF_MESH = 1.5  # times the change by a coarser mesh of pieces that slip part by part
+OF_MOST = 0.5  # of the largest relative change of these
+OF_STIFFNESS = ("relative_displacement_amplitude", "absolute_acceleration_peak", "friction_force_peak",
+                "secant_stiffness")
 MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "loop_area", "friction_work")
 
 
@@ -138,6 +142,20 @@ def cells_error(fine: dict, coarse: dict) -> dict:
     gaps = change(fine, coarse)
     typical = typical_change(fine, gaps)
     return {name: gap if of_first(name) in APART else max(gap, OF_CELLS * typical * abs(fine[name]))
+            for name, gap in gaps.items()}
+
+
+def pieces_error(fine: dict, coarse: dict) -> dict:
+    """Error by name of the mesh of pieces that slip part by part, from a run on a coarser one.
+
+    The change, times OF_MESH. A peak of a start that rings, and an amplitude, can agree by chance on both meshes; so of
+    those of OF_STIFFNESS each errs by at least OF_MOST of the share that the most changed of them does, but for one
+    that a limit holds.
+    """
+    gaps = {name: gap if name in GAPS else OF_MESH * gap for name, gap in change(fine, coarse).items()}
+    shares = [gaps[name] / abs(fine[name]) for name in OF_STIFFNESS if gaps.get(name) and fine[name]]
+    least = OF_MOST * max(shares, default=0.0)
+    return {name: max(gap, least * abs(fine[name])) if name in OF_STIFFNESS and gap > ROUND * abs(fine[name]) else gap
             for name, gap in gaps.items()}
 
 

@@ -14,6 +14,7 @@ from patchfem.response.errors import (
     change,
     jumps_error,
     orders,
+    pieces_error,
     step_error,
     tolerance_error,
     typical_change,
@@ -259,3 +260,17 @@ def test_exact_orders_are_those_that_the_changes_show():
 
     found = orders(at(1.0), at(2.0), at(4.0))
     assert found == {"one": pytest.approx(1.0), "two": pytest.approx(2.0), "four": pytest.approx(2.0)}
+
+
+def test_exact_an_amplitude_that_agrees_by_chance_errs_with_those_that_do_not():
+    """Half of the largest relative change of four measures of the stiffness; a limit and a work err by their own."""
+    fine = {"relative_displacement_amplitude": 1.0, "absolute_acceleration_peak": 100.0, "friction_force_peak": 30.0,
+            "secant_stiffness": 1e6, "loop_area": 2.0, "energy_balance": 1e-12}
+    coarse = fine | {"relative_displacement_amplitude": 1.0001, "absolute_acceleration_peak": 102.0,
+                     "secant_stiffness": 0.99e6, "loop_area": 2.2, "energy_balance": 3e-12}
+    found = pieces_error(fine, coarse)
+    assert found["absolute_acceleration_peak"] == pytest.approx(3.0)
+    assert found["relative_displacement_amplitude"] == pytest.approx(0.015)
+    assert found["secant_stiffness"] == pytest.approx(0.015e6)
+    assert found["friction_force_peak"] == 0
+    assert found["loop_area"] == pytest.approx(0.3) and found["energy_balance"] == pytest.approx(2e-12)

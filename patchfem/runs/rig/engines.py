@@ -16,7 +16,7 @@ import numpy as np
 from ...effects import has
 from ...model.model import Model
 from ...response.coarser import Rung, space_rung
-from ...response.errors import cells_error, change, jumps_error, step_error, tolerance_error
+from ...response.errors import cells_error, change, jumps_error, pieces_error, step_error, tolerance_error
 from ...scene.rules import methods
 from ..effort import too_long
 from .pieces.costs import pieces, seconds_of_pieces, seconds_of_steps
@@ -152,7 +152,7 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """Rungs of the engine of pieces: the mesh, where its nodes make the elements, and half the cells of a density."""
-    out = [space_rung(Variant(numerics, coarse))] if coarse is not None and model.soft else []
+    out = [Rung((Variant(numerics, coarse),), pieces_error)] if coarse is not None and model.soft else []
     cells = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
     return [*out, Rung((Variant(replace(numerics, pairs=numerics.pairs + 1), patch),), cells_error)] if cells else out
 

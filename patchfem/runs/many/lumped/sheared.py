@@ -15,7 +15,7 @@ from ....core import Measure, Outcome
 from ....effects import has
 from ....model.model import Model
 from ....model.source import placed
-from ....response.errors import change
+from ....response.errors import pieces_error
 from ....response.measures import energy_balance
 from ...patch import result as of_patch
 from ...results.loose import loose
@@ -144,7 +144,7 @@ def _with_mesh(fine: Runs, coarse: Runs, chosen: tuple) -> Runs:
     whole = [one.values | {MAIN: one.amplitudes, "energy_balance": energy_balance(one.book)} for one in (fine, coarse)]
     for case in range(len(chosen)):
         a, b = ({name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])} for one in whole)
-        told = change(a, b)
+        told = pieces_error(a, b)
         for name, value in a.items():
             fine.errors.setdefault(name, np.zeros(len(chosen)))[case] = told.get(name, abs(value))
     return replace(fine, chosen=chosen, again=False)
