@@ -6,7 +6,7 @@ from ...core import Outcome
 from ...effects import has
 from ...response.errors import with_errors
 from ..results.notes import climbing_as_one, of_growth, two_books, unbounded, unripe, warming
-from ..results.result import FRAMES, Result, frames_of, without_errors
+from ..results.result import FRAMES, Result, frames_of, on_a_mesh_of_known_error, without_errors
 from ..results.travel import FAR, ended, reach, travelled
 from . import bench
 from .engine import steps_of
@@ -43,7 +43,8 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
         peak = fine.values["friction_ratio_peak"] / f.static if f.static > 0 and not model.load_varies else None
         notes = of_growth(model.bonds, peak)
     notes = [*notes, *climbing_as_one(model, patch)]
-    return Result(what, outcome, without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
+    known = estimate and on_a_mesh_of_known_error(model, patch, coarse)
+    return Result(what, outcome, without_errors(found, known), fine, fine, patch, fields, seconds, warnings,
                   {"engine": fine.engine.name, "steps": steps, "notes": notes, "left_open": left})
 
 

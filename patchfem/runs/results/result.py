@@ -80,6 +80,14 @@ def frames_of(patch, time, tau, local, slide) -> dict:
             "holder_slide": np.concatenate([[0.0], slide])}
 
 
+def on_a_mesh_of_known_error(model, patch, coarse) -> bool:
+    """Whether there is a coarser patch to tell the error of a motion that hangs on the mesh of its own; coarse: patches
+    on coarser meshes, None where there is none. True of a motion that hangs on none."""
+    if patch is None or coarse[0] is not None:
+        return True
+    return not (model.soft or model.load_varies or (model.rig is not None and model.rig.strips_slide_apart))
+
+
 def without_errors(found: dict, estimate: bool) -> dict:
     """The measures as they are, or without their errors where none were estimated."""
     return found if estimate else {k: replace(m, error=None) for k, m in found.items()}

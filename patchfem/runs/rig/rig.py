@@ -19,7 +19,7 @@ from ...structure.drive_sizes import sinusoidal, slowest
 from ..bench.averaged import limit_tractions
 from ..effort import MOST_STEPS, refuse_endless
 from ..results.notes import climbing_as_one, creeping, of_growth, two_books, unbounded, unripe, warming
-from ..results.result import FRAMES, Result, frames_of, still, without_errors
+from ..results.result import FRAMES, Result, frames_of, on_a_mesh_of_known_error, still, without_errors
 from ..results.travel import ended, travelled
 from . import levels
 from .engines import ENGINES, Variant, unbalanced
@@ -61,7 +61,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     if raw.levels:
         found |= levels.measures(rig, raw.levels, raw.probe, model.accuracy.tolerance, f is not None, raw.coarser)
         extra |= {"levels": levels.shown(rig, raw.levels)}
-    estimated = estimate and raw.outcome is not Outcome.NOT_CONVERGED
+    estimated = estimate and raw.outcome is not Outcome.NOT_CONVERGED and on_a_mesh_of_known_error(model, patch, coarse)
     found = with_own(found, raw.own)
     outcome, found = settle(raw, without_errors(found, estimated), model.accuracy.tolerance, drive, rig.level_cycles,
                             slowest(rig.modes))
