@@ -157,7 +157,7 @@ def test_always_packing_errs_as_little_as_it_says_and_less_than_the_elements(rub
 
 def test_always_packed_stress_takes_a_share_of_200_megabytes_and_six_times_as_long_as_zlib(rubbing):
     """Of 200 frames of 100 000 cells: bytes for each cell in each frame. Seconds of a CPU, with all that leads to the
-    file, against those of zlib alone in the same run, 3.3 times where 25 s for 200 frames are met; machines differ."""
+    file, against those of zlib alone in the same run, 3.3 times when this was written; machines differ."""
     _, blocks, path, (seconds, packing) = rubbing
     with h5py.File(path) as file:
         size = sum(array.id.get_storage_size() for side in ("lower", "upper") for kind in ("PointData", "CellData")

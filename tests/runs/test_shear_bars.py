@@ -8,16 +8,16 @@ import patchfem as pf
 from patchfem.scene.scene import loads
 
 
-@pytest.mark.parametrize("kind, seeds", [("joint", (2000, 2036)), ("rig", (3, 505))])
+@pytest.mark.parametrize("kind, seeds", [("joint", (3002, 3024)), ("rig", (3000, 3002))])
 def test_always_the_bars_of_random_pieces_behind_their_shear_hold(kind, seeds):
-    """Of joint 2036 no node slips; the peaks of rig 3 agreed on two meshes by chance."""
+    """By the change on a coarser mesh alone joint 3024 missed the bar of its work 22 times, rig 3000 its peak 2.3."""
     for seed in seeds:
         found = misses(kind, seed)
         assert len(found) >= 7 and max(found.values()) <= 1, (seed, found)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind, first, count", [("joint", 2000, 60), ("rig", 500, 40)])
+@pytest.mark.parametrize("kind, first, count", [("joint", 3000, 40), ("rig", 3000, 40)])
 def test_always_19_of_20_bars_of_random_pieces_behind_their_shear_hold(kind, first, count):
     found = np.concatenate([list(misses(kind, seed).values()) for seed in range(first, first + count)])
     assert (found <= 1).mean() >= 0.95 and (found <= 2).mean() >= 0.97
