@@ -17,7 +17,6 @@ from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity.elasticity import assemble, interface_compliance
 from patchfem.model.model import build
-from patchfem.runs.key import key_of
 from patchfem.runs.patch.result import solve_all
 from patchfem.runs.wear import evolve, keep
 from patchfem.scene.scene import loads
@@ -31,6 +30,7 @@ WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 135723\n'
 LOAD, KAPPA, CYCLES = 26 * 4.4482216152605, 1e-14, 135723
 SOFT_RIG = TILTED + SHEAR + NONLOCAL + MODE + \
     '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 100\n'
+LOOSE = '[accuracy]\ntolerance = 2e-2\n'
 
 
 def ran(text, **sets):
@@ -262,37 +262,66 @@ def test_exact_a_scene_without_wear_imports_nothing_of_it(tmp_path):
     assert not {name for name in loaded(code, scene) if name.startswith(("patchfem.wear", "patchfem.runs.wear"))}
 
 
-@pytest.mark.share(0)
-@pytest.mark.parametrize("text, sets", [(TILTED + COULOMB + SINE + WEAR, ()),
-                                        (SOFT_RIG + WEAR, ("--set", "accuracy.tolerance=2e-2"))], ids=["bench", "rig"])
-def test_exact_an_interrupted_run_goes_on_to_the_same_bits(tmp_path, monkeypatch, text, sets):
-    scene = tmp_path / "worn.toml"
-    scene.write_text(text)
-    assert cli("run", scene, "-o", tmp_path / "whole", "-q", *sets).code == 0
-    calls = []
+def _refusing(monkeypatch, cycle):
+    """From here on no cycle of a motion repeats once the patch is worn to more than `cycle`."""
+    found = evolve.after
 
-    def interrupted(path, key, state, moments):
-        keep.save(path, key, state, moments)
-        calls.append(state.cycle)
-        if len(calls) == 4:
-            raise KeyboardInterrupt
+    def after(asked, state, *more):
+        if state.cycle > cycle:
+            raise evolve._Unbounded("nothing repeats")
+        return found(asked, state, *more)
+
+    monkeypatch.setattr(evolve, "after", after)
+
+
+@pytest.mark.share(0, 1)
+@pytest.mark.parametrize("text, until", [
+    (TILTED + COULOMB + SINE + WEAR + "jumps = 3\n", 1e9), (SOFT_RIG + WEAR + "jumps = 2\n" + LOOSE, 1e9),
+    (TILTED + COULOMB + SINE + WEAR, 1e9), (SOFT_RIG + WEAR + LOOSE, 1e9),
+    (TILTED + SHEAR + COULOMB + SINE + WEAR, 1e5)], ids=["bench_jumps", "rig_jumps", "bench", "rig", "stopped"])
+def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(tmp_path, monkeypatch, text, until):
+    """The last state among them, after which no jump is left; until [cycles]: where the motion loses its cycle."""
+    scene, states = tmp_path / "worn.toml", []
+    scene.write_text(text)
+    _refusing(monkeypatch, until)
+
+    save = keep.save
+
+    def noted(path, *more):
+        save(path, *more)
+        states.append(path.read_bytes())
 
     with monkeypatch.context() as patched:
-        patched.setattr(keep, "evolved_with", lambda kept, model, patch, coarse, progress: evolve.evolve(
-            model, patch, coarse, progress, None,
-            lambda state, moments: interrupted(kept.path, key_of(model, patch, kept.version), state, moments)))
-        answer = cli("run", scene, "-o", tmp_path / "out", *sets)
+        patched.setattr(keep, "save", noted)
+        assert cli("run", scene, "-o", tmp_path / "whole", "-q", "--no-page").code == 0
+    assert len(states) >= 2
+    for state in states:
+        (tmp_path / "out.partial").mkdir()
+        (tmp_path / "out.partial" / "wear.npz").write_bytes(state)
+        resumed = cli("run", scene, "-o", tmp_path / "out", "--resume", "-q", "--no-page")
+        assert resumed.code == 0 and "held the state" not in resumed.err
+        for name in ("result.nc", "fields.vtkhdf", "scene.resolved.toml"):
+            assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
+        one, two = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("whole", "out"))
+        assert {**one, "seconds": 0, "effects": 0} == {**two, "seconds": 0, "effects": 0}
+
+
+def test_refuses_an_interrupted_run_of_another_scene_and_names_the_way_on(tmp_path, monkeypatch):
+    scene, save = tmp_path / "worn.toml", keep.save
+    scene.write_text(TILTED + COULOMB + SINE + WEAR)
+
+    def interrupted(*asked):
+        save(*asked)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(keep, "save", interrupted)
+        answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 130 and "--resume" in answer.err
     assert [path.name for path in (tmp_path / "out.partial").iterdir()] == ["wear.npz"]
-    other = cli("run", scene, "-o", tmp_path / "out", "--resume", "--set", "wear.coefficient=2e-14 m^2/N", *sets)
+    other = cli("run", scene, "-o", tmp_path / "out", "--resume", "--set", "wear.coefficient=2e-14 m^2/N")
     assert other.code == 2 and "another scene" in other.err
-    resumed = cli("run", scene, "-o", tmp_path / "out", "--resume", *sets)
-    assert resumed.code == 0 and "held the state" not in resumed.err
-    one, two = (json.loads((tmp_path / name / "summary.json").read_text())["measures"] for name in ("whole", "out"))
-    assert one == two
-    with xr.open_dataset(tmp_path / "whole" / "result.nc", engine="h5netcdf") as a, \
-            xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as b:
-        assert a.worn_depth.equals(b.worn_depth) and a.wear_pressure_peak.equals(b.wear_pressure_peak)
+    assert cli("run", scene, "-o", tmp_path / "out", "--resume", "--no-page").code == 0
     assert not (tmp_path / "out" / "wear.npz").exists() and not (tmp_path / "out.partial").exists()
 
 

@@ -21,7 +21,7 @@ class Moment:
     """The interface after `cycle` cycles.
 
     depth [m] worn so far; used [m]: slip path per cycle of the last jump; pressure [Pa]; gap [m] that remains; all
-    (m,); values: measures of patch and motion by name.
+    (m,); miss: relative error of the slip path by its frames; values: measures of patch and motion by name.
     """
 
     cycle: float
@@ -29,6 +29,7 @@ class Moment:
     used: np.ndarray
     pressure: np.ndarray
     gap: np.ndarray
+    miss: float
     values: dict
 
 
@@ -98,9 +99,11 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
     asked = Wearing(presser(model.patch, patch.pair), motion, patch.pieces.interface.weight, wear.coefficient,
                     wear.cycles, wear.explicit)
     try:
-        state, moments = begin if begin is not None else _first(model, patch, asked, motion)
+        state, moments = begin or _first(model, patch, asked, motion)
     except _Unbounded as why:
         return Evolved(patch, tuple(coarse), None, (), (), 0.0, perf_counter() - clock, f"nothing was worn: {why}")
+    if begin is not None:
+        patch = pressed(model.patch, patch.pair, frozen_array(state.depth))
     while state.cycle < wear.cycles:
         try:
             state = after(asked, state, model.accuracy.tolerance, wear.jumps)
@@ -117,7 +120,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
     depths = tuple(_on(model, patch, other, moments) for other in others)
     worn = [pressed(model.patch, other.pair, frozen_array(depth)) for other, depth in zip(others, depths)]
     return Evolved(patch, (*worn, *(None for one in coarse if one is None)), state, moments, depths,
-                   0.0 if motion.last is None else motion.last.miss, perf_counter() - clock, stopped)
+                   moments[-1].miss, perf_counter() - clock, stopped)
 
 
 def _first(model, patch, asked: Wearing, motion: _Motion) -> tuple:
@@ -134,9 +137,8 @@ def _moment(patch, state: Worn, motion: _Motion) -> Moment:
     if motion.model.grooves is not None:
         left = lowered(motion.model, patch, state.depth).grooves
         worn["groove_amplitude"] = 0.0 if left is None else left.amplitude
-    moved = {} if motion.last is None else motion.last.values
-    return Moment(state.cycle, state.depth, state.used, patch.pressure.sigma_n, patch.pressure.gap,
-                  values(patch) | moved | worn)
+    return Moment(state.cycle, state.depth, state.used, patch.pressure.sigma_n, patch.pressure.gap, motion.last.miss,
+                  values(patch) | motion.last.values | worn)
 
 
 def _on(model, patch, other, moments) -> np.ndarray:

@@ -1,5 +1,6 @@
 """The state of a wear run on disk, from which an interrupted run goes on to the same bits."""
 
+import json
 import os
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from ..key import key_of
 from .evolve import Evolved, Moment, evolve
 
 STATE = tuple(Worn.__slots__)
-MOMENT = ("cycle", "depth", "used", "pressure", "gap")
+MOMENT = ("cycle", "depth", "used", "pressure", "gap", "miss")
 
 
 def evolved_with(kept, model, patch, coarse, progress=None) -> Evolved:
@@ -26,12 +27,11 @@ def evolved_with(kept, model, patch, coarse, progress=None) -> Evolved:
 
 def save(path: Path, key: str, state: Worn, moments: tuple) -> None:
     """Write a state and the moments so far; an earlier file is replaced only when the new one is whole."""
-    names = sorted(moments[-1].values)
     arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE}
     arrays |= {f"moment_{name}": np.array([getattr(one, name) for one in moments]) for name in MOMENT}
-    values = np.array([[one.values[name] for name in names] for one in moments], float)
+    values = json.dumps([one.values for one in moments], default=float)
     with whole(path) as partial, open(partial, "wb") as file:
-        np.savez(file, key=np.array(key), names=np.array(names), values=values, **arrays)
+        np.savez(file, key=np.array(key), values=np.array(values), **arrays)
         file.flush()
         os.fsync(file.fileno())
 
@@ -46,10 +46,9 @@ def load(path: Path, key: str) -> tuple:
                                 "without --resume")
         whole = {name: found[f"state_{name}"] for name in STATE}
         state = Worn(**{name: float(value) if value.ndim == 0 else value for name, value in whole.items()})
-        names = [str(name) for name in found["names"]]
         columns = [found[f"moment_{name}"] for name in MOMENT]
-        moments = tuple(Moment(float(row[0]), *row[1:], dict(zip(names, map(float, values))))
-                        for *row, values in zip(*columns, found["values"], strict=True))
+        moments = tuple(Moment(float(row[0]), *row[1:-1], float(row[-1]), values)
+                        for *row, values in zip(*columns, json.loads(str(found["values"])), strict=True))
     except FileNotFoundError:
         raise PatchfemError(f"{path.parent.name}: no interrupted run is kept there; run without --resume") from None
     except PatchfemError:
