@@ -187,6 +187,15 @@ def test_refuses_a_bad_scene_with_all_its_mistakes():
     assert len(caught.value.mistakes) == 3
 
 
+@pytest.mark.parametrize("name", [name for name in pf.__all__ if isinstance(getattr(pf, name), type)
+                                  and issubclass(getattr(pf, name), Exception)])
+def test_always_one_except_catches_every_failure(name):
+    """`except pf.PatchfemError` around any call of the package."""
+    assert issubclass(getattr(pf, name), pf.PatchfemError)
+    with pytest.raises(pf.PatchfemError, match="wavform"):
+        pf.run(BENCH.replace("[slide]", "[slide]\nwavform = 1"))
+
+
 # ---- looking at it
 
 def test_exact_measures_are_a_mapping_that_cannot_be_written(runs):

@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..core import BaseSine, ModalBasis
+from ..core import BaseSine, ModalBasis, PatchfemError
 from ..effects import module_of
 from ..structure.drive_sizes import Asked, level_cycles, own_period
 
@@ -44,8 +44,14 @@ def cycles_of(asked, drive) -> float:
 
 
 def recorded(scene) -> tuple:
-    """(time (k,) [s], value (k,)) of drive.file: acceleration [m s-2] of the base, or force [N]; from 0 s on."""
-    return record(scene.beside(scene.drive.file), scene.drive.kind)
+    """(time (k,) [s], value (k,)) of drive.file: acceleration [m s-2] of the base, or force [N]; from 0 s on.
+
+    PatchfemError with file and line of the scene where the file has none.
+    """
+    try:
+        return record(scene.beside(scene.drive.file), scene.drive.kind)
+    except PatchfemError as error:
+        raise type(error)(f"{scene.where('drive.file')}: {error}") from None
 
 
 def record(path, kind: str) -> tuple:

@@ -59,7 +59,11 @@ def bodies_of(patch: PatchModel) -> tuple:
         return grid_of(patch, patch.lower), None if patch.alike else grid_of(patch, patch.upper)
     from ..mesh.files import read_bodies
 
-    low, high = read_bodies(patch.mesh)
+    try:
+        low, high = read_bodies(patch.mesh)
+    except PatchfemError as error:
+        error.key = error.key or "contact.mesh"
+        raise
     for side, body in (("lower", low), ("upper", high or low)):
         _matches(patch, side, body)
     return low, low if high is None and not patch.alike else high

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ..core import Missing, say
+from ..core import Missing, PatchfemError, say
 from ..effects import EFFECTS
 from ..model.model import Model, build
 from ..model.source import placed
@@ -64,7 +64,11 @@ def _planned(model: Model, per_point: bool) -> Plan:
     if model.measured is not None:
         from ..inputs.measured import read_table
 
-        read_table(model.measured[0])  # a broken table is named before anything runs
+        try:
+            read_table(model.measured[0])  # a broken table is named before anything runs
+        except PatchfemError as error:
+            error.key = error.key or "measured.file"
+            raise
     unknowns, chain, groups = {}, {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}, {}
     engine, steps, seconds, more, said = "static", 0, 0.0, 0.0, [[], [], []]
     numerics, pressed = None, 0.0

@@ -17,6 +17,7 @@ from typing import Any
 
 from ..disk.opened import reading
 from ..effects import MOST_COORDINATES, takes
+from ..faults import PatchfemError
 from .keys import tables
 from .keys.same import once
 from .keys.types import keys as keys_of
@@ -34,7 +35,7 @@ LARGEST = 32 * 2**20  # bytes of a scene
 _VALUE = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")  # a key with a value that opens no quotes and no bracket
 
 
-class SceneError(Exception):
+class SceneError(PatchfemError):
     """A scene that cannot be run; `mistakes` holds one whole line for each, ``FILE:LINE: table.key: message``."""
 
     def __init__(self, mistakes: Iterable[str]) -> None:

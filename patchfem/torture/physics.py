@@ -72,7 +72,6 @@ def solved(trial: Trial, tables: dict, most: float = 3.0, valid: bool = False):
     except NotConverged:
         return None
     except Exception as error:
-        refused = isinstance(error, PatchfemError) or hasattr(error, "mistakes")
-        if refused and not valid:
+        if isinstance(error, PatchfemError) and not valid:
             return None
         raise Wrong(f"{type(error).__name__}: {error}") from None

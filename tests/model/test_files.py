@@ -50,6 +50,11 @@ FAULTS = {
     "measured": (MEASURED, "m.csv", "frequency [Hz],output [g]\n1,1\n", "measured.file",
                  "m.csv:1: column 'output [g]' is not known"),
     "mesh": (mesh_text(), "a.msh", "$MeshFormat\nnonsense\n", "contact.mesh", "a.msh: not a readable .msh file"),
+    "mesh, lying": (mesh_text(), "a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n9999999\n1 0 0 0\n$EndNodes\n",
+                    "contact.mesh", "a.msh: Nodes announces 9999999 entries"),
+    "mesh, .inp": (mesh_text(), "a.inp", "*NODE\n1,0,0\n", "contact.mesh", "a.inp: nothing is tagged lower_far"),
+    "mesh, .unv": (mesh_text(), "a.unv", "    -1\n  2411\n", "contact.mesh", "a.unv: dataset 2411 does not end"),
+    "mesh, .vtu": (mesh_text(), "a.vtu", "<?xml version='1.0'?>", "contact.mesh", "a.vtu: not a readable .vtu file"),
 }  # fmt: skip
 
 
@@ -59,6 +64,8 @@ def test_refuses_each_faulty_file_with_the_line_of_the_scene(tmp_path, text, nam
     assert code == 2 and len(lines) == 1, lines
     number = line_of(text, "mesh = " if key == "contact.mesh" else "file = ")
     assert lines[0].startswith(f"{tmp_path / 'scene.toml'}:{number}: {key}: ") and said in lines[0]
+    answer = cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out")
+    assert answer.code == 2 and answer.err.splitlines() == lines
 
 
 @pytest.mark.parametrize("text, name, content, key, said", FAULTS.values(), ids=FAULTS)

@@ -84,10 +84,19 @@ class Holder(Table):
     tangential_stiffness: quantity("stiffness", gt=0) | None = None
 
 
+def convex(value: object) -> object:
+    """A radius as it is; ValueError with what to write instead for one below 0, a hollow."""
+    if str(value).lstrip().startswith("-"):
+        raise ValueError("a crown is convex, its radius > 0; a hollow is told by its heights: leave [contact.crown] "
+                         'out and name a file with the columns "x [mm],z [um]" of z = x^2/(2 radius) as '
+                         "contact.profile.file")
+    return value
+
+
 class Crown(Table):
     """A rounding of this radius over the patch."""
 
-    radius: Length
+    radius: Annotated[Length, BeforeValidator(convex)]
     on: Piece = "upper"
 
 
