@@ -112,11 +112,12 @@ def new(kind: str, /) -> str:
 
 def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Path | None = None,
          say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
-    """Error against time of a scene: knob -> `runs`, `cheapest` and `sentence`, the dict of `patchfem cost --json`.
+    """Error against CPU seconds of a scene: knob -> `runs`, `cheapest`, `sentence`, the dict of `patchfem cost --json`.
 
     scene and sets as `load` takes them. over: one knob (element_size, steps_per_cycle, shear_modes, jumps) in place of
-    all that the scene has. Of each run `seconds`, and by measure its `values`, the `errors` that it states and its
-    `distances` to the best run, in SI. out: a folder for cost.csv and pictures. say: called with one line per run, on
+    all that the scene has. Of each run CPU `seconds` and `wall_seconds`, and by measure its `values`, the `errors` that
+    it states and its `distances` to the best run, in SI; settings that gave the same run, bit for bit, are one. out: a
+    folder for cost.csv and pictures. say: called with one line per run, on
     stderr unless given. {} where the answer is exact; PatchfemError for a knob that the scene does not have.
     """
     from .campaigns.cost import curve, knobs_of

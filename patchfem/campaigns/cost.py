@@ -1,10 +1,15 @@
-"""Cost of accuracy in time: a scene run again and again with one knob turned, each run timed against its error."""
+"""Cost of accuracy in time: a scene run again and again with one knob turned, each run timed against its error.
 
+Seconds are those of the processor, this process and its children together: a machine that is busy with other work takes
+longer by the clock and counts the same.
+"""
+
+import os
 from dataclasses import dataclass, replace
 from math import inf
-from statistics import median
-from time import perf_counter
+from time import perf_counter, process_time
 
+from ..compiled import cache_folder
 from ..core import NotConverged, PatchfemError
 from ..model.model import Model
 from ..model.source import placed
@@ -14,9 +19,10 @@ from ..runs.plan import plan
 from ..runs.run import run
 from .knobs import KNOBS, Setting, knobs_of, settings
 
-__all__ = ["KNOBS", "Cost", "cheapest", "curve", "knobs_of", "sentence", "turned_by"]
-TIMINGS = 3  # of a run, whose median counts
-LONG = 10.0  # seconds of a run that is timed once
+__all__ = ["KNOBS", "Cost", "cheapest", "curve", "knobs_of", "quickest", "sentence", "turned_by"]
+TIMINGS = 3  # of a run, the shortest of which counts: other work only adds to it
+LONG = 10.0  # CPU seconds of a run that is timed once
+APART = 1.5  # ratio of the seconds by the clock to those of the processor from which both are told
 NOISE = 1.1  # ratio of seconds up to which two runs cost the same
 STUCK = 0.9  # ratio of the least error over the largest from which a knob does not help
 UNTURNED = 1e-11  # relative change of a measure that a knob leaves as it is
@@ -26,15 +32,17 @@ UNTURNED = 1e-11  # relative change of a measure that a knob leaves as it is
 class Cost:
     """One run of a cost curve.
 
-    value: of the knob in SI, None where the scene's tolerance chose; words: the setting in a sentence; seconds of the
-    whole run with its error estimates, the median of so many timings. By measure: values; errors, as the run states
-    them, in the unit of the value; floors of these; distances to the run `best`, which has none itself; units.
+    label: of the setting, or of all settings that gave this run, bit for bit; value: of the knob in SI, None where the
+    scene's tolerance chose; words: the setting in a sentence; CPU seconds of the whole run with its error estimates,
+    the least of so many timings, and those by the clock in the same timing. By measure: values; errors, as the run
+    states them, in the unit of the value; floors of these; distances to the run `best`, which has none itself; units.
     """
 
     label: str
     value: float | None
     words: str
     seconds: float
+    wall_seconds: float
     timings: int
     values: dict
     errors: dict
@@ -46,6 +54,14 @@ class Cost:
         """Error of a measure: the larger of what the run states and its distance to the best; None without either."""
         known = [part[name] for part in (self.errors, self.distances) if name in part]
         return max(known, default=None)
+
+    def waited(self) -> bool:
+        """Whether the clock ran so much longer than the processor that both are told."""
+        return self.wall_seconds > APART * self.seconds
+
+    def same_as(self, other) -> bool:
+        """Whether two settings of numbers gave the same run, bit for bit."""
+        return None not in (self.value, other.value) and (self.values, self.errors) == (other.values, other.errors)
 
     def within(self, name: str, tolerance: float) -> bool:
         """Whether the error of a measure is at most tolerance * |value| + floor."""
@@ -69,9 +85,13 @@ def _curve(model: Model, knob: str, say) -> list:
         raise PatchfemError(f"cost --over {knob}: this scene has the knobs {', '.join(mine) or 'none'}", "")
     wanted = settings(model, knob)
     _tried(wanted[0], "first run, not counted", None)  # imports and compiling stay out of the times
-    runs = [_timed(one, one is not wanted[-1], say) for one in wanted]
-    runs = [one for one in runs if one is not None]
-    if len(runs) < 3:
+    runs, done = [], 0
+    for one in wanted:
+        found = _timed(one, one is not wanted[-1], say, runs[-1:])
+        if found is not None:
+            done += 1
+            runs[-1:] = [_one_run(runs[-1], found)] if runs and found.same_as(runs[-1]) else [*runs[-1:], found]
+    if done < 3:
         raise PatchfemError(f"cost --over {knob}: fewer than three values could be run", "")
     best = _best(runs)
     return [one if one is best else replace(one, distances=_distances(one, best)) for one in runs]
@@ -79,9 +99,10 @@ def _curve(model: Model, knob: str, say) -> list:
 
 def _best(runs: list) -> Cost:
     """The finest run; of it and of what the tolerance chooses the one that states most of the smaller errors."""
-    *_, fine, last = runs
+    *_, last = runs
     if last.value is not None:
         return last
+    fine = runs[-2]
     shared = last.errors.keys() & fine.errors.keys()
     return last if 2 * sum(last.errors[name] <= fine.errors[name] for name in shared) >= len(shared) else fine
 
@@ -90,25 +111,54 @@ def _distances(one: Cost, best: Cost) -> dict:
     return {name: abs(value - best.values[name]) for name, value in one.values.items() if name in best.values}
 
 
-def _timed(setting: Setting, coarse: bool, say) -> Cost | None:
-    """A setting run TIMINGS times, or once where that is long; None where it cannot be run.
+def _one_run(first: Cost, second: Cost) -> Cost:
+    """Two settings that gave the same run as one, named by both; in a sentence by the one of the scene, which has no
+    number."""
+    quick = min(first, second, key=lambda one: one.seconds)
+    return replace(first, label=f"{first.label}, {second.label.removeprefix('tolerance ')}",
+                   words=min(first.words, second.words, key=len), seconds=quick.seconds,
+                   wall_seconds=quick.wall_seconds, timings=first.timings + second.timings)
+
+
+def _timed(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
+    """A setting run TIMINGS times, or once where that is long and nothing was compiled, or where it is the run `before`
+    over again; None where it cannot be run.
 
     coarse: a mesh of a file may be split once more for its estimate.
     """
-    found, seconds = None, []
-    while found is None or (len(seconds) < TIMINGS and seconds[0] < LONG):
-        begin = perf_counter()
+    timings, one = [], None
+    while one is None or (len(timings) < TIMINGS and not any(one.same_as(other) for other in before)):
+        kept, begin = _compiled(), (_cpu(), perf_counter())
         found = _tried(setting, setting.label, say, coarse)
         if found is None:
             return None
-        seconds.append(perf_counter() - begin)
+        timings.append((_cpu() - begin[0], perf_counter() - begin[1]))
+        known = {name: m for name, m in found.items() if m.value is not None}
+        one = Cost(setting.label, setting.value, setting.words, *min(timings), len(timings),
+                   {name: m.value for name, m in known.items()},
+                   {name: m.error for name, m in known.items() if m.error is not None},
+                   {name: m.floor for name, m in known.items()}, {name: m.unit for name, m in known.items()}, {})
+        if one.seconds >= LONG and _compiled() == kept:
+            break
+    again = "".join(f", the run of {other.label}" for other in before if one.same_as(other))
     if say is not None:
-        say(f"{setting.label}: {median(seconds):.2f} s" + (", timed once" if len(seconds) == 1 else ""))
-    known = {name: m for name, m in found.items() if m.value is not None}
-    return Cost(setting.label, setting.value, setting.words, median(seconds), len(seconds),
-                {name: m.value for name, m in known.items()},
-                {name: m.error for name, m in known.items() if m.error is not None},
-                {name: m.floor for name, m in known.items()}, {name: m.unit for name, m in known.items()}, {})
+        say(f"{one.label}: {one.seconds:.2f} CPU s" + f" in {one.wall_seconds:.2f} s" * one.waited() +
+            (again or ", timed once" * (one.timings == 1)))
+    return one
+
+
+def _cpu() -> float:
+    """CPU seconds of this process, all its threads, and of its children that have ended."""
+    children = os.times()
+    return process_time() + children.children_user + children.children_system
+
+
+def _compiled() -> int:
+    """How many functions have their machine code kept: a run that adds one has compiled it."""
+    try:
+        return len(os.listdir(cache_folder() / "code"))
+    except OSError:
+        return 0
 
 
 def _tried(setting: Setting, label: str, say, coarse: bool = True) -> dict | None:
@@ -155,22 +205,33 @@ def _confirmed(runs: list, good) -> list:
     return out + [one for one in alone if good(one)]
 
 
+def quickest(runs: list, tolerance: float) -> Cost | None:
+    """The run with least CPU seconds that has all measures within a tolerance, of those that cost the same the finest;
+    None where no run has."""
+    names = _stated(runs)
+    good = _confirmed(runs, lambda one: all(one.within(name, tolerance) for name in names if name in one.values))
+    least = min((one.seconds for one in good), default=inf)
+    return next((one for one in reversed(runs) if one in good and one.seconds <= NOISE * least), None)
+
+
 def sentence(runs: list, tolerance: float) -> str:
     """What it costs to have all measures within a tolerance: the quickest run that has, or the measure that is worst in
     the best one."""
     names, percent = _stated(runs), f"{100 * tolerance:g} %"
-    good = _confirmed(runs, lambda one: all(one.within(name, tolerance) for name in names if name in one.values))
-    if good:
-        quickest = min(one.seconds for one in good)
-        one = next(one for one in reversed(runs) if one in good and one.seconds <= NOISE * quickest)
-        return f"all measures within {percent} costs {one.seconds:.2g} s: {one.words}"
+    if one := quickest(runs, tolerance):
+        return f"all measures within {percent} take {_seconds(one)}: {one.words}"
 
     known = [one for one in runs if one.errors or one.distances]
     share, name, least = min(((*_worst(one, names, tolerance), one) for one in known), key=lambda found: found[0])
     if share >= STUCK * max(_worst(one, [name], tolerance)[0] for one in known if name in one.values):
         return f"no run has all measures within {percent}: {name} is within {100 * share:.2g} % whatever the setting"
-    return f"no run has all measures within {percent}: {name} is within {100 * share:.2g} % at best, which costs " \
-           f"{least.seconds:.2g} s: {least.words}"
+    return f"no run has all measures within {percent}: {name} is within {100 * share:.2g} % at best, which takes " \
+           f"{_seconds(least)}: {least.words}"
+
+
+def _seconds(one: Cost) -> str:
+    """CPU seconds to two digits."""
+    return f"{float(f'{one.seconds:.2g}'):g} CPU s"
 
 
 def _worst(one: Cost, names: list, tolerance: float) -> tuple:

@@ -27,7 +27,7 @@ from .shared import (
 
 def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle, shear_modes or jumps") = "",
          out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
-    """Error against time of SCENE for a knob, or for all it has.
+    """Error against CPU seconds of SCENE for a knob, or for all it has.
 
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
@@ -177,12 +177,16 @@ def _fit_wear(found, to: str, free, out: Path | None, json_: bool, quiet: bool) 
 
 
 def _print_cost(knob: str, runs: list, names: list, text: str) -> None:
-    """The table of a cost curve, in relative errors, and what it comes to."""
-    print(f"{knob:<16} {'seconds':>9}  " + "  ".join(f"{name[:18]:>18}" for name in names))
-    print(f"{'':<16} {'':>9}  " + "  ".join(f"{'stated (distance)':>18}" for _ in names))
+    """The table of a cost curve, in relative errors, and what it comes to; seconds by the clock beside those of the
+    processor where any run waited."""
+    wall, first = any(one.waited() for one in runs), max(len(knob), *(len(one.label) for one in runs))
+    head = [f"{knob:<{first}}", f"{'CPU s':>7}", *[f"{'clock s':>7}"] * wall, *(f"{one:>17}" for one in names)]
+    print("  ".join(head))
+    print("  ".join([" " * len(one) for one in head[:2 + wall]] + ["stated (distance)".rjust(max(17, len(one)))
+                                                                   for one in names]))
     for one in runs:
-        cells = "  ".join(f"{_shares(one, name):>18}" for name in names)
-        print(f"{one.label:<16} {one.seconds:9.3f}  {cells}")
+        cells = [f"{one.label:<{first}}", f"{one.seconds:7.3f}", *[f"{one.wall_seconds:7.3f}"] * wall]
+        print("  ".join(cells + [_shares(one, name).rjust(max(17, len(name))) for name in names]))
     print(text)
 
 

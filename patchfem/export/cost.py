@@ -3,7 +3,7 @@
 import csv
 from pathlib import Path
 
-from ..campaigns.cost import cheapest, sentence, turned_by
+from ..campaigns.cost import cheapest, quickest, sentence, turned_by
 from ..disk.whole import whole, write_text
 from .drawing.pictures import drawing, styled
 
@@ -24,8 +24,8 @@ def shown(runs: list) -> list:
 def write(folder: Path, curves: dict) -> Path:
     """Write cost.csv into a folder that is made, and return its path; curves: knob -> Costs coarse to fine.
 
-    One row per run: knob, setting, seconds, timings, and of every measure its value, the error that the run states and
-    its distance to the best run, in SI units; empty where there is none.
+    One row per run: knob, setting, seconds of the processor, wall_seconds by the clock, timings, and of every measure
+    its value, the error that the run states and its distance to the best run, in SI units; empty where there is none.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -33,11 +33,11 @@ def write(folder: Path, curves: dict) -> Path:
     table = folder / "cost.csv"
     with whole(table) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
-        rows.writerow(["knob", "setting", "seconds", "timings",
+        rows.writerow(["knob", "setting", "seconds", "wall_seconds", "timings",
                        *(text for name in names for text in (name, f"error_{name}", f"distance_{name}"))])
         for knob, runs in curves.items():
             for one in runs:
-                rows.writerow([knob, one.label, f"{one.seconds:.6g}", one.timings,
+                rows.writerow([knob, one.label, f"{one.seconds:.6g}", f"{one.wall_seconds:.6g}", one.timings,
                                *(repr(float(part[name])) if name in part else "" for name in names
                                  for part in (one.values, one.errors, one.distances))])
     return table
@@ -53,28 +53,30 @@ def write_picture(folder: Path, knob: str, runs: list, tolerance: float, names: 
 def answer_of(runs: list, tolerance: float) -> dict:
     """What the runs of a knob come to, in plain lists and dicts; SI.
 
-    runs: Costs coarse to fine; tolerance: of the scene. `runs` holds each with its label, value of the knob, seconds,
-    values, errors and distances by measure, `cheapest` the label of the quickest run within the tolerance by measure,
-    `sentence` what all measures cost.
+    runs: Costs coarse to fine; tolerance: of the scene. `runs` holds each with its label, value of the knob, seconds
+    of the processor and by the clock, values, errors and distances by measure, `cheapest` the label of the quickest run
+    within the tolerance by measure, `sentence` what all measures cost.
     """
-    parts = ("label", "value", "seconds", "timings", "values", "errors", "distances")
+    parts = ("label", "value", "seconds", "wall_seconds", "timings", "values", "errors", "distances")
     return {"runs": [{name: getattr(one, name) for name in parts} for one in runs],
             "cheapest": cheapest(runs, tolerance), "sentence": sentence(runs, tolerance)}
 
 
 @styled
 def draw(knob: str, runs: list, tolerance: float, names: list):
-    """Relative error of each measure against the seconds of a run, as SVG text.
+    """Relative error of each measure against the CPU seconds of a run, as SVG text.
 
-    Left the errors that the runs state, right their distances to the best run. knob: its name; runs: Costs coarse to
-    fine; tolerance: a broken line; names: of the measures shown.
+    Left the errors that the runs state, right their distances to the best run; rings mark the quickest run that has
+    all measures within the tolerance. knob: its name; runs: Costs coarse to fine; tolerance: a broken line; names: of
+    the measures shown.
     """
     figure, axes = drawing(2, 4.6, sharex=True, sharey=True)
     for axis, part, title in ((axes[0], "errors", "error that the run states"),
                               (axes[1], "distances", "distance to the best run")):
-        axis.set(xscale="log", yscale="log", xlabel="seconds of a run", title=title)
+        axis.set(xscale="log", yscale="log", xlabel="CPU seconds of a run", title=title)
         for number, name in enumerate(names):
             _line(axis, runs, part, name, f"C{number % 10}")
+        _ring(axis, quickest(runs, tolerance), part, names)
         axis.axhline(tolerance, color="0.4", linestyle="--", linewidth=1, label=f"tolerance {tolerance:g}")
         axis.margins(x=0.1)
     groups, (low, high) = _groups(runs), axes[0].get_ylim()
@@ -95,17 +97,28 @@ def _axis_of(knob: str, runs: list) -> str:
 
 
 def _line(axis, runs: list, part: str, name: str, colour: str) -> None:
-    """The errors or distances of a measure over the values of the knob, and a star for what the tolerance chose.
-
-    The line goes on in time: runs that cost much the same may have changed places by the noise of their seconds.
-    """
+    """The errors or distances of a measure, joined in the order of the knob, and a star for what the tolerance
+    chose."""
     for alone, mark in ((False, "o-"), (True, "*")):
-        points = [(one.seconds, getattr(one, part).get(name, 0.0) / abs(one.values[name])) for one in runs
-                  if (one.value is None) == alone and one.values.get(name)]
-        points = sorted(point for point in points if point[1] > 0)
+        points = [point for one in runs if (one.value is None) == alone and (point := _point(one, part, name))]
         if points:
             axis.plot(*zip(*points, strict=True), mark, color=colour, markersize=11 if alone else 4,
                       label=name.replace("_", " ") if not alone else None)
+
+
+def _point(one, part: str, name: str) -> tuple | None:
+    """(CPU seconds, relative error or distance) of a run; None where it has none above 0."""
+    size = abs(one.values.get(name, 0.0))
+    found = getattr(one, part).get(name, 0.0) / size if size else 0.0
+    return (one.seconds, found) if found > 0 else None
+
+
+def _ring(axis, one, part: str, names: list) -> None:
+    """Rings around the points of the quickest run within the tolerance, where there is one."""
+    points = [point for name in names if one is not None and (point := _point(one, part, name))]
+    if points:
+        axis.plot(*zip(*points, strict=True), "o", color="0.25", markersize=11, fillstyle="none", zorder=4,
+                  label="cheapest within the tolerance")
 
 
 def _groups(runs: list) -> list:

@@ -2,6 +2,9 @@
 
 import csv
 import json
+import subprocess
+import sys
+from time import perf_counter, process_time, sleep
 
 import numpy as np
 import pytest
@@ -9,8 +12,8 @@ from command_line import cli
 from scene_texts import PIECE
 
 import patchfem as pf
-from patchfem.campaigns import knobs
-from patchfem.campaigns.cost import Cost, cheapest, curve, sentence
+from patchfem.campaigns import cost, knobs
+from patchfem.campaigns.cost import Cost, cheapest, curve, quickest, sentence
 from patchfem.export.cost import draw, write
 from patchfem.model.model import build
 from patchfem.runs.run import run
@@ -33,7 +36,7 @@ def model(keys="", tolerance=0.05):
 
 
 def made(label, seconds, error, distance=None, value=1.0):
-    return Cost(label, value, f"a knob at {label}", seconds, 3, {"a": 1.0, "b": 2.0}, {"a": error, "b": error},
+    return Cost(label, value, f"a knob at {label}", seconds, seconds, 3, {"a": 1.0, "b": 2.0}, {"a": error, "b": error},
                 {"a": 0.0, "b": 0.0}, {"a": "1", "b": "1"}, {} if distance is None else {"a": distance})
 
 
@@ -77,13 +80,13 @@ def test_exact_the_cheapest_run_is_one_that_finer_ones_confirm():
 
 def test_exact_the_sentence_names_the_cheapest_run_or_the_worst_measure():
     runs = [made("2", 1, 4e-2, 3e-2), made("4", 2, 8e-3, 6e-3), made("8", 5, 2e-3)]
-    assert sentence(runs, 1e-2) == "all measures within 1 % costs 2 s: a knob at 4"
+    assert sentence(runs, 1e-2) == "all measures within 1 % take 2 CPU s: a knob at 4"
     assert sentence(runs, 1e-3) == \
-        "no run has all measures within 0.1 %: a is within 0.2 % at best, which costs 5 s: a knob at 8"
+        "no run has all measures within 0.1 %: a is within 0.2 % at best, which takes 5 CPU s: a knob at 8"
     still = [made("2", 1, 2e-2), made("4", 2, 2e-2), made("8", 5, 2e-2)]
     assert sentence(still, 1e-2) == "no run has all measures within 1 %: a is within 2 % whatever the setting"
     bold = [made("2", 1, 1e-3, 3e-2), *runs[1:]]  # states less than its distance to the best
-    assert sentence(bold, 1e-2) == "all measures within 1 % costs 2 s: a knob at 4"
+    assert sentence(bold, 1e-2) == "all measures within 1 % take 2 CPU s: a knob at 4"
 
 
 def test_exact_the_table_holds_plain_numbers(tmp_path):
@@ -97,12 +100,66 @@ def test_exact_the_table_holds_plain_numbers(tmp_path):
     assert [(row["error_a"], row["error_b"], row["distance_a"]) for row in numbers] == [(e, e, e) for e in kinds]
 
 
-def test_always_the_line_of_a_picture_goes_on_in_time():
-    """It doubled back where a finer run happened to take less time than a coarser one."""
-    runs = [made("2", 0.43, 4e-2, 3e-2), made("4", 0.36, 4e-2, 3e-2), made("8", 5, 2e-3, 1e-3), made("16", 9, 1e-3)]
+def test_exact_the_line_of_a_picture_goes_on_in_the_order_of_the_setting_and_the_cheapest_is_ringed():
+    runs = [made("2", 0.43, 4e-2, 3e-2), made("4", 0.36, 8e-3, 7e-3), made("8", 5, 2e-3, 1e-3), made("16", 9, 1e-3)]
     for axis, ends in zip(draw.figure("jumps", runs, 1e-2, ["a"]).axes, (9, 5), strict=True):
-        seconds = axis.lines[0].get_xdata()
-        assert (np.diff(seconds) > 0).all() and seconds[-1] == ends
+        line, ring = axis.lines[:2]
+        assert line.get_xdata().tolist()[:3] == [0.43, 0.36, 5] and line.get_xdata()[-1] == ends
+        assert ring.get_xdata() == [0.36] and ring.get_fillstyle() == "none"
+    assert quickest(runs, 1e-2).label == "4" and quickest(runs, 1e-4) is None
+    assert "none" not in {one.get_fillstyle() for one in draw.figure("jumps", runs, 1e-4, ["a"]).axes[0].lines}
+
+
+def turning(monkeypatch, answers: dict, work=lambda: None) -> list:
+    """The curve of settings {label: error}, each of which does `work`."""
+    from patchfem.core import Measure
+
+    wanted = [knobs.Setting(f"tolerance {one}", 1.0, f"by tolerance {one}", None) for one in answers]
+    monkeypatch.setattr(cost, "knobs_of", lambda model: ["element_size"])
+    monkeypatch.setattr(cost, "settings", lambda model, knob: wanted)
+    monkeypatch.setattr(cost, "_tried", lambda setting, *_: work() or {
+        "a": Measure(1.0, "1", answers[setting.label.removeprefix("tolerance ")], 0.0)})
+    return cost._curve(None, "element_size", None)
+
+
+def test_exact_settings_that_gave_the_same_run_bit_for_bit_are_one(monkeypatch):
+    runs = turning(monkeypatch, {"0.1": 1e-2, "0.01": 1e-2, "0.001": 1e-3, "1e-4": 1e-4, "1e-5": 1e-4})
+    assert [(one.label, one.timings) for one in runs] == [
+        ("tolerance 0.1, 0.01", 4), ("tolerance 0.001", 3), ("tolerance 1e-4, 1e-5", 4)]
+    apart = turning(monkeypatch, {"0.1": 1e-2, "0.01": np.nextafter(1e-2, 1), "0.001": 1e-3})
+    assert [one.timings for one in apart] == [3, 3, 3]
+
+
+def test_exact_seconds_are_those_of_the_processor_with_its_children(monkeypatch):
+    """A run that waits costs nothing, one that works in a child process costs what the child does."""
+    def spin(seconds=0.06):
+        begin = process_time()
+        while process_time() - begin < seconds:
+            pass
+
+    def waits():
+        spin(), sleep(0.15)
+
+    monkeypatch.setattr(cost, "TIMINGS", 1)
+    for one in turning(monkeypatch, {"1": 1.0, "2": 2.0, "3": 3.0}, waits):
+        assert one.seconds == pytest.approx(0.06, rel=0.2) and one.wall_seconds > 0.2 and one.waited()
+    burn = "from time import process_time as t\nwhile t() < 0.3: pass"
+    begin = cost._cpu(), perf_counter()
+    subprocess.run([sys.executable, "-S", "-c", burn], check=True)
+    assert cost._cpu() - begin[0] == pytest.approx(0.3, abs=0.12)
+
+
+def test_exact_a_long_run_that_compiled_is_timed_again(monkeypatch):
+    """The first point of a curve once held the seconds of the compiler."""
+    spent, kept = iter([0, 30, 30, 31, 40, 52]), iter([5, 6, 6, 6, 6, 6])
+    monkeypatch.setattr(cost, "_cpu", lambda: next(spent))
+    monkeypatch.setattr(cost, "_compiled", lambda: next(kept))
+    monkeypatch.setattr(cost, "TIMINGS", 2)
+    monkeypatch.setattr(cost, "_tried", lambda *_: {})
+    one = cost._timed(knobs.Setting("a", 1.0, "a", None), True, None)
+    assert (one.seconds, one.timings) == (1, 2)
+    one = cost._timed(knobs.Setting("b", 1.0, "b", None), True, None)
+    assert (one.seconds, one.timings) == (12, 1)
 
 
 def test_exact_a_picture_does_not_join_two_kinds_of_error():

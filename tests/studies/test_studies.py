@@ -1,8 +1,14 @@
 """The sentences of the studies, checked by running them."""
 
+import re
+from pathlib import Path
 
+import numpy as np
 import pytest
+from command_line import cli
 from study_module import study
+
+STUDIES = Path(__file__).parents[2] / "studies"
 
 
 @pytest.mark.slow
@@ -50,3 +56,25 @@ def test_figure_14_curve_of_the_study(tmp_path):
     assert [share for *_, share in rows] == pytest.approx([0, 0.683, 0.954, 1], abs=6e-4)
     assert f"{100 * rows[1][2]:.1f} and {100 * rows[2][2]:.1f} % of a bond" in one.ANSWER
     assert "<svg" in (tmp_path / "figure.svg").read_text()
+
+
+@pytest.mark.parametrize("words", [(), ("--set", "contact.element_size=64 um")])
+def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path, monkeypatch):
+    """Errors to every digit printed; seconds hang on the machine, and their ratios to a third or three times."""
+    monkeypatch.setattr("patchfem.campaigns.cost.TIMINGS", 1)
+    said = cli("cost", STUDIES / "rig/pieces.toml", *words, "-o", tmp_path, "-q")
+    assert said.code == 0, said.err
+    blocks = re.findall(r"(?s)```text\n(element_size .*?)```", (STUDIES / "README.md").read_text("utf-8"))
+    (names, ours, said), (printed, theirs, sentence) = (table(one) for one in (said.out.split("results:")[0],
+                                                                               blocks[bool(words)]))
+    assert names == printed and said.split(": ")[1] == sentence.split(": ")[1]
+    assert [row[::2] for row in ours] == [row[::2] for row in theirs] and len(ours) in (3, 6)
+    ratios = np.array([float(one[1]) / float(other[1]) for one, other in zip(ours, theirs, strict=True)])
+    assert (np.abs(np.log(ratios / np.median(ratios))) < np.log(3)).all()
+
+
+def table(text: str) -> tuple:
+    """(names of the measures, rows (label, CPU seconds, errors), last line) of a table that `cost` prints."""
+    (_, *first), _, *rows, last = (re.split("  +", line.strip()) for line in text.rstrip().split("\n"))
+    more = first[:2].count("clock s")
+    return first[1 + more:], [(label, seconds, cells[more:]) for label, seconds, *cells in rows], last[0]
