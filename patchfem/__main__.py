@@ -1,10 +1,15 @@
 """The command line. Nothing scientific is imported until a verb needs it."""
 
+# ruff: noqa: E402
+import sys
+
+if __name__ == "__main__" and not sys.flags.safe_path:
+    del sys.path[0]  # the current folder, in which a file of the user may have the name of any module
+
 import gc
 import importlib
 import os
 import signal
-import sys
 from types import ModuleType
 
 # what asks a process to end: a person, a batch queue, a terminal that is closed (unless nohup lets it pass)
@@ -13,6 +18,7 @@ ENDINGS = [one for one in (getattr(signal, name, None) for name in ("SIGINT", "S
 for one in ENDINGS:
     signal.signal(one, lambda *_: os._exit(130))  # until main() takes over, it just leaves
 
+os.environ["PYTHONSAFEPATH"] = "1"  # nor does a process that is started from here look there
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # looking for some costs every command 30 ms
 # everything large holds BLAS to one thread anyway; others would only wait and cost a small run 0.1 s of CPU
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -47,26 +53,26 @@ if "importlib.metadata" not in sys.modules:
     later.__path__ = [os.path.join(one, "metadata") for one in importlib.__path__]
     later.entry_points = lambda **of: later.__getattr__("entry_points")(**of)
 
-import atexit  # noqa: E402
-import threading  # noqa: E402
-from pathlib import Path  # noqa: E402
-from typing import Annotated, Literal  # noqa: E402
+import atexit
+import threading
+from pathlib import Path
+from typing import Annotated, Literal
 
-from cyclopts import App, CycloptsError, Parameter  # noqa: E402
+from cyclopts import App, CycloptsError, Parameter
 
-from . import __version__  # noqa: E402
-from .commands.compare import compare  # noqa: E402
-from .commands.lab import import_  # noqa: E402
-from .commands.look import export, report, view  # noqa: E402
-from .commands.profile import profile  # noqa: E402
-from .commands.run import run  # noqa: E402
-from .commands.scene import check, mesh, plan  # noqa: E402
-from .commands.shared import Ended, Refused, say  # noqa: E402
-from .commands.start import cite, demo, doctor, new, schema  # noqa: E402
-from .commands.streams import plain, ready  # noqa: E402
-from .commands.study import cost, fit  # noqa: E402
-from .commands.sweep import sweep  # noqa: E402
-from .commands.torture import torture_of  # noqa: E402
+from . import __version__
+from .commands.compare import compare
+from .commands.lab import import_
+from .commands.look import export, report, view
+from .commands.profile import profile
+from .commands.run import run
+from .commands.scene import check, mesh, plan
+from .commands.shared import Ended, Refused, say
+from .commands.start import cite, demo, doctor, new, schema
+from .commands.streams import plain, ready
+from .commands.study import cost, fit
+from .commands.sweep import sweep
+from .commands.torture import torture_of
 
 VERBS = (new, demo, check, plan, run, sweep, profile, compare, cost, fit, mesh, import_, export, view, report, schema,
          doctor, cite)

@@ -76,7 +76,7 @@ def _threads() -> Finding:
 def _picture() -> Finding:
     """Whether a picture of the pieces can be drawn here (patchfem view -o)."""
     try:
-        done = subprocess.run([sys.executable, "-c", PICTURE], capture_output=True, text=True, timeout=SECONDS)
+        done = subprocess.run([sys.executable, "-P", "-c", PICTURE], capture_output=True, text=True, timeout=SECONDS)
         fine, why = done.returncode == 0, (done.stderr.strip().splitlines() or ["it crashed"])[-1][:100]
     except (OSError, subprocess.TimeoutExpired) as error:
         fine, why = False, str(error)[:100]

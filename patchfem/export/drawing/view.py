@@ -96,7 +96,7 @@ def _window(one: Frame, head: str, magnify) -> None:
 def no_opengl() -> str | None:
     """Reason why nothing can be drawn with OpenGL here, None where it can; a child process draws a tiny picture."""
     try:
-        done = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, text=True, timeout=SECONDS)
+        done = subprocess.run([sys.executable, "-P", "-c", PROBE], capture_output=True, text=True, timeout=SECONDS)
     except subprocess.TimeoutExpired:
         return f"a tiny picture took more than {SECONDS:g} s"
     if done.returncode == 0:

@@ -27,9 +27,10 @@ class Cluster:
             import dask
 
             # tries are counted by the sweep; a profile of the workers, which nobody sees, is a third of a chunk's way
-            dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.worker.profile.enabled": False})
+            dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.worker.profile.enabled": False,
+                             "distributed.nanny.pre-spawn-environ.PYTHONSAFEPATH": 1})
             self.own = distributed.LocalCluster(workers or os.cpu_count() or 1, threads_per_worker=1, processes=True,
-                                                dashboard_address=":0", silence_logs="CRITICAL")
+                                                dashboard_address=None, silence_logs="CRITICAL")
         try:
             self.client = distributed.Client(self.own or address, timeout=PATIENCE, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:

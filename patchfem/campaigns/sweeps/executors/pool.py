@@ -19,8 +19,19 @@ from ....core import Missing
 from ..sweep import Died, Work
 
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")}
-MODULE = __name__.rpartition(".")[0] + ".worker"
-ROOT = Path(__file__).parents[4]  # where the package lies: a worker imports this one and no other
+PACKAGE, MODULE = Path(__file__).parents[3], __name__.rpartition(".")[0] + ".worker"
+# this package and no other, and nothing of the current folder; what lies beside the package comes last, as it may be a
+# folder in which all that it needs was installed
+START = f"""\
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+spec = spec_from_file_location({PACKAGE.name!r}, sys.argv[3])
+sys.modules[spec.name] = package = module_from_spec(spec)
+spec.loader.exec_module(package)
+sys.path.append(sys.argv[4])
+from {MODULE} import main
+main()
+"""
 
 
 class Worker:
@@ -28,10 +39,10 @@ class Worker:
 
     def __init__(self, work: Work, silent: bool = False):
         here, there = Pipe()
-        path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
-        words = [sys.executable, "-c", f"from {MODULE} import main; main()", str(there.fileno()), "silent" * silent]
+        words = [sys.executable, "-P", "-c", START, str(there.fileno()), "silent" * silent,
+                 str(PACKAGE / "__init__.py"), str(PACKAGE.parent)]
         self.process = subprocess.Popen(words, pass_fds=[there.fileno()], stdin=subprocess.DEVNULL,
-                                        env=os.environ | ONE_THREAD | {"PYTHONPATH": path})
+                                        env=os.environ | ONE_THREAD)
         there.close()  # so that the death of the process closes the pipe
         self.pipe: Connection = here
         self.chunk, self.begin = None, 0.0
