@@ -19,7 +19,7 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
     """
     notes = []
     found = scene_of(scene, set_, lambda tables, folder, whole: _faults(tables, folder, whole, notes))
-    notes = list(dict.fromkeys(notes))
+    notes = list(dict.fromkeys([*found.notes, *notes]))
     cases = len(_swept(scene, set_, Over())[1]) if found.sweep else None
     for remark in found.remarks:
         say(f"{scene}: {remark}")

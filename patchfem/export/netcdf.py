@@ -15,9 +15,9 @@ import numpy as np
 from ..disk.whole import write_bytes
 
 LONG = {
-    "relative_displacement": ("m", "displacement of the block relative to the base at its output"),
+    "relative_displacement": ("m", "displacement of the output relative to the base"),
     "slide": ("m", "slide of the interface, under which friction_force is its loop"),
-    "relative_velocity": ("m s-1", "velocity of the block relative to the base at its output"),
+    "relative_velocity": ("m s-1", "velocity of the output relative to the base"),
     "absolute_acceleration": ("m s-2", "acceleration at the output, base motion included"),
     "base_acceleration": ("m s-2", "acceleration of the base"),
     "friction_force": ("N", "resultant friction force, positive against positive slip"),

@@ -187,7 +187,7 @@ def _histories(data: dict) -> Picture | None:
     count = (window["time"][-1] - window["time"][0]) / period
     title = f"The run's {count:.2g} cycles" if count >= data.get("cycles") - 1e-6 else f"Last {count:.2g} cycles"
     title = f"The run: {count:.2g} of a cycle" if part_of_cycle(data) else title
-    bodies = "block and base" if np.any(window["base"]) else "the block"
+    bodies = "output and base" if np.any(window["base"]) else "the output"
     caption = f"Displacement over the whole run; displacement, and acceleration of {bodies}, at its end.{_under(data)}"
     begin, swings = pictures.whole_from(history["time"], period, w["time"][0]), bool(data.get("released"))
     kept = int(np.sum(history["time"] < begin))

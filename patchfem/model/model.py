@@ -130,7 +130,7 @@ def build(scene: Scene) -> Model:
                   _measured(scene, measured) if measured else None,
                   _wear(scene), _absent(named), grooves)
     source = Source(scene.path, scene.title, scene.text, partial(resolved, scene, found), named, tuple(scene.remarks),
-                    scene.sets)
+                    scene.sets, scene.notes)
     return replace(found, source=source)
 
 

@@ -10,6 +10,8 @@ from .drive import cycles_of, cycles_per_level, drive_of, levelled
 from .law import interface_names, rubbings_of
 from .structure import acts, first_of, frequencies, modes_of, notes_of, own_modes, start_of, yaws
 
+NOTHING = 1e-9  # of the largest slide of a mode: one below it is round-off
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Rig:
@@ -22,7 +24,9 @@ class Rig:
     load_varies: the normal load changes with the motion or in time; strips_slide_apart: modes yaw a patch in strips.
     travel [m], infinite without a stop; cubic [N/m3] stiffening at the output or None; interlock: (stiffness [N/m],
     wavelength [m]) of a bonded spring that bends, or None. mass [kg] and own_frequency [Hz] of the first mode that is
-    not rigid; frequencies (n,) [Hz]; by_modes: the scene lists modes; notes: on a structure file.
+    not rigid; frequencies (n,) [Hz]; by_modes: the scene lists modes; notes: on a structure file; parts (p, n): slide
+    of the first interface in each of the scene's own modes, that first one before the others, per coordinate;
+    contact_mass [kg]: modal mass of that mode over slide_1^2, 0 where it leaves the interface at rest.
     """
 
     modes: ModalBasis
@@ -48,6 +52,8 @@ class Rig:
     frequencies: np.ndarray
     by_modes: bool
     notes: tuple
+    parts: np.ndarray
+    contact_mass: float
     onset: tuple = ("distortion", None)
 
     @property
@@ -63,9 +69,22 @@ class Rig:
 
     @property
     def stiffness(self) -> float:
-        """Stiffness K = mass omega_1^2 [N/m] of the first mode that is not rigid, without the bonded spring; 0: all are
-        rigid."""
-        return self.mass * (2 * np.pi * self.own_frequency)**2 if self.own_frequency else 0.0
+        """Stiffness mass omega_1^2/slide_1^2 [N/m] of the first mode that is not rigid as the contact meets it, without
+        the bonded spring; 0: all are rigid, or it leaves the contact at rest.
+
+        The mode moves the contact by slide_1 per unit of its coordinate, so (mass omega_1^2/2)(A/slide_1)^2 is its
+        energy at a slide of A.
+        """
+        if not self.own_frequency or not self.contact_mass:
+            return 0.0
+        return self.contact_mass * (2 * np.pi * self.own_frequency)**2
+
+    def beside_first(self, modal) -> float:
+        """Share of the slide's range that the largest of the other modes carries, of coordinates modal (k, n) [m]; 0
+        where nothing slides."""
+        moved = np.asarray(modal) @ self.parts.T
+        whole = float(np.ptp(moved.sum(axis=1), axis=0))
+        return float(np.ptp(moved[:, 1:], axis=0).max(initial=0.0)) / whole if whole > 0 else 0.0
 
     @property
     def bends(self) -> bool:
@@ -89,4 +108,17 @@ def rig_asked(scene) -> Rig:
                structure.stiffening.cubic if structure.stiffening is not None else None,
                (bonded.stiffness, bonded.wavelength) if bends else None,
                bonded.stiffness if bonded is not None else None, mass, own, frequencies(structure, modes),
-               bool(structure.mode), tuple(notes_of(scene)), (asked.onset, asked.onset_length))
+               bool(structure.mode), tuple(notes_of(scene)), *_contact(alone, modes), (asked.onset, asked.onset_length))
+
+
+def _contact(own: ModalBasis, modes: ModalBasis) -> tuple:
+    """(parts, contact_mass) of a Rig; own: its modes without the bonded spring, modes: its coordinates."""
+    slide = own.interfaces[0] if len(own.interfaces) else own.output
+    held = np.flatnonzero(own.omega > 0)
+    first = int(held[0]) if held.size else 0
+    turned = np.eye(slide.size)  # z of own from z of modes: the shapes of both say where the same masses are
+    if modes is not own and modes.shapes is not None:
+        turned = modes.shapes if own.shapes is None else np.linalg.lstsq(own.shapes, modes.shapes, rcond=None)[0]
+    order = [first, *(k for k in range(slide.size) if k != first)]
+    lost = abs(slide[first]) <= NOTHING * np.abs(slide).max(initial=0.0)
+    return (slide[:, None] * turned)[order], 0.0 if lost else float(own.mass / slide[first]**2)

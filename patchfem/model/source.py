@@ -14,7 +14,7 @@ class Source:
     """Origin of a model: path and text of the scene, with what messages need.
 
     text: as read; write() -> the TOML of `resolved`; effects: what the scene names; remarks: sentences on keys that
-    nothing uses; sets: `key=value` given beside the text.
+    nothing uses; sets: `key=value` given beside the text; notes: sentences on what defaults leave out.
     """
 
     path: Path
@@ -24,6 +24,7 @@ class Source:
     effects: tuple
     remarks: tuple
     sets: tuple = ()
+    notes: tuple = ()
 
     @property
     def resolved(self) -> str:

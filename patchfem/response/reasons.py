@@ -9,19 +9,20 @@ from ..structure.drive_sizes import sinusoidal, whole
 from .rows import TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
+SHARED = 0.05  # of the slide, carried by another mode, from which no damping ratio is one of the first
 CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
 HOLDS = "the interface holds as a whole throughout the last cycles"
 UNCLOSED = "the loop does not close: what the interface stores changes by more than it dissipates in the last " \
            "cycles; energy_dissipated is that of the whole run"
 
 
-def without_value(values, window, drive, rubs: bool) -> dict:
+def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dict:
     """Measures without a value, with the reason, by name: those that a coupled run can have and this one has not.
 
     values: name -> value or Measure of those it has; window: Response of its last cycles; drive; rubs: whether an
-    interface bears a load.
+    interface bears a load; beside: share of the slide that a mode beside the first carries.
     """
-    lacking = {name: _of_cycles(name, values, window, drive) for name in CYCLIC
+    lacking = {name: _of_cycles(name, values, window, drive, beside) for name in CYCLIC
                if rubs or name in ACCELERATIONS}
     if rubs:
         lacking["slip_start_phase"] = _of_phase(values, drive)
@@ -60,7 +61,7 @@ def _of_phase(values, drive) -> str:
     return "the interface never sticks in the last cycles, so no slip starts out of a stick"
 
 
-def _of_cycles(name: str, values, window, drive) -> str:
+def _of_cycles(name: str, values, window, drive, beside: float) -> str:
     if not sinusoidal(drive):
         return "only a drive that ends as a sine has it"
     if not whole(window.time[-1] - window.time[0], drive):
@@ -70,5 +71,6 @@ def _of_cycles(name: str, values, window, drive) -> str:
     if "equivalent_stiffness" not in values:
         return f"{HOLDS}, so its loop has no width"
     if name == "equivalent_damping":
-        return "the first mode is rigid, so 2 pi K A^2 is 0"
+        return f"it is the ratio of mode 1, and another mode carries {100 * beside:.2g} % of the slide" \
+            if beside > SHARED else "the first mode is rigid, or leaves the interface at rest"
     return "none of the last cycles shows the force on both sides of its largest slides"

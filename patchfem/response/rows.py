@@ -22,11 +22,11 @@ class Seen:
     """The last cycles of a run, with what its engine knows better than its samples.
 
     window: histories; steps: samples per cycle; extremes (c, 2): of the output in every cycle of the window [m]; book:
-    energies of the whole run; load [N], None where nothing rubs; stiffness K [N/m] of the first mode; sine: the drive
-    ends as a sine. loop: (slide (k,), first harmonics of slide and force, work per cycle [J]), None where the window
-    holds no whole cycle (its slide is not read); ledger (4, k) [J] or None; known: name -> value that the engine has
-    itself, None where it has none. jumps: the friction force jumps where the slide turns; still: half range of the
-    slide [m] up to which it is round-off.
+    energies of the whole run; load [N], None where nothing rubs; stiffness K [N/m] of the first mode as the contact
+    meets it, 0 where no damping ratio refers to it; sine: the drive ends as a sine. loop: (slide (k,), first harmonics
+    of slide and force, work per cycle [J]), None where the window holds no whole cycle (its slide is not read);
+    ledger (4, k) [J] or None; known: name -> value that the engine has itself, None where it has none. jumps: the
+    friction force jumps where the slide turns; still: half range of the slide [m] up to which it is round-off.
     """
 
     window: Response
@@ -110,17 +110,22 @@ ROWS = (
         "time mean of the slide in the last cycle less that in the first of the last cycles, per cycle between them",
         lambda s: drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period)),
     Row("slip_amplitude", "m", 1e-10,
-        "half peak-to-peak of the irreversible part of the slide, weighted by the pressure",
+        "half peak-to-peak of the irreversible part of the slide, its parts weighted by their "
+        "friction limits: the points of a patch by the pressure, the sliders of law 'iwan' by their slip forces",
         lambda s: s.slip.get("slip_amplitude"), group="friction"),
     Row("stick_fraction", "1", 1e-3,
-        "share of the time of the last cycles in which the interface as a whole sticks: less than half of its slide, "
-        "weighted by the pressure, is irreversible; part of a patch may slip meanwhile",
+        "share of the time of the last cycles in which the interface as a whole sticks: less than half of its slide is "
+        "irreversible, in the mean of slip_amplitude; part of a patch, or some sliders of law 'iwan', may slip "
+        "meanwhile",
         lambda s: s.slip.get("stick_fraction"), group="friction"),
-    Row("slip_start_phase", "rad", 1e-3, "phase of the base displacement at which slip starts after a stick, modulo pi",
+    Row("slip_start_phase", "rad", 1e-3,
+        "phase of the base displacement at which slip of the interface as a whole, in the mean of slip_amplitude, "
+        "starts after a stick, modulo pi",
         lambda s: s.slip.get("slip_start_phase"), group="friction"),
     Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together", lambda s: s.load,
         group="friction"),
-    Row("loop_area", "J", 1e-10, "work of friction per cycle; without a value where no sine drives the motion and the "
+    Row("loop_area", "J", 1e-10,
+        "work of friction of this interface alone per cycle; without a value where no sine drives the motion and the "
         "interface stores or gives back more than it dissipates, so that the loop does not close",
         lambda s: s.cycle.get("loop_area"), group="energy"),
     Row("equivalent_stiffness", "N m-1", 1.0,
@@ -130,13 +135,15 @@ ROWS = (
         "friction at the largest slide of a cycle less that at the smallest over their distance, where it jumps the "
         "mean of both sides", lambda s: s.cycle.get("secant_stiffness"), group="friction"),
     Row("equivalent_damping", "1", 1e-8,
-        "loop area over 2 pi K A^2, K the stiffness of the first mode, A half the range of the slide in a cycle, the "
-        "mean over the last cycles", lambda s: s.cycle.get("equivalent_damping"), group="friction"),
-    Row("friction_work", "J", 1e-10, "work that went into the interface over the run",
+        "damping ratio that friction gives mode 1: loop area over 2 pi K A^2, K = moving_mass omega_1^2 the stiffness "
+        "of the first mode that is not rigid, A its motion, half the range of the slide in a cycle over its slide, the "
+        "mean over the last cycles; without a value where another mode carries more than 5 % of the slide",
+        lambda s: s.cycle.get("equivalent_damping"), group="friction"),
+    Row("friction_work", "J", 1e-10, "work that went into all interfaces together over the run",
         lambda s: s.energies.get("friction_work"), group="energy"),
-    Row("energy_stored", "J", 1e-10, "energy in the interface at the end: elastic, over grooves with the "
+    Row("energy_stored", "J", 1e-10, "energy in all interfaces at the end: elastic, over grooves with the "
         "height of the load, or what was done against a load that changes", group="energy"),
-    Row("energy_dissipated", "J", 1e-10, "energy that friction turned into heat over the run",
+    Row("energy_dissipated", "J", 1e-10, "energy that friction of all interfaces turned into heat over the run",
         lambda s: s.energies.get("energy_dissipated"), group="energy"),
     Row("energy_created", "J", 1e-10,
         "energy that a law without passivity, the report's as printed, created over the run",

@@ -48,7 +48,7 @@ def run(what, say=None, progress=None, per_point: bool = False, estimate: bool =
 
 def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool, kept: Kept | None) -> Result:
     begin, model = perf_counter(), what.model
-    seconds, warnings, notes = {}, list(model.source.remarks), []
+    seconds, warnings, notes = {}, list(model.source.remarks), list(model.source.notes)
     patch, coarse = None, (None, None)
     if model.patch is not None:
         from .patch import result as of_patch

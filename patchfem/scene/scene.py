@@ -29,6 +29,7 @@ from .rules.drive import drive_unused, waveform_unused
 from .rules.friction import kinetic_unused, temperature_unused
 from .rules.limits import combinations, not_yet_built
 from .rules.methods import method_unused
+from .rules.structure import unseen
 from .text import effects, toml
 
 LARGEST = 32 * 2**20  # bytes of a scene
@@ -46,7 +47,7 @@ class SceneError(PatchfemError):
 @dataclass(frozen=True)
 class Scene:
     """A valid scene in SI: its tables (None where absent), the kind of run, its text, remarks on unused keys, the
-    --set strings that were applied and the axes of [sweep], () without it."""
+    --set strings that were applied, the axes of [sweep], () without it, and notes on what its defaults leave out."""
 
     path: Path
     text: str
@@ -64,6 +65,7 @@ class Scene:
     remarks: list[str]
     sets: tuple[str, ...] = ()
     sweep: tuple = ()
+    notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         sets = f"\n  with {shorten(', '.join(self.sets), 160)}" if self.sets else ""
@@ -201,7 +203,9 @@ def scene_of(draft: Draft, path: str | Path, text: str, sets: tuple[str, ...], m
         raise SceneError(draft.lines_of_mistakes())
     values = {name: getattr(found, name) for name in tables.Tables.model_fields}
     path = path if isinstance(path, Path) else Path(path)
-    return Scene(path=path, text=text, kind=kind, remarks=draft.remarks, sets=sets, **values)
+    drive = draft.tables.drive
+    notes = tuple(unseen(draft.tables.structure, drive is not None and drive.kind == "base"))
+    return Scene(path=path, text=text, kind=kind, remarks=draft.remarks, sets=sets, notes=notes, **values)
 
 
 def axes_of(text: str, path: str | Path) -> tuple[list, list[str]]:

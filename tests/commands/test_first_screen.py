@@ -41,7 +41,7 @@ def test_exact_the_numbers_are_those_of_the_summary(tmp_path):
     assert lines[0] == "A rubbing block on flexures, shaken at one frequency"
     assert lines[1] == f"steady: {Outcome.STEADY.sentence}"
     amplitude = pair("relative_displacement_amplitude", measures["relative_displacement_amplitude"])
-    assert lines[2].startswith(f"The block moves {amplitude} half peak-to-peak; peak acceleration ")
+    assert lines[2].startswith(f"The output moves {amplitude} half peak-to-peak; peak acceleration ")
     assert lines[3].startswith("Every measure with an error meets the tolerance 0.001; least well ")
     shown = dict(line.split(None, 1) for line in lines if line.startswith("  "))
     assert set(shown) == set(measures)

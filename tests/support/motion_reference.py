@@ -17,7 +17,8 @@ LOOKS = 4  # at the guards in a step of the integrator
 
 
 class Plant(NamedTuple):
-    """M x'' + C x' + K x = -base a(t) - faces^T F; output (n,), stiffness of the first mode K_1, cubic [N/m3]."""
+    """M x'' + C x' + K x = -base a(t) - faces^T F; output (n,), stiffness K_1 of the first mode at the contact,
+    cubic [N/m3]."""
 
     M: np.ndarray
     C: np.ndarray
@@ -49,7 +50,7 @@ def plant_of(s: dict) -> Plant:
         b = s.get("bonded", {"stiffness": 0.0, "damping": 0.0})
         K, C = K + b["stiffness"] * faces.T @ faces, C + b["damping"] * faces.T @ faces
         base = -mass * output if forced(s) else mass * column["base"]
-        first = mass * omega[0]**2
+        first = mass * (omega[0] / column["slide"][0])**2
     fastest = np.sqrt(np.linalg.eigvalsh(np.linalg.solve(M, K)).max()) / (2 * np.pi)
     return Plant(M, C, K, base, faces, output, first, s.get("cubic", 0.0), float(fastest))
 

@@ -1,11 +1,11 @@
-"""The swing of a block that is released: how far it goes first, and how long until it has come to rest."""
+"""The swing of an output that is released: how far it goes first, and how long until it has come to rest."""
 
 import numpy as np
 
 from ...core import say
 from ...runs.results.result import Result
 
-RESTS = 1e-2  # of the largest distance from where it ends: within it a block has come to rest
+RESTS = 1e-2  # of the largest distance from where it ends: within it an output has come to rest
 
 
 def released(result: Result) -> str:
@@ -21,11 +21,11 @@ def swung(time, output) -> str:
     end, begin = float(output[-1]), float(output[0])
     far = np.abs(output - end)
     if not np.isfinite(far).all() or not far.max() > 0:
-        return f"released at {say(begin, 3)}, the block stays there"
+        return f"released at {say(begin, 3)}, the output stays there"
     turns = 1 + np.flatnonzero(np.diff(np.sign(np.diff(output))) != 0)
     turns = turns[far[turns] > RESTS * far.max()]
     way = f"swings to {say(float(output[turns[0]]), 3)} first" if turns.size else f"goes to {say(end, 3)}"
-    first = f"released at {say(begin, 3)}, the block {way}"
+    first = f"released at {say(begin, 3)}, the output {way}"
     beyond = int(np.flatnonzero(far > RESTS * far.max())[-1])
     last = np.ptp(output[time >= time[-1] - 0.1 * (time[-1] - time[0])]) / 2
     if last > RESTS * far.max():

@@ -23,7 +23,7 @@ NO_SLIP = 1e-15  # m, the last digits of a slide
 WHOLE_RUN = "over the whole run"
 OF_WHAT = {  # said behind a value that would otherwise be taken for another, or for more than it says
     "loop_area": "per cycle", "friction_work": WHOLE_RUN, "energy_dissipated": WHOLE_RUN, "energy_created": WHOLE_RUN,
-    "stick_fraction": "of the interface as a whole"}
+    "stick_fraction": "of the interface as a whole", "equivalent_damping": "a damping ratio of mode 1"}
 BETWEEN = ("jump_level",)  # known to lie between two levels of the drive, whatever the tolerance
 ROUND = 1e-12  # of the friction force times the motion: work that is round-off
 
@@ -111,8 +111,8 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
     """The measures that answer first, as one sentence; "" where there is none.
 
     summary: as summary.json holds it; cycles: of the drive that were run, None where it has none; number: makes of a
-    value with its error, and of the name of its measure, what stands in the text; released: how a released block swung,
-    in place of what is left of that in the last cycles.
+    value with its error, and of the name of its measure, what stands in the text; released: how a released output
+    swung, in place of what is left of that in the last cycles.
     """
     measures, parts = summary["measures"], []
     whole = cycles is None or cycles >= 1 - 1e-6
@@ -130,7 +130,7 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
             parts.append(released)
             said("friction_work", "friction takes {} in all")
         else:
-            said("relative_displacement_amplitude", "the block moves {} half peak-to-peak")
+            said("relative_displacement_amplitude", "the output moves {} half peak-to-peak")
             said("relative_displacement_amplitude_steady", "it would settle at {}")
             said("absolute_acceleration_peak", "peak acceleration {}")
         if "relative_displacement_amplitude" not in measures:

@@ -2,6 +2,8 @@
 
 from math import inf, pi
 
+import numpy as np
+
 from ...effects import has
 from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
@@ -86,10 +88,18 @@ def groups(model: Model) -> dict:
         out["D"] = limit / push
     ratio = rig.own_frequency * rig.drive.period if rig.frequency else inf
     if abs(ratio - 1) < 0.2:
-        out["knee"] = 4 / pi * limit / rig.mass
+        out["knee"] = 4 / pi * limit / rig.mass * _lever(rig)
     if f is not None and f.bond_length:
         out["drive_amplitude_over_bond_length"] = largest(rig.drive) / omega_of(rig.drive)**2 / f.bond_length
     return out
+
+
+def _lever(rig) -> float:
+    """slide_1/base_1, by which friction acts on the first mode that is not rigid over what the drive does; 1 where the
+    scene lists no modes, or nothing drives that one."""
+    first = int(np.flatnonzero(rig.modes.omega > 0)[0]) if rig.own_frequency else 0
+    slide, base = abs(float(rig.modes.slide[first])), abs(float(rig.modes.base[first]))
+    return slide / base if rig.by_modes and base > 0 else 1.0
 
 
 def first_words(rig, found: dict) -> list:
@@ -97,6 +107,7 @@ def first_words(rig, found: dict) -> list:
     d = found.get("D")
     if d is None or rig.modes.omega.size != 1 or not rig.by_modes or rig.kind == "free":
         return []
+    d *= _lever(rig)
     if d >= 1:
         return [f"D = {d:.3g} >= 1: the block should stick"]
     if d > pi / 4:

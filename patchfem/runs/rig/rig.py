@@ -74,7 +74,8 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     fields = {}
     if patch is not None:
         fields = rig_fields(model, numerics, patch, raw)
-    found |= unclosed(found, raw.window, drive) | without_value(found, raw.window, drive, f is not None)
+    found |= unclosed(found, raw.window, drive) | without_value(
+        found, raw.window, drive, f is not None, rig.beside_first(raw.window.modal))
     extra |= {"book": raw.book, "period": drive.period, "notes": [*_notes(model, patch, raw), *rings.notes]}
     extra |= _behind(model, numerics, raw.contact)
     warnings = [*warnings, *_said(model, patch, raw, outcome, found)]

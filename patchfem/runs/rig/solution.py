@@ -6,6 +6,7 @@ import numpy as np
 
 from ...core import Measure, Outcome, Response
 from ...response.measures import half_swing, harmonic
+from ...response.reasons import SHARED
 from ...response.rows import Seen, measures_of
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
 
@@ -85,8 +86,8 @@ def seen(model, patch, window, extremes, book: dict, steps: int, **more) -> Seen
     fields of Seen, with `drive` where it is not the model's own.
     """
     drive = more.pop("drive", model.rig.drive)
-    return Seen(window, drive, steps, extremes, book, borne(model, patch), model.rig.stiffness, sinusoidal(drive),
-                **more)
+    stiffness = 0.0 if model.rig.beside_first(window.modal) > SHARED else model.rig.stiffness
+    return Seen(window, drive, steps, extremes, book, borne(model, patch), stiffness, sinusoidal(drive), **more)
 
 
 def sampled_loop(window, drive, work: float, force: complex | None = None) -> tuple | None:

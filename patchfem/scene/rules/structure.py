@@ -88,6 +88,16 @@ def _modes(draft: Draft) -> None:
                        "the base motion; the first mode's is its slide unless given)")  # fmt: skip
 
 
+def unseen(structure, driven: bool) -> list:
+    """Sentences on modes that slide and, by a default, do not move the output; driven: the base drives the rig."""
+    out = []
+    for mode in (structure.mode or ())[1:] if structure is not None else ():
+        if mode.slide and (mode.output, mode.accelerometer, mode.gauge) == (None, None, None):
+            still = ", nor does the base drive it (base = 0, its default)" if driven and mode.base is None else ""
+            out.append(f"mode '{mode.name}' does not move the output (output = 0, its default){still}")
+    return out
+
+
 def _instruments(draft: Draft, modes: tuple) -> None:
     """An accelerometer or a gauge that moves as the output does not stands beside what is judged at the output."""
     written = []

@@ -23,8 +23,8 @@ def test_exact_a_block_on_a_rubbing_spring_turns_where_the_closed_form_says(tmp_
     scene.write_text(re.sub(r"damping = \S+", "damping = 0", text), "utf-8")
     answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
     said = next(line for line in answer.out.splitlines() if line.startswith("Released at "))
-    found = re.match(r"Released at 500 um, the block swings to -(\S+) um first, turns (\d+) times and comes to rest at "
-                     r"(\S+) um after (\S+) ms; friction takes (\S+) ± \S+ (\S+) in all\.$", said)
+    found = re.match(r"Released at 500 um, the output swings to -(\S+) um first, turns (\d+) times and comes to rest "
+                     r"at (\S+) um after (\S+) ms; friction takes (\S+) ± \S+ (\S+) in all\.$", said)
     assert found, said
     load, mass, static = (float(re.search(pattern, text)[1]) for pattern in
                           (r'load = "(\S+) N"', r'moving_mass = "(\S+) kg"', r"static = (\S+)"))
@@ -46,9 +46,9 @@ def test_exact_a_block_on_a_rubbing_spring_turns_where_the_closed_form_says(tmp_
 def test_exact_a_motion_that_has_not_come_to_rest():
     time = np.linspace(0, 1, 2001)
     said = swung(time, 1e-3 * np.cos(2 * pi * 20 * time) * np.exp(-time))
-    assert said.startswith("released at 1 mm, the block swings to -975 um first and still by ")
-    assert swung(time, np.full(2001, 5e-4)) == "released at 500 um, the block stays there"
-    assert swung(time, 1e-3 * np.exp(-50 * time)).startswith("released at 1 mm, the block goes to ")
+    assert said.startswith("released at 1 mm, the output swings to -975 um first and still by ")
+    assert swung(time, np.full(2001, 5e-4)) == "released at 500 um, the output stays there"
+    assert swung(time, 1e-3 * np.exp(-50 * time)).startswith("released at 1 mm, the output goes to ")
 
 
 def test_exact_what_the_last_cycles_leave_is_no_headline_of_a_release():

@@ -1,0 +1,103 @@
+"""`equivalent_damping` is a ratio of the first mode: how the mode is scaled does not enter, other modes leave none."""
+
+import numpy as np
+import pytest
+
+import patchfem as pf
+from patchfem.scene.scene import loads
+
+LAWS = {"coulomb": 'law = "coulomb"', "elastic-plastic": 'law = "elastic-plastic"\nbond_length = "2 um"',
+        "tanh": 'law = "tanh"\nreference_speed = "5 mm/s"'}
+ENGINES = (("coulomb", "auto"), ("coulomb", "march"), ("coulomb", "harmonic"), ("elastic-plastic", "auto"),
+           ("elastic-plastic", "harmonic"), ("tanh", "auto"), ("tanh", "march"))
+SLIDE = 2.5
+
+
+def scene(law: str, method: str = "auto", slide: float = 1.0, more: str = "", drive: str = "") -> str:
+    """A rig of 2 kg whose mode of 120 Hz is scaled so that it slides by `slide` per unit of its coordinate."""
+    own = "" if method == "auto" else f'method = "{method}"'
+    return f"""
+[normal]
+load = "12 N"
+[friction]
+static = 0.3
+{LAWS[law]}
+[structure]
+moving_mass = "{2 * slide**2} kg"
+[[structure.mode]]
+name = "first"
+frequency = "120 Hz"
+damping = 0.02
+slide = {slide}
+base = {1 / slide}
+{more}
+[drive]
+kind = "base"
+frequency = "110 Hz"
+{drive or 'acceleration = "2 g"' + chr(10) + 'cycles = 30'}
+[accuracy]
+tolerance = 1e-2
+{own}
+"""
+
+
+def ratio(result):
+    """loop_area/(2 pi m w^2 Z^2) by the run's own modal coordinate, Z half of what it moves in a cycle, as written."""
+    modal, time = result.window.modal[:, 0], result.window.time
+    cycles = round((time[-1] - time[0]) * 110)
+    half = np.mean([np.ptp(modal[(time >= time[-1] - (k + 1) / 110) & (time <= time[-1] - k / 110)]) / 2
+                    for k in range(cycles)])
+    mass = result.plan.model.rig.modes.mass
+    return result.measures["loop_area"].value / (2 * np.pi * mass * (2 * np.pi * 120)**2 * half**2)
+
+
+@pytest.mark.parametrize("law,method", ENGINES)
+def test_exact_the_scale_of_a_mode_does_not_enter(law, method):
+    plain, scaled = (pf.run(loads(scene(law, method, slide))) for slide in (1.0, SLIDE))
+    for name in ("equivalent_damping", "equivalent_stiffness", "loop_area", "relative_displacement_amplitude"):
+        a, b = plain.measures[name], scaled.measures[name]
+        assert b.value == pytest.approx(a.value, rel=1e-7, abs=1e-12), name
+    assert scaled.measures["equivalent_damping"].value == pytest.approx(ratio(scaled), rel=2e-3)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_exact_a_batch_gives_the_ratio_of_single_runs(law):
+    models = [pf.build(loads(scene(law, slide=SLIDE, drive=f'acceleration = "{level} g"\ncycles = 30')))
+              for level in (2, 3)]
+    found = pf.run_many(models)
+    for k, model in enumerate(models):
+        alone = pf.run(model).measures["equivalent_damping"]
+        assert found.values["equivalent_damping"][k] == pytest.approx(alone.value, abs=2 * alone.error + 1e-12)
+
+
+def test_exact_levels_end_with_the_ratio_of_their_last():
+    drive = 'waveform = "levels"\nlevels = ["1 g", "2 g"]\ncycles = 30'
+    plain, scaled = (pf.run(loads(scene("coulomb", slide=slide, drive=drive))) for slide in (1.0, SLIDE))
+    for a, b in zip(plain.extra["levels"], scaled.extra["levels"]):
+        assert b.values["equivalent_damping"] == pytest.approx(a.values["equivalent_damping"], rel=1e-7)
+
+
+def test_exact_another_mode_that_slides_leaves_no_ratio():
+    """At 110 Hz a mode of 300 Hz that slides as much carries some tenths of the slide; one of 0.001 does not."""
+    second = '[[structure.mode]]\nname = "second"\nfrequency = "300 Hz"\ndamping = 0.02\nslide = {}\nbase = 0.9\n'
+    shared, alone = (pf.run(loads(scene("coulomb", slide=SLIDE, more=second.format(slide))))
+                     for slide in (2.5, 0.001))
+    part = shared.window.modal * shared.plan.model.rig.modes.slide
+    share = np.ptp(part[:, 1]) / np.ptp(part.sum(axis=1))
+    assert share > 0.05
+    none = shared.measures["equivalent_damping"]
+    assert none.value is None and none.reason == \
+        f"it is the ratio of mode 1, and another mode carries {100 * share:.2g} % of the slide"
+    assert alone.measures["equivalent_damping"].value == pytest.approx(ratio(alone), rel=2e-3)
+
+
+def test_always_a_mode_that_slides_unseen_is_noted():
+    second = '[[structure.mode]]\nname = "second"\nfrequency = "300 Hz"\ndamping = 0.02\nslide = 0.5\n{}'
+    said = "mode 'second' does not move the output (output = 0, its default)"
+    assert loads(scene("coulomb", more=second.format(""))).notes == \
+        (f"{said}, nor does the base drive it (base = 0, its default)",)
+    assert loads(scene("coulomb", more=second.format("base = 0.0"))).notes == (said,)
+    result = pf.run(loads(scene("coulomb", more=second.format("base = 0.0"))))
+    assert said in result.notes
+    for written in ("output = 0.0", "output = 0.3", "gauge = 0.2"):
+        assert loads(scene("coulomb", more=second.format(written))).notes == ()
