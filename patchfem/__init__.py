@@ -3,31 +3,32 @@
 Read the package in this order. A module imports its own entry of the list and the entries before it, nothing after:
 
 1. `faults`       named failures: a sentence for a person, the exit code
-2. `core`         the nouns that travel: interface, compliance, pressure, modal basis, response, measure, outcome
-3. `effects`      which key of a scene needs which module and equation
-4. `disk`         files written whole, folders with one writer
-5. `compiled`     where compiled code is kept
-6. `closed_forms` exact answers that tests, studies and users share
-7. `scene`        a TOML file becomes SI values, every mistake named at once
-8. `inputs`       files of measurements: columns, slide paths, signals, loops
-9. `mesh`         two coated pieces as tagged meshes
-10. `surface`     measured or made height profiles as a share of the gap
-11. `elasticity`   the pieces condensed to their interface, fields recovered inside
-12. `contact`     gap shapes, unilateral contact, skins, strips, contact maps
-13. `friction`    laws of friction and the sum over bonds along the path
-14. `slip`        partial slip of the pieces: elements, shear modes, load paths
-15. `structure`   the modes of the rig and what drives it
-16. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
-17. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
-18. `response`    measures of a run, outcome, events, levels, ringing
-19. `wear`        worn depth over many cycles
-20. `runs`        patch, bench and rig: where the pillars meet
-21. `identify`    values from measurements with intervals
-22. `campaigns`   many runs: fits, error against cost, sweeps
-23. `export`      summary, netCDF, VTK, report
-24. `api`         load, build, plan and run from Python
-25. `torture`     seeded attacks on the command line
-26. `commands`    the verbs of the command line
+2. `scales`       numbers as people read them: the unit by the size, the digits by the error
+3. `core`         the nouns that travel: interface, compliance, pressure, modal basis, response, measure, outcome
+4. `effects`      which key of a scene needs which module and equation
+5. `disk`         files written whole, folders with one writer
+6. `compiled`     where compiled code is kept
+7. `closed_forms` exact answers that tests, studies and users share
+8. `scene`        a TOML file becomes SI values, every mistake named at once
+9. `inputs`       files of measurements: columns, slide paths, signals, loops
+10. `mesh`         two coated pieces as tagged meshes
+11. `surface`     measured or made height profiles as a share of the gap
+12. `elasticity`   the pieces condensed to their interface, fields recovered inside
+13. `contact`     gap shapes, unilateral contact, skins, strips, contact maps
+14. `friction`    laws of friction and the sum over bonds along the path
+15. `slip`        partial slip of the pieces: elements, shear modes, load paths
+16. `structure`   the modes of the rig and what drives it
+17. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
+18. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
+19. `response`    measures of a run, outcome, events, levels, ringing
+20. `wear`        worn depth over many cycles
+21. `runs`        patch, bench and rig: where the pillars meet
+22. `identify`    values from measurements with intervals
+23. `campaigns`   many runs: fits, error against cost, sweeps
+24. `export`      summary, netCDF, VTK, report
+25. `api`         load, build, plan and run from Python
+26. `torture`     seeded attacks on the command line
+27. `commands`    the verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used.
 """

@@ -15,7 +15,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .core import Measure, Missing, NotConverged, Outcome, PatchfemError, rounded
+from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
 from .model.model import Model
 from .model.model import build as build_model
 from .runs.plan import Plan
@@ -246,10 +246,10 @@ class Measures(Mapping):
         return list(self._measures)
 
     def __repr__(self) -> str:
-        rows = [(name, *rounded(one.value, one.error), one.unit) for name, one in self._measures.items()]
-        first, second, third = (max((len(row[place]) for row in rows), default=0) for place in range(3))
-        return "\n".join(f"{name:<{first}}  {value:>{second}} {'±' if error else ' '} {error:<{third}}  {unit}"
-                         for name, value, error, unit in rows)
+        from .export.pages.words import table_of
+        from .export.summary import measure_object
+
+        return "\n".join(table_of({name: measure_object(one) for name, one in self._measures.items()}))
 
 
 class Plots:

@@ -8,17 +8,16 @@ Signs: compression, normal stress and load > 0; slip = upper - lower; rotation >
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
-from math import floor, isfinite, log10
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from .faults import Missing, NotConverged, PatchfemError
+from .scales import told
 
 __all__ = ["G_N", "STICK", "BaseSine", "Compliance", "Interface", "Measure", "Missing", "ModalBasis", "NotConverged",
-           "Outcome", "PatchfemError", "Pressure", "Response", "Row", "Segment", "Start", "frozen_array", "rounded",
-           "say"]
+           "Outcome", "PatchfemError", "Pressure", "Response", "Row", "Segment", "Start", "frozen_array", "say"]
 
 STICK = 1e-2  # share of the cycle's peak slip speed below which a memory law counts as sticking
 G_N = 9.80665  # standard gravity [m s-2]
@@ -209,8 +208,8 @@ class BaseSine:
 class Measure:
     """One number with its unit, its numerical error (half-width; None where none is estimated) and what it means.
 
-    `str` of it is the value and its error, both rounded by the error: ``1.4808e-05 ± 4.4e-08 m``. reason: why there is
-    no value, where it is None.
+    `str` of it is the value and its error in the unit that people read: ``14.808 ± 0.044 um``. reason: why there is no
+    value, where it is None.
     """
 
     value: float | None
@@ -223,8 +222,7 @@ class Measure:
     def __str__(self) -> str:
         if self.value is None and self.reason:
             return self.reason
-        value, error = rounded(self.value, self.error)
-        return " ".join([value, *(["±", error] if error else []), *([self.unit] if self.unit != "1" else [])])
+        return told(self.value, self.error, self.floor, self.unit)
 
     def __repr__(self) -> str:
         return f"{self} ({self.text})" if self.text else str(self)
@@ -245,29 +243,6 @@ class Row(NamedTuple):
     of: Callable | None = None
     grain: float = 0.0
     group: str = "motion"
-
-
-MOST_DIGITS = 10  # of a value in a text
-
-
-def rounded(value: float | None, error: float | None = None) -> tuple[str, str]:
-    """Value and error as texts that end at the same digit, the second of the error; ten digits of the value at most.
-
-    An error in the seventh digit or below is written with its power of ten, and the value without zeros at its end.
-
-    A dash stands for no value, an empty text for no error.
-    """
-    if value is None:
-        return "-", ""
-    second = "" if error is None else f"{error:.2g}"
-    if not error or not isfinite(error) or not isfinite(value) or value == 0:
-        return f"{value:.6g}", second
-    size, place = floor(log10(abs(value))), int(f"{error:.1e}".split("e")[1]) - 1  # of the first and the last digit
-    if place < size - 5:
-        return f"{value:.{min(size - place + 1, MOST_DIGITS)}g}", second
-    if not -4 <= size < 6 or place > 0:
-        return f"{value:.{max(0, size - place)}e}", f"{error:.1e}"
-    return f"{value:.{-place}f}", f"{error:.{-place}f}"
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from ..disk.whole import whole
+from ..scales import axis_unit
 from .drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
-from .scales import axis_unit
 
 LABEL = {"force": ("force", "N"), "friction_ratio": ("friction ratio", "1")}
 

@@ -6,13 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import rounded
+from .. import scales
 from ..effects import shown_absent
-from . import scales
 from .drawing import curves, pictures
 from .pages import charts, player
 from .pages.document import Section, document
-from .pages.words import G, headline, linked, others, pair
+from .pages.words import SHARP, G, headline, linked, others, pair, texts, units
 
 SETTLED = ("steady", "stuck", "done")
 DASH = "&ndash;"
@@ -21,12 +20,6 @@ FILES = (("fields.vtkhdf", "both pieces and their interface, frame by frame (Par
          ("summary.json", "measures, outcome, warnings, what ran"),
          ("result.nc", "histories and fields along the interface (xarray, MATLAB, ncdump)"),
          ("scene.resolved.toml", "the scene in SI with every default"))
-
-
-def matched(value, error=None) -> tuple:
-    """Value and error as `core.rounded` writes them, a dash of the page for what there is not."""
-    texts = rounded(value, error)
-    return (texts[0] if value is not None else DASH), texts[1] or DASH
 
 
 def part_of_cycle(data: dict) -> bool:
@@ -59,7 +52,8 @@ def page(data: dict) -> str:
             f"<p class=verdict>{verdict(data)}</p>"]
     warnings = [w for w in summary["warnings"] if w != data["sentence"]]
     if warnings:
-        lead.append("<div class='verdict warn'>" + "".join(f"<p>{escape(w)}</p>" for w in warnings) + "</div>")
+        said = "".join(f"<p>{escape(text)}</p>" for text in warnings)
+        lead.append(f"<div class='verdict warn'><b>Warnings</b>{said}</div>")
     lead += [f"<p class=soft>Note: {escape(text)}</p>" for text in summary["notes"]]
     drawn, shown = figures(data)
     drawn = charts.within(drawn, ROOM)
@@ -302,19 +296,22 @@ def _measures(data: dict) -> Section:
     """Every measure with its error, in other units, and what it means."""
     rows, means = [], data.get("means", {})
     for name, m in data["summary"]["measures"].items():
-        value, error = matched(m["value"], m["error"])
+        value, error = texts(name, m)
         cells = f"<td id='measure-{escape(name)}'>{escape(name)}</td><td class=n>{value}</td>"
-        if m.get("reason"):
-            cells += f"<td class=soft colspan=3>{escape(m['reason'])}</td>"
+        if m["value"] is None:
+            cells += f"<td class=soft colspan=3>{escape(m.get('reason', ''))}</td>"
         else:
-            cells += (f"<td class=n>{error}</td><td class=v>{escape(m['unit'])}</td>"
-                      f"<td>{escape(others(name, m))}</td>")
+            unit = units(name, m["value"], m["unit"], m["error"])[0][0]
+            error = error or ("unknown" if m["error"] is None else DASH)
+            cells += f"<td class=n>{error}</td><td class=v>{escape(unit)}</td><td>{escape(others(name, m))}</td>"
         rows.append(f"<tr>{cells}<td class=soft>{escape(means.get(name, ''))}</td></tr>")
     note = (f"<p class=soft>The run holds {data['cycles']:.2g} of a cycle: measures per cycle are not those of a "
             "whole one.</p>") if part_of_cycle(data) else ""
     return Section("measures", "Measures", "<div class='across many'><table><tr><th>measure<th class=n>value"
                    "<th class=n>error (±)"
-                   f"<th>unit<th>in other units<th>what it is</tr>{''.join(rows)}</table></div>{note}")
+                   f"<th>unit<th>in a workshop's units<th>what it is</tr>{''.join(rows)}</table></div>"
+                   f"<p class=soft>Value and error in the same unit; {SHARP.replace('±', 'error')}. "
+                   f"summary.json has all digits in SI.</p>{note}")
 
 
 def _cost(data: dict) -> Section:

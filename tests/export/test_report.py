@@ -14,9 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from page_data import charts_of, data_of, own_part
 
+from patchfem import scales
 from patchfem.__main__ import main
 from patchfem.core import G_N, Outcome
-from patchfem.export import report, scales
+from patchfem.export import report
 from patchfem.export.drawing import pictures
 from patchfem.export.pages import charts, words
 from patchfem.scene.keys.quantities import KINDS
@@ -226,36 +227,18 @@ def test_exact_the_same_data_give_the_same_bytes(tmp_path, name):
     assert text == report.page(data) == (tmp_path / "page.html").read_text("utf-8")
 
 
-@pytest.mark.parametrize("value, error, texts", [
-    (14.808123, 0.0187, ("14.808", "0.019")), (166.07, 91.7, ("166", "92")), (1.0, 0.0996, ("1.00", "0.10")),
-    (115.653762, 1.2e-8, ("115.653762", "1.2e-08")), (5.3907e8, 1.7e6, ("5.391e+08", "1.7e+06")),
-    (448.0, 250.0, ("4.5e+02", "2.5e+02")), (1.0, 9.96, ("1", "10")), (0.0, 1e-3, ("0", "0.001")),
-    (2.5, 0.0, ("2.5", "0")), (0.3, None, ("0.3", "&ndash;")), (None, None, ("&ndash;", "&ndash;"))])
-def test_exact_value_and_error_end_at_the_same_digit(value, error, texts):
-    assert report.matched(value, error) == texts
-
-
-@given(st.floats(1e-20, 1e12), st.floats(-12, 1))
-def test_always_rounding_hides_less_than_the_error(size, share):
-    error = size * 10**share
-    for value in (size, -size):
-        said, margin = map(float, report.matched(value, error))
-        assert abs(said - value) <= max(0.0501 * error, 5.01e-10 * size)
-        assert abs(margin - error) <= 0.0501 * error
-
-
 @pytest.mark.parametrize("name, value, unit, error, text", [
-    ("relative_displacement_amplitude_steady", 0.01106, "m", None, "11.06 mm = 435.43 mil"),
-    ("relative_displacement_amplitude", 1.48081e-5, "m", 1.9e-8, "14.808 um = 0.58300 mil"),
-    ("slip_start_phase", 2.898, "rad", 0.0012, "166.043 deg"),
-    ("rotation", 1e-4, "rad", 1e-16, "100 urad = 0.0057296 deg"),
+    ("relative_displacement_amplitude_steady", 0.01106, "m", None, "435.433 mil"),
+    ("relative_displacement_amplitude", 1.48081e-5, "m", 1.9e-8, "0.58300 mil"),
+    ("slip_start_phase", 2.898, "rad", 0.0012, ""),
+    ("rotation", 1e-4, "rad", 1e-16, "0.005729578 deg"),
     ("pressure_centre", 3.4e-18, "m", 4.5e-18, ""),  # zero within its error
     ("drift_per_cycle", 8.1e-22, "m", 1e-25, ""),  # smaller than any unit
     ("approach", 0.0, "m", 0.0, ""),
-    ("pressure_peak", 7.9044e6, "Pa", 4.5e5, "7.90 MPa = 1.146 ksi"),
-    ("contact_fraction", 0.2225, "1", 0.005, "22.25 %"),
-    ("normal_stiffness", 5.3907e8, "N m-1", 1.7e6, "539.1 N/um = 3078.2 klbf/in"),
-    ("absolute_acceleration_peak", 5 * G_N, "m s-2", None, "5 g"),
+    ("pressure_peak", 7.9044e6, "Pa", 4.5e5, "1.146 ksi"),
+    ("contact_fraction", 0.2225, "1", 0.005, ""),
+    ("normal_stiffness", 5.3907e8, "N m-1", 1.7e6, "3078.2 klbf/in"),
+    ("absolute_acceleration_peak", 5 * G_N, "m s-2", None, ""),
     ("energy_balance", 1e-13, "1", 0.0, "")])
 def test_exact_units_follow_the_size(name, value, unit, error, text):
     assert words.others(name, measure(value, unit, error)) == text
@@ -274,9 +257,10 @@ def test_exact_units_are_those_of_the_unit_table():
 @given(st.sampled_from(sorted(scales.LADDERS)), st.floats(1e-12, 1e12))
 def test_always_a_unit_is_the_smallest_below_a_thousand(unit, size):
     ladder = scales.LADDERS[unit]
-    name, scale = scales.step_of(ladder, size)
+    scale = scales.step_of(ladder, size)[1]
     smaller = [s for _, s in ladder if s > scale]
-    assert size * scale < 1000 or (name, scale) == ladder[-1]
+    above = [s for _, s in ladder if s < scale]
+    assert size * scale < 1000 or not above or size * above[0] < 1e-3  # from um^3 to mm^3 it is a long way
     assert all(size * s >= 1000 for s in smaller)
 
 

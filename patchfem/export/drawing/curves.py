@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..scales import axis_unit, wide_scale
+from ...scales import axis_unit, wide_scale
 from .pictures import BLUE, GREY, ORANGE, drawing, styled
 
 G = 9.80665

@@ -8,8 +8,8 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
+from ...scales import axis_unit
 from ..fields.series import Frame
-from ..scales import axis_unit
 from .panels import Panel, borders, curves, panels
 from .pictures import BLUE, ORANGE, STYLE
 

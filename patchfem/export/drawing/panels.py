@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...scales import axis_unit
 from ..fields.series import Frame
-from ..scales import axis_unit
 
 SHOWN = 0.995  # share of the area of a panel whose stress the colours tell apart
 CLIPPED = 0.8  # share of the largest stress above which the colours reach all the way

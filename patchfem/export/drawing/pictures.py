@@ -6,7 +6,7 @@ from functools import partial, wraps
 
 import numpy as np
 
-from ..scales import axis_unit
+from ...scales import axis_unit
 
 BLUE, ORANGE, GREY = "#1f5f99", "#c8551b", "#8a8a8a"
 WIDTH = 9.6  # inches; the page stretches a picture to its text column

@@ -13,8 +13,8 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from ...disk.whole import whole
+from ...scales import axis_unit
 from ..fields.series import Frame, Series
-from ..scales import axis_unit
 from . import reels
 from .panels import Panel, borders, curves, panels
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..scales import axis_unit
+from ...scales import axis_unit
 from .pictures import BLUE, GREY, ORANGE, drawing, styled
 
 SHOWN = 6  # profiles along the patch

@@ -4,15 +4,16 @@ The answer stands between two cases, the last one surely within and the first on
 neighbours, a straight line between them (over the logarithm of a key that grows by factors) says about where.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from html import escape
 from math import exp, inf, isfinite, log
 from typing import NamedTuple
 
 import numpy as np
 
+from ...scales import plain, short
 from .changes import lines_of, shown_of
-from .words import linked
+from .words import linked, zero_below
 from .written import NUMBER, bare
 
 WITHIN = 0.05  # of its value in the first case, in which a measure is said to stay
@@ -117,13 +118,13 @@ def _written(key: dict, one: Allowed) -> str:
     number, unit, size = one.value, key["unit"], float(key["values"][one.beyond])
     if low and high and low[2] == high[2] and size:
         number, unit = one.value * float(high[1]) / size, high[2] or ""
-    return f"{float(f'{number:.2g}'):g} {unit}".removesuffix(" 1").strip()
+    return f"{plain(number, 2)} {unit}".removesuffix(" 1").strip()
 
 
-def table(key: dict | None, found: list, measures: dict, said: Callable) -> str:
+def table(key: dict | None, found: list, measures: dict) -> str:
     """The same as an HTML table of every main measure; "" where there is none.
 
-    measures: {name: (values, errors, unit)}; said(value, unit, digits): a value as people read it.
+    measures: {name: (values, errors, unit)}.
     """
     if not found:
         return ""
@@ -135,8 +136,9 @@ def table(key: dict | None, found: list, measures: dict, said: Callable) -> str:
                 f", at about {_written(key, one)}" if isfinite(one.about) else "")
         else:
             far = "in no case" if one.value == largest else f"not up to {at(one.inside)}; the cases after it are open"
-        rows += (f"<tr><td>{linked(one.name.replace('_', ' '), one.name)}</td><td class=n>"
-                 f"{escape(said(one.first, measures[one.name][2], 4))}</td><td class=n>{_change(one.changed)}</td>"
+        first = short(one.first, measures[one.name][2], 4, zero_below(one.name))
+        rows += (f"<tr><td>{linked(one.name.replace('_', ' '), one.name)}</td><td class=n>{escape(first)}</td>"
+                 f"<td class=n>{_change(one.changed)}</td>"
                  f"<td>{escape(far)}</td></tr>")
     several = int(np.sum(np.asarray(key["values"], float) == smallest)) > 1
     least = " Of the values of the other keys those are told that allow least." if several else ""

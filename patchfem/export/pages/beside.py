@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ..scales import LADDERS, axis_unit
+from ...scales import LADDERS, axis_unit
 from ..summary import read_summary
 from .charts import COLOURS, mark
 from .document import Section, document
 from .sweep import label
-from .words import linked, meaning, pair, units
+from .words import linked, meaning, pair
 from .written import NUMBER
 
 TALL = 410  # pixels of a picture
@@ -247,8 +247,7 @@ def _measures(runs: list, names: list) -> str:
 def _cell(name: str, one: dict | None, first: dict | None) -> str:
     if one is None or one["value"] is None or not math.isfinite(one["value"]):
         return "&ndash;"
-    text = escape(pair(name, one)) if units(name, one["value"], one["unit"]) or one["unit"] == "1" else \
-        escape(f"{one['value']:.6g} {one['unit']}")
+    text = escape(pair(name, one))
     alone = first is None or first["value"] is None
     if alone or abs(one["value"] - first["value"]) <= (one["error"] or 0.0) + (first["error"] or 0.0):
         return f"<span class=v>{text}</span>"

@@ -10,10 +10,10 @@ from itertools import pairwise
 import numpy as np
 
 from ...core import G_N
+from ...scales import axis_unit, wide_scale
 from ..drawing import curves
 from ..drawing.pictures import closer, envelope, part_in_contact, whole_from
 from ..drawing.wear import MEASURES, SHOWN
-from ..scales import axis_unit, wide_scale
 
 LINE, FRAMES = 6000, 24  # points of a line, frames of the shear stress behind the largest one
 FAINT, FEWEST = 400, 200  # points of such a frame, and those that every line keeps

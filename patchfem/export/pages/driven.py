@@ -4,7 +4,7 @@ import shlex
 from pathlib import Path
 
 from ...core import G_N
-from ..scales import LADDERS, axis_unit
+from ...scales import LADDERS, axis_unit
 
 PLAIN = {"m/s^2": ("g", 1 / G_N), "m/s": ("mm/s", 1e3), "Hz": ("Hz", 1.0)}
 

@@ -78,7 +78,7 @@
 
   function source(cases, m, more) {
     const column = {case: cases, value: cases.map((i) => m.values[i]),
-      said: cases.map((i) => `${within(m.values[i], m.errors[i])} ${m.unit}`),
+      said: cases.map((i) => `${within(m.values[i], m.errors[i], m.least)} ${m.unit}`),
       outcome: cases.map((i) => data.outcome[i]), marker: cases.map((i) => bad(i) ? "x" : "circle"), ...more};
     data.keys.forEach((one, k) => { column[`key${k}`] = cases.map((i) => one.texts[i]); });
     const made = new Bokeh.ColumnDataSource({data: column});
@@ -200,7 +200,7 @@
     const highest = found.reduce((a, b) => m.values[b] > m.values[a] ? b : a);
     const where = (i) => `${x.label} ${x.texts[i]}` + (beside ? `, ${beside.label} ${beside.texts[i]}` : "");
     const off = cases.filter(bad).length;
-    const value = (i) => `${within(m.values[i], m.errors[i])} ${m.unit}`.trim();
+    const value = (i) => `${within(m.values[i], m.errors[i], m.least)} ${m.unit}`.trim();
     return `Against ${x.label}: lowest ${value(lowest)} at ${where(lowest)}; highest ` +
       `${value(highest)} at ${where(highest)}.` + (off ? ` ${off} of ${cases.length} cases did not ` +
       "settle (shaded or hatched)." : "");
@@ -216,7 +216,7 @@
     const make = () => !data.grid ? cloud(cases, x, beside, m) :
       mapped ? map(cases, x, beside, m) : lines(cases, x, beside, m);
     const away = every.filter((i) => !cases.includes(i));
-    const value = (i) => `${within(m.values[i], m.errors[i])} ${m.unit}`.trim();
+    const value = (i) => `${within(m.values[i], m.errors[i], m.least)} ${m.unit}`.trim();
     const zero = !away.length ? "" : ` Not drawn on a logarithmic axis: ${away.length === 1 ?
       `the case at ${x.label} ${x.texts[away[0]]}, ${value(away[0])}` : `${away.length} cases at 0`}.`;
     const words = told(cases, x, beside, m) + zero;

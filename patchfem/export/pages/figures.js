@@ -5,13 +5,14 @@ const pictures = (() => {
   const ink = (name) => getComputedStyle(root).getPropertyValue(name).trim();
   const colours = () => [ink("--accent"), ink("--warm"), "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86", "#3aa6b9", "#7d7d7d"];
   const number = (v) => v === null ? "–" : Number(v.toPrecision(7)).toString();
-  const within = (v, e) => {                     // a value with its error, as many digits as the error allows
+  const within = (v, e, least) => {              // a value with its error, as `scales.rounded` writes it
     if (v === null) return "no value";
-    if (e === null || e === 0) return number(v);
+    const size = Math.abs(v);
+    if (size <= least && (e === null || (e <= least && (e > 0.1 * size || size <= 1e-6 * least)))) return "0";
+    if (e === null || e === 0 || e < 1e-5 * size) return number(v);
     const places = Math.max(0, 1 - Math.floor(Math.log10(Math.abs(e))));
-    if (Math.abs(v) >= 1e6 || places > 12 || Math.abs(e) < 1e-6 * Math.abs(v))
-      return `${number(v)} ± ${Number(e.toPrecision(2))}`;
-    return `${v.toFixed(places)} ± ${e.toFixed(places)}`;
+    if (size >= 1e7 || places > 12) return `${number(v)} ± ${Number(e.toPrecision(2))}`;
+    return `${(Number(v.toFixed(places)) || 0).toFixed(v.toFixed(places) == 0 ? 0 : places)} ± ${e.toFixed(places)}`;
   };
   const named = (one) => one.unit ? `${one.label} [${one.unit}]` : one.label;
 

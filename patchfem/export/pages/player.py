@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ...scales import axis_unit
 from ..fields.series import Series, moving
 from ..fields.vtkhdf import NAME
-from ..scales import axis_unit
 from .document import Section
 from .library import own
 from .thinned import corners, spread, thinned

@@ -6,12 +6,12 @@ from math import isfinite
 
 import numpy as np
 
-from ...core import Outcome, rounded
-from ..scales import LADDERS, axis_unit
+from ...core import Outcome
+from ...scales import LADDERS, axis_unit, rounded, short
 from . import allowed
 from .changes import changes
 from .document import Section, document
-from .words import linked
+from .words import linked, zero_below
 from .written import NUMBER, brief
 
 SETTLED = ("steady", "stuck", "done", "no_contact")
@@ -78,7 +78,7 @@ def _measure(name: str, one: dict, drawn) -> dict:
     unit, scale = axis_unit(one["values"], one["unit"]) if one["unit"] in LADDERS else (one["unit"], 1.0)
     return {"name": name, "label": label(name), "unit": "" if unit == "1" else unit, "means": one.get("means", ""),
             "values": np.asarray(one["values"], float)[drawn] * scale,
-            "errors": np.asarray(one["errors"], float)[drawn] * scale}
+            "errors": np.asarray(one["errors"], float)[drawn] * scale, "least": zero_below(name) * scale}
 
 
 def _along(keys: list) -> str:
@@ -112,10 +112,11 @@ def span(measures: dict, outcome) -> str:
         every = np.isfinite(values)
         there = every & settled if np.any(every & settled) else every
         values, errors = np.asarray(values, float)[there], np.asarray(errors, float)[there]
-        low, high = _said(values.min(), unit, 4), _said(values.max(), unit, 4)
+        low, high = (short(one, unit, 4, zero_below(name)) for one in (values.min(), values.max()))
         ran = f"is {high} throughout" if low == high else f"runs from {low} to {high}"
         known = errors[np.isfinite(errors)]
-        band = f", numerical error at most {_said(known.max(), unit, 1)}" if known.size else ""
+        largest = f"numerical error at most {short(known.max(), unit, 1)}" if known.any() else "without numerical error"
+        band = f", {largest}" if known.size else ""
         whose = "" if every.sum() == there.sum() else " of the settled cases"
         return f"{label(name).capitalize()}{whose} {ran}{band}."
     return ""
@@ -155,14 +156,8 @@ def _change(table: dict) -> list:
     """The section on what each main measure has changed by since the first case; none where no key grows alone."""
     columns = _columns(table)
     text = allowed.table(*allowed.allowed(_named(table["keys"]), columns, table["outcome"], SETTLED, table["grid"]),
-                         columns, _said)
+                         columns)
     return [Section("change", "Change against the first case", text)] if text else []
-
-
-def _said(value: float, unit: str, digits: int) -> str:
-    """A value with so many digits and the unit that suits it."""
-    unit, scale = axis_unit(np.array([value]), unit) if unit in LADDERS else (unit, 1.0)
-    return f"{float(f'{value * scale:.{digits}g}'):g} {unit}".removesuffix(" 1")
 
 
 def _lead(table: dict) -> str:
@@ -204,7 +199,7 @@ def _cases(table: dict) -> str:
         if table["folders"] is not None:
             said = f'<a href="{escape(table["folders"][i])}">{said}</a>'
         cells += f"<td>{said}</td>" + "".join(
-            f"<td class=n>{_number(one['values'][i], one['errors'][i])}</td>" for one in columns)
+            f"<td class=n>{_number(one['values'][i], one['errors'][i], one['least'])}</td>" for one in columns)
         rows.append(f"<tr{'' if outcome in SETTLED else ' class=bad'}>{cells}</tr>")
     number = len(table["outcome"])
     more = f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv has all.</p>" if number > LISTED else ""
@@ -220,13 +215,11 @@ def _changes(values) -> bool:
     return found.size > 0 and np.ptp(found) > 1e-9 * np.abs(found).max()
 
 
-def _number(value: float, error: float) -> str:
-    """A value rounded by its error and with it; five digits alone where the error is below the last of them."""
+def _number(value: float, error: float, least: float) -> str:
+    """A value rounded by its error and with it; least: its floor in the unit of both."""
     if not np.isfinite(value):
         return "&ndash;"
-    if not np.isfinite(error) or error <= 1e-5 * abs(value):
-        return f"{value:.5g}"
-    return " ± ".join(rounded(value, error))
+    return " ± ".join(text for text in rounded(value, error if np.isfinite(error) else None, least) if text)
 
 
 def _meanings(table: dict) -> str:

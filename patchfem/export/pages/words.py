@@ -3,13 +3,15 @@
 import re
 from collections.abc import Callable
 from html import escape
-from math import isfinite, pi
+from math import inf, isfinite, pi
+from types import MappingProxyType
 
-from ...core import Outcome, rounded
+from ... import scales
+from ...core import Outcome
 from ...response.rows import TABLE as MOTION
 from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.result import Result
-from .. import scales
+from ..summary import measure_object
 
 G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
 DEG = ("deg", 180 / pi)
@@ -26,12 +28,17 @@ OF_WHAT = {  # said behind a value that would otherwise be taken for another, or
     "stick_fraction": "of the interface as a whole", "equivalent_damping": "a damping ratio of mode 1"}
 BETWEEN = ("jump_level",)  # known to lie between two levels of the drive, whatever the tolerance
 ROUND = 1e-12  # of the friction force times the motion: work that is round-off
+NONE = MappingProxyType({})
+TINY = 1e-300  # where nothing is asked of a measure
+UNKNOWN = " (error unknown)"
+SHARP = "what has no ± is known to its last digit"
 
 
-def units(name: str, value: float, unit: str) -> list:
-    """Units [(unit, scale)] in which a person reads the measure `name`, by its size; the metric one first.
+def units(name: str, value: float, unit: str, error: float | None = None) -> list:
+    """Units [(unit, scale)] in which a person reads the measure `name`, by its size or that of its error; the metric
+    one first.
 
-    value and unit: in SI; value times scale is in the unit.
+    value, error and unit: in SI; value times scale is in the unit.
     """
     if name.endswith("fraction"):
         return [("%", 100.0)]
@@ -39,34 +46,45 @@ def units(name: str, value: float, unit: str) -> list:
         return [DEG]
     if unit == "m s-2":
         return [("g", 1 / G)]
-    ladders = [table[unit] for table in (scales.LADDERS, WORKSHOP) if unit in table]
-    return [scales.step_of(ladder, value) for ladder in ladders]
+    size = max(abs(value), error or 0.0) if isfinite(error or 0.0) else value
+    return [scales.fitting(value, unit, error), *([scales.step_of(WORKSHOP[unit], size)] if unit in WORKSHOP else [])]
+
+
+def texts(name: str, measure: dict, scale: float | None = None) -> tuple:
+    """Value and error of a measure as texts, in the first of its units or with a scale of one's own."""
+    value, error, unit = measure["value"], measure["error"], measure["unit"]
+    if value is None:
+        return "-", ""
+    scale = units(name, value, unit, error)[0][1] if scale is None else scale
+    return scales.rounded(value * scale, None if error is None else error * scale, zero_below(name, measure) * scale,
+                          unit == "1")
 
 
 def pair(name: str, measure: dict) -> str:
     """A measure with its error in the first of its units, such as `14.808 ± 0.041 um`; a dash without a value."""
-    value, error = measure["value"], measure["error"]
-    if value is None:
-        return "-"
-    plain = "" if measure["unit"] == "1" else measure["unit"]
-    unit, scale = (units(name, value, measure["unit"]) or [(plain, 1.0)])[0]
-    value, error = rounded(value * scale, None if error is None else error * scale)
-    return (f"{value} ± {error} {unit}" if error else f"{value} {unit}").strip()
+    value, error = texts(name, measure)
+    if value == "-":
+        return value
+    unit = units(name, measure["value"], measure["unit"], measure["error"])[0][0]
+    return f"{f'{value} ± {error}' if error else value} {unit}".strip()
+
+
+def zero_below(name: str, measure: dict = NONE) -> float:
+    """Floor of a measure in its row, or the smaller one of its run [SI]: below it, it is 0 for a reader.
+
+    A floor that the run has raised to the tolerance times larger terms is what is asked of it, not what is known.
+    """
+    row, own = row_of(name), measure.get("floor") or inf
+    return 0.0 if row is None else min(row.floor, own)
 
 
 def others(name: str, measure: dict) -> str:
-    """The value in its other units, to the digits its error allows; nothing for a value that is zero within it."""
+    """The value in the units of a workshop, to the digits its error allows; nothing for one that is 0 within it."""
     value, error = measure["value"], measure["error"]
-    if value is None or not isfinite(value) or abs(value) <= (error or 0.0):
+    if value is None or not isfinite(value) or texts(name, measure)[0] == "0" or abs(value) <= (error or 0.0):
         return ""
-    out = []
-    for unit, scale in units(name, value, measure["unit"]):
-        if scale == 1.0 or abs(value) * scale < 1e-3:
-            continue
-        sharp = error is None or error < 1e-4 * abs(value)
-        text = f"{value * scale:.5g}" if sharp else rounded(value * scale, error * scale)[0]
-        out.append(f"{text} {unit}")
-    return " = ".join(out)
+    found = units(name, value, measure["unit"], error)[1:]
+    return " = ".join(f"{texts(name, measure, scale)[0]} {unit}" for unit, scale in found if abs(value) * scale >= 1e-3)
 
 
 def verdict(summary: dict) -> str:
@@ -149,22 +167,24 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
 def least_known(result: Result) -> str:
     """The measure known least well for the tolerance, as one sentence; "" where one misses it, which a warning says."""
     tolerance = result.plan.model.accuracy.tolerance
-    wide = {name: one.error / (tolerance * abs(one.value) + one.floor) for name, one in result.measures.items()
-            if one.value and one.error is not None}
+    wide = {name: one.error / max(tolerance * abs(one.value) + one.floor, TINY)
+            for name, one in result.measures.items() if one.value is not None and one.error is not None}
     if not wide or max(wide.values()) > 1:
         return ""
+    told = {name: pair(name, measure_object(result.measures[name])) for name in wide}
 
     def known(name: str) -> str:
-        one = result.measures[name]
-        return f"{name}, {pair(name, {'value': one.value, 'error': one.error, 'unit': one.unit})}"
+        return f"{name}, {told[name]}"
 
     steps = [name for name in wide if name in BETWEEN]
-    name = max([name for name in wide if name not in BETWEEN], key=wide.get, default="")
+    name = max(wide.keys() - set(steps), key=lambda one: ("±" in told[one], wide[one], one), default="")
     of_steps = f"{', '.join(map(known, steps))}, is known to the distance of two levels of the drive"
     if not name:
         return f"{of_steps}."
     but = f"; {of_steps}, which the scene sets" if steps else ""
-    return f"Every measure with an error meets the tolerance {tolerance:g}; least well {known(name)}{but}."
+    least = f"; least well {known(name)}" if "±" in told[name] else ""
+    sharp = "" if all("±" in one for one in told.values()) else f"; {SHARP}"
+    return f"Every measure with an error meets the tolerance {tolerance:g}{least}{but}{sharp}."
 
 
 def linked(text: str, name: str, more: str = "") -> str:
@@ -172,25 +192,28 @@ def linked(text: str, name: str, more: str = "") -> str:
     return f"<a{more} href='#measure-{escape(name)}'>{escape(text)}</a>"
 
 
-def meaning(name: str) -> str:
-    """What a measure is, in a sentence; "" for one that no table has."""
-    for known in (name, re.sub(r"_\d+$", "", name)):
-        for table in (MOTION, STATIC):
-            if known in table:
-                return table[known].text
-    return ""
-
-
-def group_of(name: str, pressed: bool = True) -> str:
-    """The group, one of GROUPS, of a measure by its name; that of one of several interfaces ends in its number.
+def row_of(name: str, pressed: bool = False):
+    """The Row of a measure by its name, that of one of several interfaces ends in its number; None without one.
 
     pressed: a patch was pressed, so that what it shares with a point, the load, is its own.
     """
     for table in (STATIC, MOTION) if pressed else (MOTION, STATIC):
         for known in (name, re.sub(r"_\d+$", "", name)):
             if known in table:
-                return table[known].group
-    return GROUPS[0]
+                return table[known]
+    return None
+
+
+def meaning(name: str) -> str:
+    """What a measure is, in a sentence; "" for one that no table has."""
+    row = row_of(name)
+    return "" if row is None else row.text
+
+
+def group_of(name: str, pressed: bool = True) -> str:
+    """The group, one of GROUPS, of a measure by its name; pressed: as `row_of` takes it."""
+    row = row_of(name, pressed)
+    return GROUPS[0] if row is None else row.group
 
 
 def table_of(measures: dict) -> list[str]:
@@ -221,4 +244,5 @@ def _value(name: str, one: dict) -> str:
     if one.get("reason"):
         return f"- ({one['reason']})"
     of_what = OF_WHAT.get(re.sub(r"_\d+$", "", name))
-    return f"{pair(name, one)}, {of_what}" if of_what else pair(name, one)
+    unknown = UNKNOWN if one["error"] is None and one["value"] is not None else ""
+    return f"{pair(name, one)}{unknown}{f', {of_what}' if of_what else ''}"

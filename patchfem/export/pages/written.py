@@ -2,6 +2,8 @@
 
 import re
 
+from ...scales import plain
+
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?\Z")
 LONG = 9  # letters of a number from which on a range made it, not a person
 MOST = 6  # digits of such a number at most
@@ -39,5 +41,5 @@ def _short(text: str, digits: int) -> str:
     found = NUMBER.match(text)
     if found is None or len(found[1]) < LONG:
         return text
-    return f"{float(f'{float(found[1]):.{digits}g}'):g} {found[2] or ''}".strip()
+    return f"{plain(float(found[1]), digits)} {found[2] or ''}".strip()
 

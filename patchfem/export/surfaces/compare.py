@@ -9,6 +9,7 @@ from ... import __version__
 from ...campaigns.compare import Pressed
 from ...campaigns.compare import data_of as pressed_data
 from ...disk.whole import write_text
+from ...scales import LADDERS, step_of
 from ...surface.areal import level_plane
 from ...surface.compare.compare import Comparison
 from ...surface.compare.quantity import LEVEL, Quantity
@@ -19,7 +20,6 @@ from ...surface.roughness.parameters import Heights
 from ...surface.roughness.spectrum import BAND
 from ..drawing.inline import CSS, placed
 from ..pages.words import pair
-from ..scales import LADDERS, step_of
 from . import compare_pictures as pictures
 
 WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_max": "worn depth, largest",

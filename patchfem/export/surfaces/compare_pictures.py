@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from ...scales import axis_unit
 from ...surface.profile import level
 from ...surface.roughness.filter import even
 from ..drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
-from ..scales import axis_unit
 from .pictures import thinned
 
 CURVE = 400

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from ...scales import axis_unit
 from ..drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
-from ..scales import axis_unit
 
 POINTS = 1200  # pairs of lowest and highest height that a line shows
 CURVE = 400  # points of a spectrum

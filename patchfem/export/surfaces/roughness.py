@@ -6,9 +6,9 @@ from pathlib import Path
 from ... import __version__
 from ...core import say
 from ...disk.whole import write_text
+from ...scales import LADDERS, step_of
 from ...surface.roughness.report import RoughnessReport, Value
 from ..drawing.inline import CSS
-from ..scales import LADDERS, step_of
 from . import pictures
 
 AREAL = ("Interval: 5 to 95 %, of the mean over all scans of this size on a surface with Gaussian heights and the "

@@ -107,7 +107,7 @@ def test_exact_a_key_written_in_several_units_is_shown_in_that_of_its_numbers(ta
     assert shown["unit"] == "N" and shown["values"] == load["values"].tolist()
 
 
-@pytest.mark.parametrize("text, shown", [("3.16227766016838e-06 rad", "3.16228e-06 rad"), ("26 lbf", "26 lbf"),
+@pytest.mark.parametrize("text, shown", [("3.16227766016838e-06 rad", "3.16228e-6 rad"), ("26 lbf", "26 lbf"),
                                          ("0.0001 rad", "0.0001 rad"), ("nonlocal", "nonlocal"),
                                          ("0.123456789", "0.123457")])
 def test_exact_long_numbers_are_shown_short(text, shown):
@@ -175,7 +175,7 @@ def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_error(
     measures["loop_area"] = ([1e-3, lost, lost], [lost] * 3, "J")
     assert span(measures, outcome) == "Loop area is 1 mJ throughout."
     assert span({"pressure_peak": ([lost, lost, 9e6], [0.0] * 3, "Pa")}, outcome) == \
-        "Pressure peak is 9 MPa throughout, numerical error at most 0 Pa."
+        "Pressure peak is 9 MPa throughout, without numerical error."
     assert span({"relative_displacement_amplitude": ([2.939e-8, 8.2614e-3], [1e-9, 8e-8], "m")}, outcome[:2]) == \
         "Relative displacement amplitude runs from 29.39 nm to 8.261 mm, numerical error at most 80 nm."
     assert span({"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}, ["steady"]) == ""
