@@ -48,20 +48,22 @@ def _mesh(path: Path, tables, whole: bool) -> None:
 
 
 def _profile(path: Path, tables, whole: bool) -> tuple:
-    """A trace that covers the interface and is no finer than its elements; what is done to it."""
+    """A trace that covers the interface and is no finer than the patch can show; what is done to it."""
     import numpy as np
 
-    from .patch import AUTOMATIC_CELLS, interface_of, pieces_asked
+    from .patch import AUTOMATIC_CELLS, interface_of, pieces_asked, profile_lengths
     from .profile import profile_gap, trace_of
 
     trace_of(path)
     contact = tables.contact
     if not whole or contact.mesh is not None:
         return ()
-    length = interface_of(pieces_asked(contact))
+    pieces = pieces_asked(contact)
+    length = interface_of(pieces)
     size = contact.element_size or length / AUTOMATIC_CELLS
     x = np.linspace(-length / 2, length / 2, max(1, round(length / size)) + 1)
-    return profile_gap(path, x, size, contact.asperities is not None, contact.profile.heights == "surface")[1]
+    return profile_gap(path, x, profile_lengths(contact, pieces), contact.asperities is not None,
+                       contact.profile.heights == "surface")[1]
 
 
 def _slide(path: Path, tables, whole: bool) -> None:

@@ -19,14 +19,17 @@ from ..scene.keys.contact import Contact
 class Gap:
     """The shapes that open the gap between the pieces.
 
-    shapes: (name, keys of its table) each; profile: path of measured heights or None; profile_size [m]: the size down
-    to which these heights stand for content, None: that of the mesh's own cells; rough: asperities stand for what is
-    finer; side: the piece that carries the shapes, "upper" or "lower"; material: peaks of the profile are material.
+    shapes: (name, keys of its table) each; profile: path of measured heights or None; average [m]: the length over
+    which these heights are averaged, None: the cells of the mesh, down to the spacing of the file; limit [m]: cells
+    that too much of the heights may not be finer than, 0: those of the mesh, None: all may; rough: asperities stand
+    for what is finer; side: the piece that carries the shapes, "upper" or "lower"; material: peaks of the profile are
+    material.
     """
 
     shapes: tuple
     profile: Path | None
-    profile_size: float | None
+    average: float | None
+    limit: float | None
     rough: bool
     side: str
     material: bool = False
@@ -41,6 +44,17 @@ class Gap:
         """Places [m] where the gap jumps, at the edge of a step."""
         return tuple(part.at for name, part in self.shapes if name == "step")
 
+    def averaging(self, x, loaded) -> float | None:
+        """Length [m] that the profile is averaged over where nodes x (m,) [m] are `loaded` (m,) bool: the longest cell
+        beside one of them, or what the scene or the file allows at least; None without a profile."""
+        if self.profile is None:
+            return None
+        from .profile import spacing_of
+
+        beside = loaded[1:] | loaded[:-1]
+        longest = np.diff(x)[beside].max(initial=0.0) or np.diff(x).max()
+        return float(max(longest, self.average or spacing_of(self.profile)))
+
     def at(self, x) -> tuple:
         """Gap of the unloaded surfaces (m,) [m] at x (m,) [m], with notes for the user and seconds by shape."""
         gap, seconds, notes = np.zeros(x.size), {}, ()
@@ -53,20 +67,20 @@ class Gap:
             from .profile import profile_gap
 
             begin = perf_counter()
-            heights, notes = profile_gap(self.profile, x, self.profile_size, self.rough, self.material)
+            heights, notes = profile_gap(self.profile, x, (self.average, self.limit), self.rough, self.material)
             gap = gap + heights
             seconds["profile"] = perf_counter() - begin
         return gap, notes, seconds
 
 
-def gap_asked(contact: Contact, size: float | None, beside) -> Gap:
+def gap_asked(contact: Contact, lengths: tuple, beside) -> Gap:
     """The shapes of [contact].
 
-    size [m]: of the elements, None: those of a mesh file; beside(name) -> path of a file.
+    lengths: average and limit [m] of a profile; beside(name) -> path of a file.
     """
     shapes = tuple((name, part) for name, part in contact.shapes.items() if name in SHAPES)
     profile = contact.profile
-    return Gap(shapes, beside(profile.file) if profile is not None else None, size, contact.asperities is not None,
+    return Gap(shapes, beside(profile.file) if profile is not None else None, *lengths, contact.asperities is not None,
                shape_side(contact), profile is not None and profile.heights == "surface")
 
 

@@ -11,7 +11,7 @@ from ..scene.keys.contact import Asperities, Coating, Contact, Material
 from .gap import Gap, gap_asked
 
 CHOSEN_POINTS = 160  # about what a patch takes at the default tolerance
-AUTOMATIC_CELLS = 200  # along the interface: down to this length a profile stands for content
+AUTOMATIC_CELLS = 200  # along the interface, of an even mesh; beside asperities a profile is averaged over one of them
 CLOSE = 1e-9  # lengths below this share of another one are nothing
 
 
@@ -139,9 +139,8 @@ class PatchModel:
 
     def sized(self, size: float | None) -> "PatchModel":
         """The patch with another element size [m]; None: the mesh that the tolerance chooses."""
-        found = replace(self, element_size=size)
-        profile = None if self.mesh is not None else found.size
-        return replace(found, gap=replace(self.gap, profile_size=profile))
+        gap = self.gap if self.gap.rough or self.mesh is not None else replace(self.gap, average=size, limit=size)
+        return replace(self, element_size=size, gap=gap)
 
     @property
     def moment(self) -> float | None:
@@ -155,11 +154,10 @@ def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
     """The patch of [contact]; kind: of the run; beside(name) -> path of a file that the scene names."""
     lower, upper = pieces = pieces_asked(contact)
     length = interface_of(pieces)
-    size = None if contact.mesh is not None else contact.element_size or length / AUTOMATIC_CELLS
     line, holder, strips = contact.load_line, contact.holder, contact.strips
     return PatchModel(
         length, contact.width, contact.height, contact.pairs, contact.plane, contact.substrate, lower, upper,
-        gap_asked(contact, size, beside), contact.element_size, kind == "patch", "",
+        gap_asked(contact, profile_lengths(contact, pieces), beside), contact.element_size, kind == "patch", "",
         beside(contact.mesh) if contact.mesh is not None else None, contact.load,
         contact.approach.distance if contact.approach is not None else None,
         line.offset if line is not None else None, line.moment if line is not None else None, line is not None,
@@ -172,6 +170,22 @@ def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
 def pieces_asked(contact: Contact) -> tuple:
     """The lower and the upper OnePiece of [contact]."""
     return _piece(contact, contact.lower), _piece(contact, contact.upper)
+
+
+def profile_lengths(contact: Contact, pieces) -> tuple:
+    """(average, limit) [m] of a profile, as `Gap` has them.
+
+    A mesh that the tolerance chooses shows all that the file holds; its cells are automatic ones at most, which is the
+    limit where the finest waves cannot be solved apart (asperities, strips, pieces that reach beyond the interface).
+    """
+    length = interface_of(pieces)
+    automatic = length / AUTOMATIC_CELLS
+    if contact.asperities is not None:
+        return automatic, None
+    if contact.mesh is not None or contact.element_size:
+        return (None, 0.0) if contact.mesh is not None else (contact.element_size, contact.element_size)
+    apart = contact.strips is None and all(piece.length <= length * (1 + CLOSE) for piece in pieces)
+    return None, None if apart else automatic
 
 
 def interface_of(pieces) -> float:

@@ -6,47 +6,61 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array
+from ..core import PatchfemError, frozen_array, say
 from ..surface.files.read import read_profile
-from ..surface.fine import too_fine
+from ..surface.fine import ELEMENTS, fine_share, too_fine
 from ..surface.nodes import on_nodes, placed
 from ..surface.profile import Profile, cleaned, level
 
 SPLIT = 16  # straight pieces of a cell of a smooth profile
 NOISE = 1e-10  # m: heights below it are digits
+CELLS = 200  # of an even mesh over the interface
 
 
-def profile_gap(path: Path, x, asked: float | None, rough: bool, material: bool = False) -> tuple:
+def profile_gap(path: Path, x, lengths: tuple, rough: bool, material: bool = False) -> tuple:
     """Gap (m,) [m] that a profile in a file adds at the nodes x (m,) [m], and notes for the user.
 
-    The profile is levelled, freed of spikes and averaged over cells of `asked` [m], which decides what it may hold; a
-    smooth curve through these means is what the nodes see, however fine they are. None: it is averaged over the nodes'
-    own cells. The gap counts from its least, where flat pieces touch first.
-    rough: asperities stand for what is finer; material: heights of a surface, on either piece measured outwards, so
-    that a peak closes the gap. PatchfemError where too much of it is finer than the mesh and no asperities stand for
-    it.
+    The profile is levelled and freed of spikes. lengths: (average, limit) [m]. It is averaged over `average` and a
+    smooth curve goes through the means, or, where that is None, through the samples of the file; every node sees the
+    mean of the curve over its own cells. limit: cells that too much of the heights may not be finer than, 0: those of
+    the nodes, None: all may. The gap counts from its least, where flat pieces touch first. rough: asperities stand for
+    what is finer; material: heights of a surface, on either piece measured outwards, so that a peak closes the gap.
+    PatchfemError where too much of the profile is finer than `limit`.
     """
-    size = float(np.diff(x).max())
-    whole = _whole(path, x, 2 * size)
+    average, limit = lengths
+    trace, notes, straight = _levelled(path, x, average or float(x[-1] - x[0]) / CELLS, material)
+    if limit is not None and not straight and \
+            (said := too_fine(trace, limit or float(np.diff(x).max()))) is not None:
+        raise PatchfemError(said, "contact.profile.file")
+    if rough and not straight and (share := fine_share(trace, ELEMENTS * average)) > 0:
+        notes = (*notes, f"{trace.source}: averaged over {say(average)}; the finer heights, {100 * share:.2g} % of the "
+                         "rms, are left to the law of the asperities")
+    even, shape = x, trace
+    if average is not None and not _even(x, average):
+        even = np.linspace(x[0], x[-1], max(2, round(float(x[-1] - x[0]) / average) + 1))
+        shape = _smooth(trace, even, on_nodes(trace, even), SPLIT)
+    elif average is None and (split := _split(trace, x)) > 1:
+        shape = _smooth(trace, trace.x, trace.z, split)
+    return on_nodes(shape, x) - on_nodes(trace if average is not None else shape, even).min(), notes
+
+
+def _levelled(path: Path, x, cell: float, material: bool) -> tuple:
+    """The levelled Profile of a file over the nodes x (m,) [m], flat beyond its ends, notes for the user, and whether
+    it is what levelling leaves of a straight line. cell [m]: half of it may lack at either end, two in between."""
+    long = float(x[-1] - x[0])
+    whole = _whole(path, np.linspace(x[0], x[-1], max(1, round(long / cell)) + 1), 2 * cell)
     if material:
         whole = replace(whole, z=frozen_array(-whole.z))
     trace = level(whole)
-    slope = float(np.polyfit(whole.x, whole.z - trace.z, 1)[0])
-    notes = trace.notes
+    slope, notes = float(np.polyfit(whole.x, whole.z - trace.z, 1)[0]), trace.notes
     if abs(slope) * trace.length > 1e-2 * np.ptp(trace.z):
         notes = (*notes, f"{trace.source}: levelled, a slope of {slope:.3g} rad is taken out; a tilt belongs in "
                          "[contact.tilt]")
-    noise = np.std(trace.z) <= max(NOISE, 1e-5 * np.ptp(whole.z))  # what levelling leaves of a straight line
-    if not noise and (said := too_fine(trace, size if asked is None else asked)) is not None:
-        if not rough:
-            raise PatchfemError(said, "contact.profile.file")
-        notes = (*notes, said.partition(": add")[0] + ": that is averaged out and left to the law of the asperities")
-    shape, even = trace, x
-    if asked is not None and not _even(x, asked):
-        even = np.linspace(x[0], x[-1], max(2, round(float(x[-1] - x[0]) / asked) + 1))
-        shape = _smooth(trace, even)
-    least = on_nodes(trace, even).min()
-    return on_nodes(shape, x) - least, notes
+    straight = bool(np.std(trace.z) <= max(NOISE, 1e-5 * np.ptp(whole.z)))
+    before, after = int(trace.x[0] > x[0]), int(trace.x[-1] < x[-1])
+    places = np.concatenate([x[:1][:before], trace.x, x[-1:][:after]])
+    heights = np.concatenate([trace.z[:1][:before], trace.z, trace.z[-1:][:after]])
+    return replace(trace, x=frozen_array(places), z=frozen_array(heights)), notes, straight
 
 
 def _even(x, size: float) -> bool:
@@ -54,12 +68,17 @@ def _even(x, size: float) -> bool:
     return np.ptp(np.diff(x)) <= 1e-9 * np.ptp(x) and abs(x[1] - x[0] - size) <= 1e-2 * size
 
 
-def _smooth(trace: Profile, even) -> Profile:
-    """The cubic spline through the heights of a trace on even nodes (k,) [m], SPLIT points a cell."""
+def _split(trace: Profile, x) -> int:
+    """Straight pieces that a step between samples of a trace is cut into under the nodes x (m,) [m]."""
+    return min(SPLIT, int(np.ceil(2 * float(np.diff(trace.x).max()) / float(np.diff(x).min()))))
+
+
+def _smooth(trace: Profile, x, z, split: int) -> Profile:
+    """The cubic spline through heights z (k,) [m] at x (k,) [m], `split` points a step."""
     from scipy.interpolate import CubicSpline
 
-    fine = np.interp(np.arange(SPLIT * (even.size - 1) + 1) / SPLIT, np.arange(even.size), even)
-    heights = CubicSpline(even, on_nodes(trace, even), bc_type="natural")(fine)
+    fine = np.interp(np.arange(split * (x.size - 1) + 1) / split, np.arange(x.size), x)
+    heights = CubicSpline(x, z, bc_type="natural")(fine)
     return replace(trace, x=frozen_array(fine), z=frozen_array(heights), notes=())
 
 
@@ -70,6 +89,11 @@ def trace_of(path: Path) -> Profile:
         return _read(path, stamp)
     except PatchfemError as error:
         raise type(error)(str(error), "contact.profile.file") from None
+
+
+def spacing_of(path: Path) -> float:
+    """Distance [m] between most samples of the trace in a file."""
+    return float(np.median(np.diff(trace_of(path).x)))
 
 
 def _whole(path: Path, x, longest: float) -> Profile:

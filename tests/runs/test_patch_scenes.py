@@ -230,7 +230,9 @@ def test_refuses_a_profile_finer_than_the_mesh_and_leaves_it_to_the_asperities(t
         run(scene(tables, path=tmp_path / "scene.toml"))
     patch, _ = solved(tables + SKINS["linear"], path=tmp_path / "scene.toml")
     assert any("left to the law of the asperities" in note for note in patch.notes)
-    box = np.sinc(0.127e-3 / 50e-6)  # of the average over a cell
+    # of the average over a two-hundredth of the length, which leaves a wave of 235 um, and of that over a cell
+    split = LENGTH / 200
+    box = np.sinc(split / 50e-6) * np.sinc(0.127e-3 * (1 / 50e-6 - 1 / split))
     assert np.ptp(patch.gap[1:-1]) / 2 == pytest.approx(1e-7 * abs(box), rel=0.02)
 
 

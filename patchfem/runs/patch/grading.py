@@ -27,6 +27,7 @@ MOST_PLACES = 12  # beyond it the contact is many islands and the columns stay e
 SWING = (0.5, 1.5)  # of the mean load, between which edges are resolved where the load varies
 WORN = 1 / 48  # of the interface, a column of the coarsest grid where wear may move the edges anywhere
 CLOSER = 64  # cells along a contact of a node or two, in the next search
+CREST, CRESTS = 0.3, 4  # of the largest pressure: a crest that cells are graded to; its cells of the coarsest grid
 SEARCHES = 8  # of the contact, each on columns graded to what the one before found
 
 
@@ -35,13 +36,15 @@ class Found:
     """What a search finds of a contact.
 
     span: (from, to) [m] of the loaded stretch; places: where the pressure ends inside the interface, or the nodes of a
-    contact too small to tell; corners: ends of the interface that bear; cell: longest cell [m] in which it ends.
+    contact too small to tell; corners: ends of the interface that bear; cell: longest cell [m] in which it ends;
+    crests: (place, half-width) [m] of the largest pressures inside it.
     """
 
     span: tuple
     places: tuple
     corners: tuple
     cell: float
+    crests: tuple = ()
 
     @property
     def wide(self) -> float:
@@ -63,9 +66,17 @@ def base_grids(asked) -> list:
         pair = condensed(asked, *grids)
         seen = [loaded(pressed(each, pair)) for each in (asked, *sweep)]
         layout = layout_of(asked, seen)
-        if max(one.cell / one.wide for one in seen) <= 1 / (EDGE[asked.still] - 1):
+        cells = max(one.cell / one.wide for one in seen)
+        if cells <= 1 / (EDGE[asked.still] - 1) and _shows_crests(asked, grids[0].x, layout):
             break
     return grids_of(asked, layout)
+
+
+def _shows_crests(asked, x, layout: Layout) -> bool:
+    """Whether columns x (k,) [m] are no longer than a layout wants them at the crests of a pressure under a profile."""
+    if asked.gap.profile is None or x.size > MOST_COLUMNS:
+        return True
+    return bool((np.diff(x) <= 2 * layout.size((x[1:] + x[:-1]) / 2)).all())
 
 
 def search_layout(asked) -> Layout:
@@ -97,6 +108,8 @@ def layout_of(asked, seen: list) -> Layout:
     near = [place for place in known if span[0] - least <= place <= span[1] + least]
     bands += tuple((place, place, min(least, fall / 4)) for place in near)
     sharp = JUMP if asked.singular_ends else 1
+    if asked.gap.profile is not None:
+        bands += tuple((place, place, max(wide / CRESTS, least / JUMP)) for one in seen for place, wide in one.crests)
     corner = max(min(thick / 16 if thick else np.inf, wide / EDGE[asked.still] / sharp), LEAST * asked.length)
     ends = {place for one in seen for place in one.corners}
     bands += tuple((place, place, corner) for place in sorted(ends))
@@ -141,7 +154,18 @@ def loaded(patch: Patch) -> Found:
     corners = tuple(float(x[at]) for at in (0, -1) if bears[:, at].any())
     low = places[0] if index[0] else x[0]
     high = places[-1] if index[-1] < x.size - 1 else x[-1]
-    return Found((float(low), float(high)), tuple(places.tolist()), corners, float(cells.max(initial=0.0)))
+    return Found((float(low), float(high)), tuple(places.tolist()), corners, float(cells.max(initial=0.0)),
+                 _crests(x, sigma))
+
+
+def _crests(x, sigma) -> tuple:
+    """(place, half-width) [m] of the largest pressures (m,) [Pa] inside a contact: of the parabola through three nodes.
+    """
+    top = np.flatnonzero((sigma[1:-1] > CREST * sigma.max()) & (sigma[1:-1] > sigma[:-2]) & (sigma[1:-1] >= sigma[2:]))
+    rise = np.diff(sigma) / np.diff(x)
+    bend = -2 * np.diff(rise)[top] / (x[top + 2] - x[top])
+    wide = np.sqrt(2 * sigma[top + 1] / bend)
+    return tuple(zip(x[top + 1].tolist(), wide.tolist())) if top.size <= MOST_PLACES else ()
 
 
 def grids_of(asked, layout: Layout) -> list:

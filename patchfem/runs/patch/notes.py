@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...core import Outcome
+from ...core import Outcome, say
 from ...mesh.nested import plan_of
 from .shared.kept import band
 
@@ -22,6 +22,9 @@ def left_out(model, patch, coarse) -> list:
     if patch.sharper:
         out.append("static measures come from Gauss-Lobatto cells of order 4 where these have the smaller errors; the "
                    f"bilinear mesh of {patch.x.size} interface points serves fields and motion")
+    if patch.averaging is not None and not asked.gap.rough:
+        out.append(f"the profile is averaged over {say(patch.averaging, 3)} where it bears; what another length "
+                   "changes stands in the errors")
     if patch.strips is not None:
         out.append(patch.strips.note)
     if patch.pair.coupling > COUPLED and model.kind != "patch":

@@ -24,7 +24,8 @@ class Patch:
     the width then stand in `pressure`, else None; tangential_ratio: k_t/k_n of the skin, None where it is rigid in
     shear; skinned: a skin of asperities lies between the pieces; jumps: places [m] where the gap steps; sharp: an end
     of the interface is a corner that meets a face which goes on; notes: sentences for the warnings; sharper: static
-    measures by name as (value, error) that cells of order 4 gave in addition, {} where none were asked for them.
+    measures by name as (value, error) that cells of order 4 gave in addition, {} where none were asked for them;
+    averaging [m]: the length that a profile is averaged over where it bears, None without one.
     """
 
     pair: Pair
@@ -41,6 +42,7 @@ class Patch:
     notes: tuple
     seconds: dict
     sharper: dict = field(default_factory=dict)
+    averaging: float | None = None
 
     @property
     def x(self) -> np.ndarray:
@@ -92,7 +94,8 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
     if pair.joint is not None and pair.joint.ripple > RIPPLE:
         notes = (*notes, f"contact.mesh: {pair.joint.reason}")
     return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio,
-                 asked.skin is not None, asked.gap.jumps, asked.singular_ends, notes, pair.seconds | seconds)
+                 asked.skin is not None, asked.gap.jumps, asked.singular_ends, notes, pair.seconds | seconds,
+                 averaging=asked.gap.averaging(pieces.interface.x, pressure.sigma_n > 0))
 
 
 def presser(asked, pair: Pair):

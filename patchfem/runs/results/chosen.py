@@ -5,7 +5,8 @@ COUNTS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
 
 def chosen(result) -> dict:
     """Engine, steps per cycle or those that a tolerance chose, cycles and window of a run, shear modes or elements
-    behind the pieces' shear, how bonds are summed, and interface nodes and strips of its patch.
+    behind the pieces' shear, how bonds are summed, and interface nodes and strips of its patch,
+    and the length [m] that its profile is averaged over.
 
     map: "events" or "yields" that a steady motion was found by. A choice that the run did not make is left out.
     """
@@ -26,6 +27,8 @@ def chosen(result) -> dict:
         out["window_cycles"] = int(window)
     if patch is not None:
         out["interface_nodes"] = int(patch.x.size)
+        if patch.averaging is not None:
+            out["profile_averaging"] = float(patch.averaging)
         if result.plan.model.patch.strips is not None:
             out["strips"] = int(result.plan.model.patch.strips[0])
     return out

@@ -23,7 +23,7 @@ class Kept:
         own = [getattr(asked, one.name) for one in fields(asked) if one.name not in ("gap", "meshes", "skin")]
         shapes = tuple((name, tuple(part)) for name, part in gap.shapes)
         self.content = (*own, asked.skin and tuple(asked.skin), asked.meshes and asked.meshes.name, shapes,
-                        gap.profile_size, gap.rough, gap.side, gap.material)
+                        gap.average, gap.limit, gap.rough, gap.side, gap.material)
 
     def __eq__(self, other) -> bool:
         return self.content == other.content
