@@ -33,6 +33,7 @@ class Outcome(StrEnum):
     GROWS = "grows"
     EXCEEDS_TRAVEL = "exceeds_travel"
     LEAVES_CONTACT = "leaves_contact"
+    LEAVES_GROOVES = "leaves_grooves"
     NO_CONTACT = "no_contact"
     NOT_CONVERGED = "not_converged"
 
@@ -51,6 +52,8 @@ _SENTENCES = {
     Outcome.EXCEEDS_TRAVEL: "The motion passed the stop of the flexure; the run ended there.",
     Outcome.LEAVES_CONTACT: "The slide passed the end of the piece, where the pieces no longer overlap; lower the "
                             "drive, shorten the slide or lengthen the piece.",
+    Outcome.LEAVES_GROOVES: "The inertia of the lifted mass took all of the load, so it left its grooves and the run "
+                            "ended there; lower the drive or the lifted mass, or raise the load.",
     Outcome.NO_CONTACT: "The pieces do not touch; raise the load or close the gap.",
     Outcome.NOT_CONVERGED: "A solve did not reach its residual; the result is marked and must not be used.",
 }

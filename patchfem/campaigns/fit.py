@@ -50,7 +50,8 @@ class Fitted:
 
     @property
     def outcome(self) -> Outcome:
-        """How the fit ended: done, or not_converged where the descent ran out of evaluations."""
+        """How the fit ended: done, or not_converged where the descent ran out of evaluations and no other found its
+        valley."""
         return self.found.outcome
 
 

@@ -20,6 +20,7 @@ from .space import Counted, space, spread_points
 QUICK = 1e-4  # change of the sum of squares by a step at which the descent of a quick model ends
 MOST = 100  # evaluations of one descent, Jacobians not counted
 EXACT = 1e-9  # of the largest residual seen: an answer this good needs no other start
+VALLEY = 1.02  # times the least sum of squares, 1 % of the score: descents that end below it found one valley
 NEAR = 1e-3  # of the range: a value this close to a bound is tried on it
 
 
@@ -33,6 +34,8 @@ class Fit:
     "low", "high" or ""; unknown: (d, n) directions of relative change (of change over range where a value is 0) that
     leave the residual as it is; rows: independent ones that the intervals count, NaN without intervals; failures and
     reason: evaluations that failed, and the first cause; agreed: descents that ended at the same sum of squares.
+    outcome: done where the best descent settled, or another one ended in the same valley; a residual that is rough in
+    its last digits never lets a step settle to 1e-10.
     """
 
     values: np.ndarray
@@ -107,8 +110,9 @@ def descents(model: Counted, begins, every: bool = True, kept: Callable = lambda
     return found
 
 
-def answered(model: Counted, found: list, bars: str = "rows") -> Fit:
-    """The Fit of the best of some Descents; bars as in `fit`."""
+def answered(model: Counted, found: list, bars: str = "rows", starts=None) -> Fit:
+    """The Fit of the best of some Descents; bars as in `fit`; starts: the Descents that tell whether
+    others found its valley, where `found` follows the best of them."""
     u, cost, done, _ = min(found, key=lambda one: one.cost)
     agreed = sum(abs(other.cost - cost) <= 1e-6 * cost + 1e-20 * model.largest**2 * model.rows for other in found)
     if bars:
@@ -117,7 +121,8 @@ def answered(model: Counted, found: list, bars: str = "rows") -> Fit:
     else:
         answer = nothing(u.size)
     rms = float(np.sqrt(cost / model.rows))
-    return _frozen(model, u, answer, rms, agreed, Outcome.DONE if done else Outcome.NOT_CONVERGED)
+    alike = sum(one.cost <= VALLEY * cost for one in starts or found)
+    return _frozen(model, u, answer, rms, agreed, Outcome.DONE if done or alike > 1 else Outcome.NOT_CONVERGED)
 
 
 def _frozen(model: Counted, u, answer: Answer, rms: float, agreed: int, outcome: Outcome) -> Fit:

@@ -2,14 +2,15 @@
 
 import numpy as np
 
-from .least_squares import Fit
+from ..core import Outcome
+from .least_squares import MOST, Fit
 
 
 def remarks(found: Fit, names) -> list:
     """Sentences on what a fit leaves open, by the names (n,) of its values.
 
-    One each for a value on a bound, without effect, known only in a combination, or open to a bound, and one for
-    evaluations that failed.
+    One each for a value on a bound, without effect, known only in a combination, or open to a bound, one for
+    evaluations that failed, and one for a fit that did not converge.
     """
     out = [f"{names[i]} is at its {side} bound {found.values[i]:.6g}: widen the range or doubt the law"
            for i, side in enumerate(found.at_bound) if side]
@@ -27,6 +28,9 @@ def remarks(found: Fit, names) -> list:
     if found.failures:
         out.append(f"{found.failures} of {found.evaluations} evaluations failed and were passed over, the first: "
                    f"{found.reason}")
+    if found.outcome is Outcome.NOT_CONVERGED:
+        out.append(f"not converged: the best descent did not settle within {MOST} evaluations, and no other start "
+                   "ended within 1 % of its score")
     return out
 
 

@@ -8,7 +8,7 @@ from scipy.stats import t as student
 
 from patchfem.core import Missing, NotConverged, Outcome, PatchfemError
 from patchfem.identify import least_squares as module
-from patchfem.identify.least_squares import fit
+from patchfem.identify.least_squares import Descent, answered, fit
 from patchfem.identify.space import Counted, space, spread_points
 from patchfem.identify.words import remarks
 
@@ -193,3 +193,19 @@ def test_exact_intervals_of_a_decay_cover_its_truth_in_19_of_20():
         found = fit(lambda v, data=data: v[0] * np.exp(-v[1] * LINE) - data, [0.01, 0.01], [30, 50])
         inside += sum(a <= x <= b for (a, b), x in zip(found.intervals, (1.0, 3.0)))
     assert 0.935 < inside / 2000 < 0.965
+
+
+@pytest.mark.parametrize(("scores", "ended"), [((1.0, 1.009), Outcome.DONE), ((1.0, 1.02), Outcome.NOT_CONVERGED),
+                                               ((1.0,), Outcome.NOT_CONVERGED)])
+def test_always_the_valley_judges_descents_that_ran_out_of_evaluations(scores, ended):
+    """None settled: two that end within 1 % of the least score found one valley; else the remark says why not."""
+    values, _, _, rest = linear(DESIGN, NOISY)
+    model = Counted(lambda v: DESIGN @ v - NOISY, space([-5, -5, -5], [5, 5, 5]))
+    u = model.space.unit(values)
+    assert model(u) is not None
+    ends = [Descent(u, score**2 * rest, False, model.rows) for score in scores]
+    for found in (answered(model, ends), answered(model, ends[:1], starts=ends)):
+        assert found.outcome is ended
+        said = [text for text in remarks(found, "abc") if "not converged" in text]
+        assert bool(said) == (ended is Outcome.NOT_CONVERGED)
+        assert all("100 evaluations, and no other start ended within 1 %" in text for text in said)

@@ -72,7 +72,8 @@ class FittedRows:
 
     @property
     def outcome(self) -> Outcome:
-        """How the fit ended: done, or not_converged where the descent ran out of evaluations."""
+        """How the fit ended: done, or not_converged where the descent ran out of evaluations and no other found its
+        valley."""
         return self.fit.outcome
 
     def scored(self, logs, left, stable: bool = False) -> dict:

@@ -82,6 +82,6 @@ def searched(cells: Cells, computed: Computed, training, how: Search, bars: str 
     if np.isnan(rms).all():
         raise NotConverged(f"fit: every one of {how.starts} starts failed, the first: {quick.reason}")
     best = descents(Counted(residual, box), [ends[int(np.nanargmin(rms))].u], before=computed.forget)
-    found = answered(quick, best, bars)
+    found = answered(quick, best, bars, ends)
     values = np.array([box.values(one.u) if np.isfinite(one.cost) else np.full(n, np.nan) for one in ends])
     return Found(found, np.array([box.values(u) for u in begins]), values, rms)

@@ -181,7 +181,7 @@ class FlankRun(Run):
     def _judge(self, status: int) -> None:
         super()._judge(status)
         if self.contact.now_at[LIFTS] and self.outcome is None:
-            self.outcome = Outcome.NOT_CONVERGED
+            self.outcome = Outcome.LEAVES_GROOVES
             self.message = lifts(self.model.grooves, self.done * self.prop.dt)
 
 

@@ -145,7 +145,7 @@ class GroovesRun(Run):
     def _judge(self, status: int) -> None:
         super()._judge(status)
         if status == 5:
-            self.outcome = Outcome.NOT_CONVERGED
+            self.outcome = Outcome.LEAVES_GROOVES
             self.message = lifts(self.model.grooves, self.done * self.prop.dt)
 
     def check(self) -> None:

@@ -50,6 +50,9 @@ the inertia.
 **Pressure fixed to a piece.** The pressure rides on the piece that carries the shape; where the other slides out from
 under it the overhang is not modelled. A slide beyond the patch ends the run as `leaves_contact`.
 
+**Grooves are followed, not left.** A lifted mass whose inertia takes all of the load would fly: the run ends there as
+`leaves_grooves`.
+
 **Friction is local to a point and its path.** Only `convolution` averages over neighbours (Oden-Pires); bonds are
 nonlocal along the path. Friction does not depend on temperature but by eq. 2.13 with a surface temperature that the
 scene gives; the friction's own heat does not warm it.

@@ -17,7 +17,7 @@ from ..rig.engines import ENGINES, HARMONIC, MARCH, steady_by
 from ..rig.numerics import choose
 
 SAMPLES = 400  # of a cycle without friction
-UNBOUNDED = Outcome.GROWS, Outcome.NOT_CONVERGED, Outcome.EXCEEDS_TRAVEL
+UNBOUNDED = Outcome.GROWS, Outcome.NOT_CONVERGED, Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES
 
 
 class Watched(NamedTuple):

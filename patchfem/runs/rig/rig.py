@@ -27,6 +27,7 @@ from .numerics import choose, crowded, quadrature_of, refuse_costly
 from .solution import borne, curve_measures
 from .start_ring import StartRing, start_ring
 
+ENDED = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)  # of a run before its time
 FINEST = 1e-12  # error of a step below which round-off rules
 
 
@@ -76,15 +77,22 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         fields = rig_fields(model, numerics, patch, raw)
     found |= unclosed(found, raw.window, drive) | without_value(
         found, raw.window, drive, f is not None, rig.beside_first(raw.window.modal))
-    extra |= {"book": raw.book, "period": drive.period, "notes": [*_notes(model, patch, raw), *rings.notes]}
+    told = _told(raw)
+    extra |= {"book": raw.book, "period": drive.period, "notes": [*_notes(model, patch, raw), *rings.notes, *told[1]]}
     extra |= _behind(model, numerics, raw.contact)
     warnings = [*warnings, *_said(model, patch, raw, outcome, found)]
     warnings = [*warnings, *two_books(found, numerics.engine, extra.get("steps_per_cycle"))]
-    warnings = [*warnings, *changing_note(outcome, drive), *raw.notes, *([raw.message] if raw.message else [])]
+    warnings = [*warnings, *changing_note(outcome, drive), *raw.notes, *told[0]]
     if patch is not None:
         warnings = [*warnings, *travelled(patch, raw.response.slide)]
     return Result(what, ended(outcome, model.patch, patch, raw.response.slide), found, raw.response, raw.window, patch,
                   fields, seconds, warnings, extra)
+
+
+def _told(raw) -> tuple:
+    """(warnings, notes) of how an engine says that its run ended: that of a motion which ends by itself is a note."""
+    said = [raw.message] if raw.message else []
+    return ([], said) if raw.outcome is Outcome.LEAVES_GROOVES else (said, [])
 
 
 def _behind(model, numerics, contact) -> dict:
@@ -237,7 +245,7 @@ def _enough(model, numerics, found, measures) -> bool:
     if numerics.local:
         return met or numerics.local < FINEST
     return met or "steps_per_cycle" in numerics.pinned or again > MOST_STEPS or again * numerics.cycles > 1e7 \
-        or crowded(model, numerics, found.book) or found.outcome is Outcome.EXCEEDS_TRAVEL
+        or crowded(model, numerics, found.book) or found.outcome in ENDED
 
 
 def rig_fields(model, numerics, patch, raw) -> dict:

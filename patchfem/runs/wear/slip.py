@@ -15,7 +15,7 @@ from ..rig.engines import ENGINES
 from ..rig.numerics import choose
 from ..rig.rig import rig_fields
 
-UNBOUNDED = (Outcome.GROWS, Outcome.EXCEEDS_TRAVEL, Outcome.NOT_CONVERGED)
+UNBOUNDED = (Outcome.GROWS, Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES, Outcome.NOT_CONVERGED)
 LEAST_FRAMES, MOST_FRAMES = 64, 800
 
 

@@ -6,7 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from ....compiled import load
-from ....core import BaseSine, NotConverged, Outcome, say
+from ....core import BaseSine, NotConverged, Outcome, Start, say
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.balance import cycle_energy, periodic_response
 from ....dynamics.harmonic.balance import regime as balanced_regime
@@ -25,7 +25,7 @@ from ..interface import contact_model, flank_of, model_of
 from ..solution import Solution, sampled_loop, seen
 from ..strips import other_measures
 from .curves import LAST, SHOWN, Shown, unlasting
-from .marched import disturbed, lasts
+from .marched import disturbed, lasts, left_grooves
 
 ADRIFT = ("the steady motion that the balance found over the grooves does not last: another one is reached from rest; "
           'use accuracy.method = "march"')
@@ -53,6 +53,7 @@ class Balance:
         if rig.cubic is not None:
             parts.append((rig.modes.output, Spring(0.0, rig.cubic)))
         self.model, self.modes, self.patch, self.harmonics = model, rig.modes, patch, model.accuracy.harmonics
+        self.numerics = numerics
         self.group, self.tolerance = Group(rig.modes, parts), model.accuracy.tolerance
         self.climbing = model_of(model, numerics, patch) if model.grooves is not None else None
 
@@ -72,7 +73,13 @@ class Balance:
     def point(self, drive, near=None) -> tuple:
         """The steady motion, from the point `near` of a curve where there are several, its measures read off one cycle,
         and its Periodic; errors from half the harmonics, twice as many over grooves, and the balance's own."""
-        begin, near = perf_counter(), self._near(drive, near)
+        begin = perf_counter()
+        try:
+            near = self._near(drive, near)
+        except NotConverged:
+            if (gone := self._left(drive)) is None:
+                raise
+            return gone, None
         found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance, start=near)
         others = 2 * found.harmonics if self.climbing is not None else max(1, found.harmonics // 2)
         other = periodic_point(self.modes, drive, self.group, others, self.tolerance,
@@ -103,9 +110,15 @@ class Balance:
         if load is not None and load.min() <= 0:
             from ....dynamics.grooves.run import lifts
 
+            if (gone := self._left(drive, Start(response.modal[0], response.modal_rate[0]))) is not None:
+                return gone, None
             outcome, message = Outcome.NOT_CONVERGED, lifts(grooves, response.time[int(np.argmin(load))])
         return Solution(values, response, response, amplitude, (None, None), outcome, [], book, perf_counter() - begin,
                         message=message, errors=errors, extra=extra, notes=notes), found
+
+    def _left(self, drive, start=None) -> Solution | None:
+        """As of `left_grooves`."""
+        return left_grooves(self.model, self.numerics, self.patch, drive, self.climbing, start)
 
     def _lasting(self, drive, found, stable, other) -> tuple:
         """In place of a Periodic that does not last the smallest one under the same drive that does, with its

@@ -57,7 +57,7 @@ def unlasting(multipliers) -> str:
 def shown_of(drive, raw, near=None) -> Shown:
     """The Solution of a steady motion as a point of a curve."""
     size = float(np.abs(np.asarray(raw.extra["multipliers"])).max(initial=0.0))
-    bounded = raw.outcome not in (Outcome.GROWS, Outcome.NOT_CONVERGED)
+    bounded = raw.outcome not in (Outcome.GROWS, Outcome.LEAVES_GROOVES, Outcome.NOT_CONVERGED)
     return Shown(drive, raw.values if bounded else {}, raw.errors if bounded else {}, raw.extra["regime"], size,
                  "unstable" not in raw.extra["regime"] and bounded, raw.outcome, near)
 

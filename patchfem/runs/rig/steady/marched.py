@@ -20,10 +20,32 @@ from .curves import Shown, shown_of, traced, unlasting
 STEPS, MOST = 256, 4096  # of a cycle, at first and at most
 FINE = 512  # of a cycle of marches that a balance is disturbed in
 EXACT = 1024  # of a law without memory, whose steps their error chooses: samples
+LEAD = 30  # cycles within which a lifted mass leaves its grooves, or stays in them
 READ = 1e-9  # relative error of a step's end
 LEFT = 0.1  # of the size of a motion: a march that is so far from it has left it
 LOOSE = 1e-6  # change from cycle to cycle, over the size of a motion, up to which it repeats
 ROUGH = 1e-2  # change of the multipliers beyond 1 that the steps of a march leave open
+
+
+def left_grooves(model, numerics, patch, drive, contact, start=None) -> Solution | None:
+    """The Solution of a motion under the sine `drive` whose lifted mass leaves the grooves within LEAD cycles of a
+    march from rest, or from a Start; None where it stays in them, or nothing is lifted.
+
+    contact: its model of grooves. The errors are what half the steps change.
+    """
+    if not model.grooves.lifted_mass:
+        return None
+    begin, found = perf_counter(), []
+    rig = replace(model.rig, drive=drive, levels=(), waveform="sine")
+    for steps in (STEPS, STEPS // 2):
+        done = hub.march(rig.modes, drive, contact, LEAD, steps, 1, rig.travel, start=start, whole=False)
+        if done.outcome is not Outcome.LEAVES_GROOVES:
+            return None
+        read = Read(replace(model, rig=rig), replace(numerics, cycles=LEAD, steps=steps, window=1), patch, contact)
+        found.append(read.solution(done, perf_counter() - begin, None))
+    fine, half = (one.values for one in found)
+    errors = {name: abs(value - half.get(name, 0.0)) + READ * abs(value) for name, value in fine.items()}
+    return replace(found[0], errors=errors, extra={"regime": "leaves its grooves", "multipliers": np.zeros(0)})
 
 
 class Marched:
@@ -63,6 +85,15 @@ class Marched:
         return values | {"drift_per_cycle": 0.0}, mark, snapshots, stuck
 
     def point(self, drive, near=None) -> tuple:
+        """As of `_point`; a motion that leaves its grooves instead, without a Run."""
+        try:
+            return self._point(drive, near)
+        except NotConverged:
+            if (gone := left_grooves(self.model, self.numerics, self.patch, drive, self.contact)) is None:
+                raise
+        return gone, None
+
+    def _point(self, drive, near) -> tuple:
         """The steady motion as a cycle of it, and the Run that goes on in it; steps are doubled until half of them
         change its amplitude by less than the tolerance, which is the error of every measure."""
         begin, name = perf_counter(), "relative_displacement_amplitude"
