@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from cyclopts import Parameter
 
@@ -91,7 +91,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     target = out if out is not None else Path("out") / f"{scene.stem}-sweep"
     tells = "json" if json_ else "faults" if quiet else "words"
     if by.collect:
-        _answer(cases, collect(asked, cases, target, not no_page), target, not no_page, tells, perf_counter() - begin)
+        _answer(asked, cases, collect(asked, cases, target, not no_page), Told(target, not no_page, tells, begin))
         return
     line = Progress(quiet)
     try:
@@ -108,7 +108,17 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
             print(json.dumps({"cases": line.done, "folder": str(target)}) if json_ else
                   f"shard {by.shard}: {line.done} cases in {target}; when all shards are done: the same with --collect")
         return
-    _answer(cases, found, target, not no_page, tells, perf_counter() - begin)
+    _answer(asked, cases, found, Told(target, not no_page, tells, begin))
+
+
+class Told(NamedTuple):
+    """How a sweep is told: its folder, whether it has a page, as "json", in "words" or by its "faults" alone, and the
+    clock at its begin [s]."""
+
+    target: Path
+    page: bool
+    tells: str
+    begin: float
 
 
 class Progress:
@@ -135,26 +145,26 @@ class Progress:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
-def _answer(cases, found, target: Path, page: bool, tells: str, seconds: float) -> None:
-    """What came out, as "json", in "words", or the "faults" alone."""
+def _answer(asked, cases, found, told: Told) -> None:
+    """What came out, the worst first."""
     from collections import Counter
 
-    from ..export.pages.sweep import span, turns, within
-    from ..export.sweeps.page import columns_of
+    from ..export.pages.lead import lead_of
+    from ..export.sweeps.page import table_of
 
-    counts = dict(Counter(map(str, found.outcome)).most_common())
+    counts, target = dict(Counter(map(str, found.outcome)).most_common()), told.target
     failed = sorted(found.messages)
-    if tells == "json":
-        print(json.dumps({"cases": len(found), "outcomes": counts, "failed": len(failed), "folder": str(target),
-                          "seconds": round(seconds, 3)}, ensure_ascii=False))
-    elif tells == "words":
+    if told.tells != "faults":
+        lead = lead_of(table_of(asked, cases, found, [], target))
+    if told.tells == "json":
+        print(json.dumps({"cases": len(found), "outcomes": counts, "failed": len(failed), "answer": lead.answer(),
+                          "over_tolerance": lead.missed, "folder": str(target),
+                          "seconds": round(perf_counter() - told.begin, 3)}, ensure_ascii=False))
+    elif told.tells == "words":
         print(f"{len(found)} cases: " + ", ".join(f"{count} {name}" for name, count in counts.items()))
-        columns = {name: (values, found.errors[name], found.units[name]) for name, values in found.values.items()}
-        asked = columns_of(cases), columns, found.outcome, not cases.rows
-        for said in (span(columns, found.outcome), turns(*asked), within(*asked)):
-            if said:
-                print(said)
-        if page:
+        for said in lead.sentences():
+            print(said)
+        if told.page:
             print(f"page: {target / 'report.html'}")
         print(f"results: {target / 'sweep.csv'} {target / 'sweep.nc'}")
     sys.stdout.flush()

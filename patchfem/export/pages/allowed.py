@@ -1,152 +1,249 @@
-"""How far a swept key may go until a measure leaves the 5 % around its value at the smallest key.
+"""How far a swept key may go: until anything that moves changes by 5 %, and until the largest pressure doubles.
 
-The answer stands between two cases, the last one surely within and the first one surely beyond; where these are
-neighbours, a straight line between them (over the logarithm of a key that grows by factors) says about where.
+A limit stands between two cases, the last one surely within and the first one surely beyond; where these are
+neighbours, a straight line between them (over the logarithm of a key that grows by factors) says about where. A case
+that did not settle, or whose measure misses its tolerance, is neither.
 """
 
 from collections.abc import Sequence
 from html import escape
-from math import exp, inf, isfinite, log
+from math import ceil, exp, isfinite, log, log10
 from typing import NamedTuple
 
 import numpy as np
 
-from ...scales import plain, short
+from ...scales import LADDERS, plain, short, step_of
 from .changes import lines_of, shown_of
 from .words import linked, zero_below
-from .written import NUMBER, bare
+from .written import NUMBER, bare, label
 
 WITHIN = 0.05  # of its value in the first case, in which a measure is said to stay
-MAIN = ("relative_displacement_amplitude", "loop_area", "equivalent_stiffness", "onset_level", "friction_ratio_peak",
-        "tangential_stiffness", "normal_stiffness", "contact_fraction", "pressure_peak")
+MOVES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "loop_area",
+         "friction_force_peak", "friction_ratio_peak", "onset_level")
+STIFF = ("normal_stiffness", "tangential_stiffness")
+CHANGES = dict.fromkeys((*MOVES, *STIFF, "contact_fraction"), WITHIN) | {"pressure_peak": 1.0}  # 1: it doubles
+DRIVES = ("drive.", "slide.", "accuracy.", "wear.cycles")  # keys that are to change what moves, or nothing
+OPENS = {"contact.tilt.angle": ("Tilt", "length"), "contact.strips.roll": ("Roll", "width")}  # what opens a gap over it
 
 
 class Allowed(NamedTuple):
     """How far the key may go for one measure, on the line of cases that allows least.
 
-    first, changed: value in the first case [SI] and its relative change up to the last one; start: place of the first
-    case; inside, beyond: places of the last case that is surely within and of the first that is surely not (None: none
-    is); about: where it leaves, as a share of the way from the one to the other, NaN where the cases between them are
-    left open by their errors or by their outcome; value: of the key at that place, or at `inside` [SI].
+    change: relative to the first case, by which the measure leaves, < 0 where it falls; first, changed: value in the
+    first case [SI] and its relative change up to the last one; start: place of the first case; inside, beyond: places
+    of the last case that is surely within and of the first that is surely not (None: none is); whole: no case of the
+    line is left open; about: where it leaves, as a share of the way from the one to the other, NaN where the cases
+    between them are left open; value: of the key at that place, or at `inside` [SI].
     """
 
     name: str
+    change: float
     first: float
     changed: float
     start: int
     inside: int
     beyond: int | None
+    whole: bool
     about: float
     value: float
 
+    def resolved(self) -> bool:
+        """Whether the cases show how far the key may go: no more than the first of them is not far."""
+        return self.inside != self.start
 
-def allowed(keys: list, measures: dict, outcome: Sequence, settled: Sequence, grid: bool = True) -> tuple:
-    """(the key, Allowed of each main measure, in their order); (None, []) where no key of numbers grows alone.
 
-    keys: [{`name`, `unit`, `values` (n,) [SI], `texts` (n,), `log`, `words`: whether its values are words}];
-    measures: {name: (values (n,), errors (n,), ...)}, NaN where a case has none; outcome (n,); settled: outcomes whose
-    cases count, where there are any; grid: the cases are all combinations of the keys' values.
+class Limits(NamedTuple):
+    """What the key of a sweep allows: the key, None without one; Allowed of each measure of CHANGES that can be told;
+    lost: measures that move and cannot be, for their first case did not settle or misses its tolerance; most: largest
+    value of the key [SI]; over: {`length`, `width`} [m] of the patch, where known."""
+
+    key: dict | None = None
+    found: Sequence = ()
+    lost: Sequence = ()
+    most: float = np.nan
+    over: dict | None = None
+
+
+def allowed(keys: list, measures: dict, trusted: dict, grid: bool = True, over: dict | None = None) -> Limits:
+    """How far the key with most values may go; nothing where no key of numbers grows alone.
+
+    keys: [{`name`, `unit`, `values` (n,) [SI], `texts` (n,), `log`, `words`: whether its values are words}]; measures:
+    {name: (values (n,), errors (n,), ...)}, NaN where a case has none; trusted: {name: (n,) whether a case settled and
+    meets its tolerance}; grid: the cases are all combinations of the keys' values; over: as of Limits.
     """
     numbers = [one for one in keys if not one["words"]]
     if not numbers or (len(keys) > 1 and not grid):
-        return None, []
+        return Limits()
     key = max(numbers, key=lambda one: len(set(np.asarray(one["values"]).tolist())))
-    lines = lines_of(key, [one for one in keys if one is not key])
-    size = np.asarray(key["values"], float)
-    there = np.isin(np.asarray(outcome, str), list(settled))
-    found = []
-    for name in MAIN:
-        if name not in measures:
+    if key["name"].startswith(DRIVES):
+        return Limits()
+    lines, size = lines_of(key, [one for one in keys if one is not key]), np.asarray(key["values"], float)
+    found, lost = [], []
+    for name, change in CHANGES.items():
+        values, errors = (np.asarray(one, float) for one in measures.get(name, ([np.nan], [np.nan]))[:2])
+        if not np.isfinite(values).any():
             continue
-        values, errors = (np.asarray(one, float) for one in measures[name][:2])
-        values = np.where(there, values, np.nan) if np.isfinite(values[there]).any() else values
-        each = [one for line in lines if (one := _along(name, line, size, values, errors, bool(key["log"])))]
-        if each:
-            found.append(min(each, key=lambda one: inf if one.beyond is None else one.value))
-    return key, found
+        values = np.where(trusted[name], values, np.nan)
+        each = [_along(name, change, line, size, values, errors, bool(key["log"])) for line in lines]
+        if None not in each:
+            found.append(min(each, key=lambda one: (one.beyond is None and one.whole, one.value)))
+        elif name in MOVES:
+            lost.append(name)
+    return Limits(key, found, lost, float(size.max()), over)
 
 
-def _along(name: str, line: np.ndarray, size: np.ndarray, values: np.ndarray, errors: np.ndarray,
+def _along(name: str, change: float, line: np.ndarray, size: np.ndarray, values: np.ndarray, errors: np.ndarray,
            factors: bool) -> Allowed | None:
     """Allowed of a measure along one line of cases; None where its first case or all others have no value."""
     value, error = values[line], np.nan_to_num(errors[line])
     known = np.flatnonzero(np.isfinite(value))
     if known.size < 2 or known[0] != 0 or value[0] == 0:
         return None
-    off, bar, edge = value[known] - value[0], error[known] + error[0], WITHIN * abs(value[0])
-    sure = np.abs(off) + bar <= edge
+    share, bar = (value[known] - value[0]) / abs(value[0]), (error[known] + error[0]) / abs(value[0])
+    away = np.abs(share) if change < 1 else share  # what doubles rises
+    sure = away + bar <= change
     sure[0] = True  # the case that all are held against
     inside = int(np.argmin(sure)) - 1 if not sure.all() else known.size - 1
-    far = np.flatnonzero(np.abs(off) - bar > edge)
+    far = np.flatnonzero(away - bar > change)
     start, last = int(line[0]), int(line[known[inside]])
-    ends = Allowed(name, float(value[0]), float(off[-1] / abs(value[0])), start, last, None, np.nan, float(size[last]))
+    ends = Allowed(name, change, float(value[0]), float(share[-1]), start, last, None, inside == line.size - 1, np.nan,
+                   float(size[last]))
     if not far.size:
         return ends
     beyond = int(far[0])
     next_one = int(line[known[beyond]])
+    ends = ends._replace(beyond=next_one, change=float(np.copysign(change, share[beyond])))
     if known[beyond] != known[inside] + 1:
-        return ends._replace(beyond=next_one)
-    share = (np.copysign(edge, off[beyond]) - off[inside]) / (off[beyond] - off[inside])
+        return ends
+    way = np.array([share[inside], ends.change, share[beyond]])
+    way = np.log(1 + way) if factors and change >= 1 else way  # a power of the key is straight in both logarithms
+    part = float((way[1] - way[0]) / (way[2] - way[0]))
     low, high = float(size[last]), float(size[next_one])
-    place = exp(log(low) + share * log(high / low)) if factors and low > 0 else low + share * (high - low)
-    return ends._replace(beyond=next_one, about=float(share), value=place)
+    place = exp(log(low) + part * log(high / low)) if factors and low > 0 else low + part * (high - low)
+    return ends._replace(about=part, value=place)
 
 
-def sentence(key: dict | None, found: list) -> str:
-    """Which main measures leave the 5 %, in the order of the key, as one sentence; "" where none does."""
-    leave = sorted((one for one in found if one.beyond is not None), key=lambda one: one.value)
-    if not leave:
+def as_json(limits: Limits) -> list:
+    """The limits as sweep.json has them, SI: `value` of the key, between the cases `low` and `high`, from which a
+    measure differs by `change`, relative to the first case."""
+    if limits.key is None:
+        return []
+    size = np.asarray(limits.key["values"], float)
+    return [{"measure": one.name, "key": limits.key["name"], "value": one.value, "unit": limits.key["unit"],
+             "change": one.change, "low": float(size[one.inside]), "high": float(size[one.beyond])}
+            for one in limits.found if one.beyond is not None and one.resolved()]
+
+
+def sentence(limits: Limits) -> str:
+    """How far the key may go, as one sentence: what moves, the largest pressure, the stiffness; "" where the cases do
+    not show it."""
+    if limits.key is None:
         return ""
-    at = shown_of(key)
-    places = {}
-    for one in leave:
-        places.setdefault(_up_to(key, one), []).append(one.name.replace("_", " "))
-    last = list(places)[-1]
-    said = [f"{' and '.join(names)} up to {place if place == last else bare(place, last)}"
-            for place, names in places.items()]
-    return f"Within {100 * WITHIN:g} % of their values at {at(leave[0].start)} stay: {', '.join(said)}."
+    moving, ends = _moving(limits), [one for one in limits.found if one.beyond is not None and one.resolved()]
+    parts = [moving] if moving else []
+    parts += [f"the {label(one.name)} doubles at {_at(limits, one)}" for one in ends if one.change >= 1]
+    stiff = [f"{_at(limits, one)} ({one.name.partition('_')[0]})" for one in ends if one.name in STIFF]
+    if stiff:
+        parts.append(f"the stiffness of the patch changes by {100 * WITHIN:g} % at {' and '.join(stiff)}")
+    where = "" if moving or not parts else f"As {limits.key['name']} grows, "
+    return f"{where}{'; '.join(parts)}." if parts else ""
 
 
-def _up_to(key: dict, one: Allowed) -> str:
-    """About how far a measure allows its key to go; the last case that is surely within where no more is known."""
-    return _written(key, one) if isfinite(one.about) else shown_of(key)(one.inside)
+def _moving(limits: Limits) -> str:
+    """How far the key may go before anything that moves changes; "" where the cases do not show it."""
+    moving = [one for one in limits.found if one.name in MOVES]
+    if not moving or not all(one.resolved() for one in moving):
+        return ""
+    name = OPENS.get(limits.key["name"], (limits.key["name"],))[0]
+    ends = sorted((one for one in moving if one.beyond is not None or not one.whole), key=lambda one: one.value)
+    if not ends:
+        far = _at(limits, moving[0], limits.most) + _brackets(_gap(limits, limits.most))
+        return "" if limits.lost else f"{name} may reach {far}: nothing that moves changes by {100 * WITHIN:g} %"
+    least, *_, last = *ends, ends[-1]
+    what = "anything that moves" if not limits.lost else "the " + " or the ".join(label(one.name) for one in moving)
+    held = f"before {what} changes by {100 * WITHIN:g} %"
+    if least.beyond is None:
+        far = _at(limits, least) + _brackets(_gap(limits, least.value))
+        return f"{name} may reach at least {far} {held}: the cases after it are open"
+    between = f"between cases at {_between(limits, least)}"
+    later = "" if last is least or last.beyond is None else f"; {label(last.name)} at {_at(limits, last)}"
+    return (f"{name} may reach {_at(limits, least)}{_brackets(_gap(limits, least.value), between)} {held} "
+            f"({label(least.name)} first{later})")
 
 
-def _written(key: dict, one: Allowed) -> str:
-    """The key where the measure leaves, with two digits, in the unit of the cases at both sides."""
-    low, high = (NUMBER.match(str(key["texts"][place])) for place in (one.inside, one.beyond))
-    number, unit, size = one.value, key["unit"], float(key["values"][one.beyond])
-    if low and high and low[2] == high[2] and size:
-        number, unit = one.value * float(high[1]) / size, high[2] or ""
-    return f"{plain(number, 2)} {unit}".removesuffix(" 1").strip()
+def _brackets(*parts: str) -> str:
+    told = ", ".join(part for part in parts if part)
+    return f" ({told})" if told else ""
 
 
-def table(key: dict | None, found: list, measures: dict) -> str:
-    """The same as an HTML table of every main measure; "" where there is none.
+def _at(limits: Limits, one: Allowed, value: float | None = None) -> str:
+    """A value of the key, that of a limit unless given, with two digits or what its cases resolve."""
+    value = one.value if value is None else value
+    unit, scale = _unit(limits.key, value, one.inside)
+    return f"{plain(value * scale, _digits(limits.key, one))} {unit}".strip()
+
+
+def _gap(limits: Limits, value: float) -> str:
+    """What an angle opens over the patch; "" for another key, and where the size of the patch is not known."""
+    side = (limits.over or {}).get(OPENS.get(limits.key["name"], ("", ""))[1])
+    if not side or not value:
+        return ""
+    name, size = step_of(LADDERS["m"], value * side)
+    return f"{plain(value * side * size, 2)} {name} over the patch"
+
+
+def _between(limits: Limits, one: Allowed) -> str:
+    """The cases at both sides of a limit, in its unit."""
+    size = np.asarray(limits.key["values"], float)
+    unit, scale = _unit(limits.key, one.value, one.inside)
+    low, high = (plain(size[place] * scale, _digits(limits.key, one)) for place in (one.inside, one.beyond))
+    return f"{low} and {high} {unit}".strip()
+
+
+def _unit(key: dict, value: float, case: int) -> tuple:
+    """(unit, scale from SI) in which a value of the key is read: that in which the case is written, unless the number
+    would be below 0.01 and there is a unit for it."""
+    written, size = NUMBER.match(str(key["texts"][case])), float(key["values"][case])
+    unit, scale = (written[2] or "", float(written[1]) / size) if written and size else (key["unit"], 1.0)
+    if 0.01 <= abs(value * scale) < 1e4:
+        return unit.removesuffix("1"), scale
+    return next((step for step in reversed(LADDERS.get(key["unit"], ())) if 0.01 <= abs(value * step[1])),
+                (unit.removesuffix("1"), scale))
+
+
+def _digits(key: dict, one: Allowed) -> int:
+    """Digits with which a limit is told: two, or as many as tell apart the cases around it."""
+    apart = 0.0 if one.beyond is None else abs(float(key["values"][one.beyond]) - float(key["values"][one.inside]))
+    return max(2, 1 + ceil(log10(abs(one.value) / apart))) if apart and one.value else 2
+
+
+def table(limits: Limits, measures: dict) -> str:
+    """The same as an HTML table of every measure; "" where there is none.
 
     measures: {name: (values, errors, unit)}.
     """
-    if not found:
+    if not limits.found:
         return ""
-    at, rows = shown_of(key), ""
-    smallest, largest = (float(pick(np.asarray(key["values"], float))) for pick in (np.min, np.max))
-    for one in found:
+    key, rows, at = limits.key, "", shown_of(limits.key)
+    for one in limits.found:
         if one.beyond is not None:
             far = f"between {bare(at(one.inside), at(one.beyond))} and {at(one.beyond)}" + (
-                f", at about {_written(key, one)}" if isfinite(one.about) else "")
+                f", at about {_at(limits, one)}" if isfinite(one.about) else "")
         else:
-            far = "in no case" if one.value == largest else f"not up to {at(one.inside)}; the cases after it are open"
+            far = "in no case" if one.whole else f"not up to {at(one.inside)}; cases after it are open"
+        by = f"{100 * WITHIN:g} %" if abs(one.change) < 1 else "double"
         first = short(one.first, measures[one.name][2], 4, zero_below(one.name))
-        rows += (f"<tr><td>{linked(one.name.replace('_', ' '), one.name)}</td><td class=n>{escape(first)}</td>"
+        rows += (f"<tr><td>{linked(label(one.name), one.name)}</td><td class=n>{escape(first)}</td>"
                  f"<td class=n>{_change(one.changed)}</td>"
-                 f"<td>{escape(far)}</td></tr>")
-    several = int(np.sum(np.asarray(key["values"], float) == smallest)) > 1
+                 f"<td>{by}</td><td>{escape(far)}</td></tr>")
+    several = int(np.sum(np.asarray(key["values"], float) == np.min(np.asarray(key["values"], float)))) > 1
     least = " Of the values of the other keys those are told that allow least." if several else ""
-    return (f"<p class=soft>{escape(key['name'])} grows from {escape(at(found[0].start))}. A measure leaves its first "
-            f"value where it differs from it by more than {100 * WITHIN:g} % and by more than both numerical errors."
-            f"{least}</p><div class=wide><table><thead><tr><th>measure</th><th class=n>first case</th>"
-            f"<th class=n>change up to the last</th><th>differs by more than {100 * WITHIN:g} %</th></tr></thead>"
-            f"<tbody>{rows}</tbody></table></div>")
+    return (f"<p class=soft>{escape(key['name'])} grows from {escape(at(limits.found[0].start))}. A measure has left "
+            "its first value where it differs from it by so much and by more than both numerical errors; cases that "
+            "did not settle or miss their tolerance do not count."
+            f"{least}</p><div class=wide><table><thead><tr><th>measure</th>"
+            "<th class=n>first case</th><th class=n>change up to the last</th><th>leaves by</th><th>where</th></tr>"
+            f"</thead><tbody>{rows}</tbody></table></div>")
 
 
 def _change(share: float) -> str:

@@ -8,7 +8,6 @@ import numpy as np
 from .words import NO_SLIP
 from .written import bare, resolved
 
-SHARE = 0.1  # of its first value, beyond the errors of both, from which a measure has changed
 MOST, WORDS = 3, 40  # changes in the sentence, and words, which the later changes give way to
 WHOLE = 1 - 1e-12  # a contact fraction of 1 but for round-off
 ENDS = {
@@ -34,14 +33,13 @@ class Change(NamedTuple):
     stays: bool
 
 
-def changes(keys: list, measures: dict, outcome: Sequence, grid: bool = True, main: str = "") -> str:
+def changes(keys: list, measures: dict, outcome: Sequence, grid: bool = True) -> str:
     """What changes first as a swept key grows, as one sentence; "" where nothing changes beyond the numerical errors.
 
     keys: [{`name`, `values` (n,), `texts` (n,), `words`: whether its values are words}]; the key is that of numbers
     with most values. measures: {name: (values (n,), errors (n,))}, NaN where a case has none; outcome (n,); grid: the
-    cases are all combinations of the keys' values; main: the measure that has changed where it differs by a tenth from
-    its value at the smallest key and by more than both errors. Failed cases, and those that their errors leave open,
-    are passed over.
+    cases are all combinations of the keys' values. Failed cases, and those that their errors leave open, are passed
+    over.
     """
     numbers = [one for one in keys if not one["words"]]
     if not numbers or (len(keys) > 1 and not grid):
@@ -51,7 +49,7 @@ def changes(keys: list, measures: dict, outcome: Sequence, grid: bool = True, ma
     lines, at = lines_of(key, others), shown_of(key)
     found = {}
     for line in lines:
-        for one in _along(line, measures, np.asarray(outcome, str), main, at):
+        for one in _along(line, measures, np.asarray(outcome, str)):
             found.setdefault(one.what, []).append(one)
     order = np.asarray(key["values"], float)
     told = {}
@@ -92,7 +90,7 @@ def lines_of(key: dict, others: list) -> list:
     return [np.array(line) for line in lines.values()]
 
 
-def _along(line: np.ndarray, measures: dict, outcome: np.ndarray, main: str, at: Callable) -> list:
+def _along(line: np.ndarray, measures: dict, outcome: np.ndarray) -> list:
     """Every change along a line of cases."""
     out = _ends(line, outcome[line])
     for name, states in STATES.items():
@@ -102,10 +100,7 @@ def _along(line: np.ndarray, measures: dict, outcome: np.ndarray, main: str, at:
             there, not_there = ((values + known < 1, values >= WHOLE) if name.endswith("fraction") else
                                 (values > np.maximum(known, NO_SLIP), values <= NO_SLIP))
             out += _turn(line, np.where(there, 1.0, np.where(not_there, 0.0, np.nan)), states)
-    out = _once(out)
-    if main in measures:
-        out += _departed(line, *(np.asarray(one, float)[line] for one in measures[main][:2]), main, at)
-    return out
+    return _once(out)
 
 
 def _once(found: list) -> list:
@@ -138,21 +133,6 @@ def _turn(line: np.ndarray, state: np.ndarray, words: tuple) -> list:
         return []
     first = int(other[0])
     return [Change(words[int(state[0])], int(line[first]), int(line[first - 1]), other.size == state.size - first)]
-
-
-def _departed(line: np.ndarray, values: np.ndarray, errors: np.ndarray, name: str, at: Callable) -> list:
-    """Where a measure is a tenth above or below its first value, beyond both errors."""
-    known = np.isfinite(values)
-    line, values, errors = line[known], values[known], np.nan_to_num(errors[known])
-    if not values.size or values[0] == 0:
-        return []
-    far = np.abs(values - values[0]) > SHARE * abs(values[0]) + errors + errors[0]
-    if not far.any():
-        return []
-    above = values[int(np.argmax(far))] > values[0]
-    what = (f"the {name.replace('_', ' ')} has {'risen' if above else 'fallen'} by more than {100 * SHARE:g} % since "
-            f"{at(line[0])}")
-    return _turn(line, np.where(far & ((values > values[0]) == above), 1.0, 0.0), (what, what))
 
 
 def _where(found: list, order: np.ndarray, at: Callable, others: list, lines: int) -> str:

@@ -1,7 +1,8 @@
 // Draws the cases of a sweep from the page's data: lines with error bands, a map of two keys, or a cloud of points.
 //
 // data.keys:     [{name, label, unit, log, values: [...] per case, texts: [...] per case, words}]
-// data.measures: [{name, label, unit, means, values: [...], errors: [...]}]   already in the unit shown
+// data.measures: [{name, label, unit, means, values: [...], errors: [...], over: [...] whether a case misses its
+//                tolerance}]   already in the unit shown
 // data.outcome:  [...] per case; data.settled: outcomes that count as an answer; data.links: [...] per case or null
 "use strict";
 (() => {
@@ -10,6 +11,10 @@
   const at = (id) => document.getElementById(id);
   const {ink, colours, within, named, figure, legend, bar, put} = pictures;
   const bad = (i) => !data.settled.includes(data.outcome[i]);
+  const of = (name) => data.measures.find((one) => one.name === name);
+  const log = () => at("log").checked;           // whether the axis of the values is logarithmic
+  const values = () => ({y_axis_type: log() ? "log" : "linear"});
+  const DECADES = 2;                             // of values, from which their axis is logarithmic by itself
   const key = (name) => data.keys.find((one) => one.name === name);
 
   function option(select, value, text) {
@@ -23,7 +28,8 @@
     data.keys.forEach((one) => option(at("along"), one.name, one.label));
     if (data.measures.some((one) => one.name === data.first)) at("measure").value = data.first;
     at("along").value = data.along;
-    ["measure", "along", "beside", "shown"].forEach((id) => at(id).addEventListener("change", () => refresh(id)));
+    ["measure", "along", "beside", "shown", "log"].forEach((id) => at(id).addEventListener("change", () => refresh(id)));
+    scaled();
     beside();
   }
 
@@ -57,7 +63,14 @@
     });
   }
 
+  function scaled() {                            // the tick box of the values, as they ask for it by themselves
+    const found = of(at("measure").value).values.filter((v) => v !== null);
+    at("log").checked = found.length > 0 && Math.min(...found) > 0 &&
+      Math.max(...found) > 10 ** DECADES * Math.min(...found);
+  }
+
   function refresh(id) {
+    if (id === "measure") scaled();
     if (id === "along") beside();
     if (id === "beside") { at("shown").disabled = !data.grid || !at("beside").value; others(); }
     draw();
@@ -94,17 +107,23 @@
     fig.add_tools(new Bokeh.HoverTool({tooltips: rows, renderers}));
   }
 
+  function spread(cases, m) {                    // ends of the bars; on a logarithmic axis none goes below all values
+    const least = Math.min(...m.values.filter((v) => v > 0)) / 10;
+    const end = (i, sign) => m.values[i] === null ? NaN : m.values[i] + sign * (m.errors[i] ?? 0);
+    const low = cases.map((i) => log() ? Math.max(end(i, -1), Math.min(least, m.values[i])) : end(i, -1));
+    return {low, high: cases.map((i) => end(i, 1))};
+  }
+
   function curve(fig, cases, x, m, colour, label) {
     cases.sort((a, b) => x.values[a] - x.values[b]);
     const xs = cases.map((i) => x.values[i]);
-    const spread = (sign) => cases.map((i) => m.values[i] === null ? NaN : m.values[i] + sign * (m.errors[i] ?? 0));
-    const made = source(cases, m, {x: xs, y: cases.map((i) => m.values[i] ?? NaN), low: spread(-1), high: spread(1),
-      edge: cases.map((i) => bad(i) ? ink("--warm") : colour), stroke: cases.map((i) => bad(i) ? 2.5 : 1)});
+    const made = source(cases, m, {x: xs, y: cases.map((i) => m.values[i] ?? NaN), ...spread(cases, m),
+      fill: cases.map((i) => m.over[i] ? ink("--paper") : colour), edge: cases.map((i) => bad(i) ? ink("--warm") : colour), stroke: cases.map((i) => bad(i) ? 2.5 : m.over[i] ? 1.8 : 1)});
     fig.add_layout(new Bokeh.Band({base: {field: "x"}, lower: {field: "low"}, upper: {field: "high"}, source: made,
       fill_color: colour, fill_alpha: 0.22, line_color: null}));
     const named = label ? {legend_label: label} : {};
     fig.line({field: "x"}, {field: "y"}, {source: made, line_color: colour, line_width: 2, ...named});
-    return fig.scatter({field: "x"}, {field: "y"}, {source: made, size: 8, fill_color: colour,
+    return fig.scatter({field: "x"}, {field: "y"}, {source: made, size: 8, fill_color: {field: "fill"},
       line_color: {field: "edge"}, line_width: {field: "stroke"}, marker: {field: "marker"}, ...named});
   }
 
@@ -120,7 +139,7 @@
   }
 
   function lines(cases, x, beside, m) {
-    const fig = figure(x, named(m)), groups = new Map();
+    const fig = figure(x, named(m), values()), groups = new Map();
     worded(fig.xaxis, x);
     cases.forEach((i) => {
       const v = beside ? beside.values[i] : 0;
@@ -157,11 +176,11 @@
     const place = (of, all, one) => cases.map((i) => all[of.indexOf(one.values[i])]);
     const found = cases.map((i) => m.values[i]).filter((v) => v !== null);
     const low = Math.min(...found), high = Math.max(...found);
-    const mapper = new Bokeh[low > 0 && high > 30 * low ? "LogColorMapper" : "LinearColorMapper"]({
+    const mapper = new Bokeh[log() && low > 0 ? "LogColorMapper" : "LinearColorMapper"]({
       palette: Bokeh.Palettes.cividis(256), low, high: high > low ? high : low + 1, nan_color: "rgba(128,128,128,0.25)"});
     const made = source(cases, m, {left: place(xs, ex.slice(0, -1), x), right: place(xs, ex.slice(1), x),
       bottom: place(ys, ey.slice(0, -1), y), top: place(ys, ey.slice(1), y),
-      hatch: cases.map((i) => bad(i) ? "right_diagonal_line" : "blank")});
+      hatch: cases.map((i) => bad(i) ? "right_diagonal_line" : m.over[i] ? "dot" : "blank")});
     const cells = fig.quad({field: "left"}, {field: "right"}, {field: "bottom"}, {field: "top"}, {source: made,
       fill_color: {field: "value", transform: mapper}, line_color: ink("--paper"), line_width: 0.5,
       hatch_pattern: {field: "hatch"}, hatch_color: ink("--warm"), hatch_weight: 1.5, hatch_scale: 10});
@@ -171,13 +190,12 @@
   }
 
   function cloud(cases, x, beside, m) {
-    const fig = figure(x, named(m));
+    const fig = figure(x, named(m), values());
     worded(fig.xaxis, x);
     const made = source(cases, m, {x: cases.map((i) => x.values[i]), y: cases.map((i) => m.values[i] ?? NaN),
       colour: cases.map((i) => bad(i) ? ink("--warm") : ink("--accent")),
       shade: cases.map((i) => beside ? beside.values[i] : 0),
-      low: cases.map((i) => m.values[i] === null ? NaN : m.values[i] - (m.errors[i] ?? 0)),
-      high: cases.map((i) => m.values[i] === null ? NaN : m.values[i] + (m.errors[i] ?? 0))});
+      filled: cases.map((i) => m.over[i] ? 0 : 0.75), ...spread(cases, m)});
     fig.segment({field: "x"}, {field: "low"}, {field: "x"}, {field: "high"}, {source: made, line_color: ink("--soft")});
     let fill = {field: "colour"};
     if (beside) {
@@ -188,7 +206,7 @@
       bar(fig, mapper, named(beside));
     }
     const dots = fig.scatter({field: "x"}, {field: "y"}, {source: made, size: count > 2000 ? 4 : 7, fill_color: fill,
-      line_color: {field: "colour"}, line_width: beside ? 0.5 : 1, fill_alpha: 0.75});
+      line_color: {field: "colour"}, line_width: beside ? 0.5 : 1, fill_alpha: {field: "filled"}});
     hover(fig, m, [dots]);
     return fig;
   }
@@ -199,26 +217,28 @@
     const lowest = found.reduce((a, b) => m.values[b] < m.values[a] ? b : a);
     const highest = found.reduce((a, b) => m.values[b] > m.values[a] ? b : a);
     const where = (i) => `${x.label} ${x.texts[i]}` + (beside ? `, ${beside.label} ${beside.texts[i]}` : "");
-    const off = cases.filter(bad).length;
+    const off = cases.filter(bad).length, open = cases.filter((i) => m.over[i]).length;
     const value = (i) => `${within(m.values[i], m.errors[i], m.least)} ${m.unit}`.trim();
     return `Against ${x.label}: lowest ${value(lowest)} at ${where(lowest)}; highest ` +
       `${value(highest)} at ${where(highest)}.` + (off ? ` ${off} of ${cases.length} cases did not ` +
-      "settle (shaded or hatched)." : "");
+      "settle (shaded or hatched)." : "") + (open ? ` ${open} of ${cases.length} cases miss the tolerance ` +
+      "(hollow or dotted)." : "");
   }
 
   function draw() {
     const every = chosen(), x = key(at("along").value), beside = key(at("beside").value);
-    const m = data.measures.find((one) => one.name === at("measure").value);
+    const m = of(at("measure").value);
     const mapped = data.grid && beside && at("shown").value === "map";
     const axes = [x, ...(beside && (mapped || !data.grid) ? [beside] : [])].filter((one) => one.log);
     // a logarithmic axis has no place for 0
-    const cases = every.filter((i) => axes.every((one) => one.values[i] > 0));
+    const cases = every.filter((i) => axes.every((one) => one.values[i] > 0) &&
+      (mapped || !log() || m.values[i] === null || m.values[i] > 0));
     const make = () => !data.grid ? cloud(cases, x, beside, m) :
       mapped ? map(cases, x, beside, m) : lines(cases, x, beside, m);
     const away = every.filter((i) => !cases.includes(i));
     const value = (i) => `${within(m.values[i], m.errors[i], m.least)} ${m.unit}`.trim();
     const zero = !away.length ? "" : ` Not drawn on a logarithmic axis: ${away.length === 1 ?
-      `the case at ${x.label} ${x.texts[away[0]]}, ${value(away[0])}` : `${away.length} cases at 0`}.`;
+      `the case at ${x.label} ${x.texts[away[0]]}, ${value(away[0])}` : `${away.length} cases at 0 or below`}.`;
     const words = told(cases, x, beside, m) + zero;
     at("means").textContent = `${m.means ? `${m.means[0].toUpperCase()}${m.means.slice(1)}. ` : ""}${words}`;
     at("chart").setAttribute("aria-label", `${m.label}: ${words}`);

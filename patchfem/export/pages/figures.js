@@ -16,6 +16,27 @@ const pictures = (() => {
   };
   const named = (one) => one.unit ? `${one.label} [${one.unit}]` : one.label;
 
+  function ticks(start, end, steps, most) {       // of a logarithmic axis: steps within a decade, all decades or some
+    const low = Math.log10(Math.min(start, end)) - 1e-9, high = Math.log10(Math.max(start, end)) + 1e-9, out = [];
+    const every = Math.ceil((high - low) / most);
+    for (let d = Math.ceil(low / every - 1) * every; d <= high; d += every)
+      for (const m of steps) if (d + Math.log10(m) >= low && d + Math.log10(m) <= high) out.push(m * 10 ** d);
+    return out;
+  }
+  function readable(start, end) {                // 1 2 5 10 20, as many as there is room for
+    const out = [[1, 2, 5], [1, 3], [1]].map((steps) => ticks(start, end, steps, 10)).find((one) => one.length <= 11);
+    if (out.length > 2) return out;
+    const size = 10 ** Math.floor(Math.log10((end - start) / 2.5)), all = [];  // of less than a decade even steps
+    const step = size * [1, 2, 5].findLast((m) => m * size <= (end - start) / 2.5);
+    for (let k = Math.ceil(start / step); k * step <= end; k++) all.push(k * step);
+    return all;
+  }
+  function ticked(axis) {                        // labels that are numbers, not powers of ten
+    axis.ticker = new Bokeh.CustomJSTicker({major_code: "return pictures.readable(cb_data.range.start, cb_data.range.end)",
+      minor_code: "return pictures.ticks(cb_data.range.start, cb_data.range.end, [1, 2, 3, 4, 5, 6, 7, 8, 9], 10)"});
+    axis.formatter = new Bokeh.CustomJSTickFormatter({code: "return Number(tick.toPrecision(4)).toString()"});
+  }
+
   function figure(x, title, options) {           // x: {label, unit, log} of the axis; title: of the other one
     const fig = Bokeh.Plotting.figure({sizing_mode: "stretch_width", height: 420, x_axis_type: x.log ? "log" : "linear",
       tools: "pan,box_zoom,wheel_zoom,reset,save,tap", background_fill_color: null, border_fill_color: null,
@@ -30,6 +51,8 @@ const pictures = (() => {
     for (const grid of [fig.xgrid, fig.ygrid]) grid.grid_line_color = ink("--line");
     fig.xaxis.axis_label = named(x);
     fig.yaxis.axis_label = title;
+    if (x.log) ticked(fig.xaxis);
+    if (options?.y_axis_type === "log") ticked(fig.yaxis);
     return fig;
   }
 
@@ -79,5 +102,5 @@ const pictures = (() => {
     dark.addEventListener("change", all);
   }
 
-  return {ink, colours, number, within, named, figure, legend, bar, put, themed};
+  return {ink, colours, number, within, named, ticks, readable, figure, legend, bar, put, themed};
 })();

@@ -7,15 +7,14 @@ from math import isfinite
 import numpy as np
 
 from ...core import Outcome
-from ...scales import LADDERS, axis_unit, rounded, short
+from ...scales import LADDERS, axis_unit, rounded
 from . import allowed
-from .changes import changes
 from .document import Section, document
+from .lead import FIRST, SETTLED, Lead, columns, lead_of
+from .missed import over
 from .words import linked, zero_below
-from .written import NUMBER, brief
+from .written import NUMBER, brief, label
 
-SETTLED = ("steady", "stuck", "done", "no_contact")
-FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", "onset_level", "pressure_peak")
 DRAWN, LISTED = 20_000, 400  # cases in the pictures and in the table; sweep.csv has them all
 
 
@@ -25,37 +24,34 @@ def page(table: dict) -> str:
     table: `title`, `of` (the scene's own title; may be missing), `version`, `command` (the line that made it),
     `scene` (its text), `seconds` of work (NaN: unknown); `grid`: whether the cases are all combinations of the keys'
     values; `keys`: [{`name`, `unit`, `values` (n,) in SI, `texts` (n,) as written, `log`}];
-    `measures`: {name: {`unit`, `means`, `values` (n,), `errors` (n,)}}, NaN where a case has none; `outcome` (n,);
+    `measures`: {name: {`unit`, `means`, `values` (n,), `errors` (n,), `floors` (n,)}}, NaN where a case has none;
+    `tolerance` of all cases or (n,) and `patch` {`length`, `width`} [m], where they are known; `outcome` (n,);
     `messages`: {case: why it has no answer}; `folders` (n,): where the cases lie beside the page, or None; `own`: False
     where sweep.csv does not lie beside the page.
     """
     outcome, number = list(table["outcome"]), len(table["outcome"])
     drawn = _spread(number, DRAWN)
     keys = [_key(one, drawn) for one in table["keys"]]
-    measures = [_measure(name, one, drawn) for name, one in table["measures"].items()
+    measures = [_measure(name, one, drawn, table.get("tolerance", np.nan)) for name, one in table["measures"].items()
                 if np.isfinite(one["values"]).any()]
+    told = lead_of(table)
     first = next((name for name in FIRST if any(m["name"] == name for m in measures)), None)
     data = {"keys": keys, "measures": measures, "outcome": [outcome[i] for i in drawn], "settled": SETTLED,
             "grid": bool(table["grid"]), "first": first, "along": _along(keys),
             "links": None if table["folders"] is None else [table["folders"][i] for i in drawn]}
     sections = [Section("answers", "What came out", _explorer(number, len(drawn)) if measures else
                         "<p>No case has a value to draw.</p>"),
-                *_change(table),
+                *_change(table, told.limits),
                 Section("cases", "Cases", _cases(table)),
                 Section("measures", "What the measures mean", _meanings(table)),
                 Section("again", "The same again", _again(table))]
-    return document(table["title"] or "patchfem sweep", _lead(table), sections, data if measures else None,
+    return document(table["title"] or "patchfem sweep", _lead(table, told), sections, data if measures else None,
                     ("figures.js", "explorer.js") if measures else ())
 
 
 def _spread(number: int, most: int) -> np.ndarray:
     """At most `most` of so many cases, evenly spread."""
     return np.arange(number) if number <= most else np.unique(np.linspace(0, number - 1, most).astype(int))
-
-
-def label(name: str) -> str:
-    """A name of the program as people read it."""
-    return name.replace("_", " ")
 
 
 def _key(one: dict, drawn) -> dict:
@@ -73,12 +69,13 @@ def _key(one: dict, drawn) -> dict:
             "texts": [brief(text) for text in texts], "log": bool(one["log"]), "words": words}
 
 
-def _measure(name: str, one: dict, drawn) -> dict:
-    """A measure in the unit that suits its largest value."""
+def _measure(name: str, one: dict, drawn, tolerance=np.nan) -> dict:
+    """A measure in the unit that suits its largest value; `over`: whether a case misses its tolerance."""
     unit, scale = axis_unit(one["values"], one["unit"]) if one["unit"] in LADDERS else (one["unit"], 1.0)
     return {"name": name, "label": label(name), "unit": "" if unit == "1" else unit, "means": one.get("means", ""),
             "values": np.asarray(one["values"], float)[drawn] * scale,
-            "errors": np.asarray(one["errors"], float)[drawn] * scale, "least": zero_below(name) * scale}
+            "errors": np.asarray(one["errors"], float)[drawn] * scale, "least": zero_below(name) * scale,
+            "over": over(one, tolerance)[drawn]}
 
 
 def _along(keys: list) -> str:
@@ -93,84 +90,29 @@ def _explorer(number: int, drawn: int) -> str:
             "<label>Along the axis<select id=along></select></label>"
             "<label>Second key<select id=beside></select></label>"
             "<label>Shown as<select id=shown><option value=lines>lines</option><option value=map>map</option></select>"
-            "</label><span id=held class=choices style='padding:0'></span></div>"
+            "</label><label>Logarithmic values<input type=checkbox id=log></label>"
+            "<span id=held class=choices style='padding:0'></span></div>"
             "<div id=chart class=chart role=img></div><p id=means class=soft aria-live=polite></p>"
-            "<p class=soft>Bands show the numerical error. Crosses, shading and hatching mark cases that did not "
+            "<p class=soft>Bands show the numerical error. Hollow points (dots in a map) miss the tolerance. Crosses, "
+            "shading and hatching mark cases that did not "
             f"settle. A click on a case opens it.</p>{thinned}<noscript><p class=verdict>The pictures need "
             "JavaScript; the numbers stand in sweep.csv.</p></noscript>")
 
 
-def span(measures: dict, outcome) -> str:
-    """From where to where the first measure of interest runs, and its largest numerical error; "" where none has a
-    value. measures: {name: (values (n,), errors (n,), SI unit)}, NaN where a case has none; outcome (n,): cases that
-    did not settle are left out where others did."""
-    settled = np.isin(np.asarray(outcome, str), SETTLED)
-    for name in FIRST:
-        if name not in measures or not np.isfinite(measures[name][0]).any():
-            continue
-        values, errors, unit = measures[name]
-        every = np.isfinite(values)
-        there = every & settled if np.any(every & settled) else every
-        values, errors = np.asarray(values, float)[there], np.asarray(errors, float)[there]
-        low, high = (short(one, unit, 4, zero_below(name)) for one in (values.min(), values.max()))
-        ran = f"is {high} throughout" if low == high else f"runs from {low} to {high}"
-        known = errors[np.isfinite(errors)]
-        largest = f"numerical error at most {short(known.max(), unit, 1)}" if known.any() else "without numerical error"
-        band = f", {largest}" if known.size else ""
-        whose = "" if every.sum() == there.sum() else " of the settled cases"
-        return f"{label(name).capitalize()}{whose} {ran}{band}."
-    return ""
-
-
-def turns(keys: list, measures: dict, outcome, grid: bool = True) -> str:
-    """What changes first as a swept key grows, and from where on, as a sentence; "" where nothing does beyond the bars.
-
-    keys: [{`name`, `values` (n,), `texts` (n,)}] of the cases; measures and outcome as `span` takes them; grid: the
-    cases are all combinations of the keys' values.
-    """
-    main = next((name for name in FIRST if name in measures and np.isfinite(measures[name][0]).any()), "")
-    known = {name: one[:2] for name, one in measures.items()}
-    if main:
-        settled = np.isin(np.asarray(outcome, str), SETTLED)
-        there = settled & np.isfinite(known[main][0])
-        known[main] = np.where(settled if there.any() else True, known[main][0], np.nan), known[main][1]
-    return changes(_named(keys), known, outcome, grid, main)
-
-
-def within(keys: list, measures: dict, outcome, grid: bool = True) -> str:
-    """How far the key may go until each main measure is off by 5 %, as a sentence; "" where none is. As `turns`."""
-    return allowed.sentence(*allowed.allowed(_named(keys), measures, outcome, SETTLED, grid))
-
-
-def _named(keys: list) -> list:
-    """The keys with whether their values are words."""
-    return [one | {"words": not any(NUMBER.match(str(text)) for text in one["texts"])} for one in keys]
-
-
-def _columns(table: dict) -> dict:
-    """The measures of a table as `span` takes them."""
-    return {name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()}
-
-
-def _change(table: dict) -> list:
+def _change(table: dict, limits: allowed.Limits) -> list:
     """The section on what each main measure has changed by since the first case; none where no key grows alone."""
-    columns = _columns(table)
-    text = allowed.table(*allowed.allowed(_named(table["keys"]), columns, table["outcome"], SETTLED, table["grid"]),
-                         columns)
+    text = allowed.table(limits, columns(table))
     return [Section("change", "Change against the first case", text)] if text else []
 
 
-def _lead(table: dict) -> str:
-    """The verdict: how many cases, over what, how they ended, the span of the first measure, what changes first."""
+def _lead(table: dict, said: Lead) -> str:
+    """The verdict: how many cases, over what, how they ended, and what the sweep says."""
     number, over = len(table["outcome"]), " × ".join(one["name"] for one in table["keys"])
     ended = ", ".join(f"{count} {label(name)}" for name, count in Counter(table["outcome"]).most_common())
-    text = f"<b>{number} cases</b> over {escape(over)}: {escape(ended)}."
-    columns, outcome, grid = _columns(table), table["outcome"], table["grid"]
-    for said in (span(columns, outcome), turns(table["keys"], columns, outcome, grid),
-                 within(table["keys"], columns, outcome, grid)):
-        text += f" {escape(said)}" if said else ""
-    text += "".join(f" <i>{escape(label(one))}</i>: {escape(one.sentence)}" for one in Outcome
-                    if one.value in table["outcome"] and one.value not in SETTLED)
+    lines = [f"<b>{number} cases</b> over {escape(over)}: {escape(ended)}.", *map(escape, said.sentences())]
+    lines += [f"<i>{escape(label(one))}</i>: {escape(one.sentence)}" for one in Outcome
+              if one.value in table["outcome"] and one.value not in SETTLED]
+    text = "".join(f"<p>{line}</p>" for line in lines)
     failed = table["messages"]
     fault = ""
     if failed:
@@ -180,7 +122,7 @@ def _lead(table: dict) -> str:
     took = f" &middot; computed in {table['seconds']:.2f} s, all cases together" if isfinite(table["seconds"]) else ""
     scene = f"Scene: {escape(table['of'])} &middot; " if "of" in table else ""
     return (f"<p class=soft>{scene}patchfem {escape(table['version'])}{took}</p>"
-            f"<p class=verdict>{text}</p>{fault}")
+            f"<div class='verdict{' warn' * bool(said.missed)}'>{text}</div>{fault}")
 
 
 def _cases(table: dict) -> str:
@@ -188,7 +130,7 @@ def _cases(table: dict) -> str:
     shown = [name for name in FIRST if name in table["measures"]]
     shown += [name for name, one in table["measures"].items() if name not in shown and _changes(one["values"])]
     shown = shown[:6]
-    columns = [_measure(name, table["measures"][name], slice(None)) for name in shown]
+    columns = [_measure(name, table["measures"][name], slice(None), table.get("tolerance", np.nan)) for name in shown]
     head = "".join(f"<th>{escape(one['name'])}</th>" for one in table["keys"]) + "<th>outcome</th>" + "".join(
         f"<th class=n>{linked(one['label'], one['name'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}</th>"
         for one in columns)
@@ -199,7 +141,8 @@ def _cases(table: dict) -> str:
         if table["folders"] is not None:
             said = f'<a href="{escape(table["folders"][i])}">{said}</a>'
         cells += f"<td>{said}</td>" + "".join(
-            f"<td class=n>{_number(one['values'][i], one['errors'][i], one['least'])}</td>" for one in columns)
+            f"<td class=n{' data-over' * bool(one['over'][i])}>"
+            f"{_number(one['values'][i], one['errors'][i], one['least'])}</td>" for one in columns)
         rows.append(f"<tr{'' if outcome in SETTLED else ' class=bad'}>{cells}</tr>")
     number = len(table["outcome"])
     more = f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv has all.</p>" if number > LISTED else ""

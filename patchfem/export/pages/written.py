@@ -10,6 +10,11 @@ MOST = 6  # digits of such a number at most
 OFF = 0.05  # of the distance to the nearest other value, by which a value in a sentence may be off
 
 
+def label(name: str) -> str:
+    """A name of the program as people read it."""
+    return name.replace("_", " ")
+
+
 def brief(text: str) -> str:
     """A value as written, its number with six digits at most: 3.16227766016838e-06 rad is 3.16228e-06 rad."""
     return _short(text, MOST)

@@ -26,7 +26,7 @@ from ..folder import save
 from ..results import LOCK, PAGE, refuse_others
 from ..summary import read_summary, summary
 
-CASES, SUMMARY, TABLES = "cases", "summary.json", ("sweep.csv", "sweep.nc", "report.html")
+CASES, SUMMARY, TABLES = "cases", "summary.json", ("sweep.csv", "sweep.nc", "sweep.json", "report.html")
 
 
 @dataclass(frozen=True, slots=True)

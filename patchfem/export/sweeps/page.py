@@ -21,23 +21,24 @@ from ...runs.many.answers import Answers
 from ...runs.results.result import meaning
 from ..pages import sweep
 from ..pages.written import NUMBER
-from .tables import names_of
+from .tables import facts, names_of
 
 WHOLE, SHORT = "report.html", "summary.json"  # what a click on a case opens: its page where it has one
 
 
-def write_page(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Path) -> None:
+def write_page(table: dict, folder: Path) -> None:
     """Write the page of all cases beside their tables."""
-    write_text(folder / "report.html", sweep.page(table_of(asked, cases, found, keys, folder)))
+    write_text(folder / "report.html", sweep.page(table))
 
 
 def table_of(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Path) -> dict:
     """The table of `pages.sweep.page` from the answers of the cases."""
     columns = columns_of(cases)
     measures = {name: {"unit": found.units[name], "means": meaning(name), "values": found.values[name],
-                       "errors": found.errors[name]}
+                       "errors": found.errors[name], "floors": found.floors[name]}
                 for name in names_of(found) if name not in [axis.name for axis in cases.axes]}
     return {**titles(columns, tomllib.loads(asked.text).get("title") or asked.path.stem), "version": __version__,
+            **_shared(facts(asked, cases), columns),
             "command": command(asked, cases), "scene": asked.text, "seconds": float(np.sum(found.seconds)),
             "grid": not cases.rows, "keys": columns, "measures": measures,
             "outcome": [str(one) for one in found.outcome],
@@ -50,6 +51,13 @@ def columns_of(cases: Cases) -> list:
     return [{"name": axis.key, "unit": axis.unit or "1", "texts": [axis.texts[k] for k in place],
              "values": numbers([axis.values[k] for k in place]), "log": wide(axis.values)}
             for axis, place in zip(cases.axes, places.T)]
+
+
+def _shared(held: dict, columns: list) -> dict:
+    """The tolerance of the cases and the size of their patch, from what all have in common and what is swept."""
+    swept = next((one["values"] for one in columns if one["name"] == "accuracy.tolerance"), np.nan)
+    return {"tolerance": held.get("tolerance", swept),
+            "patch": {name: float(held[f"patch_{name}"]) for name in ("length", "width") if f"patch_{name}" in held}}
 
 
 def titles(columns: list, of: str) -> dict:
@@ -125,12 +133,16 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
                         "log": wide(values.tolist())})
     measures = {name: {"unit": str(file[name].attrs["units"]), "means": str(file[name].attrs["long_name"]),
                        "values": np.asarray(file[name][...], float).ravel(),
-                       "errors": np.asarray(file[f"{name}_error"][...], float).ravel()}
+                       "errors": np.asarray(file[f"{name}_error"][...], float).ravel(),
+                       "floors": np.asarray(file[f"{name}_floor"][...], float).ravel()
+                       if f"{name}_floor" in file.variables else np.zeros(len(rows))}
                 for name in file.variables if f"{name}_error" in file.variables}
     text, sets = str(file.attrs["scene"]), json.loads(str(file.attrs["sets"]))
     overs = [] if "case" in file.dimensions else [word for one in columns for word in
                                                   ("--over", f"{one['name']}={','.join(dict.fromkeys(one['texts']))}")]
-    return {**titles(columns, tomllib.loads(text).get("title") or folder.resolve().name),
+    held = {name: float(file.attrs[name]) for name in ("tolerance", "patch_length", "patch_width")
+            if name in file.attrs}
+    return {**titles(columns, tomllib.loads(text).get("title") or folder.resolve().name), **_shared(held, columns),
             "version": str(file.attrs["source"]).removeprefix("patchfem "), "scene": text, "seconds": float("nan"),
             "command": shlex.join(["patchfem", "sweep", str(file.attrs["scene_file"]),
                                    *(word for one in sets for word in ("--set", one)), *overs]),
@@ -163,11 +175,13 @@ def joined(tables: list, names: list) -> dict:
         own = [table["measures"].get(name) for table in tables]
         first = next(one for one in own if one is not None)
         measures[name] = {"unit": first["unit"], "means": first["means"]} | {
-            part: np.concatenate([np.full(count, np.nan) if one is None else one[part]
-                                  for one, count in zip(own, counts)]) for part in ("values", "errors")}
+            part: np.concatenate([np.full(count, np.nan) if one is None else one.get(part, np.zeros(count))
+                                  for one, count in zip(own, counts)]) for part in ("values", "errors", "floors")}
     return {"title": " and ".join(names), "own": False, "version": tables[0]["version"], "seconds": float("nan"),
             "command": "\n".join(table["command"] for table in tables), "scene": "\n".join(
                 f"# {name}\n{table['scene']}" for name, table in zip(names, tables)),
+            "tolerance": np.concatenate([np.broadcast_to(table.get("tolerance", np.nan), count)
+                                         for table, count in zip(tables, counts)]),
             "grid": all(table["grid"] for table in tables), "keys": columns, "measures": measures,
             "outcome": [one for table in tables for one in table["outcome"]],
             "messages": {number + start: why for table, start in zip(tables, shift.tolist())

@@ -12,8 +12,9 @@ from ...campaigns.sweeps.sweep import Work, solved
 from ...core import Missing
 from ...runs.many.answers import Answers
 from .. import netcdf
+from .answer import write_answer
 from .folder import Folder, Summaries, Whole
-from .page import WHOLE, write_page
+from .page import WHOLE, table_of, write_page
 from .tables import contents, write_csv
 
 
@@ -97,11 +98,14 @@ def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> Answ
 
 
 def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder, page: bool = True) -> None:
-    """Write sweep.csv, sweep.nc and report.html of all cases; without a page, none is left of other cases."""
+    """Write sweep.csv, sweep.nc, sweep.json and report.html of all cases; without a page, none is left of other
+    cases."""
     write_csv(cases, found, folder.keys, folder.target / "sweep.csv")
     netcdf.write(contents(asked, cases, found, folder.keys), folder.target / "sweep.nc")
+    table = table_of(asked, cases, found, folder.keys, folder.target)
+    write_answer(table, folder.target / "sweep.json")
     if page:
-        write_page(asked, cases, found, folder.keys, folder.target)
+        write_page(table, folder.target)
     else:
         (folder.target / WHOLE).unlink(missing_ok=True)
 

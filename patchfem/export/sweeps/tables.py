@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
+import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import numpy as np
 from ... import __version__
 from ...campaigns.sweeps.asked import Asked
 from ...campaigns.sweeps.cases import Cases
+from ...core import PatchfemError
 from ...disk.whole import whole
 from ...response import rows
 from ...runs.many.answers import Answers
@@ -24,6 +26,7 @@ from .. import netcdf
 from ..summary import versions
 
 BLOCK = 1000  # cases whose texts are made at once
+TRIED = 3  # cases that are asked for what all have in common
 ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
 
 
@@ -77,6 +80,9 @@ def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (
         data[name] = (dims, found.values[name].reshape(cases.shape), about)
         error = {"units": found.units[name], "long_name": f"estimated numerical half-width of {name}"}
         data[f"{name}_error"] = (dims, found.errors[name].reshape(cases.shape), error)
+        if np.nan_to_num(found.floors[name]).any():
+            data[f"{name}_floor"] = (dims, found.floors[name].reshape(cases.shape), {
+                "units": found.units[name], "long_name": f"error of {name} that is allowed beside the tolerance"})
     texts = {"outcome": (found.outcome, "how the case ended")}
     if found.messages:
         messages = [found.messages.get(number, "") for number in range(len(cases))]
@@ -88,8 +94,25 @@ def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (
     return netcdf.Contents(data, coordinates, {
         "Conventions": "CF-1.11", "title": f"sweep over {', '.join(axis.key for axis in cases.axes)}",
         "source": f"patchfem {__version__}", "scene": asked.text, "scene_file": asked.path.name,
-        "sets": json.dumps(list(asked.sets)),
+        "sets": json.dumps(list(asked.sets)), **facts(asked, cases),
         "scene_sha256": hashlib.sha256(asked.text.encode()).hexdigest(), "versions": json.dumps(versions())})
+
+
+def facts(asked: Asked, cases: Cases) -> dict:
+    """`tolerance` of all cases and `patch_length`, `patch_width` [m], as far as they are known and not swept."""
+    for number in range(min(len(cases), TRIED)):
+        try:
+            tables = tomllib.loads(asked.scene(cases.sets(number)).resolved())
+            break
+        except PatchfemError:  # this case has no answer
+            continue
+    else:
+        return {}
+    swept = {axis.key for axis in cases.axes}
+    held = {"tolerance": ("accuracy", "tolerance"), "patch_length": ("contact", "length"),
+            "patch_width": ("contact", "width")}
+    return {name: float(str(tables[table][key]).partition(" ")[0]) for name, (table, key) in held.items()
+            if key in tables.get(table, {}) and f"{table}.{key}" not in swept}
 
 
 def _numbers(values: Sequence) -> np.ndarray:

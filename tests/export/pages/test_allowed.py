@@ -1,5 +1,6 @@
-"""How far a key may go until a measure is off by 5 %: places known from a closed form, and ends that errors widen."""
+"""How far a key may go until what moves is off by 5 %: places known from a closed form, and ends that errors widen."""
 
+import json
 from math import log
 
 import numpy as np
@@ -7,81 +8,134 @@ import pytest
 from page_data import own_part
 from test_changes import TILT, key
 
-from patchfem.export.pages.allowed import allowed, sentence
-from patchfem.export.pages.sweep import page, within
+from patchfem.export.pages.allowed import allowed, as_json, sentence
+from patchfem.export.pages.sweep import page
+from patchfem.export.sweeps.answer import answer_of
 
-SETTLED = ("steady",)
+TILT = np.array(TILT)
 
 
-def found(values, errors=0.0, tilt=TILT, factors=False, **more):
-    one = key(tilt) | {"unit": "rad", "log": factors}
-    outcome = more.pop("outcome", ["steady"] * len(tilt))
-    measures = {"loop_area": (np.array(values, float), np.zeros(len(values)) + errors)}
-    return allowed([one], measures, outcome, SETTLED)
+def limits(measures: dict, errors=0.0, tilt=TILT, factors=False, trusted=None, **more):
+    """Limits of {measure: values} over the tilt."""
+    one = key(tilt, **more) | {"unit": "rad", "log": factors, "values": np.array(tilt) * 1e-3}
+    columns = {name: (np.array(values, float), np.zeros(len(values)) + errors) for name, values in measures.items()}
+    good = np.ones(len(tilt), bool) if trusted is None else np.array(trusted, bool)
+    return allowed([one], columns, dict.fromkeys(columns, good), True, {"length": 12.7e-3})
+
+
+def one_of(values, errors=0.0, **more):
+    """Allowed of the loop area."""
+    (one,) = limits({"loop_area": values}, errors, **more).found
+    return one
 
 
 def test_exact_a_straight_line_leaves_where_it_is_a_twentieth_off():
-    """E = 1 + 0.25 t - 0.0125 of a tilt t [mrad] from 0.05 on: 5 % are reached at t = 0.25."""
-    _, (one,) = found(1 + 0.25 * (np.array(TILT) - 0.05))
-    assert (one.inside, one.beyond) == (2, 3) and one.value == pytest.approx(0.25)
-    assert one.changed == pytest.approx(0.25 * 0.95)
-    assert sentence(*found(1 + 0.25 * (np.array(TILT) - 0.05))) == \
-        "Within 5 % of their values at 0.05 mrad stay: loop area up to 0.25 mrad."
+    """E = 1 + 0.25 t - 0.0125 of a tilt t [mrad] from 0.05 on: 5 % are reached at t = 0.25, 3.175 um over 12.7 mm."""
+    one = one_of(1 + 0.25 * (TILT - 0.05))
+    assert (one.inside, one.beyond) == (2, 3) and one.value == pytest.approx(0.25e-3)
+    assert one.changed == pytest.approx(0.25 * 0.95) and one.change == 0.05
+    assert sentence(limits({"loop_area": 1 + 0.25 * (TILT - 0.05)})) == (
+        "Tilt may reach 0.25 mrad (3.2 um over the patch, between cases at 0.2 and 0.5 mrad) before anything that "
+        "moves changes by 5 % (loop area first).")
 
 
 def test_exact_a_key_of_factors_is_read_along_its_logarithm():
-    """E = 1 - 0.02 ln(t/t0) has fallen by 5 % at t0 e^2.5."""
-    tilt = np.geomspace(1e-6, 1e-2, 9)
-    _, (one,) = found(1 - 0.02 * np.log(tilt / 1e-6), tilt=tilt, factors=True)
-    assert log(one.value / 1e-6) == pytest.approx(2.5) and (one.inside, one.beyond) == (2, 3)
+    """E = 1 - 0.02 ln(t/t0) has fallen by 5 % at t0 e^2.5; what grows as t^0.5 has doubled at 4 t0."""
+    tilt = np.geomspace(1e-3, 10, 9)
+    one = one_of(1 - 0.02 * np.log(tilt / 1e-3), tilt=tilt, factors=True)
+    assert log(one.value / 1e-6) == pytest.approx(2.5) and (one.inside, one.beyond, one.change) == (2, 3, -0.05)
+    (peak,) = limits({"pressure_peak": (tilt / 1e-3)**0.5}, tilt=tilt, factors=True).found
+    assert peak.value == pytest.approx(4e-6) and peak.change == 1
+    assert limits({"pressure_peak": (tilt / 1e-3)**-0.5}, tilt=tilt, factors=True).found[0].beyond is None
 
 
 def test_exact_errors_widen_the_ends_and_then_no_place_between_is_told():
     """5 % of 1 with the errors of both: 1.04 +- 0.02 is open, 1.09 +- 0.02 is beyond."""
     values = [1, 1.001, 1.04, 1.09, 1.2]
-    _, (one,) = found(values, 0.01)
+    one = one_of(values, 0.01)
     assert (one.inside, one.beyond) == (1, 3) and np.isnan(one.about)
-    assert "up to 0.1 mrad" in sentence(*found(values, 0.01))
-    assert (found(values)[1][0].inside, found(values)[1][0].beyond) == (2, 3)
+    assert "may reach 0.1 mrad (1.3 um over the patch, between cases at 0.1 and 0.5 mrad)" in sentence(
+        limits({"loop_area": values}, 0.01))
+    assert (one_of(values).inside, one_of(values).beyond) == (2, 3)
 
 
-def test_exact_what_never_leaves_or_has_no_first_value_is_not_in_the_sentence():
-    assert sentence(*found([1, 1.01, 1.02, 1.03, 0.96])) == ""
-    assert found([0, 1, 2, 3, 4])[1] == [] and found([np.nan, 1, 2, 3, 4])[1] == []
-    _, (one,) = found([1, 1.01, 1.04, 1.06, 1.2], 0.1)
-    assert one.beyond is None and one.inside == 0
-
-
-def test_exact_cases_that_did_not_settle_are_passed_over():
-    """The case at 0.2 mrad did not settle: the place lies somewhere between 0.1 and 0.5."""
-    outcome = ["steady", "steady", "grows", "steady", "steady"]
-    _, (one,) = found([1, 1.01, 7, 1.2, 1.3], outcome=outcome)
+def test_exact_cases_that_did_not_settle_or_miss_their_tolerance_are_passed_over():
+    """The case at 0.2 mrad does not count: the place lies somewhere between 0.1 and 0.5."""
+    one = one_of([1, 1.01, 7, 1.2, 1.3], trusted=[1, 1, 0, 1, 1])
     assert (one.inside, one.beyond) == (1, 3) and np.isnan(one.about)
+    assert sentence(limits({"loop_area": [1, 1.01, 1.02, 1.2, 1.3]}, trusted=[0, 1, 1, 1, 1])) == ""
+
+
+def test_exact_what_the_first_step_leaves_says_nothing():
+    """A loop that doubles from case to case was once said to stay within 5 % up to its first case."""
+    said = sentence(limits({"loop_area": 2.0**np.arange(5), "friction_force_peak": [1, 1, 1, 1.1, 1.2]}))
+    assert said == "" and as_json(limits({"loop_area": 2.0**np.arange(5)})) == []
+    assert one_of([0.5, 1, 2, 3, 4]).resolved() is False and limits({"loop_area": [0, 1, 2, 3, 4]}).found == []
+
+
+def test_exact_keys_that_drive_have_no_limit():
+    assert limits({"loop_area": [1, 1.01, 1.02, 1.2, 1.3]}, name="slide.amplitude").key is None
+
+
+def test_exact_nothing_that_moves_changes():
+    assert sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]})) == \
+        "Tilt may reach 1 mrad (13 um over the patch): nothing that moves changes by 5 %."
+    assert sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]}, trusted=[1, 1, 1, 1, 0])) == (
+        "Tilt may reach at least 0.5 mrad (6.4 um over the patch) before anything that moves changes by 5 %: the cases "
+        "after it are open.")
+
+
+def test_exact_a_measure_that_cannot_be_told_is_not_among_what_moves():
+    line = 1 + 0.25 * (TILT - 0.05)
+    said = sentence(limits({"loop_area": line, "slip_amplitude": [0, 1, 1, 1, 1]}))
+    assert "before the loop area changes by 5 %" in said and "anything" not in said
 
 
 def test_exact_of_several_lines_the_one_that_allows_least():
     """E = 1 + s (t - 0.05) leaves at 0.05 + 0.05/s: 0.25 and 0.15 for slopes of 0.25 and 0.5."""
     tilt, slope = (grid.ravel() for grid in np.meshgrid(TILT, [0.25, 0.5], indexing="ij"))
     keys = [key(tilt) | {"unit": "rad", "log": False}, key(slope, "normal.load", "N") | {"unit": "N", "log": False}]
-    values = 1 + slope * (tilt - 0.05)
-    _, (one,) = allowed(keys, {"loop_area": (values, 0 * values)}, ["steady"] * 10, SETTLED)
+    values, good = 1 + slope * (tilt - 0.05), {"loop_area": np.ones(10, bool)}
+    (one,) = allowed(keys, {"loop_area": (values, 0 * values)}, good).found
     assert one.value == pytest.approx(0.15)
-    assert allowed(keys, {"loop_area": (values, 0 * values)}, ["steady"] * 10, SETTLED, grid=False) == (None, [])
+    assert allowed(keys, {"loop_area": (values, 0 * values)}, good, grid=False).key is None
 
 
-def test_exact_the_page_tells_it_in_a_sentence_and_a_table():
-    values = 1 + 0.25 * (np.array(TILT) - 0.05)
-    measures = {name: {"unit": unit, "means": "m", "values": each, "errors": np.zeros(5)}
-                for name, unit, each in (("loop_area", "J", values), ("pressure_peak", "Pa", 1e6 * np.array(TILT)),
-                                         ("contact_fraction", "1", np.ones(5)))}
-    text = own_part(page({"title": "t", "version": "0", "command": "c", "scene": "s", "seconds": 1.0, "grid": True,
-                          "keys": [key() | {"unit": "rad", "log": True}], "measures": measures,
-                          "outcome": ["steady"] * 5, "messages": {}, "folders": None}))
-    assert "Within 5 % of their values at 0.05 mrad stay: " in text and "Change against the first case" in text
-    assert "between 0.2 and 0.5 mrad, at about 0.2" in text and "in no case" in text
-    assert "&times; 20" in text and "+23.8 %" in text
+def swept() -> dict:
+    """A sweep over the tilt: straight lines, a pressure in proportion, two cases that miss the tolerance."""
+    line, tilt = 1 + 0.25 * (TILT - 0.05), key() | {"unit": "rad", "log": False, "values": TILT * 1e-3}
+    known = {"loop_area": ("J", line), "relative_displacement_amplitude": ("m", 1e-5 * line**0.5),
+             "pressure_peak": ("Pa", 1e6 + 2e7 * TILT), "moment": ("N m", np.ones(5)),
+             "normal_stiffness": ("N m-1", 1 - 0.1 * TILT), "contact_fraction": ("1", np.ones(5))}
+    measures = {name: {"unit": unit, "means": "m", "values": values, "errors": np.zeros(5)}
+                for name, (unit, values) in known.items()}
+    measures["moment"]["errors"] = np.array([0, 0, 0, 0.2, 0.4])
+    return {"title": "t", "version": "0", "command": "c", "scene": "s", "seconds": 1.0, "grid": True, "keys": [tilt],
+            "measures": measures, "outcome": ["steady"] * 5, "messages": {}, "folders": None, "tolerance": 0.01,
+            "patch": {"length": 12.7e-3}}
+
+
+def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
+    """(1 + s)^0.5 is 1.05 at s = 0.1025, a tilt of 0.46 mrad; 2 MPa are doubled at 0.15 mrad; 1 - 0.1 t at 0.5475."""
+    text, found = own_part(page(swept())), answer_of(swept())
+    want = ("Tilt may reach 0.25 mrad (3.2 um over the patch, between cases at 0.2 and 0.5 mrad) before anything that "
+            "moves changes by 5 % (loop area first; relative displacement amplitude at 0.46 mrad); the pressure peak "
+            "doubles at 0.15 mrad; the stiffness of the patch changes by 5 % at 0.55 mrad (normal).")
+    assert f"<p>{want}</p>" in text and "Change against the first case" in text
+    assert "between 0.2 and 0.5 mrad, at about 0.25 mrad" in text and "in no case" in text and "+23.8 %" in text
+    assert found["cases"] == {"count": 5, "failed": 0, "unfinished": 0,
+                              "over_tolerance": {"moment": {"count": 2, "worst": pytest.approx(0.4)}}}
+    miss = "2 of 5 cases miss the tolerance of 1 % in moment, worst at contact.tilt.angle 1 mrad: 40 % of its value"
+    assert found["answer"] == f"{miss}; {want.replace('Tilt', 'tilt', 1)}" and f"<p>{miss}.</p>" in text
+    known = {one["measure"]: one for one in found["limits"]}
+    assert known["pressure_peak"] == {"measure": "pressure_peak", "key": "contact.tilt.angle", "unit": "rad",
+                                      "value": pytest.approx(0.15e-3, rel=0.02), "change": 1.0,
+                                      "low": pytest.approx(1e-4), "high": pytest.approx(2e-4)}
+    assert known["normal_stiffness"]["change"] == -0.05 and found["ranking"] == {}
+    json.dumps(found, allow_nan=False)
 
 
 def test_always_the_sentence_of_a_sweep_without_numbers_is_empty():
-    one = key([0, 1], words=True) | {"unit": "1", "log": False, "texts": ["coulomb", "tanh"]}
-    assert within([one], {"loop_area": (np.ones(2), np.zeros(2), "J")}, ["steady"] * 2) == ""
+    table = swept() | {"keys": [key(words=True) | {"unit": "1", "log": False, "texts": list("abcde")}]}
+    found = answer_of(table)
+    assert found["limits"] == [] and "moment, worst at contact.tilt.angle e" in found["answer"]

@@ -1,0 +1,91 @@
+"""What a sweep says first: how many cases miss the tolerance, how far its key may go, where its main measure runs."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...scales import plain, short
+from . import allowed, missed
+from .changes import changes, shown_of
+from .words import zero_below
+from .written import NUMBER, label
+
+SETTLED = ("steady", "stuck", "done", "no_contact")
+FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", "onset_level", "pressure_peak")
+
+
+class Lead(NamedTuple):
+    """missed: as `missed.counted`; misses: that in a sentence; limits: what the key allows; limit: that in a sentence;
+    span: from where to where the main measure runs; turns: what changes as the key grows. "" where there is nothing to
+    say."""
+
+    missed: dict
+    misses: str
+    limits: allowed.Limits
+    limit: str
+    span: str
+    turns: str
+
+    def sentences(self) -> list:
+        """What people read, the worst first."""
+        return [one for one in (self.misses, self.limit, self.span, self.turns) if one]
+
+    def answer(self) -> str:
+        """One sentence: how far the key may go or where the main measure runs, and before it how many cases miss the
+        tolerance."""
+        text = self.limit or self.span or self.turns
+        return f"{self.misses.rstrip('.')}; {text[0].lower() if text[1:2].islower() else text[0]}{text[1:]}" \
+            if self.missed and text else text or self.misses
+
+
+def lead_of(table: dict) -> Lead:
+    """The Lead of a sweep; table: as `sweep.page` takes it."""
+    measures, tolerance = table["measures"], table.get("tolerance", np.nan)
+    keys = [one | {"words": not any(NUMBER.match(str(text)) for text in one["texts"])} for one in table["keys"]]
+    outcome = np.asarray(table["outcome"], str)
+    settled = np.isin(outcome, SETTLED)
+    trusted = {name: ~missed.over(one, tolerance) & (settled | ~np.isfinite(one["values"])[settled].any())
+               for name, one in measures.items()}
+    limits = allowed.allowed(keys, columns(table), trusted, table["grid"], table.get("patch"))
+    shown = {one["name"]: shown_of(one) for one in keys if not one["words"]}
+
+    def where(case: int) -> str:
+        return ", ".join(f"{one['name']} {shown[one['name']](case) if one['name'] in shown else one['texts'][case]}"
+                         for one in keys)
+
+    return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
+                allowed.sentence(limits), span(columns(table), trusted, settled),
+                changes(keys, columns(table), outcome, table["grid"]))
+
+
+def span(measures: dict, trusted: dict, settled: np.ndarray) -> str:
+    """From where to where the first measure of interest runs, and how well its values are known; "" where none has a
+    value that counts.
+
+    measures: {name: (values (n,), errors (n,), SI unit)}, NaN where a case has none; trusted: {name: (n,) whether the
+    value of a case counts}; settled: (n,) whether a case did.
+    """
+    for name in FIRST:
+        every = np.isfinite(measures[name][0]) if name in measures else np.zeros(1, bool)
+        if not every.any():
+            continue
+        there = every & trusted[name]
+        if not there.any():
+            return ""
+        values, errors, unit = (part if isinstance(part, str) else np.asarray(part, float)[there]
+                                for part in measures[name])
+        low, high = (short(one, unit, 4, zero_below(name)) for one in (values.min(), values.max()))
+        ran = f"is {high} throughout" if low == high else f"runs from {low} to {high}"
+        known = np.isfinite(errors) & (errors > 0) & (values != 0)
+        share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
+        band = f", known to {plain(100 * share, 1)} % or better" if share else ""
+        counts, ended = there.sum(), (every & settled).sum()
+        whose = "" if counts == every.sum() else " of the settled cases" if counts == ended else \
+            " in the cases that meet the tolerance"
+        return f"{label(name).capitalize()}{whose} {ran}{band}."
+    return ""
+
+
+def columns(table: dict) -> dict:
+    """The measures of a table as (values, errors, unit)."""
+    return {name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()}

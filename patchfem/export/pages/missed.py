@@ -1,0 +1,66 @@
+"""Cases of a sweep that miss their tolerance: which measures, how many cases, and the worst by its relative error."""
+
+import numpy as np
+
+from ...scales import plain
+from .written import label
+
+# what a case answers first, named before what misses its tolerance by more
+FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_ratio_peak",
+         "pressure_peak", "contact_fraction")
+
+
+def over(one: dict, tolerance) -> np.ndarray:
+    """(n,) whether the error of a measure is more than tolerance * |value| + floor, as a single run is warned of.
+
+    one: `values`, `errors` and `floors` (n,) [SI], NaN where a case has none; tolerance: of all cases or (n,), NaN
+    where it is not known.
+    """
+    values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
+    floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
+    with np.errstate(invalid="ignore"):
+        return errors > tolerance * np.abs(values) + floors  # no comparison with NaN holds
+
+
+def counted(measures: dict, tolerance) -> dict:
+    """{measure: {`count` of cases over the tolerance, `worst`: their largest error/|value|, None where all are 0}} of
+    the measures that miss it anywhere; measures: {name: as `over` takes it}."""
+    out = {}
+    for name, one in measures.items():
+        if (missed := over(one, tolerance)).any():
+            share = _share(one)[missed & (np.asarray(one["values"], float) != 0)]
+            out[name] = {"count": int(missed.sum()), "worst": float(share.max()) if share.size else None}
+    return out
+
+
+def sentence(measures: dict, tolerance, where) -> str:
+    """How many cases miss the tolerance in the worst measure of those that answer first, where it is worst and how many
+    other measures miss it; "" where no error is known.
+
+    measures and tolerance: as `counted` takes them; where(case): the swept values of a case as people read them.
+    """
+    known = {name: np.isfinite(np.asarray(one["errors"], float)) for name, one in measures.items()}
+    number = max((found.size for found in known.values()), default=0)
+    limits = np.broadcast_to(np.asarray(tolerance, float), number)
+    if not any(found.any() for found in known.values()) or not np.isfinite(limits).any():
+        return ""
+    asked = f"the tolerance of {100 * limits[0]:g} %" if np.ptp(limits) == 0 else "their tolerance"
+    lost = {name: over(one, tolerance) for name, one in measures.items()}
+    lost = {name: missed for name, missed in lost.items() if missed.any()}
+    if not lost:
+        return f"All {number} cases meet {asked}."
+    worst = {name: float(np.where(missed, _share(measures[name]), 0.0).max()) for name, missed in lost.items()}
+    name = max([name for name in FIRST if name in lost] or lost, key=worst.get)
+    count, size, others = int(lost[name].sum()), worst[name], len(lost) - 1
+    case = int(np.argmax(np.where(lost[name], _share(measures[name]), 0.0)))
+    known = f"{plain(100 * size, 2)} % of its value" if np.isfinite(size) else "0 within its error"
+    more = f"; {others} other measure{'s' * (others > 1)} miss{'es' * (others == 1)} it somewhere" if others else ""
+    return (f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {label(name)}, worst at {where(case)}: "
+            f"{known}{more}.")
+
+
+def _share(one: dict) -> np.ndarray:
+    """Error over |value|, case by case; inf where the value is 0."""
+    values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(errors > 0, errors / np.abs(values), 0.0)

@@ -1,0 +1,74 @@
+"""Which cases miss their tolerance: against the rule by hand, and against a single run of every case."""
+
+import numpy as np
+import pytest
+from scene_texts import PIECE
+
+import patchfem as pf
+from patchfem.export.pages.missed import counted, over, sentence
+
+NAN = np.nan
+
+
+def one(values, errors, floors=0.0) -> dict:
+    return {"values": np.array(values, float), "errors": np.array(errors, float), "floors": floors}
+
+
+def test_exact_an_error_is_over_where_it_is_more_than_tolerance_and_floor():
+    found = one([1, -1, 0, 0, NAN, 2], [0.011, 0.009, 1e-9, 1e-3, 0.1, NAN], np.array([0, 0, 1e-6, 1e-6, 0, NAN]))
+    assert over(found, 0.01).tolist() == [True, False, False, True, False, False]
+    assert over(found, NAN).sum() == 0 and over(found, np.full(6, 0.02)).tolist() == [False] * 3 + [True] + [False] * 2
+    assert counted({"a": found, "b": one([1], [0])}, 0.01) == {"a": {"count": 2, "worst": pytest.approx(0.011)}}
+    assert counted({"a": one([0, 0], [1, 0])}, 0.01) == {"a": {"count": 1, "worst": None}}
+
+
+def test_exact_the_worst_is_relative_and_named_with_its_case():
+    """The largest absolute error, of the last case, is the smallest of all: 2e-5 of 0.19 is one in ten thousand."""
+    loop = one([2e-7, 5e-6, 0.19], [4.4e-7, 5e-7, 2e-5])
+    where = ["slide.amplitude 0.05 um", "", ""].__getitem__
+    assert sentence({"loop_area": loop}, 0.01, where) == \
+        "2 of 3 cases miss the tolerance of 1 % in loop area, worst at slide.amplitude 0.05 um: 220 % of its value."
+    others = {"loop_area": loop, "moment": one([1, 1, 1], [9, 9, 9]), "rotation": one([1] * 3, [0, 0, 1])}
+    assert sentence(others, 0.01, where).endswith("220 % of its value; 2 other measures miss it somewhere.")
+    assert sentence({"loop_area": one([1, 1], [1e-3, 0])}, 0.01, where) == "All 2 cases meet the tolerance of 1 %."
+    assert sentence({"loop_area": loop}, np.array([9, 0.2, 0.1]), where) == "All 3 cases meet their tolerance."
+    assert sentence({"loop_area": loop}, NAN, where) == sentence({"a": one([1], [NAN])}, 0.1, where) == ""
+
+
+@pytest.mark.share(1)
+def test_exact_the_count_is_that_of_single_runs():
+    """A joint in deep microslip on a mesh too coarse for it: every case run alone, its measures and its warnings."""
+    scene = pf.load(PIECE + """
+load = "115 N"
+substrate = "steel"
+element_size = "0.4 mm"
+[contact.crown]
+radius = "100 m"
+[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.3
+[slide]
+kind = "sine"
+amplitude = "2 um"
+frequency = "1 Hz"
+cycles = 2
+[accuracy]
+tolerance = 1e-2
+""")
+    swept = pf.sweep(scene, {"slide.amplitude": "0.02 um..20 um:5"})
+    alone = [pf.run(scene, **{"slide.amplitude": float(value)}) for value in swept.slide_amplitude.values]
+    names = [name.removesuffix("_error") for name in swept if name.endswith("_error")]
+    lost = {name: [_misses(run.measures.get(name)) for run in alone] for name in names}
+    for name, missed in lost.items():
+        floors = swept[f"{name}_floor"].values if f"{name}_floor" in swept else 0.0
+        found = one(swept[name].values, swept[f"{name}_error"].values, floors)
+        assert over(found, swept.attrs["tolerance"]).tolist() == missed, name
+    assert 0 < sum(lost["loop_area"]) < 5 and sum(map(any, zip(*lost.values(), strict=True))) in range(1, 6)
+    warned = [any("the tolerance is 0.01" in text for text in run.warnings) for run in alone]
+    assert warned == [any(missed) for missed in zip(*lost.values(), strict=True)]
+
+
+def _misses(measure) -> bool:
+    return None not in (measure and measure.value, measure and measure.error) and \
+        measure.error > 0.01 * abs(measure.value) + measure.floor
