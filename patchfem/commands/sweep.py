@@ -80,6 +80,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     """
     from ..campaigns.sweeps import executors
     from ..campaigns.sweeps.ask import asked_of
+    from ..core import Missing
     from ..export.sweeps.run import Place, collect, sweep_into
 
     if no_page and keep == "pages":
@@ -97,11 +98,13 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     try:
         found = sweep_into(asked, cases, Place(target, resume, keep != "summaries", part, keep == "pages", not no_page),
                            executors.of(by.executor, by.jobs), None if quiet else say, line)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Missing) as why:
         line.end()
-        say(f"interrupted; {line.done} of {len(cases)} cases are kept; go on with: patchfem "
+        if isinstance(why, Missing) and not line.done:
+            raise
+        say(f"{str(why) or 'interrupted'}; {line.done} of {len(cases)} cases are kept; go on with: patchfem "
             f"{shlex.join([word for word in sys.argv[1:] if word != '--resume'])} --resume")
-        raise Ended(130) from None
+        raise Ended(getattr(why, "code", 130)) from None
     line.end()
     if part is not None:
         if json_ or not quiet:

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache
+from hashlib import sha256
+from logging import CRITICAL, getLogger
+from pathlib import Path
 from time import perf_counter
 
-from ....core import Missing
+import numpy as np
+
+from ....core import Missing, PatchfemError
 from ..sweep import Died, Work, answer
 
+_TLS = "DASK_DISTRIBUTED__COMM__TLS__"
+CERTIFICATES = f"{_TLS}CA_FILE, {_TLS}CLIENT__CERT and {_TLS}CLIENT__KEY"
 AHEAD = 2  # chunks on their way per worker, so that none waits for the next
 PATIENCE = "10s"  # for a scheduler to answer
 
@@ -28,52 +38,113 @@ class Cluster:
 
             # tries are counted by the sweep; a profile of the workers, which nobody sees, is a third of a chunk's way
             dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.worker.profile.enabled": False,
+                             "distributed.scheduler.http.routes": [], "distributed.worker.http.routes": [],
                              "distributed.nanny.pre-spawn-environ.PYTHONSAFEPATH": 1})
+            quiet = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}  # a port that tells nothing
             self.own = distributed.LocalCluster(workers or os.cpu_count() or 1, threads_per_worker=1, processes=True,
-                                                dashboard_address=None, silence_logs="CRITICAL")
+                                                scheduler_kwargs=quiet, silence_logs="CRITICAL")
+        self.name = f"--executor dask{':' * bool(address)}{address}"
+        for one in (*getLogger("distributed").handlers, getLogger("tornado"), getLogger("asyncio")):
+            one.setLevel(CRITICAL)  # what they have to say is said here
+        tls = distributed.Security().get_connection_args("client")["ssl_context"] is not None
+        if address.startswith("tls:") and not tls:
+            raise PatchfemError(f"{self.name}: TLS wants certificates; name their files in {CERTIFICATES}")
         try:
             self.client = distributed.Client(self.own or address, timeout=PATIENCE, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
-            raise Missing(f"--executor dask:{address}: no scheduler answers there ({error})") from None
-        self.workers = max(len(self.client.scheduler_info(n_workers=-1)["workers"]), 1)
+            raise Missing(f"{self.name}: no scheduler answers there ({error})") from None
+        found = self.client.run(own_of, on_error="return")
+        self.workers = max(len(found), 1)
+        for own in found.values():
+            if own != own_of():
+                self.client.close()
+                raise self._other(own, own_of())
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
         """(chunk, seconds, answer or Died) of each chunk that `take` hands out, as they come in."""
         from distributed import as_completed
+        from distributed.client import ClosedClientError
 
+        path, want = work.asked.path, own_of(work)
+        there = replace(work, asked=replace(work.asked, path=Path(os.path.abspath(path))))
         try:
-            shared = self.client.submit(_as_it_is, work, pure=False)  # made again where all that hold it have died
+            shared = self.client.submit(_as_it_is, there, pure=False)  # made again where all that hold it have died
             ready, on_the_way = as_completed(loop=self.client.loop, with_results=True, raise_errors=False), {}
             while True:
                 while len(on_the_way) < AHEAD * self.workers and (chunk := take(not on_the_way)) is not None:
-                    future = self.client.submit(_answer, shared, chunk, os.getcwd(), pure=False)
+                    future = self.client.submit(_answer, shared, chunk, (want, path), pure=False)
                     on_the_way[future] = chunk
                     ready.add(future)
                 if not on_the_way:
                     return
                 future, found = next(ready)
                 chunk = on_the_way.pop(future)
-                yield chunk, *(found if future.status == "finished" else _died(future))
+                if isinstance(found, dict):
+                    raise self._other(found, want)
+                yield chunk, *(found if future.status == "finished" else self._died(future))
+        except ClosedClientError:
+            raise self._lost() from None
         finally:
             self.client.close()
             if self.own is not None:
                 self.own.close()
+
+    def _lost(self) -> Missing:
+        return Missing(f"{self.name}: its scheduler is lost")
+
+    def _other(self, found: dict | Exception, want: dict) -> Missing:
+        """Why a worker cannot answer: what it said of itself, or how it failed to, beside what is wanted."""
+        if isinstance(found, Exception):
+            said = f"{type(found).__name__}: {found}"
+            return Missing(f"{self.name}: a worker has no patchfem {want['patchfem']} ({said})")
+        names = [name for name in want if found[name] != want[name] and name != "files"]
+        there, here = (", ".join(f"{name} {one[name]}" for name in names) for one in (found, want))
+        if names:
+            return Missing(f"{self.name}: a worker has {there}; here it is {here}: install the same there")
+        return Missing(f"{self.name}: a worker finds other files than those that the scene names here; put them where "
+                       "both look")
+
+    def _died(self, future) -> tuple:
+        """(0 s, Died) of a chunk whose worker died or failed; Missing where the scheduler did."""
+        if future.status == "cancelled":  # nobody here does that
+            raise self._lost()
+        error = future.exception()
+        killed = type(error).__name__ == "KilledWorker"
+        return 0.0, Died("its worker died" if killed else f"its worker failed ({type(error).__name__}: {error})")
+
+
+@cache
+def _source() -> str:
+    """Sign of the sources of this package."""
+    root = Path(__file__).parents[3]
+    texts = sorted((path.relative_to(root).as_posix(), path.read_bytes()) for path in root.rglob("*.py"))
+    return sha256(repr(texts).encode()).hexdigest()[:8]
+
+
+def own_of(work: Work | None = None) -> dict:
+    """What whoever answers a work must have as who asks has it: versions by name, and as `files` the sign of the scene
+    with the files that it names."""
+    from .... import __version__
+
+    own = {"patchfem": f"{__version__} (sources {_source()})", "numpy": np.__version__,
+           "python": "{}.{}".format(*sys.version_info)}
+    return own if work is None else own | {"files": work.asked.digest()}
 
 
 def _as_it_is(work: Work) -> Work:
     return work
 
 
-def _answer(work: Work, chunk: list, folder: str) -> tuple:
-    """(seconds, answer) of a chunk, in a worker; folder: which the paths of the scene are relative to."""
-    if os.path.isdir(folder):
-        os.chdir(folder)
+def _answer(work: Work, chunk: list, asked: tuple) -> tuple | dict:
+    """(seconds, answer) of a chunk, in a worker, or `own_of` there where that is not the same.
+
+    asked: (`own_of` where the sweep runs, the path of the scene as it is named there, which messages name too).
+    """
+    want, path = asked
+    if (own := own_of(work)) != want:
+        return own
     begin = perf_counter()
-    found = answer(work, chunk)
-    return perf_counter() - begin, found
-
-
-def _died(future) -> tuple:
-    error = future.exception()
-    killed = type(error).__name__ == "KilledWorker"
-    return 0.0, Died("its worker died" if killed else f"its worker failed ({type(error).__name__}: {error})")
+    found, told = answer(work, chunk)
+    folder, named = f"{work.asked.path.parent}{os.sep}", str(path.parent / "_")[:-1]
+    found.messages.update({case: text.replace(folder, named) for case, text in found.messages.items()})
+    return perf_counter() - begin, (found, told)

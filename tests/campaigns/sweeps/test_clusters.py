@@ -1,0 +1,148 @@
+"""Clusters: a worker that is not what asks is refused, one whose scheduler dies says so, and nobody looks in."""
+
+import os
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+from command_line import cli
+from scene_texts import BENCH
+
+from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.cases import Cases
+from patchfem.campaigns.sweeps.executors import cluster
+from patchfem.campaigns.sweeps.executors.cluster import Cluster, _answer, own_of
+from patchfem.campaigns.sweeps.sweep import Work, answer
+from patchfem.core import Missing
+from patchfem.scene.axes import read
+
+pytest.importorskip("distributed")
+BY_FILE = BENCH[:BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'
+PATH = "time [s],displacement [um]\n0,0\n0.1,5\n0.2,-5\n0.3,5\n"
+SERVER = """\
+import time
+import distributed
+cluster = distributed.LocalCluster(1, processes=False, protocol="tcp", host="127.0.0.1", dashboard_address=None)
+print(cluster.scheduler.address, flush=True)
+time.sleep(100)
+"""
+
+
+def work(place: Path, text=BENCH, values="0.2,0.3,-1") -> Work:
+    return Work(Asked(place, text), Cases(tuple(read([f"friction.static={values}"])[0])))
+
+
+@pytest.fixture
+def scene(tmp_path):
+    (tmp_path / "here").mkdir()
+    (tmp_path / "there").mkdir()
+    (tmp_path / "here" / "path.csv").write_text(PATH)
+    return tmp_path / "here" / "bench.toml"
+
+
+def test_exact_a_worker_in_another_folder_answers_from_the_files_of_the_scene(scene, monkeypatch):
+    """Messages name the scene as it was named where the sweep runs; the worker's folder stays as it is."""
+    monkeypatch.chdir(scene.parent)
+    asked = work(Path("bench.toml"), BY_FILE)
+    want, _ = answer(asked, [0, 1, 2])
+    there, mine = work(scene, BY_FILE), own_of(asked)
+    monkeypatch.chdir(scene.parents[1] / "there")
+    _, (found, _) = _answer(there, [0, 1, 2], (mine, Path("bench.toml")))
+    assert found.messages == want.messages and len(want.messages) == 1
+    assert found.values["friction_work"].tolist()[:2] == want.values["friction_work"].tolist()[:2]
+    assert Path.cwd().name == "there"
+    (scene.parent / "path.csv").write_text(PATH.replace("5", "6"))
+    assert _answer(there, [0], (mine, Path("bench.toml")))["files"] != mine["files"]
+
+
+class Worn:
+    """A future of a scheduler that is gone, or one that failed."""
+
+    def __init__(self, status, error=None):
+        self.status, self.error = status, error
+
+    def exception(self):
+        return self.error
+
+
+def test_always_says_what_a_worker_has_otherwise():
+    here = Cluster.__new__(Cluster)
+    here.name, mine = "--executor dask:tcp://x:1", own_of(work(Path("a.toml")))
+    said = str(here._other(mine | {"patchfem": "0.3.0 (sources 12345678)", "files": "other"}, mine))
+    assert "a worker has patchfem 0.3.0 (sources 12345678); here it is patchfem " + mine["patchfem"] in said
+    assert "numpy" not in said and "files" not in said
+    assert "numpy 1.0" in str(here._other(mine | {"numpy": "1.0"}, mine))
+    assert "other files" in str(here._other(mine | {"files": "other"}, mine))
+    assert "no patchfem" in str(here._other(AttributeError("no own_of"), mine))
+    with pytest.raises(Missing, match="its scheduler is lost"):
+        here._died(Worn("cancelled"))
+    assert "OSError: no" in here._died(Worn("error", OSError("no")))[1].reason
+
+
+SEEN = []
+
+
+def changing(asked=None) -> dict:
+    """`own_of` with another version every time: by reference, as what travels to a worker by value is a copy."""
+    SEEN.append(asked)
+    return own_of(asked) | {"patchfem": f"0.{len(SEEN)}"}
+
+
+def test_refuses_a_worker_of_another_version(monkeypatch):
+    """Workers that are there at once are asked before anything is sent, one that comes later with its first chunk."""
+    import distributed
+
+    said = r"a worker has patchfem 0.\d; here it is patchfem 0.\d: install the same there"
+    with distributed.LocalCluster(1, processes=False, protocol="tcp", host="127.0.0.1", dashboard_address=None,
+                                  silence_logs="CRITICAL") as one:
+        ready, left = Cluster(one.scheduler.address), [[0], [1]]
+        monkeypatch.setattr(cluster, "own_of", changing)
+        with pytest.raises(Missing, match=said):
+            Cluster(one.scheduler.address)
+        with pytest.raises(Missing, match=said):
+            list(ready.run(work(Path("a.toml")), lambda idle=True: left.pop() if left else None))
+
+
+def test_refuses_tls_without_certificates_and_names_the_variables(tmp_path):
+    (tmp_path / "bench.toml").write_text(BENCH)
+    answer = cli("sweep", tmp_path / "bench.toml", "--over", "friction.static=0.2,0.3", "--executor",
+                 "dask:tls://127.0.0.1:1", "-o", tmp_path / "out")
+    assert answer.code == 2
+    for name in ("CA_FILE", "CLIENT__CERT", "CLIENT__KEY"):
+        assert f"DASK_DISTRIBUTED__COMM__TLS__{name}" in answer.err
+
+
+@pytest.mark.slow
+def test_always_a_lost_scheduler_ends_the_sweep_with_what_is_kept(tmp_path):
+    (tmp_path / "bench.toml").write_text(BENCH)
+    server = subprocess.Popen([sys.executable, "-P", "-c", SERVER], stdout=subprocess.PIPE, text=True)
+    words = ["bench.toml", "--over", "friction.static=0.05..0.6:3000lin", "-o", "out", "--no-page"]
+    try:
+        running = subprocess.Popen([sys.executable, "-m", "patchfem", "sweep", *words, "--executor",
+                                    f"dask:{server.stdout.readline().strip()}"], cwd=tmp_path, stderr=subprocess.PIPE,
+                                   text=True, env=os.environ | {"PYTHONUNBUFFERED": "1"})
+        while running.poll() is None and not any((tmp_path / "out" / "cases").glob("[0-9a-f]*")):
+            pass
+    finally:
+        server.kill()
+    _, said = running.communicate(timeout=60)
+    assert running.returncode == 4, said
+    assert "its scheduler is lost; " in said and "of 3000 cases are kept; go on with: patchfem sweep" in said
+    assert "Traceback" not in said and "CommClosed" not in said
+
+
+@pytest.mark.slow
+def test_always_a_cluster_of_this_machine_shows_itself_to_nobody():
+    one = Cluster("", 1)
+    try:
+        places = [held.getsockname() for held in one.own.scheduler.http_server._sockets.values()]
+        assert {place[0] for place in places} == {"127.0.0.1"}
+        for page in ("status", "info/main/workers.html", "json/counts.json", "health"):
+            with pytest.raises(urllib.error.HTTPError, match="404"):
+                urllib.request.urlopen(f"http://127.0.0.1:{places[0][1]}/{page}", timeout=10)
+    finally:
+        one.client.close()
+        one.own.close()
