@@ -236,7 +236,8 @@ class Row(NamedTuple):
 
     of: its function of the solution, None where a run of another kind or an engine alone has it; grain: samples of a
     cycle that its reading may be off by; group: of measures that a reader looks at together, motion, friction, energy,
-    patch or wear.
+    patch or wear; term: of a measure that is a difference of larger terms, what these are in words, and the size of
+    them from the values of the same interface by name; the tolerance times it is a floor as well.
     """
 
     name: str
@@ -246,6 +247,7 @@ class Row(NamedTuple):
     of: Callable | None = None
     grain: float = 0.0
     group: str = "motion"
+    term: tuple[str, Callable] | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

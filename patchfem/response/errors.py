@@ -15,7 +15,7 @@ from statistics import median
 import numpy as np
 
 from ..core import Measure
-from .rows import floor_of, of_first, row_of
+from .rows import first_harmonic, floor_of, of_first, row_of
 
 ORDERS = 2**1.7, 2**2.3  # ratios of two changes at halved steps that show second order
 SURE = 2.2  # times the error that follows from the order: 95 % of these are below 1.5 to 2 times it
@@ -84,18 +84,14 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int, size: float = 
     if "slip_start_phase" in out and "slip_start_phase" not in quarter:  # one change alone tells nothing; a stick of a
         # share s lasts pi s twice a cycle, and each of its ends moves by half of that
         out["slip_start_phase"] = max(out["slip_start_phase"], np.pi / 2 * out.get("stick_fraction", 0.0))
+    if fine.get("open_fraction") == 0 and fine.get("normal_load_least", 0.0) > out.get("normal_load_least", np.inf):
+        out["open_fraction"] = 0.0  # the load stays above 0 between the samples as well
     return out
 
 
 def _size(values: dict, name: str) -> float:
-    """What a share of a measure is a share of: its value, and of the stiffness that of the whole first harmonic.
-
-    The part of the force against the slide, W/(pi A^2) over the slide, is often many times the part with it.
-    """
-    value, reach = abs(values[name]), values.get("slip_amplitude", 0.0)
-    if name == "equivalent_stiffness" and reach:
-        return float(np.hypot(value, values.get("loop_area", 0.0) / (np.pi * reach**2)))
-    return value
+    """What a share of a measure is a share of: its value, and of the stiffness that of the whole first harmonic."""
+    return float(first_harmonic(values)) if name == "equivalent_stiffness" else abs(values[name])
 
 
 def orders(fine: dict, half: dict, quarter: dict) -> dict:

@@ -5,7 +5,7 @@ off the last cycles of a run. A new measure is a new row.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -90,6 +90,21 @@ class Seen:
         return None if load is None or self.load is None else float(value(load))
 
 
+def first_harmonic(values: dict):
+    """First harmonic of the friction over that of the slide [N/m]: the part in phase and the other, W/(pi A^2), which
+    is often many times as large; values: of one run, or (n,) of many."""
+    part, reach = np.abs(values["equivalent_stiffness"]), np.asarray(values.get("slip_amplitude", 0.0), float)
+    with np.errstate(all="ignore"):
+        other = np.where(reach > 0, values.get("loop_area", 0.0) / (np.pi * reach**2), 0.0)
+    return np.hypot(part, np.nan_to_num(other))
+
+
+def _moved(values: dict):
+    """Amplitude [m] of what drifts: of the slip, of the motion where nothing slips; values as `first_harmonic`."""
+    slip = np.abs(np.nan_to_num(np.asarray(values.get("slip_amplitude", 0.0), float)))
+    return np.where(slip > 0, slip, np.abs(values.get("relative_displacement_amplitude", 0.0)))
+
+
 ROWS = (
     Row("relative_displacement_amplitude", "m", 1e-10, "half peak-to-peak motion at the output, relative to the base",
         lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2),
@@ -99,7 +114,7 @@ ROWS = (
         lambda s: float(np.abs(s.window.force).max()) if s.load is not None else None, group="friction"),
     Row("energy_balance", "1", 1e-8,
         "work in that is neither stored nor dissipated over the run, over the power that passed and the peak stored",
-        lambda s: energy_balance(s.book), group="energy"),
+        lambda s: energy_balance(s.book), group="energy", term=("1", lambda _: 1.0)),
     Row("absolute_acceleration_fundamental", "m s-2", 1e-4,
         "first harmonic of the acceleration at the output, base motion included",
         lambda s: s.waves.get("absolute_acceleration_fundamental")),
@@ -108,7 +123,8 @@ ROWS = (
         lambda s: s.waves.get("acceleration_distortion")),
     Row("drift_per_cycle", "m", 1e-11,
         "time mean of the slide in the last cycle less that in the first of the last cycles, per cycle between them",
-        lambda s: drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period)),
+        lambda s: drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period),
+        term=("slip, or motion", _moved)),
     Row("slip_amplitude", "m", 1e-10,
         "half peak-to-peak of the irreversible part of the slide, its parts weighted by their "
         "friction limits: the points of a patch by the pressure, the sliders of law 'iwan' by their slip forces",
@@ -117,11 +133,11 @@ ROWS = (
         "share of the time of the last cycles in which the interface as a whole sticks: less than half of its slide is "
         "irreversible, in the mean of slip_amplitude; part of a patch, or some sliders of law 'iwan', may slip "
         "meanwhile",
-        lambda s: s.slip.get("stick_fraction"), group="friction"),
+        lambda s: s.slip.get("stick_fraction"), group="friction", term=("1", lambda _: 1.0)),
     Row("slip_start_phase", "rad", 1e-3,
         "phase of the base displacement at which slip of the interface as a whole, in the mean of slip_amplitude, "
         "starts after a stick, modulo pi",
-        lambda s: s.slip.get("slip_start_phase"), group="friction"),
+        lambda s: s.slip.get("slip_start_phase"), group="friction", term=("pi", lambda _: np.pi)),
     Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together", lambda s: s.load,
         group="friction"),
     Row("loop_area", "J", 1e-10,
@@ -130,7 +146,8 @@ ROWS = (
         lambda s: s.cycle.get("loop_area"), group="energy"),
     Row("equivalent_stiffness", "N m-1", 1.0,
         "part of the friction's first harmonic in phase with the slide over the first harmonic of the slide, negative "
-        "where friction holds the spring while stuck", lambda s: s.cycle.get("equivalent_stiffness"), group="friction"),
+        "where friction holds the spring while stuck", lambda s: s.cycle.get("equivalent_stiffness"), group="friction",
+        term=("whole first harmonic", first_harmonic)),
     Row("secant_stiffness", "N m-1", 1.0,
         "friction at the largest slide of a cycle less that at the smallest over their distance, where it jumps the "
         "mean of both sides", lambda s: s.cycle.get("secant_stiffness"), group="friction"),
@@ -153,7 +170,7 @@ ROWS = (
     Row("normal_load_peak", "N", 1e-6, "largest normal load in the last cycles", lambda s: s.of_load(np.max),
         group="friction"),
     Row("open_fraction", "1", 1e-3, "share of the time without contact",
-        lambda s: s.of_load(lambda load: np.mean(load <= 0)), 4.0, group="friction"),
+        lambda s: s.of_load(lambda load: np.mean(load <= 0)), 4.0, group="friction", term=("1", lambda _: 1.0)),
     Row("relative_displacement_amplitude_steady", "m", 1e-10,
         "amplitude at which a motion that has not settled would settle, extrapolated"),
     Row("peak_frequency", "Hz", 0.0, "drive frequency of the largest amplitude on a curve of steady motions"),
@@ -208,6 +225,25 @@ def floor_of(name: str, size=np.inf):
     if of_first(name) not in MOVED:
         return floor
     return np.where(np.greater(size, 0), np.minimum(floor, LEAST_MOVED * np.asarray(size)), floor)
+
+
+def larger_term(name: str, values: dict):
+    """Size of the larger terms that a measure is a difference of, in its unit; 0 where it is none.
+
+    values: by name, of one run or (n,) of many; those of the same interface count.
+    """
+    row, number = row_of(name), name[len(of_first(name)):]
+    if row.term is None:
+        return 0.0
+    return row.term[1]({of_first(one): values.get(of_first(one) + number, values[one]) for one in values})
+
+
+def judged(found: dict, tolerance: float) -> dict:
+    """Measures by name with their final floors: those that are differences have the tolerance times the larger term."""
+    values = {name: one.value for name, one in found.items() if one.value is not None}
+    raised = {name: tolerance * float(larger_term(name, values)) for name in values if of_first(name) in TABLE}
+    return found | {name: replace(found[name], floor=floor) for name, floor in raised.items()
+                    if floor > found[name].floor}
 
 
 def row_of(name: str) -> Row:

@@ -73,7 +73,7 @@ def problem(name: str) -> Problem:
         made = Problem(name, problems.TWO, problems.TWO_DRIVE, problems.TWO_LIMIT, 20,
                        {"limit": problems.TWO_LIMIT, "omega": 1.14})
         return replace(made, truth=exact(made, 0))
-    model = build(scene.load(HERE / "patch.toml"))
+    model = build(scene.load(HERE / "patch.toml", ["contact.element_size=0.2 mm", "accuracy.tolerance=1e-3"]))
     modes, drive = model.rig.modes, model.rig.drive
     contact = contact_model(model, choose(model), solve_all(model.patch, model.accuracy.tolerance, False)[0])
     k, y = contact.element.numbers[2:].reshape(2, -1)

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from patchfem.core import Measure
 from patchfem.response.errors import SURE, step_error, with_errors
-from patchfem.response.rows import TABLE, floor_of, of_first, row_of
+from patchfem.response.rows import TABLE, floor_of, judged, of_first, row_of
 from patchfem.response.settling import steady_amplitude
 
 
@@ -29,3 +30,27 @@ def test_exact_a_motion_that_stands_still_has_its_own_amplitude():
         assert steady_amplitude(np.zeros(6), np.zeros(6, complex)) == (None, None)
         late = np.array([0.0, 0, 1, 1, 1, 1, 1])
         assert steady_amplitude(late, late + 0j)[0] in (None, 1.0)
+
+
+def test_exact_what_is_a_difference_is_judged_by_its_larger_terms():
+    """A drift of no size beside a slip of 10 um, that of its own interface; a share by the whole."""
+    found = {"slip_amplitude": Measure(1e-5, "m", 1e-9, 1e-10), "slip_amplitude_2": Measure(0.0, "m", 0.0, 1e-10),
+             "relative_displacement_amplitude": Measure(4e-5, "m", 1e-9, 1e-10), "loop_area": Measure(1e-3, "J", 0.0),
+             "drift_per_cycle": Measure(6e-11, "m", 2.2e-10, 1e-11), "drift_per_cycle_2": Measure(0.0, "m", 0.0, 1e-11),
+             "slip_start_phase": Measure(1e-4, "rad", 2e-3, 1e-3), "stick_fraction": Measure(None, "1", None, 1e-3),
+             "equivalent_stiffness": Measure(3e6, "N m-1", 5e3, 1.0), "energy_balance": Measure(2e-8, "1", 2e-8, 1e-8)}
+    floors = {name: one.floor for name, one in judged(found, 1e-3).items()}
+    assert floors["drift_per_cycle"] == pytest.approx(1e-8) and floors["drift_per_cycle_2"] == pytest.approx(4e-8)
+    assert floors["slip_start_phase"] == pytest.approx(np.pi * 1e-3) and floors["energy_balance"] == pytest.approx(1e-3)
+    assert floors["equivalent_stiffness"] == pytest.approx(1e-3 * np.hypot(3e6, 1e-3 / (np.pi * 1e-10)))
+    assert all(floors[name] == found[name].floor for name in ("loop_area", "slip_amplitude", "stick_fraction"))
+    assert judged(found, 1e-9)["drift_per_cycle"].floor == 1e-11  # its own floor where the tolerance is tight
+
+
+def test_exact_a_load_that_never_comes_near_zero_opens_no_contact():
+    """The resolution of the samples, 4/steps, was its error; it is where the load comes near."""
+    def error(least, coarser):
+        runs = [{"open_fraction": 0.0, "normal_load_least": one} for one in (least, coarser, coarser)]
+        return step_error(*runs, 400)["open_fraction"]
+
+    assert error(100.0, 101.0) == 0.0 and error(1.0, 2.0) == pytest.approx(4 / 400)

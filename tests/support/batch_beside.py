@@ -62,7 +62,7 @@ def held_against(cases, ones, many, of_bar: float = 0.0) -> None:
                 near += 1e-6 * bar  # extrapolation shows the last digits of the amplitudes
             elif name == "acceleration_distortion":
                 near += 1e-13  # of the first harmonic: round-off of the phase omega t
-            assert many.floors[name][case] == ones.floors[name][case]
+            assert many.floors[name][case] == pytest.approx(ones.floors[name][case], rel=1e-9), name
             assert many.values[name][case] == pytest.approx(value, rel=0, abs=near, nan_ok=True), (case, name)
             if name not in DIFFERENCES:
                 told = 1e-9 * near + of_bar * abs(value)

@@ -27,11 +27,16 @@ what the drive itself moves, a/omega^2, where that is less.
     @classmethod
     def text(cls) -> str:
         """The whole page."""
-        still, moving = ([(f"`{one.name}`", one.unit, f"{one.floor:g}", one.text) for one in rows]
+        still, moving = ([(f"`{one.name}`", one.unit, _floor(one), one.text) for one in rows]
                          for rows in (STATIC, MOTION))
         head = ("measure", "unit", "floor", "meaning")
         return "\n\n".join([cls.HEAD.strip(), "## Of a pressed patch", grid(head, still), "## Of a motion",
                             grid(head, moving)]) + "\n"
+
+
+def _floor(row) -> str:
+    """The floor of a row, and the larger term that the tolerance times is one as well."""
+    return f"{row.floor:g}" if row.term is None else f"{row.floor:g}, tolerance × {row.term[0]}"
 
 
 class Materials:

@@ -5,6 +5,7 @@ import numpy as np
 from ...core import Outcome
 from ...effects import has
 from ...response.errors import with_errors
+from ...response.rows import judged
 from ..results.notes import climbing_as_one, of_growth, two_books, unbounded, unripe, warming
 from ..results.result import FRAMES, Result, frames_of, on_a_mesh_of_known_error, without_errors
 from ..results.travel import FAR, ended, reach, travelled
@@ -44,7 +45,8 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
         notes = of_growth(model.bonds, peak)
     notes = [*notes, *climbing_as_one(model, patch)]
     known = estimate and on_a_mesh_of_known_error(model, patch, coarse)
-    return Result(what, outcome, without_errors(found, known), fine, fine, patch, fields, seconds, warnings,
+    found = judged(without_errors(found, known), model.accuracy.tolerance)
+    return Result(what, outcome, found, fine, fine, patch, fields, seconds, warnings,
                   {"engine": fine.engine.name, "steps": steps, "notes": notes, "left_open": left})
 
 

@@ -13,6 +13,7 @@ from ...response.coarser import estimate, left_open
 from ...response.errors import with_errors
 from ...response.outcome import changing_note, settle
 from ...response.reasons import unclosed, without_value
+from ...response.rows import judged
 from ...response.run_events import events_of, with_own
 from ...response.settling import slip_period
 from ...structure.drive_sizes import sinusoidal, slowest
@@ -85,6 +86,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     warnings = [*warnings, *changing_note(outcome, drive), *raw.notes, *told[0]]
     if patch is not None:
         warnings = [*warnings, *travelled(patch, raw.response.slide)]
+    found = judged(found, model.accuracy.tolerance)
     return Result(what, ended(outcome, model.patch, patch, raw.response.slide), found, raw.response, raw.window, patch,
                   fields, seconds, warnings, extra)
 
@@ -114,6 +116,9 @@ def _notes(model, patch, raw) -> list:
                  "over which the interface gives way; below it a part of the interface may slip already"]
     if patch is not None and patch.strips is not None and model.soft:
         return ["strips that slip part by part have no common shear stress: the fields hold the pressure"]
+    if f is not None and has(f.law, "creeps"):
+        climb = [*climb, f"law '{f.law}' never holds: under a constant force of half its limit it creeps at "
+                 f"{1e3 * 0.5493 * f.reference_speed:.3g} mm/s"]
     if f is None or not has(f.law, "bonds"):
         return climb
     limit = f.static * borne(model, patch)
@@ -136,13 +141,9 @@ def _said(model, patch, raw, outcome, found) -> list:
 
 def said_of_law(model, outcome, found, peak: float) -> list:
     """Warnings of the law of a run; found: its measures by name, peak: its largest speed of the slide [m/s]."""
-    f, out = model.friction, []
-    if has(f.law, "creeps"):
-        out = [f"law '{f.law}' never holds: under a constant force of half its limit it creeps at "
-               f"{0.5493 * f.reference_speed:.3g} m/s"]
-    if has(f.law, "bonds"):
-        out = [*out, *unbounded(model.bonds), *unripe(model.bonds, peak), *creeping(model.bonds, outcome, found)]
-    return out
+    if not has(model.friction.law, "bonds"):
+        return []
+    return [*unbounded(model.bonds), *unripe(model.bonds, peak), *creeping(model.bonds, outcome, found)]
 
 
 def created_warning(model, book: dict, cycles: float) -> list:

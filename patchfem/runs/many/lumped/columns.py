@@ -11,7 +11,7 @@ from ....response.errors import total_error
 from ....response.measures import energy_balance
 from ....response.outcome import SMALL, settled, steady_error
 from ....response.reasons import CYCLIC, without_value
-from ....response.rows import TABLE, floor_of
+from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, steady_amplitudes, windows_of
 from ....structure.drive_sizes import largest, omega_of, slowest
 from ...results.notes import BOOKS
@@ -86,7 +86,8 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
             continue
         row, floor = TABLE[name], floor_of(name, moved)
         wide = there & (errors[name] > tolerance * np.abs(value) + floor)
-        loose |= wide & ~grows
+        floor = np.fmax(floor, tolerance * larger_term(name, values))
+        loose |= wide & (errors[name] > tolerance * np.abs(value) + floor) & ~grows
         if name == MAIN and runs.again:
             alone |= wide & ~grows
         if not name.endswith("_steady"):

@@ -27,7 +27,7 @@ class _Seen(NamedTuple):
 
 def said(model: Model, outcome, found: Answers, case: int, wide: bool) -> list:
     """Warnings of a case: of its law and, where `wide` says that some is, of what is known less well than asked."""
-    if not wide and not has(model.friction.law, "bonds") and not has(model.friction.law, "creeps"):
+    if not wide and not has(model.friction.law, "bonds"):
         return []
     known = {name: Measure(float(values[case]), found.units[name], float(found.errors[name][case]),
                            float(found.floors[name][case])) for name, values in found.values.items()

@@ -30,7 +30,7 @@ from .marched import disturbed, lasts, left_grooves
 ADRIFT = ("the steady motion that the balance found over the grooves does not last: another one is reached from rest; "
           'use accuracy.method = "march"')
 CYCLES, STEPS, FEW = 30, 256, 31  # of the march that a balance over grooves starts from, and its harmonics
-SAMPLES = 1024  # of the cycle that measures are read off
+SAMPLES = 4096  # of the cycle that measures are read off
 BESIDE = 2  # points on either side of one of a curve, whose changes count for it
 OF_HALF = 0.7  # of the change by half the harmonics and samples: seen at 350 points of elastic-plastic elements, whose
 # motion is known exactly, 0.1 of it is left on the mean and 0.55 at most
