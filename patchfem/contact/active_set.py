@@ -41,6 +41,20 @@ class Operator:
     def __init__(self, c: np.ndarray):
         self.c, self.base, self.index, self.low, self.answers = c, None, None, None, {}
 
+    @property
+    def own(self) -> float:
+        """Mean compliance [m/N] of a node under its own force."""
+        return float(self.c.diagonal().mean())
+
+    @property
+    def longest(self) -> float:
+        """Bound of the largest eigenvalue [m/N]."""
+        return float(np.abs(self.c).sum(axis=1).max())
+
+    def product(self, force: np.ndarray) -> np.ndarray:
+        """Displacement C f (m,) [m] of forces f (m,) [N]."""
+        return self.c @ force
+
     def part(self, rows: np.ndarray) -> np.ndarray:
         """Copy (n, n) [m/N] of the block of `rows` (n,), sorted indices of nodes, C-ordered."""
         if rows[-1] - rows[0] == rows.size - 1:

@@ -20,19 +20,18 @@ def _program(operator: Operator, ask: Ask) -> tuple:
     All rigid motions have the size 1. A spring takes part as two more forces >= 0 that turn the piece either way; each
     has the compliance of a node.
     """
-    c, gap = operator.c, ask.gap
+    bent, gap, own = operator.product, ask.gap, operator.own
     middle, half = ask.x.mean(), np.ptp(ask.x) / 2
     rigid = np.stack([np.ones(ask.x.size), (ask.x - middle) / half], axis=1)
     if ask.moment is None:
         some = 0 if ask.load is None else 1
-        return c.__matmul__, gap, rigid[:, :some], np.array([ask.load] * some, float)
+        return bent, gap, rigid[:, :some], np.array([ask.load] * some, float)
     sums = np.array([ask.load, (ask.moment - ask.load * middle) / half])
     if ask.spring == 0:
-        return c.__matmul__, gap, rigid, sums
-    own = c.diagonal().mean()
+        return bent, gap, rigid, sums
     arm = np.sqrt(ask.spring * own) / half
     rigid = np.concatenate([rigid, [[0.0, arm], [0.0, -arm]]])
-    return (lambda force: np.concatenate([c @ force[:-2], own * force[-2:]]), np.concatenate([gap, [0.0, 0.0]]),
+    return (lambda force: np.concatenate([bent(force[:-2]), own * force[-2:]]), np.concatenate([gap, [0.0, 0.0]]),
             rigid, sums)
 
 
@@ -73,15 +72,18 @@ def _top(start, step, rise: float) -> float:
     return (rise - level[piece]) / slope[piece] if slope[piece] > 0 else 0.0
 
 
-def gradients(operator: Operator, ask: Ask, tolerance: float = 1e-11, limit: int = 1000) -> tuple:
+def gradients(operator, ask: Ask, tolerance: float = 1e-11, limit: int = 1000, start=None) -> tuple:
     """Conjugate gradients: forces (m,) [N] near the answer, nonnegative and with the right sums, and the iterations.
 
-    The last digits are left to the active set.
+    operator: an Operator, or what has its `product`, `own` and `longest`; start: (m,) forces [N] to begin with. The
+    last digits are left to the active set.
     """
     bent, gap, rigid, sums = _program(operator, ask)
-    longest = np.abs(operator.c).sum(axis=1).max()
-    safe = 1 / max(longest, operator.c.diagonal().mean())
+    longest = operator.longest
+    safe = 1 / max(longest, operator.own)
     even = np.full(gap.size, ask.load / gap.size) if sums.size else np.maximum(-gap, 0.0) / longest
+    if start is not None:
+        even = np.concatenate([start, np.zeros(gap.size - start.size)])
     force = nearest(even, rigid, sums)
     along, last, keep = np.zeros(gap.size), 1.0, 0.0
     held, least = force, np.inf

@@ -35,13 +35,14 @@ def profile_gap(path: Path, x, lengths: tuple, rough: bool, material: bool = Fal
     if rough and not straight and (share := fine_share(trace, ELEMENTS * average)) > 0:
         notes = (*notes, f"{trace.source}: averaged over {say(average)}; the finer heights, {100 * share:.2g} % of the "
                          "rms, are left to the law of the asperities")
+    if average is None:
+        heights = on_nodes(trace, x, _curve(trace).antiderivative())
+        return heights - heights.min(), notes
     even, shape = x, trace
-    if average is not None and not _even(x, average):
+    if not _even(x, average):
         even = np.linspace(x[0], x[-1], max(2, round(float(x[-1] - x[0]) / average) + 1))
-        shape = _smooth(trace, even, on_nodes(trace, even), SPLIT)
-    elif average is None and (split := _split(trace, x)) > 1:
-        shape = _smooth(trace, trace.x, trace.z, split)
-    return on_nodes(shape, x) - on_nodes(trace if average is not None else shape, even).min(), notes
+        shape = _smooth(trace, even)
+    return on_nodes(shape, x) - on_nodes(trace, even).min(), notes
 
 
 def _levelled(path: Path, x, cell: float, material: bool) -> tuple:
@@ -68,17 +69,17 @@ def _even(x, size: float) -> bool:
     return np.ptp(np.diff(x)) <= 1e-9 * np.ptp(x) and abs(x[1] - x[0] - size) <= 1e-2 * size
 
 
-def _split(trace: Profile, x) -> int:
-    """Straight pieces that a step between samples of a trace is cut into under the nodes x (m,) [m]."""
-    return min(SPLIT, int(np.ceil(2 * float(np.diff(trace.x).max()) / float(np.diff(x).min()))))
-
-
-def _smooth(trace: Profile, x, z, split: int) -> Profile:
-    """The cubic spline through heights z (k,) [m] at x (k,) [m], `split` points a step."""
+def _curve(trace: Profile):
+    """The cubic spline through the heights of a trace."""
     from scipy.interpolate import CubicSpline
 
-    fine = np.interp(np.arange(split * (x.size - 1) + 1) / split, np.arange(x.size), x)
-    heights = CubicSpline(x, z, bc_type="natural")(fine)
+    return CubicSpline(trace.x, trace.z, bc_type="natural")
+
+
+def _smooth(trace: Profile, even) -> Profile:
+    """The cubic spline through the means of a trace over even nodes (k,) [m], SPLIT points a cell."""
+    fine = np.interp(np.arange(SPLIT * (even.size - 1) + 1) / SPLIT, np.arange(even.size), even)
+    heights = _curve(replace(trace, x=frozen_array(even), z=on_nodes(trace, even)))(fine)
     return replace(trace, x=frozen_array(fine), z=frozen_array(heights), notes=())
 
 

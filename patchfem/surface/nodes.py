@@ -41,7 +41,7 @@ def placed(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
     return replace(profile, x=frozen_array(moved[keep]), z=frozen_array(profile.z[keep]), notes=notes)
 
 
-def on_nodes(profile: Profile, x: np.ndarray) -> np.ndarray:
+def on_nodes(profile: Profile, x: np.ndarray, integral=None) -> np.ndarray:
     """Gap contribution (m,) [m] of a trace in the coordinate of the patch (`placed`) at its nodes x (m,) [m].
 
     The heights count as gap, as written: a larger z is more open. Each node takes the mean of the trace, straight lines
@@ -49,7 +49,8 @@ def on_nodes(profile: Profile, x: np.ndarray) -> np.ndarray:
     waves shorter than an element do not pass for long ones: a wave of two elements enters with 64 % of its height, of
     four with 90 %, of one with nothing. The mean is carried from the middle of the tributary length to the node along
     the slope of the neighbouring means, so that straight profiles are exact on any nodes and smooth ones to second
-    order (h^2 z''/24 inside even nodes). Beyond the trace it goes on flat, over half an element at most.
+    order (h^2 z''/24 inside even nodes). Beyond the trace it goes on flat, over half an element at most. integral:
+    function of places [m] -> [m2] of another curve through the samples, which ends where the trace does.
 
     PatchfemError for missing heights and a trace that does not cover the patch.
     """
@@ -58,7 +59,7 @@ def on_nodes(profile: Profile, x: np.ndarray) -> np.ndarray:
         raise PatchfemError(f"{profile.source}: {profile.missing.sum()} heights are missing; clean the trace first")
     _demand(profile.source, profile.x, x)
     edges = np.concatenate([x[:1], (x[1:] + x[:-1]) / 2, x[-1:]])
-    mean = np.diff(_primitive(profile, edges)) / np.diff(edges)
+    mean = np.diff(_primitive(profile, edges) if integral is None else integral(edges)) / np.diff(edges)
     middle = (edges[1:] + edges[:-1]) / 2
     low, high = np.maximum(np.arange(x.size) - 1, 0), np.minimum(np.arange(x.size) + 1, x.size - 1)
     slope = (mean[high] - mean[low]) / (middle[high] - middle[low])

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scene_texts import PIECE
+from scene_texts import COATING, PIECE
 
 import patchfem as pf
 from patchfem.closed_forms import contact as closed_forms
+from patchfem.model.model import build
+from patchfem.runs.patch.fine import trace
 from patchfem.scene.scene import loads
+from patchfem.surface.synthetic import self_affine
 
 SKIN = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e14 Pa/m"\ntangential_ratio = 0.8\n'
 
@@ -51,3 +54,71 @@ def test_beside_asperities_the_stiffness_does_not_hang_on_the_cells(tmp_path, si
     assert abs(mine.value - even.value) <= mine.error + even.error
     assert mine.value == pytest.approx(even.value, rel=5e-3)
     assert any("averaged over 63.5 um" in text and "law of the asperities" in text for text in found.warnings)
+
+
+# the independent program of test_order_four.py: contact interval [m], approach [m], peak [Pa], stiffness [N/m]
+CROWN = (2 * 3.7177189e-4, 2.8687086e-7, 1.46972585e7, 3.66814797e10 * 12.7e-3)
+
+
+def on_points(tmp_path, x, z, text, *settings):
+    """Static measures of a profile from points as fine as its file, (value, error) by name."""
+    rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(x.tolist(), z.tolist()))
+    (tmp_path / "trace.csv").write_text(f"x [m],z [m]\n{rows}\n", "utf-8")
+    asked = build(loads(text + '[contact.profile]\nfile = "trace.csv"\n', tmp_path / "scene.toml", sets=settings)).patch
+    assert trace.serves(asked)
+    return trace.sharper(asked, lambda found: True)[0]
+
+
+def test_points_as_fine_as_a_file_hold_an_independent_program(tmp_path):
+    """A crown of 1 m read from a file of 1001 samples, on the coated pieces of the rig."""
+    x = np.linspace(-6.35e-3, 6.35e-3, 1001)
+    found = on_points(tmp_path, x, x**2 / 2, PIECE + 'load = "26 lbf"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING)
+    names = ("contact_half_width", "approach", "pressure_peak", "normal_stiffness")
+    for name, truth in zip(names, (CROWN[0] / 2, *CROWN[1:]), strict=True):
+        value, error = found[name]
+        assert abs(value - truth) <= error + 5e-6 * truth, name
+        assert error <= 1e-3 * truth, name
+
+
+@pytest.mark.parametrize("pieces", [
+    "contact.load_line.offset=1.5 mm", "contact.lower.coating=none",
+    pytest.param("contact.plane=stress", marks=pytest.mark.slow)])
+def test_points_and_cells_agree_within_their_bars(tmp_path, pieces):
+    """A wave of a tenth of the length under a free rotation, of unlike pieces, in plane stress."""
+    x = np.linspace(-6.35e-3, 6.35e-3, 1271)
+    z, text = 0.1e-6 * np.cos(2 * np.pi * x / 1.27e-3), PIECE + 'load = "500 N"\nsubstrate = "steel"\n' + COATING
+    points = on_points(tmp_path, x, z, text, pieces)
+    even = pressed(tmp_path, x, z, text, pieces, "contact.element_size=16 um").measures
+    assert len(points) == (11 if "lower" in pieces else 12)  # the shear of unlike pieces is left to the cells
+    for name, (value, error) in points.items():
+        assert abs(value - even[name].value) <= error + even[name].error + even[name].floor, name
+        if name in ("approach", "pressure_peak", "normal_stiffness"):
+            assert error <= 2e-3 * abs(value), name
+
+
+def test_a_smooth_trace_asks_for_no_points_and_a_rough_one_does(tmp_path):
+    """Heights down to four samples, of which length/200 showed 60 %: the share, the peak and the stiffness of the
+    points are those of twice as many within a few per cent."""
+    x = np.linspace(-6.35e-3, 6.35e-3, 1601)
+    text = PIECE + 'load = "115.7 N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
+    smooth = pressed(tmp_path, x, 0.1e-6 * np.cos(2 * np.pi * x / 6e-3), text)
+    assert not smooth.patch.sharper
+    rough = self_affine(12.7e-3, 1600, 0.3e-6, 0.8, 0.8e-3, 32e-6, 1)
+    found = pressed(tmp_path, x, rough.z, text)
+    assert found.patch.sharper and found.patch.averaging < 8e-6
+    for name, share in (("contact_fraction", 0.03), ("pressure_peak", 0.02), ("normal_stiffness", 0.02)):
+        assert found.measures[name].error <= share * found.measures[name].value, name
+
+
+@pytest.mark.slow
+def test_a_bench_takes_the_static_measures_of_the_points(tmp_path):
+    """Its motion is that of the cells, whose changes from mesh to mesh its errors hold."""
+    x = np.linspace(-6.35e-3, 6.35e-3, 1601)
+    z = self_affine(12.7e-3, 1600, 0.3e-6, 0.8, 0.8e-3, 32e-6, 1).z
+    text = PIECE + 'load = "115.7 N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
+    slide = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\namplitude = "1 um"\n' \
+            'frequency = "1 Hz"\n'
+    still, moved = (pressed(tmp_path, x, z, each).measures for each in (text, text + slide))
+    for name in ("pressure_peak", "contact_fraction", "approach"):
+        assert moved[name].value == pytest.approx(still[name].value, abs=moved[name].error + still[name].error)
+    assert moved["friction_force_peak"].value == pytest.approx(0.3 * 115.7, rel=1e-3)

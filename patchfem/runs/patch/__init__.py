@@ -1,4 +1,5 @@
 """The static patch: condense, press, estimate errors on coarser meshes.
 
-Read `press` first, then `ladder` and `measures`; `high_order` has sharper measures for tight tolerances.
+Read `press` first, then `ladder` and `measures`; `high_order` has sharper measures for tight tolerances, `fine`
+for traces.
 """

@@ -101,9 +101,10 @@ def beside(low, high) -> list:
 def climbed(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
     """A patch on the coarsest mesh of the ladder that meets its tolerance, and on all coarser ones, fine to coarse.
 
-    Where the tolerance is below FINE, or the next mesh is dear, cells of order 4 add sharper measures if they can; then
-    the mesh serves fields and motion. The climb ends where the next mesh would take more than the work that is spent on
-    a patch. Without an estimate it is the third mesh, and nothing is solved on the others.
+    Where the tolerance is below FINE, or the next mesh is dear, cells of order 4 add sharper measures if they can, or
+    points as fine as a trace; then the mesh serves fields and motion. The climb ends where the next mesh would take
+    more than the work that is spent on a patch. Without an estimate it is the third mesh, and nothing is solved on the
+    others.
     """
     grids, out, sharp = base_grids(asked), [], None
     while True:
@@ -122,6 +123,11 @@ def climbed(asked, tolerance: float, estimate: bool = True, fresh: bool = False)
             return tuple(out)
         out[0], dear = replace(out[0], sharper=sharp or {}), seconds_of(grids)
         found = measures(*out, tolerance=tolerance)
+        if dear > SPENT[False] and not met(found, tolerance) and _finer(asked):
+            sharp, out[0] = _on_points(asked, out, tolerance)
+            found = measures(*out, tolerance=tolerance)
+            if sharp:
+                return tuple(out)
         if sharp is None and not met(found, tolerance) and high_order.serves(asked) and \
                 (dear > SPENT[False] or (asked.still and met(found, FINE))):
             before = missed(found, tolerance)
@@ -134,6 +140,24 @@ def climbed(asked, tolerance: float, estimate: bool = True, fresh: bool = False)
             return tuple(out)
 
 
+def _finer(asked) -> bool:
+    """Whether a trace may be solved on points finer than any cells."""
+    if asked.gap.profile is None:
+        return False
+    from .fine.trace import serves
+
+    return serves(asked)
+
+
+def _on_points(asked, patches: list, tolerance: float) -> tuple:
+    """Sharper measures of patches, fine to coarse, from points as fine as a trace, and the finest patch with them."""
+    from .fine.trace import sharper
+
+    found, apart = sharper(asked, partial(_enough, patches, tolerance))
+    first = patches[0]
+    return found, replace(first, sharper=found, averaging=apart or first.averaging)
+
+
 def climbs_at(asked, patches, tolerance: float) -> float | None:
     """The loosest tenth, hundredth, ... of a tolerance for which a patch climbs beyond its finest mesh.
 
@@ -142,6 +166,9 @@ def climbs_at(asked, patches, tolerance: float) -> float | None:
     """
     if seconds_of([finer(grid) for grid in _grids(patches[0])]) > SPENT[asked.still]:
         return None
+    if asked.gap.profile is not None and patches[0].sharper:
+        ended = not met(measures(*(one for one in patches if one is not None), tolerance=tolerance), tolerance)
+        return None if ended else tolerance / 10
     known = [one for one in patches if one is not None]
     shares = (10.0**-k for k in range(1, MOST_DECADES + 1))
     return next((share * tolerance for share in shares

@@ -19,10 +19,14 @@ def left_out(model, patch, coarse) -> list:
     """
     asked = model.patch
     out = [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
-    if patch.sharper:
+    if patch.sharper and patch.averaging is not None:
+        out.append(f"static measures come from points {say(patch.averaging, 3)} apart, whose short waves are those of "
+                   "layers without ends, where these have the smaller errors; the mesh of "
+                   f"{patch.x.size} interface points serves fields and motion")
+    elif patch.sharper:
         out.append("static measures come from Gauss-Lobatto cells of order 4 where these have the smaller errors; the "
                    f"bilinear mesh of {patch.x.size} interface points serves fields and motion")
-    if patch.averaging is not None and not asked.gap.rough:
+    elif patch.averaging is not None and not asked.gap.rough:
         out.append(f"the profile is averaged over {say(patch.averaging, 3)} where it bears; what another length "
                    "changes stands in the errors")
     if patch.strips is not None:

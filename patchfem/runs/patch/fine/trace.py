@@ -1,0 +1,186 @@
+"""A patch under a measured trace on rows of even points, as fine as the samples of its file and finer.
+
+Waves along the interface have their compliance in closed form; the cells of the pieces are left with what the free ends
+change, which is smooth. Errors come from the changes from level to level, as those of meshes do: of cells half as long
+at the ends, and of twice the points.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ....contact.active_set import Ask
+from ....contact.fine.products import Products, ends_of, smooth_modes, stiffness_of
+from ....contact.fine.strip import end_effect, strip_compliance
+from ....contact.gradients import gradients
+from ....core import NotConverged
+from ....elasticity.elasticity import assemble
+from ....elasticity.lapack import one_thread
+from ....mesh.grading import Layout, columns, rows
+from ....model.pieces import layers_of
+from ..measures import OFFSET, Hidden, combined, least_of
+from ..values import peak_pressure
+
+LEAST_LEVELS, MOST_POINTS, MOST_WORK = 3, 60_000, 2.5e7  # of a level; its iterations times its points
+POINTS = 500  # of the first level at least
+END, CELL, SLOPE = 1e-4, 1 / 30, 0.8  # of the length: cell of level 0 at the ends, in the middle; its growth
+CLOSED, LIMIT = 1e-9, 4000  # of the contact: relative residual, most iterations
+OVERLAP = 1e-6  # of what the pressure moves: the largest overlap of a solved contact
+
+
+class Level(NamedTuple):
+    """A solved level: forces (n,) [N], values by name, what its meshes may hide, iterations."""
+
+    force: np.ndarray
+    values: dict
+    hidden: Hidden
+    work: int
+
+
+def serves(asked) -> bool:
+    """Whether a `PatchModel` is bare pieces of one length under a profile, pressed by what a row of points can take."""
+    held = asked.approach is None or not (asked.rotates or asked.spring > 0)
+    return asked.chosen and asked.gap.profile is not None and asked.skin is None and asked.strips is None \
+        and not asked.outlined and asked.sweeps != "wear" and held
+
+
+def sharper(asked, enough) -> tuple:
+    """(static measures by name as (value, error), spacing [m] of the finest points) of a `PatchModel`.
+
+    enough(measures) -> bool ends the climb, as do MOST_POINTS and MOST_WORK. ({}, None) where a level is not solved.
+    """
+    count, series, found = _first(asked), [], {}
+    with one_thread():
+        try:
+            cells = [_ends(asked, level) for level in range(LEAST_LEVELS)]
+            coarse = [_level(asked, ends, count, None) for ends in cells]
+            series = coarse[-1:]
+            while len(series) < LEAST_LEVELS or not (enough(found) or _dear(series[-1])):
+                series.append(_level(asked, cells[-1], 2 * series[-1].force.size, series[-1].force))
+                found = _summed(coarse, series) if len(series) >= LEAST_LEVELS else {}
+        except (NotConverged, np.linalg.LinAlgError):
+            pass
+    return found, asked.length / series[-1].force.size if found else None
+
+
+def _first(asked) -> int:
+    from ....model.profile import spacing_of
+
+    return max(POINTS, min(round(asked.length / spacing_of(asked.gap.profile) / 4), MOST_POINTS // 4))
+
+
+def _dear(last: Level) -> bool:
+    """Whether twice the points of a level are too many, or take too many iterations."""
+    return 2 * last.force.size > MOST_POINTS or 3 * last.work * last.force.size > MOST_WORK
+
+
+def _summed(coarse: list, series: list) -> dict:
+    """(value, error) by name from levels of ever finer cells at the ends, and from levels of ever more points on the
+    finest of these; what the first series lacks is added to the second."""
+    mine = series[-1].values
+    found = combined([one.values for one in series], least_of(series[-1].hidden, mine), True, 0.0)
+    ends = combined([one.values for one in coarse], {}, True, 0.0)
+    return {name: (one.value + ends[name].value - coarse[-1].values[name], one.error + ends[name].error)
+            for name, one in found.items()}
+
+
+def _ends(asked, level: int) -> list:
+    """What the free ends of the pieces change: (places (k,) [m], changes (2, k, k) [m2/N] for pressure and for shear),
+    by the cells of a level."""
+    length, sides = asked.length, (-0.5, 0.5)
+    layout = Layout(-length / 2, length / 2, tuple((side * length, side * length, END * length) for side in sides),
+                    (-length / 2, length / 2), CELL * length, CELL * length, SLOPE).times(0.5**level)
+    places, changes = columns(layout), 0.0
+    for piece, share in _bodies(asked):
+        depth, coated = _rows(piece, layout)
+        changes = changes + share * np.array(end_effect(assemble(places, depth, coated, layers_of(asked, piece))))
+    return places, changes
+
+
+def _bodies(asked) -> list:
+    """(piece, times it counts) of both pieces."""
+    return [(asked.upper, 2)] if asked.alike else [(asked.lower, 1), (asked.upper, 1)]
+
+
+def operators(asked, ends: tuple, count: int) -> tuple:
+    """Products for pressure and for shear of `count` even points; ends: what the free ends of the pieces change."""
+    length, width = asked.length, asked.width * asked.pairs
+    x = ((np.arange(count) + 0.5) / count - 0.5) * length
+    k = np.arange(count) * np.pi / length
+    waves = sum(share * np.array(strip_compliance(k, piece.height, piece.thickness, layers_of(asked, piece)))
+                for piece, share in _bodies(asked))
+    out = []
+    for wave, change in zip(waves, ends[1]):
+        modes, sizes = smooth_modes(ends[0], change, x)
+        out.append(Products(x, length / count * width, wave, modes, sizes / width))
+    return tuple(out)
+
+
+def _rows(piece, layout: Layout) -> tuple:
+    """Depths of a piece as fine as the columns at its ends, and the rows in its coating."""
+    height, thick, least = piece.height, piece.thickness, layout.bands[0][2]
+    bands = [(0.0, 0.0, least), (height, height, height * layout.largest / (layout.stop - layout.start) / 2)]
+    bands += [(thick, thick, max(thick * layout.slope / 4, least))] if thick else []
+    most = 2 * height * layout.largest / (layout.stop - layout.start)
+    return rows(Layout(0.0, height, tuple(bands), (0.0, height), most, most, layout.slope), thick)
+
+
+def _level(asked, ends: tuple, count: int, start) -> Level:
+    normal, shear = operators(asked, ends, count)
+    x, between = normal.x, np.linspace(-asked.length / 2, asked.length / 2, 2 * count + 1)
+    gap = asked.gap.at(between)[0][1::2]
+    force, closing, theta, work = _pressed(asked, normal, gap, start)
+    moved = normal.product(force)
+    opening, touches = gap + theta * x - closing + moved, force > 0
+    if not opening.min() >= -OVERLAP * np.abs(moved).max():
+        raise NotConverged(f"contact: an overlap of {-opening.min():.1e} m is left at {count} points")
+    values, found = _values(asked, (normal, shear), force, np.where(touches, 0.0, opening))
+    values |= {"approach": closing, "rotation": asked.gap.angle + theta}
+    hidden = Hidden(asked.length, int(touches.sum()), (asked.length / count,) * len(found), OFFSET,
+                    asked.moment is not None, float(np.ptp(gap) + np.abs(moved).max()), 0.0, 0.0)
+    return Level(force, values, hidden, work)
+
+
+def _pressed(asked, normal: Products, gap, start) -> tuple:
+    """(forces (n,) [N], closing [m], rotation [rad] beyond that in the gap, iterations) of a level."""
+    x, begin = normal.x, None if start is None else np.repeat(start, 2) / 2
+    low = gap.min() if asked.approach is None else asked.approach
+    moment = None if asked.approach is not None else asked.moment
+    load = asked.load if asked.approach is None else None
+    force, count = gradients(normal, Ask(x, gap - low, load, moment, asked.spring), CLOSED, LIMIT, begin)
+    touches = force > 0
+    if asked.approach is not None or not touches.any():
+        return force, float(low), 0.0, count
+    depth = (gap + normal.product(force))[touches]
+    if moment is None:
+        return force, float(depth.mean()), 0.0, count
+    middle = x[touches].mean()
+    arms = x[touches] - middle
+    lean = float(arms @ depth) / max(float(arms @ arms), 1e-300)
+    return force, float(depth.mean() - lean * middle), -lean, count
+
+
+def _values(asked, both: tuple, force, gap) -> tuple:
+    """The measures but approach and rotation, and the ends of the contact."""
+    (normal, shear), x, load = both, both[0].x, float(force.sum())
+    touches, sigma = force > 0, force / normal.area
+    if not touches.any():
+        raise NotConverged("contact: the pieces touch on coarser cells only")
+    one = np.ones(x.size)
+    found = ends_of(normal, force, gap, normal.on(touches, one))
+    bears = np.concatenate([[False], touches, [False]])
+    edges = iter(found)
+    places = [next(edges).place if 0 < at < x.size else (at / x.size - 0.5) * asked.length
+              for at in np.flatnonzero(bears[1:] != bears[:-1])]
+    stretches = np.array(places).reshape(-1, 2)
+    long = np.maximum(np.diff(stretches).ravel(), 0.0)
+    peak = float(max(peak_pressure(x, sigma), sigma.max())) if 0 < np.argmax(sigma) < x.size - 1 else float(sigma.max())
+    moment = float(force @ x)
+    out = {"normal_load": load, "contact_fraction": float(long.sum()) / asked.length, "pressure_peak": peak,
+           "moment": moment, "contact_half_width": float(places[-1] - places[0]) / 2, "pressure_centre": moment / load,
+           "loaded_fraction": load / (normal.area * x.size * peak),
+           "normal_stiffness": stiffness_of(normal, touches, one, found)[0],
+           "rotational_stiffness": stiffness_of(normal, touches, x, found)[0]}
+    if asked.alike:
+        out["tangential_stiffness"] = stiffness_of(shear, touches, one, found)[0]
+    return out, found

@@ -1,0 +1,87 @@
+"""Rows of points as fine as a trace: the waves of a layer in closed form, what free ends change, edges, stiffnesses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from patchfem.closed_forms import contact as closed_forms
+from patchfem.contact.active_set import Ask
+from patchfem.contact.fine.products import Products, ends_of, smooth_modes, stiffness_of
+from patchfem.contact.fine.strip import _led, end_effect, strip_compliance
+from patchfem.contact.gradients import gradients
+from patchfem.elasticity.condense import condense
+from patchfem.elasticity.elasticity import Layers, assemble
+
+LENGTH, HEIGHT, THICK = 12.7e-3, 6.35e-3, 0.1524e-3
+COATED = Layers((250e9, 0.24), (120e9, 0.32), "strain")
+
+
+def test_exact_short_waves_of_a_strip_are_those_of_a_coated_half_plane():
+    k = np.geomspace(1e2, 1e7, 50)
+    known = closed_forms.layered_compliance(k, COATED.coating, COATED.substrate, THICK)
+    assert strip_compliance(k, 1.0, THICK, COATED)[0] == pytest.approx(known, rel=1e-13)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+@pytest.mark.parametrize("held", [0, 1])
+def test_order_waves_of_a_strip_are_those_of_cells_between_lines_without_friction(held, plane):
+    """Pressure (held 0) and shear (held 1) of a coated piece; an even face moves as bars do to round-off."""
+    layers, errors = Layers(COATED.coating, COATED.substrate, plane), []
+    for cells in (40, 80):
+        x = np.linspace(0, LENGTH, cells + 1)
+        depth = np.concatenate([np.linspace(0, THICK, cells // 10 + 1)[:-1],
+                                THICK + (HEIGHT - THICK) * np.linspace(0, 1, cells // 2)**1.8])
+        piece = assemble(x, depth, cells // 10, layers)
+        face = condense(_led(piece.stencil, held), False).compliance()[1 - held::2, 1 - held::2]
+        weight = np.full(x.size, x[1])
+        weight[[0, -1]] /= 2
+        k = np.array([0.0, 2.0, 5.0]) * np.pi / LENGTH
+        known = strip_compliance(k, HEIGHT, THICK, layers)[held]
+        seen = [np.ptp(face @ (weight * np.cos(one * x))) / 2 for one in k[1:]]
+        errors.append(np.abs(np.array(seen) / known[1:] - 1).max())
+        assert face @ weight == pytest.approx(np.full(x.size, known[0]), rel=1e-9)
+    assert errors[1] < 4e-3 and 1.8 <= np.log2(errors[0] / errors[1]) <= 2.4, errors
+
+
+def row(count: int, area: float = LENGTH) -> Products:
+    """Two bare pieces between lines without friction, per metre of width."""
+    k = np.arange(count) * np.pi / LENGTH
+    layers = Layers((120e9, 0.32), (120e9, 0.32), "strain")
+    x = ((np.arange(count) + 0.5) / count - 0.5) * LENGTH
+    return Products(x, area / count, 2 * strip_compliance(k, HEIGHT, 0.0, layers)[0], np.zeros((count, 0)), np.zeros(0))
+
+
+def test_exact_products_are_symmetric_and_their_equations_solved():
+    points, draw = row(300), np.random.default_rng(1)
+    one, other = draw.normal(size=(2, 300))
+    assert one @ points.product(other) == pytest.approx(other @ points.product(one), rel=1e-12)
+    active = draw.random(300) < 0.4
+    force = points.on(active, one)
+    assert points.product(force)[active] == pytest.approx(one[active], abs=1e-8)
+    assert not force[~active].any()
+
+
+@pytest.mark.parametrize("count", [721, pytest.param(2967, marks=pytest.mark.slow)])
+def test_exact_edges_between_points_are_those_of_a_row_eight_times_as_fine(count):
+    """To 0.03 of a cell; the stiffness of so many points to 7e-5."""
+    found = []
+    for points in (row(count), row(8 * count)):
+        gap = (points.x - 0.123e-3)**2 / (2 * 0.3)
+        force, _ = gradients(points, Ask(points.x, gap - gap.min(), 2e4), 1e-10, 3000)
+        active, one = force > 0, np.ones(points.x.size)
+        moved = gap + points.product(force)
+        edges = ends_of(points, force, np.where(active, 0.0, moved - moved[active].mean()), points.on(active, one))
+        found.append((*(edge.place for edge in edges), stiffness_of(points, active, one, edges)[0]))
+    assert found[0][:2] == pytest.approx(found[1][:2], abs=0.03 * LENGTH / count)
+    assert found[0][2] == pytest.approx(found[1][2], rel=7e-5)
+
+
+def test_exact_what_free_ends_change_is_added_back():
+    """Functions between the columns of a piece give its own compliance at them, to the part that is left out."""
+    x = np.linspace(-LENGTH / 2, LENGTH / 2, 41)
+    depth = HEIGHT * np.linspace(0, 1, 21)**1.5
+    piece = assemble(x, depth, 0, COATED)
+    change = end_effect(piece)[0]
+    modes, sizes = smooth_modes(x, change, x)
+    assert modes * sizes @ modes.T == pytest.approx(change, abs=1e-7 * np.abs(change).max())
