@@ -175,12 +175,14 @@ def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[
 
 
 def compare(before: str | Path, after: str | Path, /, *other: str | Path, direction: str = "",
-            units: tuple[str, str] | None = None, shift: float | None = None) -> dict[str, Any]:
+            units: tuple[str, str] | None = None, shift: float | None = None,
+            keep_spikes: bool = False) -> dict[str, Any]:
     """Compare a measured surface before with the same surface after: the dict that compare.json holds, in SI.
 
     before, after: files of two traces or two areal scans; other: the pair of traces of the other direction. direction:
     "x" or "y", along which the first two run. units: of x and of z for files that name none, as ("mm", "um").
-    shift [m]: of two traces whose places are known, 0.0 where both start at one mark. In the dict `verdict` and
+    shift [m]: of two traces whose places are known, 0.0 where both start at one mark. keep_spikes: spikes, dropouts and
+    dust stay in the traces. In the dict `verdict` and
     `sentences` are words; `shift`, `worn_depth_mean`, `amplitude_ratio` and so on have `value`, `low`, `high`, `unit`,
     and a `reason` where the value is None. PatchfemError for files that do not fit together.
     """
@@ -189,7 +191,7 @@ def compare(before: str | Path, after: str | Path, /, *other: str | Path, direct
     from .surface.compare.measured import compared_files
     from .surface.compare.verdict import verdicts
 
-    parts = compared_files((before, after, *other), direction, units, shift)
+    parts = compared_files((before, after, *other), direction, units, shift, keep_spikes)
     directions = directions_of(parts)
     return data_of(parts, verdicts(parts, directions), directions)
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .shared import Json, Out, Quiet, Refused, Sets, Units, model_of, note, say, scene_of, word
+from .shared import Json, Out, Quiet, Refused, Sets, Units, flag, model_of, note, say, scene_of, word
 
 
 def compare(before: Path, after: Path, /, *other: Path,
@@ -14,6 +14,7 @@ def compare(before: Path, after: Path, /, *other: Path,
             units: Units = "",
             shift: word("known shift: what stands at x before stands at x + shift after, such as \"0 mm\" for traces "
                         "from one mark") = "",
+            keep_spikes: flag("keep spikes, dropouts and dust, which are left out of traces otherwise") = False,
             scene: Annotated[Path | None, Parameter(name="--scene", help="press the patch of this scene with each "
                                                     "surface, such as rig.toml")] = None,
             set_: Sets = (), out: Out = None, json_: Json = False, quiet: Quiet = False):
@@ -30,7 +31,7 @@ def compare(before: Path, after: Path, /, *other: Path,
 
     told = _length("shift", shift) if shift else None
     named = tuple(word.strip() for word in units.split(",")) if units else None
-    parts = compared_files((before, after, *other), direction, named, told)
+    parts = compared_files((before, after, *other), direction, named, told, keep_spikes)
     directions = directions_of(parts)
     found = verdicts(parts, directions)
     target = out if out is not None else Path("out") / f"{before.stem}-{after.stem}"

@@ -9,6 +9,7 @@ from ..core import PatchfemError, frozen_array, say
 
 WINDOW = 7  # samples of the running median; what is three samples wide or less can be a spike
 SPIKE = 8.0  # robust standard deviations from the running median
+WIDE, FOOT = (15, 31), 3.0  # samples of the medians that wider specks stand above; deviations at which their feet end
 _BLOCK = 1 << 17  # windows sorted at a time
 
 
@@ -124,9 +125,51 @@ def spikes(profile: Profile) -> np.ndarray:
     return out
 
 
-def _running(z) -> tuple:
+def despiked(profile: Profile) -> Profile:
+    """A trace without its spikes, dropouts and specks of dust: they count as not measured, and a note tells how many.
+
+    Spikes and dropouts are those of `spikes`. A speck stands as far above the median of 15 or 31 samples, and both of
+    its walls are as many deviations steeper than the steps of the trace: up to 15 samples wide. A hollow as wide is
+    none: a scratch may look so. All are left out with their feet, down to 3 deviations.
+    """
+    there = np.flatnonzero(~profile.missing)
+    if there.size < max(WIDE):
+        return profile
+    z, struck = profile.z[there], spikes(profile)[there]
+    step = np.abs(z[2:] - z[:-2])
+    steep = SPIKE * 1.4826 * float(np.median(step))
+    out = np.zeros(z.size, bool)
+    for window in (WINDOW, *WIDE):
+        middle, spread = _running(z, window)
+        place = np.clip(np.arange(z.size) - window // 2, 0, z.size - window)
+        off = z - middle[place]
+        scale = 1.4826 * np.maximum(spread[place], float(np.median(spread)))
+        for first, last in runs_of(np.abs(off) > FOOT * scale):
+            low, high = max(first - 2, 0), min(last + 3, z.size)
+            walls = np.diff(z[low:high])
+            speck = off[first:last + 1].max() > SPIKE * scale[first:last + 1].max() and last - first < window // 2 \
+                and walls.max(initial=0.0) > steep / 2 and -walls.min(initial=0.0) > steep / 2
+            if struck[first:last + 1].any() or speck:
+                out[max(first - 1, 0):last + 2] = True
+    out |= struck
+    if not out.any():
+        return profile
+    heights = np.array(profile.z)
+    heights[there[out]] = np.nan
+    note = (f"{profile.source}: {out.sum()} of {z.size} heights are spikes, dropouts or dust (the first at x = "
+            f"{say(profile.x[there[np.argmax(out)]])}) and are left out; --keep-spikes keeps them")
+    return replace(profile, z=frozen_array(heights), notes=(*profile.notes, note))
+
+
+def runs_of(flags) -> list:
+    """First and last index of each run of true flags (n,)."""
+    change = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return list(zip(change[::2].tolist(), (change[1::2] - 1).tolist()))
+
+
+def _running(z, window: int = WINDOW) -> tuple:
     """Median and median deviation of every full window."""
-    windows, half = np.lib.stride_tricks.sliding_window_view(z, WINDOW), WINDOW // 2
+    windows, half = np.lib.stride_tricks.sliding_window_view(z, window), window // 2
     middle, spread = np.empty(len(windows)), np.empty(len(windows))
     for start in range(0, len(windows), _BLOCK):
         part = slice(start, start + _BLOCK)

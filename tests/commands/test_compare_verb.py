@@ -86,7 +86,8 @@ def test_exact_json_says_why_there_is_no_depth(files, tmp_path, no_page):
 
 def test_exact_identical_traces_show_no_change(files, tmp_path, no_page):
     found = json.loads(cli("compare", files[0], files[0], "--json", "-o", tmp_path / "out").out)
-    assert found["verdict"] == "no change shown" and found["worn_depth_mean"]["value"] == 0.0
+    assert found["verdict"] == "no change shown" and found["worn_depth_mean"]["value"] is None
+    assert found["hidden_wear"]["high"] is None and found["hidden_wear"]["value"] < 1e-9
     assert found["shift"]["value"] == pytest.approx(0.0, abs=1e-12)
 
 

@@ -11,6 +11,7 @@ from ...campaigns.compare import data_of as pressed_data
 from ...disk.whole import write_text
 from ...scales import LADDERS, step_of
 from ...surface.areal import level_plane
+from ...surface.compare.carried import NO_LIMIT
 from ...surface.compare.compare import Comparison
 from ...surface.compare.quantity import LEVEL, Quantity
 from ...surface.profile import Profile, level
@@ -27,6 +28,9 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "slope_ratio": "slope ratio", "worn_from_before": "worn from, x before", "worn_to_before": "worn to, x before",
          "worn_from_after": "worn from, x after", "worn_to_after": "worn to, x after",
          "track_from": "track from, x after", "track_to": "track to, x after", "track_depth": "track depth, mean",
+         "track_depth_floor": "track depth, floor", "track_area_gross": "track, lost area",
+         "track_pile_up": "track, pile-up", "track_area_net": "track, lost less pile-up",
+         "hidden_wear": "wear that a wedge may hide, mean",
          "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
 NOTE = ("Interval: 95 %. Shift, depth and area: of this place, from the noise of the unworn heights. Ratios: of the "
         "surface, as far as one trace before and one after can tell, for Gaussian heights that are alike everywhere; "
@@ -40,7 +44,9 @@ def shown(one: Quantity) -> tuple:
     unit, scale = ("", 1.0)
     if one.unit != "1":
         ladder = {**LADDERS, "m2": (("um^2", 1e12),)}[one.unit]
-        unit, scale = step_of(ladder, max(abs(one.low), abs(one.high)))
+        unit, scale = step_of(ladder, max(abs(one.low), abs(one.value if one.high is None else one.high)))
+    if one.high is None:
+        return _written(one.value * scale, 3), f"{_written(one.low * scale, 3)} .. {NO_LIMIT}", unit
     digits = _digits(one)
     value, low, high = (_written(each * scale, digits) for each in (one.value, one.low, one.high))
     return value, f"{low} .. {high}", unit
@@ -89,7 +95,8 @@ def data_of(parts: list, found: tuple, directions: list, pressing: Pressed | Non
     """The answer as plain data in SI; the first direction stands at the top."""
     def part(one: Comparison) -> dict:
         return {"before": one.before.source, "after": one.after.source, "direction": one.direction or None,
-                "reference": one.reference or None, **{name: _plain(each) for name, each in one.values.items()}}
+                "reference": one.reference or None, **{name: _plain(each) for name, each in one.values.items()},
+                **_of_traces(one)}
 
     out = {"patchfem": __version__, "verdict": found[0], "sentences": found[1], "confidence": LEVEL,
            "band": list(BAND), **part(parts[0]), "notes": [text for one in parts for text in one.notes]}
@@ -100,6 +107,15 @@ def data_of(parts: list, found: tuple, directions: list, pressing: Pressed | Non
     if pressing is not None:
         out["pressed"] = pressed_data(pressing)
     return out
+
+
+def _of_traces(one: Comparison) -> dict:
+    """What traces alone have: how they were laid on each other, the longest track, the heights left out."""
+    if not isinstance(one.before, Profile):
+        return {}
+    sizes = {name: _plain(each) for name, each in one.tracks.sizes.items()}
+    return {"registration": {"shift": _plain(one.shift), "mirrored": one.mirrored, "turned": one.turned},
+            "track": sizes or None, "removed": dict(zip(("before", "after"), one.removed))}
 
 
 def _plain(one: Quantity) -> dict:

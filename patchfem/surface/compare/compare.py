@@ -6,19 +6,20 @@ import numpy as np
 
 from ...core import PatchfemError, say
 from ..areal import Areal
-from ..profile import Profile
+from ..profile import Profile, despiked
 from ..roughness.filter import even
 from ..roughness.spectrum import BAND
 from . import depth as worn_depth
+from .carried import Carried, carried, hidden_wear, raised
 from .depth import Worn
-from .extent import exchanged, grown
 from .flanks import Flanks, flanks_of
 from .place import Match
 from .quantity import SIDE, Quantity, around, refused
-from .ratios import Size, at_step, likeness, ratio, size_along, size_of
-from .registration import Registration
-from .same import placed, turned
-from .tracks import Tracks, beside_flanks, pieces_of, tracks_of
+from .ratios import BEYOND, Size, at_step, likeness, loose, of_noise, ratio, scattered, size_along, size_of
+from .registration import Registration, register
+from .same import Place, found_place
+from .specks import without_specks
+from .tracks import Tracks, beside_flanks, of_flanks, pieces_of, tracks_of
 
 SHIFT = "a place at x of the trace before stands at x + shift of the trace after"
 STRETCH = "length of the trace after over that of the trace before, from their unworn valleys"
@@ -34,7 +35,9 @@ class Comparison:
     before, after: Profile or Areal; direction: "x", "y" or ""; reference: what the worn depth counts from: "place",
     "flanks" or "" for nothing; match: the search for the same place, None for scans and where the shift was told;
     shift, stretch, tilt, worn_*, amplitude_ratio, slope_ratio, abbott: Quantity; sizes: `Size` before and after; notes:
-    sentences; exchanged: whether the other order of the traces is the likelier one.
+    sentences; exchanged: whether material stands above the first trace and none is missing, or a place shows in the
+    other order alone; tracks; carried: what carries the registration, None without one; hidden: what a wedge may hide;
+    removed: heights left out before and after; mirrored, turned: whether one trace was, for the registration.
     """
 
     before: Profile | Areal
@@ -55,6 +58,11 @@ class Comparison:
     notes: tuple = field(default=())
     exchanged: bool = False
     tracks: Tracks = field(default=Tracks(()))
+    carried: Carried | None = None
+    hidden: Quantity = field(default_factory=lambda: hidden_wear(None, None))
+    removed: tuple = (0, 0)
+    mirrored: bool = False
+    turned: bool = False
 
     @property
     def values(self) -> dict:
@@ -65,21 +73,25 @@ class Comparison:
         if self.worn.extent is not None:
             names = (f"worn_{end}_{when}" for when in ("before", "after") for end in ("from", "to"))
             out.update(zip(names, (*self.worn.extent.before, *self.worn.extent.after)))
-        sizes = zip(("track_from", "track_to", "track_depth"), self.tracks[1:4])
-        out.update((name, one) for name, one in sizes if one is not None)
+        sizes = self.tracks.sizes
+        names = {"from": "track_from", "to": "track_to", "depth_mean": "track_depth"}
+        out.update((names.get(name, f"track_{name}"), one) for name, one in sizes.items())
+        if isinstance(self.before, Profile):
+            out["hidden_wear"] = self.hidden
         return out if self.abbott is None else {**out, "worn_depth_mean_from_abbott": self.abbott}
 
 
 def compared(before: Profile | Areal, after: Profile | Areal, direction: str = "", band: tuple = BAND,
-             shift: float | None = None) -> Comparison:
+             shift: float | None = None, keep_spikes: bool = False) -> Comparison:
     """Compare two traces of a surface, or two areal scans of it in one direction.
 
-    Where valleys or parts of both traces agree beyond chance (`same`), they are registered on each other
-    (`registration`) and the worn depth is what is missing. Else the worn depth counts from unworn flanks of the trace
-    after (`flanks`), or is refused and the guess from the Abbott curves stands beside it. band [m]: waves of the
-    amplitude ratio. shift [m]: where it is known, a place at x of the one is taken to stand at x + shift of the other,
-    give or take half a wave. PatchfemError for a trace beside a scan, a shift of scans, and traces that cannot show
-    the band.
+    Spikes, dropouts and dust are left out of traces unless keep_spikes. Where valleys or parts of both traces agree
+    beyond chance (`same`), as they are, mirrored or turned over, they are registered on each other (`registration`) and
+    the worn depth is what is missing, where unworn parts or valleys carry that (`carried`). Else the worn depth counts
+    from unworn flanks of the trace after (`flanks`), or is refused and the guess from the Abbott curves stands beside
+    it. band [m]: waves of the amplitude ratio. shift [m]: where it is known, a place at x of the one is taken to stand
+    at x + shift of the other, give or take half a wave. PatchfemError for a trace beside a scan, a shift of scans, and
+    traces that cannot show the band.
     """
     if isinstance(before, Areal) != isinstance(after, Areal):
         raise PatchfemError(f"{before.source} and {after.source}: a trace and an areal scan; two of a kind are wanted")
@@ -87,48 +99,90 @@ def compared(before: Profile | Areal, after: Profile | Areal, direction: str = "
         if shift is not None:
             raise PatchfemError("compare: a shift is told for traces; areal scans are not laid on each other")
         return _scans(before, after, direction or "x", band)
-    return _traces(before, after, direction, band, shift)
+    sides = (before, after) if keep_spikes else (despiked(before), despiked(after))
+    place = found_place(*sides, shift)
+    if place.found is not None and not keep_spikes:
+        place = _without_specks(place)
+    removed = tuple(int(now.missing.sum() - one.missing.sum()) for now, one in
+                    ((place.before, before), (place.after, after)))
+    return _placed(place, direction, band, removed) if place.found is not None else \
+        _apart(place, direction, band, removed)
 
 
-def _traces(before: Profile, after: Profile, direction: str, band: tuple, told: float | None) -> Comparison:
+def _without_specks(place: Place) -> Place:
+    """The place again without what stands out of the difference as no surface does."""
+    for _ in range(2):
+        before, after = without_specks(place.found, place.before, place.after)
+        if before is place.before and after is place.after:
+            break
+        try:
+            found = register(before, after, place.found.shift)
+        except PatchfemError:
+            break
+        place = place._replace(before=before, after=after, found=found)
+    return place
+
+
+def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Comparison:
+    """The comparison of two traces of one place."""
+    before, after, found = place.before, place.after, place.found
+    by = carried(found)
+    hidden = hidden_wear(found, by)
+    notes, step = _steps(before, after)
+    notes += _told(found)
+    worn, tracks = worn_depth.of_registration(found), Tracks(())
+    if by.by:
+        tracks = tracks_of(found, worn_depth.neighbours(found), band[1])
+    else:
+        worn = worn_depth.nowhere("no part of the traces is surely unworn: even wear, a wedge and a bow look like no "
+                                  "wear", worn.deposited if raised(found) else 0.0)
+    pieces = pieces_of(found, tracks, band[1])
+    flat = pieces_of(found, tracks, band[1], True)
+    ratios, sizes = [], [tuple(_pooled(side, step, band) for side in zip(*one)) for one in (flat, pieces)]
+    for name, text, alike, noise in zip(("amplitude", "slope"), (AMPLITUDE, SLOPE), _alike(flat, step, band),
+                                        of_noise(sizes[0], found.noise, step, band)):
+        one, other = (ratio(name, text, *pair[::-1], alike) for pair in sizes)
+        off = abs(np.log(one.value / other.value)) if one.value and other.value else 0.0
+        ratios.append(loose(one, float(np.hypot(np.hypot(BEYOND, noise), off))))
+    stretch = around(1 + found.stretch[0], found.stretch[1], "1", STRETCH) if np.isfinite(found.stretch[0]) \
+        else refused("1", STRETCH, "too few heights are unworn")
+    grew = worn.deposited > (worn.area.high or 0.0) and not (worn.mean.low or 0.0) > 0
+    return Comparison(before, after, direction, "place", place.match, around(found.shift, found.errors[2], "m", SHIFT),
+                      stretch, around(found.slope, found.errors[1], "rad", TILT), worn, *ratios, None, sizes[0], found,
+                      None, tuple(notes), grew, tracks, by, hidden, removed, place.mirrored, place.turned)
+
+
+def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Comparison:
+    """The comparison of two traces without a common place."""
+    before, after, why = place.before, place.after, place.why
+    notes, step = _steps(before, after)
+    if place.order:
+        notes.append("taken the other way round, as wear of the trace after, the traces show a common place, at which "
+                     "nothing grew: material grew between them, or the two files are in the wrong order")
+    flanks = flanks_of(before, after)
+    abbott = None if flanks is not None else worn_depth.abbott_estimate(before, after)
+    sides = [[before], [after] if flanks is None else beside_flanks(after, flanks, band[1])]
+    worn = worn_depth.of_flanks(flanks) if flanks is not None else worn_depth.nowhere(
+        why + ", and no unworn flanks stand beside a track; a worn depth wants one or the other")
+    sizes = tuple(_pooled(side, step, band) for side in sides)
+    freedom = [[scattered(one, step, band) for one in side] for side in sides]
+    sizes = tuple(one._replace(freedom=tuple(min(a, b) for a, b in zip(one.freedom, np.sum(each, axis=0))))
+                  for one, each in zip(sizes, freedom))
+    ratios = [ratio(name, text, sizes[1], sizes[0]) for name, text in (("amplitude", AMPLITUDE), ("slope", SLOPE))]
+    blank = [refused(unit, text, why) for unit, text in (("m", SHIFT), ("1", STRETCH), ("rad", TILT))]
+    return Comparison(before, after, direction, "" if flanks is None else "flanks", place.match, *blank, worn, *ratios,
+                      abbott, sizes, None, flanks, tuple(notes), place.order,
+                      of_flanks(flanks) if flanks is not None else Tracks(()), removed=removed)
+
+
+def _steps(before: Profile, after: Profile) -> tuple:
+    """Notes of both traces, and the coarser of their steps [m]."""
     steps = [one.length / (one.x.size - 1) for one in (even(before), even(after))]
-    match, found, why, order = placed(before, after, told)
-    notes, flanks, abbott, tracks = list(before.notes + after.notes), None, None, Tracks(())
-    sides, alike = [[before], [after]], (0.0, 0.0)
+    notes = list(before.notes + after.notes)
     if max(steps) > 1.01 * min(steps):
         notes.append(f"samples lie {say(steps[0])} apart before and {say(steps[1])} after; slopes and amplitudes are "
                      f"read every {say(max(steps))}")
-    if found is not None:
-        tracks = tracks_of(found, worn_depth.neighbours(found), band[1])
-        pieces = pieces_of(found, tracks, band[1])
-        sides, alike = list(zip(*pieces)), _alike(pieces, max(steps), band)
-        notes += _told(found)
-        shift = around(found.shift, found.errors[2], "m", SHIFT)
-        tilt = around(found.slope, found.errors[1], "rad", TILT)
-        stretch = around(1 + found.stretch[0], found.stretch[1], "1", STRETCH) if np.isfinite(found.stretch[0]) \
-            else refused("1", STRETCH, "too few heights are unworn")
-        worn, reference = worn_depth.of_registration(found), "place"
-        other = turned(before, after, found.shift)
-        notes += grown(found, other, worn.area.value, worn.deposited)
-        order = exchanged(found, other, worn.area, worn.deposited)
-    else:
-        if order:
-            notes.append("taken the other way round, as wear of the trace after, the traces show a common place: are "
-                         "the two files in the wrong order?")
-        shift, tilt, stretch = (refused(unit, text, why) for unit, text in
-                                (("m", SHIFT), ("rad", TILT), ("1", STRETCH)))
-        flanks = flanks_of(before, after)
-        abbott = None if flanks is not None else worn_depth.abbott_estimate(before, after)
-        reference = "flanks" if flanks is not None else ""
-        if flanks is not None:
-            sides[1] = beside_flanks(after, flanks, band[1])
-        worn = worn_depth.of_flanks(flanks) if flanks is not None else worn_depth.nowhere(
-            why + ", and no unworn flanks stand beside a track; a worn depth wants one or the other")
-    sizes = tuple(_pooled(side, max(steps), band) for side in sides)
-    ratios = [ratio(part, text, sizes[1], sizes[0], one) for part, text, one in
-              zip(("amplitude", "slope"), (AMPLITUDE, SLOPE), alike)]
-    return Comparison(before, after, direction, reference, match, shift, stretch, tilt, worn, *ratios, abbott, sizes,
-                      found, flanks, tuple(notes), order, tracks)
+    return notes, max(steps)
 
 
 def _pooled(pieces: tuple, step: float, band: tuple) -> Size:

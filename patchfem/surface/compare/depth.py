@@ -12,7 +12,7 @@ from ..roughness.spectrum import spectrum_of
 from .extent import Extent, extent_of
 from .flanks import Flanks
 from .largest import largest
-from .quantity import LEVEL, Quantity, around, refused
+from .quantity import LEVEL, SIDE, Quantity, around, refused
 from .registration import REACH, Registration, together
 
 MAX, MEAN, AREA = ("largest worn depth, without what noise adds to a largest value",
@@ -45,13 +45,14 @@ def of_registration(found: Registration) -> Worn:
     depth is that of `largest`.
     """
     area, error, length, deposited = summed(found, np.ones(found.rest.size, bool))
-    return Worn(_largest(found), around(area / length, error / length, "m", MEAN, 0.0),
+    ends = area / found.rest.size / SIDE  # the common length is known to a sample
+    return Worn(_largest(found), around(area / length, float(np.hypot(error, ends)) / length, "m", MEAN, 0.0),
                 around(area, error, "m2", AREA, 0.0), deposited, extent_of(found, neighbours(found)))
 
 
 def summed(found: Registration, inside) -> tuple:
     """(worn area [m2], its standard deviation, length [m], deposited area) of the samples inside (n,), all for bool."""
-    width = np.where(inside, _widths(found.x), 0.0)
+    width = np.where(inside, widths(found.x), 0.0)
     length, rest = float(width.sum()), found.rest
     deposit = rest < -DEPOSIT * found.noise
     weight = np.where(deposit, 0.0, width)
@@ -69,7 +70,14 @@ def summed(found: Registration, inside) -> tuple:
     return area, error, length, float(-(width[deposit] @ rest[deposit]))
 
 
-def _widths(x) -> np.ndarray:
+def balance(found: Registration) -> float:
+    """(what is missing less what grew) / (both), by the heights beyond 4 noises: 1 for wear alone, 0 for neither."""
+    rest = np.where(np.abs(found.rest) > DEPOSIT * found.noise, found.rest, 0.0)
+    both = float(np.abs(rest).sum())
+    return float(rest.sum()) / both if both > 0 else 0.0
+
+
+def widths(x) -> np.ndarray:
     """Share of the length that each sample stands for [m]."""
     edges = np.concatenate([[1.5 * x[0] - x[1] / 2], (x[1:] + x[:-1]) / 2, [1.5 * x[-1] - x[-2] / 2]])
     return np.diff(edges)
@@ -98,9 +106,9 @@ def of_flanks(found: Flanks) -> Worn:
                 Quantity(*found.area, "m2", AREA))
 
 
-def nowhere(reason: str) -> Worn:
-    """No worn depth, and why."""
-    return Worn(refused("m", MAX, reason), refused("m", MEAN, reason), refused("m2", AREA, reason))
+def nowhere(reason: str, deposited: float = 0.0) -> Worn:
+    """No worn depth, and why; deposited [m2]: what stands above the first trace nevertheless."""
+    return Worn(refused("m", MAX, reason), refused("m", MEAN, reason), refused("m2", AREA, reason), deposited)
 
 
 def abbott_estimate(before: Profile, after: Profile) -> Quantity:

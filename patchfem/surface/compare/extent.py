@@ -1,20 +1,16 @@
-"""From where to where a trace is worn, and whether material grew: in the registration of two traces."""
+"""From where to where a trace is worn: in the registration of two traces."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from ...core import say
 from .quantity import SIDE, Quantity
-from .registration import REACH, Registration
+from .registration import Registration
 
 FROM, TO = "first worn place", "last worn place"
 SURE = 5.0  # noises of a mean of neighbours from which they are worn: chance brings it in 1 of 1000 traces
 MEANS = (1, 4, 16, 64)  # neighbours
 DEEP, LEAST, MOST = 10.0, 12, 400  # noises at which a flank of the wear ends; samples of it to either side
-MORE = 1.1  # times the unworn heights, from which the other order of the traces is the likelier one
-WORSE = 1.5  # times the noise, from which a fit is none: it runs between worn and unworn heights
-DEPOSITED = 0.05  # of the worn area, what may stand above without a word
 
 
 class Extent(NamedTuple):
@@ -76,46 +72,3 @@ def edge(rest, noise: float, together: float):
     near = np.flatnonzero(sums <= sums.min() + 1.5 * SIDE**2 * noise**2 * together)
     best = low + int(np.argmin(sums))
     return best, max(low + int(near[0]) - 1, 0), min(low + int(near[-1]) + 1, rest.size - 1)
-
-
-def _unworn(found: Registration, other: Registration) -> tuple:
-    """Shares of the heights that are unworn, within the smaller noise of both registrations; none of the other one
-    where its noise is much the larger."""
-    if other.noise > WORSE * found.noise:
-        return 1.0, 0.0
-    reach = REACH * min(found.noise, other.noise)
-    return tuple(float(np.mean(np.abs(one.rest) <= reach)) for one in (found, other))
-
-
-def exchanged(found: Registration, other: Registration | None, area: Quantity, deposited: float) -> bool:
-    """Whether the other order of the traces is the likelier one; arguments as those of `grown`.
-
-    Either it leaves more heights unworn, or more stands above the first trace than can be worn off it: deposited is
-    beyond the interval of the worn area.
-    """
-    if other is not None:
-        kept, more = _unworn(found, other)
-        if more > MORE * kept:
-            return True
-    return deposited > area.high
-
-
-def grown(found: Registration, other: Registration | None, area: float, deposited: float) -> list[str]:
-    """What speaks for material that grew, or for files in the wrong order, as sentences.
-
-    other: the first trace registered on the second one, None where that cannot be done; area, deposited [m2]: what is
-    below and above the first trace. Two traces have no height in common but that of their unworn parts, and wear is
-    taken for that order in which the second one lies below. Where the other order leaves more heights unworn, within
-    the smaller noise of both, it is the likelier one.
-    """
-    if other is not None:
-        kept, more = _unworn(found, other)
-        if more > MORE * kept:
-            top = float(np.quantile(other.rest, 0.99))
-            return [f"taken the other way round, as wear of the trace after, {100 * more:.0f} % of the heights are "
-                    f"alike, as given {100 * kept:.0f} %: material grew by up to about {say(top)} between the traces, "
-                    "or the two files are in the wrong order; worn depths are no wear then"]
-    if deposited > DEPOSITED * abs(area) and deposited > 0:
-        return [f"{1e12 * deposited:.3g} um^2 of the trace after stand above the trace before: material grew there "
-                "(deposits), or the two files are in the wrong order"]
-    return []

@@ -88,7 +88,7 @@ def _windows(rest, noise: float, together: float) -> tuple:
         pair = good[np.clip(np.stack([after - 1, after]), 0, good.size - 1)]
         away = np.abs(pair + length // 2 - here)
         nearest = np.where(away[0] <= away[1], pair[0], pair[1])
-        inside = away.min(axis=0) <= length // 2
+        inside = away.min(axis=0) <= length // 4  # a corner beside the window would lift its outer heights
         start[inside], size[inside] = nearest[inside], length
         length = 2 * length - 1
     half = (size + 1) // 2

@@ -11,7 +11,10 @@ from ..roughness.filter import even
 from ..roughness.intervals import Intervals
 from ..roughness.parameters import Heights
 from ..roughness.spectrum import BAND, Spectrum, amplitude_of, refuse_band, spectrum_of
-from .quantity import LEVEL, Quantity, refused
+from .quantity import LEVEL, SIDE, Quantity, refused
+
+BEYOND = 0.004  # standard deviation of a ratio by what noise does not tell: the tip, interpolation, the datum
+PLACES = 6  # parts of a trace whose mean squares scatter from place to place
 
 
 class Size(NamedTuple):
@@ -116,6 +119,42 @@ def ratio(part: str, text: str, over: Size, under: Size, alike: float = 0.0) -> 
         high = 1 + k + np.sqrt(k * (2 + k))
         low = 1 / high
     return Quantity(value, value * float(np.sqrt(low)), value * float(np.sqrt(high)), "1", text)
+
+
+def loose(one: Quantity, error: float) -> Quantity:
+    """A ratio with a further standard deviation of its logarithm."""
+    if one.value is None or one.value <= 0:
+        return one
+    sides = [np.hypot(np.log(end / one.value), SIDE * error) for end in (max(one.low, 1e-300), one.high)]
+    return one._replace(low=one.value * float(np.exp(-sides[0])), high=one.value * float(np.exp(sides[1])))
+
+
+def of_noise(sizes: tuple, noise: float, step: float, band: tuple) -> tuple:
+    """Relative share of the noise [m] of a height difference in the amplitude and the slope of registered traces.
+
+    Half of the mean square that white noise of one trace adds: it may be another one in each, and where the first trace
+    is read between its samples, less. noise [m]: of the difference.
+    """
+    least = [min(one[part] for one in sizes) for part in (0, 1)]
+    squares = noise**2 * 2 * step * (1 / band[0] - 1 / band[1]), noise**2 / step**2
+    return tuple(float(0.5 * added / max(size**2, 1e-300)) for added, size in zip(squares, least))
+
+
+def scattered(trace: Profile, step: float, band: tuple = BAND) -> tuple:
+    """Degrees of freedom of amplitude and slope by how their mean squares scatter along a trace at a step [m].
+
+    The trace is cut into six parts; as the scatter of six is known to a third, half of what they show counts.
+    """
+    z, step = at_step(trace, step)
+    wave = np.fft.rfftfreq(z.size, step)
+    inside = (wave >= 1 / band[1]) & (wave <= 1 / band[0])
+    edges = np.linspace(0, z.size - 1, PLACES + 1).astype(int)[:-1]
+    out = []
+    for part in (np.fft.irfft(np.where(inside, np.fft.rfft(z), 0.0), z.size)[:-1], np.diff(z)):
+        means = np.add.reduceat(part**2, edges) / np.diff([*edges, part.size])
+        scatter = float(means.var(ddof=1)) / PLACES
+        out.append(float(np.clip(means.mean() ** 2 / max(scatter, 1e-300), 2.0, 1e9)))
+    return tuple(out)
 
 
 def likeness(first, second, step: float, band: tuple = BAND) -> tuple:

@@ -6,6 +6,7 @@ mean of the worn depth away with the tilt.
 """
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -22,6 +23,8 @@ FEWEST = 12  # unworn heights
 BESIDE = 1  # samples next to a worn one that do not count: the wear runs out in them
 NOISY, MOST = 0.05, 51  # share of noise in a slope, and samples of a parabola
 WIDER = 1.15  # the interval of the stretch, without it, holds 92 of 100
+BENT, GROWN = 0.8, 0.5  # of the noise that a bend, or heights that grew, must leave at most to be taken
+SIDES = 20  # parts of the trace whose low depths show a bend
 ROUNDS = 100
 DIGITS = 1e-5  # of the height: least noise that is counted with
 
@@ -34,10 +37,11 @@ class Registration:
     of the common part) of the second against the first; noise [m] of a height difference; x (n,) [m]: samples of the
     second that lie on the first; first (n,) [m]: the first trace there; rest (n,) [m]: depth of the second below the
     first, moved by slope and offset: worn depth plus noise; used (n,): the unworn heights of the fit; gradient (n, 3)
-    of rest by offset, slope and shift, (n, 4) where the stretch was fitted too; covariance of these; stretch: length of
-    the second over that of the first, less one, its standard deviation, and whether it was taken out of rest; doubt:
-    change of offset, slope and shift where the deeper half of the unworn heights alone makes the fit, as slight wear of
-    the higher half would bring it about.
+    of rest by offset, slope and shift, (n, 4) or (n, 5) where stretch and bend were fitted too; covariance of these;
+    stretch: length of the second over that of the first, less one, its standard deviation, and whether it was taken out
+    of rest; doubt: change of offset, slope and shift where the deeper half of the unworn heights alone makes the fit,
+    as slight wear of the higher half would bring it about; bend [m]: sag of the second against the first in the middle
+    of the trace that was taken out, 0 where none was.
     """
 
     shift: float
@@ -52,6 +56,7 @@ class Registration:
     covariance: np.ndarray
     stretch: tuple
     doubt: np.ndarray
+    bend: float = 0.0
 
     @property
     def errors(self) -> tuple:
@@ -78,32 +83,84 @@ def register(before: Profile, after: Profile, shift: float, lowest: float = LOWE
     the next offset, slope and shift, until they stay the same; the first rounds count with the noise of half a step of
     shift, halved from round to round. Slopes come from parabolas as long as the noise wants. A second fit lets the
     second trace be longer or shorter by a factor; where that halves the noise, the heights are compared with the factor
-    taken out.
+    taken out. A third one lets it be bent, from the parabola that most low depths lie on; where that takes a fifth of
+    the noise away, the bend is taken out. All of it is tried with heights that grew, too, and taken where that halves
+    the noise, or where else both ends were worn and the middle not. What lies in a gap of the first trace does not
+    count.
     PatchfemError where fewer than 12 heights are unworn.
     """
-    fit = _Fit(even(before), after, shift)
+    fit = _Fit(before, after, shift)
     state, used = fit.start(shift, lowest)
     first = _settled(fit, state, used, 4)
     if first is not None:
         fit.smooth_slope(fit.noise(first))
-    free = _settled(fit, state, used, 4)
-    held = _settled(fit, state, used, 3)
-    if held is None and free is None:
+    best = _straight(fit, *fit.start(shift, lowest))
+    for side, bent, better in ((-1, False, GROWN), (1, True, BENT), (-1, True, GROWN)):
+        fit.side = side
+        start = fit.start(shift, lowest, bent)
+        other = _bent(fit, *start) if bent else _straight(fit, *start)
+        other = _as_given(fit, other, bent) if other is not None and side < 0 else other
+        if other is not None and (best is None or other.noise < better * best.noise or _inside_out(best, other)):
+            best = other
+    if best is None:
         raise PatchfemError(f"{after.source}: fewer than {FEWEST} of its heights lie on the valleys of "
                             f"{before.source}; no common reference")
+    return best
+
+
+def _as_given(fit, grown: Registration, bent: bool) -> Registration:
+    """The fit to the heights that stand above the first trace in another one, where they are as quiet and hold an end
+    of the traces: the others are worn then, and nothing grew. Else the fit in which they grew."""
+    high = np.asarray(grown.rest) < -2 * REACH * grown.noise
+    if high.sum() < FEWEST:
+        return grown
+    fit.side, state = 1, fit.improved(fit.state, high, 2)
+    worn = (_bent if bent else _straight)(fit, state, high)
+    if worn is not None and worn.noise < 1.5 * grown.noise and worn.used.mean() > 0.15 and any(unworn_ends(worn)):
+        return worn
+    return grown
+
+
+def _inside_out(one: Registration, other: Registration) -> bool:
+    """Whether no end of the traces is unworn in one registration, and both are in the other, with more heights.
+
+    A trace between whose worn ends the middle is unworn is likelier one whose middle grew, or the files are exchanged.
+    """
+    if other.bend or other.noise > 1.5 * one.noise or other.used.mean() < one.used.mean():
+        return False
+    return not any(unworn_ends(one)) and all(unworn_ends(other))
+
+
+def unworn_ends(found: Registration) -> tuple:
+    """Whether the first and the last twentieth of a registration are unworn."""
+    count = max(found.rest.size // 20, min(40, found.rest.size))
+    return tuple(bool(found.used[part].mean() > 0.7) for part in (slice(None, count), slice(-count, None)))
+
+
+def _straight(fit, state, used) -> Registration | None:
+    """The fit without a bend, with the stretch where that halves the noise; None where too few heights are unworn."""
+    free, held = (_settled(fit, state, used, count) for count in (4, 3))
     if free is None:
-        return fit.found(held, (float("nan"), float("nan"), False))
+        return None if held is None else fit.found(held, (float("nan"), float("nan"), False))
     error = WIDER * fit.found(free, (0.0, 0.0, False), 4).covariance[3, 3] ** 0.5
-    noise = [fit.noise(one) if one is not None else np.inf for one in (free, held)]
-    out = held is None or noise[0] < 0.5 * noise[1]
+    out = held is None or fit.noise(free) < 0.5 * fit.noise(held)
     return fit.found(free if out else held, (float(free[3]), float(error), bool(out)), 4 if out else 3)
+
+
+def _bent(fit, state, used) -> Registration | None:
+    """The fit with stretch and bend; None where too few heights are unworn."""
+    bent = _settled(fit, state, used, 5)
+    if bent is None:
+        return None
+    error = WIDER * fit.found(bent, (0.0, 0.0, False), 5).covariance[3, 3] ** 0.5
+    return fit.found(bent, (float(bent[3]), float(error), True), 5)
 
 
 def _settled(fit, state, used, free: int):
     """State of the fit of the first `free` numbers once its unworn heights stay the same, None where too few are."""
     for turn in range(ROUNDS):
         rest, least = fit.rest(state)[0], max(fit.least, fit.blur * 0.5**turn)
-        noise, now = _unworn(rest, least)
+        noise, now = _unworn(fit.side * rest, least)
         if now.sum() < FEWEST:
             return None
         same = used.size == now.size and bool((used == now).all())
@@ -125,12 +182,14 @@ def _unworn(rest, least: float) -> tuple:
 
 
 class _Fit:
-    """The two traces and the state of the second: offset, height of its slope at the end, shift, stretch."""
+    """The two traces and the state of the second: offset, height of its slope at the end, shift, stretch, bend."""
 
-    def __init__(self, one: Profile, after: Profile, shift: float):
+    def __init__(self, before: Profile, after: Profile, shift: float):
         from scipy.interpolate import CubicSpline
 
-        there = ~after.missing
+        one, there = even(before), ~after.missing
+        self.side = 1  # -1: heights that are not unworn stand above the first trace
+        self.known, self.lost = before.x, before.missing
         self.one, self.x, self.z, self.source = one, after.x[there], after.z[there], after.source
         self.spline = CubicSpline(one.x, one.z)
         self.slope = self.spline.derivative()
@@ -138,8 +197,8 @@ class _Fit:
         height, step = float(self.flat.std()), one.length / (one.x.size - 1)
         self.least = max(DIGITS * height, 1e-13 * float(np.abs(self.z).max(initial=0.0)), 1e-300)
         tilt = max(height, 1e-12)
-        self.scales = np.array([tilt, tilt, step, step / self.half])
-        inside = self.inside(np.array([0.0, 0.0, shift, 0.0]), 0.0)
+        self.scales = np.array([tilt, tilt, step, step / self.half, tilt])
+        inside = self.inside(np.array([0.0, 0.0, shift, 0.0, 0.0]), 0.0)
         if inside.sum() < FEWEST:
             raise PatchfemError(f"{self.source}: {inside.sum()} samples lie on {one.source}; {FEWEST} at least are "
                                 "wanted")
@@ -147,7 +206,11 @@ class _Fit:
 
     def inside(self, state, centre=None):
         at, edge = self.at(state, centre), 1e-9 * self.half
-        return (at >= self.one.x[0] - edge) & (at <= self.one.x[-1] + edge)
+        inside = (at >= self.one.x[0] - edge) & (at <= self.one.x[-1] + edge)
+        if self.lost.any():
+            after = np.clip(np.searchsorted(self.known, at), 1, self.known.size - 1)
+            inside &= ~(self.lost[after] | self.lost[after - 1])
+        return inside
 
     def at(self, state, centre=None):
         """Places in the first trace of the samples of the second."""
@@ -155,13 +218,13 @@ class _Fit:
         return centre + (self.x - centre) / (1 + state[3]) - state[2]
 
     def rest(self, state) -> tuple:
-        """Depth below the first trace, its gradient (n, 4), and which samples of the second these are."""
+        """Depth below the first trace, its gradient (n, 5), and which samples of the second these are."""
         inside = self.inside(state)
         along = (self.x[inside] - self.centre) / self.half
         at = self.at(state)[inside]
         fall = -self.slope(at)
-        rest = self.spline(at) - self.z[inside] + state[0] + state[1] * along
-        return rest, np.column_stack([np.ones(at.size), along, fall, fall * along * self.half]), inside
+        rest = self.spline(at) - self.z[inside] + state[0] + state[1] * along + state[4] * along**2
+        return rest, np.column_stack([np.ones(at.size), along, fall, fall * along * self.half, along**2]), inside
 
     def smooth_slope(self, noise: float) -> None:
         """Take slopes from parabolas through so many samples that the noise [m] leaves 5 % in them, three at least.
@@ -179,17 +242,20 @@ class _Fit:
         self.slope = lambda at: np.interp(at, self.one.x, smooth)
 
     def noise(self, state) -> float:
-        return _unworn(self.rest(state)[0], self.least)[0]
+        return _unworn(self.side * self.rest(state)[0], self.least)[0]
 
-    def start(self, shift: float, lowest: float) -> tuple:
+    def start(self, shift: float, lowest: float, bent: bool = False) -> tuple:
         """State and the unworn heights of the one-sided line over a share of the heights, the lowest ones."""
-        state = np.array([0.0, 0.0, shift, 0.0])
+        state = np.array([0.0, 0.0, shift, 0.0, 0.0])
         rest, gradient, inside = self.rest(state)
         x = self.x[inside]
+        if bent:
+            state[4] = -self.side * _bend((x - self.centre) / self.half, self.side * rest)
+            rest = self.rest(state)[0]
         low = np.interp(x - shift, self.one.x, self.flat)
-        low = low <= np.quantile(low, lowest)
+        low = low <= np.quantile(low, lowest if self.side > 0 else 1.0)
         self.blur = float(np.std(gradient[:, 2])) * self.scales[2] / 2  # half a step of shift left open
-        line = one_sided_line(x[low], rest[low], "above", self.blur)
+        line = one_sided_line(x[low], rest[low], "above" if self.side > 0 else "below", self.blur)
         state[:2] = -line.at(self.centre), -line.slope * self.half
         used = np.zeros(x.size, bool)
         used[np.flatnonzero(low)[line.used]] = True
@@ -201,19 +267,20 @@ class _Fit:
         rest, gradient, _ = self.rest(state)
         step = np.linalg.lstsq(gradient[used, :free], -rest[used], rcond=1e-10)[0]
         most = 4 * self.scales[2:free]
-        step[2:] = np.clip(step[2:], -most, most)
+        step[2:4] = np.clip(step[2:4], -most[:2], most[:2])
         new = state.copy()
         new[:free] += step
         return new
 
     def found(self, state, stretch: tuple, free: int = 3) -> Registration:
         rest, gradient, inside = self.rest(state)
-        noise, used = _unworn(rest, self.least)
+        self.state = state
+        noise, used = _unworn(self.side * rest, self.least)
         part = gradient[used, :free]
         inverse = np.linalg.pinv(part.T @ part, rcond=1e-14, hermitian=True)
         spread = float(np.mean(rest[used] ** 2)) / KEPT
         covariance = inverse * max(spread, self.least**2 / 100) * TRIMMED * together(rest, used)
-        turn = np.array([1.0, 1 / self.half, 1.0, 1.0])[:free]  # slope [rad] from the height at the end
+        turn = np.array([1.0, 1 / self.half, 1.0, 1.0, 1.0])[:free]  # slope [rad] from the height at the end
         x, at = self.x[inside], self.at(state)[inside]
         slope = float(state[1] / self.half)
         offset = float(state[0]) + slope * (float(x[0] + x[-1]) / 2 - self.centre)
@@ -224,7 +291,28 @@ class _Fit:
         return Registration(
             float(state[2]), slope, offset, noise, frozen_array(x),
             frozen_array(first), frozen_array(rest), used, frozen_array(gradient[:, :free] / turn),
-            frozen_array(covariance * np.outer(turn, turn)), stretch, frozen_array(doubt * turn))
+            frozen_array(covariance * np.outer(turn, turn)), stretch, frozen_array(doubt * turn),
+            float(state[4] * (np.ptp(x) / 2 / self.half) ** 2))
+
+
+def _bend(along, rest) -> float:
+    """Bend [m] of the parabola through low depths of three of 20 parts on which most other low ones lie, none below.
+
+    A point above costs r/(r + noise), one at most; a point below r/noise, as in `levelling`.
+    """
+    cell = np.clip(((along - along.min()) / max(float(np.ptp(along)), 1e-300) * SIDES).astype(int), 0, SIDES - 1)
+    parts = [cell == k for k in range(SIDES) if (cell == k).sum() > 3]
+    if len(parts) < 6:
+        return 0.0
+    at = np.array([along[one].mean() for one in parts])
+    least, low = np.array([np.quantile(rest[one], (0.05, 0.25)) for one in parts]).T
+    noise = 2 * float(np.quantile(low - least, 0.25)) + 1e-9 * float(np.ptp(rest)) + 1e-300
+    chosen = np.array(list(combinations(range(at.size), 3)))
+    chosen = chosen[at[chosen[:, 2]] - at[chosen[:, 0]] > 0.5 * np.ptp(at)]
+    shapes = np.linalg.solve(np.vander(at, 3)[chosen], low[chosen][..., None])[..., 0]
+    off = low - shapes @ np.vander(at, 3).T
+    cost = np.where(off > 0, off / (off + noise), np.minimum(-off / noise, 1e6)).sum(axis=1)
+    return float(shapes[int(np.argmin(cost)), 0])
 
 
 def together(rest, used) -> float:

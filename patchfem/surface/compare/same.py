@@ -1,16 +1,15 @@
 """Whether two traces run over the same place: found by their valleys, part by part, or told; or why they do not."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, say
+from ...core import PatchfemError, frozen_array, say
 from ..profile import Profile
 from . import depth as worn_depth
-from .extent import exchanged
-from .parts import alone, matched_in_parts
-from .place import CLEAR, Match, matched, prepared
-from .registration import LOWEST, Registration, register, together
+from .place import CLEAR, Match, alone, matched, matched_in_parts, prepared
+from .registration import LOWEST, Registration, register, together, unworn_ends
 
 # Noise of the registration over the root mean square height, and likeness that goes with it: where valleys agree to
 # 2 %, less likeness will do. A noise above 10 % may be wear of the valleys too, unless it is white: wear moves
@@ -18,22 +17,56 @@ from .registration import LOWEST, Registration, register, together
 ENOUGH = ((0.1, CLEAR), (0.02, 2.5))
 WHITE, NEIGHBOURS = 0.3, 1.5  # noise up to which white noise passes for that of the instrument; how many err alike
 TOLD = 0.5  # white noise up to which a shift that was told is believed
+NOTHING_GREW = 0.9  # balance of what is missing and what grew, beyond which wear alone stands in a registration
 SHARE = 0.15  # of the heights, at least, unworn
 MARK = "where both traces were measured from the same mark, tell it with --shift '0 mm'"
 
 
 class Place(NamedTuple):
     """match: the search; found: `Registration`, None where the places are not the same, and why, in words; order:
-    whether the traces show a place when they are taken the other way round."""
+    whether the traces show a place when they are taken the other way round; before, after: the traces as they were
+    compared; mirrored, turned: whether one of them was mirrored along x, or its heights turned over, for that."""
 
     match: Match | None
     found: Registration | None
     why: str = ""
     order: bool = False
+    before: Profile | None = None
+    after: Profile | None = None
+    mirrored: bool = False
+    turned: bool = False
+
+
+def found_place(before: Profile, after: Profile, shift: float | None = None) -> Place:
+    """The place that both traces share, as they are, else with one of them mirrored, its heights turned over, or both.
+
+    Of two traces whose heights count the opposite ways that one is turned over that leaves more missing than grown. A
+    surface that repeats itself, and a told shift, are taken as they are.
+    """
+    place = placed(before, after, shift)._replace(before=before, after=after)
+    if place.found is not None or shift is not None or (place.match.repeats and place.match.clear > CLEAR):
+        return place
+    for mirrored, turned_over in ((True, False), (False, True), (True, True)):
+        other = _mirrored(after) if mirrored else after
+        tried = [(before, _turned_over(other)), (_turned_over(before), other)] if turned_over else [(before, other)]
+        found = [(*_searched(*pair)[:2], *pair) for pair in tried]
+        known = [one for one in found if one[1] is not None]
+        if known:
+            match, best, *pair = max(known, key=lambda one: worn_depth.balance(one[1]))
+            return Place(match, best, "", False, *pair, mirrored, turned_over)
+    return place
+
+
+def _mirrored(one: Profile) -> Profile:
+    return replace(one, x=frozen_array(one.x[0] + one.x[-1] - one.x[::-1]), z=frozen_array(one.z[::-1]))
+
+
+def _turned_over(one: Profile) -> Profile:
+    return replace(one, z=frozen_array(-one.z))
 
 
 def placed(before: Profile, after: Profile, shift: float | None = None) -> Place:
-    """Find the place that both traces share, by their valleys (`place`), else part by part (`parts`).
+    """Find the place that both traces share, by their valleys (`place`), else part by part (`matched_in_parts`).
 
     A place counts where it stands out from chance, only once, and the unworn heights agree there, within 10 % of the
     root mean square height or within 30 % where their differences are white noise. shift [m]: known from a mark; the
@@ -41,19 +74,24 @@ def placed(before: Profile, after: Profile, shift: float | None = None) -> Place
     """
     if shift is not None:
         return _told(before, after, shift)
-    match = matched(before, after)
-    found = None if match.repeats else _registered(before, after, match)
+    match, found, valleys = _searched(before, after)
     if found is not None:
         return Place(match, found)
-    parts, valleys = matched_in_parts(before, after), match
-    if parts is not None and parts.clear > CLEAR and not parts.repeats:
-        match, found = parts, _registered(before, after, parts)
-        if found is not None:
-            return Place(match, found)
     other = turned(before, after, match.shift) if match.clear > CLEAR and not match.repeats else None
     order = other is not None and _alike(other, match, _about_line(before.x, before.z)) \
         and _likelier(before, after, match.shift, other)
     return Place(match, None, _why(before, after, match, valleys), order)
+
+
+def _searched(before: Profile, after: Profile) -> tuple:
+    """(match, registration or None, match of the valleys of the whole traces)."""
+    match = valleys = matched(before, after)
+    found = None if match.repeats else _registered(before, after, match)
+    if found is None:
+        parts = matched_in_parts(before, after)
+        if parts is not None and parts.clear > CLEAR and not parts.repeats:
+            match, found = parts, _registered(before, after, parts)
+    return match, found, valleys
 
 
 def turned(before: Profile, after: Profile, shift: float) -> Registration | None:
@@ -128,13 +166,17 @@ def _quiet(found: Registration, most: float) -> bool:
 
 
 def _likelier(before: Profile, after: Profile, shift: float, other: Registration) -> bool:
-    """Whether the other order is likelier for traces that are too noisy for a place: a worn floor has a place too."""
+    """Whether the other order is likelier for traces that are too noisy for a place: a worn floor has a place too.
+
+    It is where wear alone, and nothing grown, stands in it, and as given neither end of the traces is unworn.
+    """
+    if not worn_depth.balance(other) > NOTHING_GREW:
+        return False
     try:
         found = register(before, after, shift)
     except PatchfemError:
         return True
-    worn = worn_depth.of_registration(found)
-    return exchanged(found, other, worn.area, worn.deposited)
+    return not any(unworn_ends(found))
 
 
 def _apart(found: Registration) -> str:

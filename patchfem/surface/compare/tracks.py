@@ -6,18 +6,26 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import frozen_array
-from ..profile import Profile
-from .depth import summed
+from ..profile import Profile, runs_of
+from ..roughness.filter import mean_line
+from .carried import median_of_five
+from .depth import summed, widths
 from .extent import edge
 from .flanks import PARTS, Flanks
-from .quantity import Quantity, around
+from .quantity import SIDE, Quantity, around, refused
 from .registration import REACH, Registration
 
 LONG = 3.0  # longest waves of the band, and a track is longer; so is a piece of the traces whose roughness is compared
 MEDIAN, UNWORN = 5, 0.05  # samples of the running median that is worn in a track, share of unworn heights in it
 NEW = 10.0  # noises that a new valley is deeper than the trace before, and 3 below all of it nearby
-FROM, TO, DEPTH = ("where the longest track begins, in the x of the trace after",
-                   "where the longest track ends, in the x of the trace after", "mean worn depth of the longest track")
+FORM = 2.5  # longest waves, from which the shape of the depth is the form of a track
+FLOOR = 5  # parts of a track, the deepest of which is its floor
+FROM, TO = ("where the longest track begins, in the x of the trace after",
+            "where the longest track ends, in the x of the trace after")
+DEPTH, BOTTOM = ("lost area of the longest track over its width",
+                 "floor of the longest track: bottom of the parabola through the deepest fifth of its width")
+GROSS, PILED, NET = ("area lost in the longest track", "area that stands above the trace before, to within a width of "
+                     "the longest track on both sides together", "lost area less pile-up")
 
 
 class Valley(NamedTuple):
@@ -28,14 +36,25 @@ class Valley(NamedTuple):
 
 
 class Tracks(NamedTuple):
-    """spans: first and last sample of each track; start, end, depth: `Quantity` of the longest one, None without one;
-    valley: the deepest new one, None without one."""
+    """spans: first and last sample of each track; start, end, depth, floor, gross, pile, net: `Quantity` of the longest
+    one, all of one span, None without one; valley: the deepest new one, None without one."""
 
     spans: tuple
     start: Quantity | None = None
     end: Quantity | None = None
     depth: Quantity | None = None
+    floor: Quantity | None = None
+    gross: Quantity | None = None
+    pile: Quantity | None = None
+    net: Quantity | None = None
     valley: Valley | None = None
+
+    @property
+    def sizes(self) -> dict:
+        """Every `Quantity` of the longest track by its name; nothing without one."""
+        names = ("from", "to", "depth_mean", "depth_floor", "area_net", "area_gross", "pile_up")
+        parts = (self.start, self.end, self.depth, self.floor, self.net, self.gross, self.pile)
+        return dict(zip(names, parts)) if self.start is not None else {}
 
 
 def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
@@ -46,8 +65,7 @@ def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
     heights err alike.
     """
     rest, noise = np.asarray(found.rest), found.noise
-    middle = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(rest, MEDIAN // 2, "edge"), MEDIAN), axis=1)
-    runs = _runs(middle > REACH * noise)
+    runs = runs_of(median_of_five(rest) > REACH * noise)
     spans = tuple((a, b) for a, b in runs if found.x[b] - found.x[a] > LONG * longest
                   and (rest[a:b + 1] <= REACH * noise).mean() < UNWORN)
     valley = _valley(found, spans, longest)
@@ -57,13 +75,8 @@ def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
     at = spans.index(widest)
     low = spans[at - 1][1] + 1 if at else 0
     high = spans[at + 1][0] if at + 1 < len(spans) else rest.size
-    return Tracks(spans, *_ends(found, widest, (low, high), together), _depth(found, widest), valley)
-
-
-def _runs(flags) -> list:
-    """First and last index of each run of true flags."""
-    change = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    return list(zip(change[::2].tolist(), (change[1::2] - 1).tolist()))
+    ends = _ends(found, widest, (low, high), together)
+    return Tracks(spans, *ends, *_sizes(found, *ends), valley)
 
 
 def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -> tuple:
@@ -81,11 +94,35 @@ def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -
     return tuple(out)
 
 
-def _depth(found: Registration, span: tuple) -> Quantity:
-    inside = np.zeros(found.rest.size, bool)
-    inside[span[0]:span[1] + 1] = True
-    area, error, length = summed(found, inside)[:3]
-    return around(area / length, error / length, "m", DEPTH, 0.0)
+def _sizes(found: Registration, start: Quantity, end: Quantity) -> tuple:
+    """Depth, floor, lost area, pile-up and net area of the track from start to end [m], each a `Quantity`.
+
+    The interval of the mean depth has that of the width.
+    """
+    x, width = found.x, max(end.value - start.value, 1e-300)
+    area, error = summed(found, (x >= start.value) & (x <= end.value))[:2]
+    wide = float(np.hypot(*(one.high - one.low for one in (start, end)))) / (2 * SIDE)
+    depth = area / width
+    raised = -np.asarray(found.rest) * (median_of_five(-found.rest) > REACH * found.noise)
+    near = (abs(x - (start.value + end.value) / 2) < 1.5 * width) & ((x < start.value) | (x > end.value)) & (raised > 0)
+    piled = float(widths(x)[near] @ raised[near])
+    loose = float(widths(x)[near].sum()) * max(found.errors[0], found.noise / max(np.sqrt(near.sum()), 1.0))
+    return (around(depth, float(np.hypot(error / width, depth * wide / width)), "m", DEPTH, 0.0),
+            _floor(found, start.value, width), around(area, error, "m2", GROSS, 0.0),
+            around(piled, loose, "m2", PILED, 0.0), around(area - piled, float(np.hypot(error, loose)), "m2", NET))
+
+
+def _floor(found: Registration, start: float, width: float) -> Quantity:
+    """Highest depth of the parabola through the deepest fifth of a track, whose vertex errs half as much again."""
+    places = np.linspace(start, start + (1 - 1 / FLOOR) * width, 8 * FLOOR)
+    parts = [(found.x >= place) & (found.x <= place + width / FLOOR) for place in places]
+    means = [float(found.rest[one].mean()) if one.sum() > 3 else 0.0 for one in parts]
+    deepest = parts[int(np.argmax(means))]
+    area, error, length = summed(found, deepest)[:3]
+    along = np.linspace(-1, 1, int(deepest.sum()))
+    shape = np.polyfit(along, found.rest[deepest], 2)
+    top = float(np.polyval(shape, np.clip(-shape[1] / (2 * shape[0]) if shape[0] < 0 else 0.0, -1, 1)))
+    return around(top, 1.5 * float(np.hypot(error / length, (top - area / length) / 4)), "m", BOTTOM, 0.0)
 
 
 def _valley(found: Registration, spans: tuple, longest: float) -> Valley | None:
@@ -103,17 +140,37 @@ def _valley(found: Registration, spans: tuple, longest: float) -> Valley | None:
     return Valley(float(found.x[at]), float(rest[at]))
 
 
-def pieces_of(found: Registration, tracks: Tracks, longest: float) -> list:
+def pieces_of(found: Registration, tracks: Tracks, longest: float, flat: bool = False) -> list:
     """Pairs of traces, the second laid on the first, between and within the tracks: without the edges of these.
 
     An edge is a step, which has waves of every length; half of the longest wave [m] to either side, or three samples,
-    stays out. The whole common part where no piece is three waves long.
+    stays out. The whole common part where no piece is three waves long. flat: the form of the tracks, that is the mean
+    line of the depth at two and a half of the longest waves, is put back.
     """
     x, second = np.asarray(found.x), found.first - found.rest
-    reach = max(longest / 2, 3 * float(np.diff(x).mean()))
+    step = float(np.diff(x).mean())
+    reach = max(longest / 2, 3 * step)
     cuts = _between(x, [x[k] for span in tracks.spans for k in span], reach, longest)
-    return [tuple(Profile(frozen_array(x[one]), frozen_array(z[one]), "the common part")
-                  for z in (found.first, second)) for one in cuts]
+    out = []
+    for one in cuts:
+        form = mean_line(found.rest[one], FORM * longest / step, tilted=True) if flat and tracks.spans else 0.0
+        out.append(tuple(Profile(frozen_array(x[one]), frozen_array(z), "the common part")
+                         for z in (found.first[one], second[one] + form)))
+    return out
+
+
+def of_flanks(found: Flanks) -> Tracks:
+    """The track below the unworn flanks of a trace: its ends are known to a part (`flanks.PARTS`), its pile-up not."""
+    part = float(found.x[-1] - found.x[0]) / PARTS
+    ends = [Quantity(one, one - part, one + part, "m", text) for one, text in ((found.start, FROM), (found.end, TO))]
+    depth = Quantity(*(one / found.width for one in found.area), "m", DEPTH)
+    inside = np.asarray(found.depth)[(found.x >= found.start) & (found.x <= found.end)]
+    many = max(inside.size // FLOOR, 1)
+    floor = float(np.convolve(inside, np.full(many, 1 / many), "valid").max())
+    off = found.largest[2] - found.largest[0]
+    unknown = [refused("m2", text, "what stands beside the track before is not known") for text in (PILED, NET)]
+    return Tracks((), *ends, depth, Quantity(floor, max(floor - off, 0.0), floor + off, "m", BOTTOM),
+                  Quantity(*found.area, "m2", GROSS), *unknown)
 
 
 def beside_flanks(after: Profile, found: Flanks, longest: float) -> list:

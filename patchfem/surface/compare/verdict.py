@@ -3,11 +3,14 @@
 import numpy as np
 
 from ...core import say
+from ..profile import Profile
+from .carried import may_hide, told
 from .compare import Comparison
-from .extent import DEPOSITED
 from .quantity import SIDE, Quantity
 
-EXCHANGED = "the files may be in the wrong order, or material grew"
+EXCHANGED = "material grew, or the files are in the wrong order"
+ELSEWHERE = "not comparable place by place"
+DEPOSITED = 0.05  # of the worn area, what may stand above without a word
 NEAR = 1e-6  # a ratio that close to one is one but for round-off
 
 
@@ -17,8 +20,8 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     directions: (when, amplitude ratio x over y, slope ratio) for each time at which both directions are known. The
     headline is "worn", where a depth is shown, then "reduced", "increased" or "no change shown", by the amplitude of
     the band in each direction; the first sentence says where and how deep. Unchanged surfaces are called "reduced" in
-    2.5 of 100 cases, and as often "increased". Where the other order of the files is the likelier one, that is said
-    before it.
+    2.5 of 100 cases, and as often "increased". Before it stands that traces of other places are compared, or, where no
+    depth is shown, that material stands above the trace before; behind it that a trace is mirrored or turned over.
     """
     words = [changed(one.amplitude_ratio) for one in parts]
     names = [f" along {one.direction}" if one.direction else "" for one in parts]
@@ -30,11 +33,16 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     elif headline == "no change shown":
         told = worn + ["flatter"] * any(changed(one.slope_ratio) == "reduced" for one in parts)
         headline = " and ".join(told) + ", no change of the waves shown" if told else headline
-    if any(one.exchanged for one in parts):
+    if any(one.exchanged for one in parts) and not worn:
         headline = f"{EXCHANGED}; as given: {headline}"
+    elif any(_elsewhere(one) for one in parts):
+        headline = f"{ELSEWHERE}; {headline}"
+    over = _over(parts)
+    headline = f"{headline}; {over}" if over else headline
     out = []
     for one, word, name in zip(parts, words, names):
-        out += [_worn(one, name), _amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name)]
+        out += [*_variant(one, name), _worn(one, name), *_reference(one)]
+        out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name)]
         out += _apart(one)
     out += [_direction(*each) for each in directions]
     return headline, out
@@ -94,8 +102,38 @@ def _length(one: Quantity) -> str:
     return f"{say(one.value)} ({say(one.low)} to {say(one.high)})"
 
 
+def _elsewhere(one: Comparison) -> bool:
+    """Whether two traces have no place in common."""
+    return isinstance(one.before, Profile) and one.registration is None
+
+
+def _over(parts: list) -> str:
+    """What was mirrored or turned over, for the headline."""
+    names = [word for word, any_one in (("mirrored", any(one.mirrored for one in parts)),
+                                        ("turned over", any(one.turned for one in parts))) if any_one]
+    return f"one trace is {' and '.join(names)} against the other" if names else ""
+
+
+def _variant(one: Comparison, name: str) -> list:
+    """What was turned for the comparison, as a sentence."""
+    out = []
+    if one.mirrored:
+        out.append(f"The trace after{name} runs the other way: it was mirrored, and its x counts from the other end.")
+    if one.turned:
+        out.append(f"The heights of both traces{name} count opposite ways: those of one were turned over, so that wear "
+                   "is what is missing; tell which file counts into the material.")
+    return out
+
+
 def _worn(one: Comparison, name: str) -> str:
     mean = one.worn.mean
+    above = ""
+    if one.worn.deposited > DEPOSITED * (one.worn.area.value or 0.0) and one.worn.deposited > 0:
+        above = (f" {1e12 * one.worn.deposited:.3g} um^2 stand above the trace before: deposits, or the two files are "
+                 "in the wrong order." if one.exchanged else
+                 f" {1e12 * one.worn.deposited:.3g} um^2 stand above the trace before: deposits or pile-up.")
+    if one.reference == "place" and not one.carried.by:
+        return f"Worn depth{name}: none shown.{above} {may_hide(one.registration, one.hidden)}"
     if mean.value is None:
         text = f"Worn depth{name}: not available; {mean.reason}."
         if one.abbott is not None and one.abbott.value is not None:
@@ -103,26 +141,36 @@ def _worn(one: Comparison, name: str) -> str:
                      "everywhere and its valleys are unworn.")
         return text
     if not _sure(mean):
-        return f"Worn depth{name}: none shown; at most {say(mean.high)} in the mean."
+        return f"Worn depth{name}: none shown; at most {say(mean.high)} in the mean.{above}"
     what = "over the track below its unworn flanks" if one.reference == "flanks" else "over the common length"
     text = (f"Worn{name}: {_track(one)}{_length(mean)} in the mean {what}, {_length(one.worn.largest)} at the deepest "
-            "place.")
-    if one.worn.deposited > DEPOSITED * one.worn.area.value:
-        text += f" {1e12 * one.worn.deposited:.3g} um^2 stand above the surface before: deposits."
-    if one.worn.extent is not None:
+            f"place.{above}")
+    if one.worn.extent is not None and one.tracks.start is None:
         before, after = (_span(*(end.value for end in ends)) for ends in one.worn.extent)
         text += f" Worn from x = {before} of the trace before, that is from {after} of the trace after."
     return text
 
 
+def _reference(one: Comparison) -> list:
+    """What the depth counts from, and a bow that was taken out, as sentences."""
+    if one.registration is None or not one.carried.by:
+        return []
+    out, bend = [told(one.carried)], one.registration.bend
+    if bend:
+        out.append(f"A bow of {say(abs(bend), 3)} over the common length is taken out: a bent datum and wear of that "
+                   "shape look alike.")
+    return out
+
+
 def _track(one: Comparison) -> str:
     """The longest track as the begin of a sentence."""
-    start, end, depth = one.tracks[1:4]
+    found = one.tracks
     if one.flanks is not None:
         return f"a track from about x = {_span(one.flanks.start, one.flanks.end)} of the trace after; "
-    if depth is None:
+    if found.start is None:
         return ""
-    return f"a track from x = {_span(start.value, end.value)} of the trace after, {_length(depth)} deep in the mean; "
+    return (f"a track from x = {_span(found.start.value, found.end.value)} of the trace after, {_length(found.depth)} "
+            f"deep in the mean, its floor {_length(found.floor)}; ")
 
 
 def _apart(one: Comparison) -> list:

@@ -61,7 +61,7 @@ def test_always_noise_alone_is_no_reason_against_the_place():
     """Unworn traces that were alike by 0.97 were refused: "chance brings their valleys the likeness of 0.97 too"."""
     before, after, *_ = milled(HELD_OUT, depth=0.0)
     found = compared(before, after)
-    assert found.reference == "place" and found.worn.mean.low == 0.0 and found.worn.mean.high < 0.02 * UM
+    assert found.reference == "place" and found.worn.mean.value is None and found.hidden.high is None
 
 
 def test_always_shallow_wear_is_no_exchange():
@@ -162,7 +162,8 @@ def test_always_walls_between_unworn_flanks_are_no_roughness():
     """Traces of two places: the track is found between its flanks, and its walls do not count either."""
     for seed in range(HELD_OUT + 230, HELD_OUT + 233):
         found = compared(milled(seed, waves=0.0)[0], milled(seed + 1000, waves=0.0)[1])
-        assert found.reference == "flanks" and verdicts([found])[0] == "worn, no change of the waves shown"
+        assert found.reference == "flanks"
+        assert verdicts([found])[0] == "not comparable place by place; worn, no change of the waves shown"
         assert verdicts([found])[1][0].startswith("Worn: a track from about x = ")
 
 

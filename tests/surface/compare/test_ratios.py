@@ -71,7 +71,8 @@ def test_always_wear_of_peaks_is_called_reduced():
     p = pair(30077, share=0.5)
     headline, sentences = verdicts([compared(p.before, p.after, "x")])
     assert headline == "worn, waves reduced" and sentences[0].startswith("Worn along x: ")
-    assert "along x" in sentences[1] and "confidence" in sentences[1]
+    assert sentences[1].startswith("Depths count from the ")
+    assert "along x" in sentences[2] and "confidence" in sentences[2]
 
 
 def scan(seed: int, squeeze: int = 1) -> Areal:

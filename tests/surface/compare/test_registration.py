@@ -66,8 +66,8 @@ def test_exact_a_trace_on_itself_shows_no_change():
     p = pair(1)
     found = compared(p.before, p.before)
     assert found.shift.value == pytest.approx(0.0, abs=1e-15) and found.tilt.value == pytest.approx(0.0, abs=1e-12)
-    assert found.worn.mean.value == found.worn.largest.value == found.worn.area.value == 0.0
-    assert found.worn.mean.low == 0.0 <= found.worn.mean.high < 1e-10
+    assert found.worn.mean.value is found.worn.largest.value is found.worn.area.value is None
+    assert found.hidden.value < 1e-9 and found.hidden.high is None
     assert (found.amplitude_ratio.value, found.slope_ratio.value) == pytest.approx((1.0, 1.0), rel=1e-14)
     assert verdicts([found])[0] == "no change shown"
 
@@ -103,7 +103,8 @@ def test_always_unworn_traces_of_one_place_show_no_wear(count):
         p = pair(seed, share=0.0)
         found = compared(p.before, p.after)
         assert found.reference == "place"
-        assert found.worn.mean.value < 0.004 * UM and found.worn.largest.value < 0.15 * UM
+        assert found.worn.mean.value is None and abs(found.registration.rest.mean()) < 0.004 * UM
+        assert "none shown" in verdicts([found])[1][0] and "at most" not in verdicts([found])[1][0]
 
 
 def test_always_surfaces_that_wear_each_other_have_their_depth_or_none():

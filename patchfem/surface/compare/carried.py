@@ -1,0 +1,115 @@
+"""What carries a registration: unworn parts, valleys, or nothing, so that even wear, a wedge and a bend may hide."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import say
+from ..profile import runs_of
+from .quantity import SIDE, Quantity, refused
+from .registration import REACH, Registration
+
+PART, SAMPLES, FILLED = 0.05, 40, 0.7  # of the length, samples, and share of unworn heights of a part that carries
+WORN, FEW = 2 * REACH, 6  # noises from which a height is clearly worn, and how many of them are asked for
+CURVED, BOWED = 30.0, 0.75  # chi-squared of a bow in an unworn part, and its size in noises, from which it is none
+TURNS, HIGHER, VALLEYS = 8, 0.3, 0.1  # worn tops, their height over the valleys in rms, share of the valleys
+HIDDEN = "mean worn depth that the tilt, to the end of its interval, may be as a wedge; even wear has no limit"
+NO_LIMIT = "no limit"
+
+
+class Carried(NamedTuple):
+    """by: "parts", "valleys" or "" for nothing; parts: (from, to) [m] of the unworn parts in the x of the trace after;
+    share: of the heights that are unworn."""
+
+    by: str
+    parts: tuple
+    share: float
+
+
+def carried(found: Registration) -> Carried:
+    """What tells the worn heights of a registration from unworn ones.
+
+    Unworn parts are runs of a twentieth of the length or more whose heights are unworn and straight, beside heights
+    that are clearly worn; a part that is bowed is the foot of wear that runs out slowly. Valleys carry where worn tops
+    stand between them, more than eight of them, higher than they. Without either, wear that is the same everywhere, a
+    wedge, or a bow may be anything.
+    """
+    rest, noise, x = np.asarray(found.rest), found.noise, found.x
+    share = float(found.used.mean())
+    if (rest > WORN * noise).sum() < FEW:
+        return Carried("", (), share)
+    runs = runs_of(median_of_five(rest) <= REACH * noise)
+    long = [(a, b) for a, b in runs if _carries(found, a, b)]
+    if long:
+        return Carried("parts", tuple((float(x[a]), float(x[b])) for a, b in long), share)
+    tops = runs_of(median_of_five(rest) > REACH * noise)
+    high = found.first - np.polyval(np.polyfit(x, found.first, 1), x)
+    worn = rest > WORN * noise
+    above = float(high[worn].mean() - high[found.used].mean()) if found.used.any() else 0.0
+    if len(tops) >= TURNS and above > HIGHER * float(high.std()) and share > VALLEYS:
+        return Carried("valleys", (), share)
+    return Carried("", (), share)
+
+
+def _carries(found: Registration, first: int, last: int) -> bool:
+    """Whether a run of heights is long, unworn and straight."""
+    x, trim = found.x, (last - first) // 10
+    part = slice(first + (trim if first else 0), last + 1 - (trim if last < x.size - 1 else 0))
+    if x[last] - x[first] < PART * (x[-1] - x[0]) or last - first < SAMPLES or found.used[part].mean() < FILLED:
+        return False
+    used = found.used[part]
+    along, rest = np.linspace(-1, 1, used.size)[used], found.rest[part][used]
+    base = np.linalg.qr(np.vander(along, 3, True))[0]
+    bow = base[:, 1:].T @ rest
+    size = float(np.sqrt((bow**2).sum() / rest.size))
+    left = float(np.std(rest - base @ (base.T @ rest)))
+    return not (float((bow**2).sum()) > CURVED * left**2 and size > BOWED * found.noise)
+
+
+def raised(found: Registration) -> bool:
+    """Whether heights stand clearly above the first trace."""
+    return int((median_of_five(-np.asarray(found.rest)) > WORN * found.noise).sum()) >= FEW
+
+
+def hidden_wear(found: Registration | None, by: Carried | None) -> Quantity:
+    """What a wedge may hide [m]: half of the tilt times the common length; no numbers where nothing can hide.
+
+    A tilt between both traces is that of their mounting or of a wedge that wore off; its mean depth is then half of the
+    tilt times the length. Even wear adds any depth, as does a mounting that turns a wedge back: there is no limit.
+    """
+    if found is None:
+        return refused("m", HIDDEN, "the traces are not laid on each other")
+    if by.by:
+        return refused("m", HIDDEN, f"{_what(by)} carry the registration")
+    length = float(found.x[-1] - found.x[0])
+    return Quantity((abs(found.slope) + SIDE * found.errors[1]) * length / 2, 0.0, None, "m", HIDDEN)
+
+
+def _what(by: Carried) -> str:
+    return "valleys between worn tops" if by.by == "valleys" else "unworn parts"
+
+
+def told(by: Carried) -> str:
+    """What the worn depths count from, as a sentence."""
+    if by.by == "valleys":
+        return (f"Depths count from the valleys between the worn tops, {100 * by.share:.0f} % of the heights, which "
+                "agree and are taken for unworn.")
+    spans = ", ".join(f"{say(a, 4)} to {say(b, 4)}" for a, b in by.parts[:4])
+    more = f" and {len(by.parts) - 4} more" if len(by.parts) > 4 else ""
+    return (f"Depths count from the parts that agree, x = {spans}{more} of the trace after, which are taken for "
+            "unworn.")
+
+
+def may_hide(found: Registration, hidden: Quantity) -> str:
+    """What may hide where nothing carries the registration, and what would settle it, as a sentence."""
+    bow = f" A bow of {say(abs(found.bend), 3)}, taken out, may be a bent datum or wear as well." if found.bend else ""
+    return ("Even wear of any depth would look the same, and so would a wedge that the mounting turned back; the tilt "
+            f"of {1e6 * abs(found.slope):.3g} urad between the traces may itself be up to {say(hidden.value, 3)} of "
+            f"wear in the mean, half of it times the length.{bow} Only an unworn flank beside the rubbed part, or a "
+            "reference mark, in both traces would settle it.")
+
+
+def median_of_five(rest) -> np.ndarray:
+    """Running median (n,) of five depths (n,)."""
+    return np.median(np.lib.stride_tricks.sliding_window_view(np.pad(rest, 2, "edge"), 5), axis=1)
+
