@@ -53,6 +53,7 @@ if "importlib.metadata" not in sys.modules:
     later.__path__ = [os.path.join(one, "metadata") for one in importlib.__path__]
     later.entry_points = lambda **of: later.__getattr__("entry_points")(**of)
 
+import _thread
 import atexit
 import threading
 from pathlib import Path
@@ -209,6 +210,17 @@ def _interrupted() -> str:
     return text + "".join(f"; what is kept in {there.shown(one)} goes on with --resume" for one in kept)
 
 
+def _once_more(lost) -> None:
+    """Where an exception is dropped, as in what LLVM calls while it compiles, an interrupt comes again in a moment."""
+    if lost.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(lost)
+        return
+    again = threading.Timer(0.05, _thread.interrupt_main, ENDINGS[:1])
+    again.daemon = True
+    again.start()
+
+
+sys.unraisablehook = _once_more
 for one in ENDINGS:  # as late as can be: from here to the try above there is nothing that waits
     signal.signal(one, signal.default_int_handler)
 

@@ -31,6 +31,18 @@ else:
     atexit.register(ask)
 runpy.run_module("patchfem", run_name="__main__", alter_sys=True)
 """
+SWALLOWED = """\
+import ctypes, os, signal, time
+import patchfem.__main__
+
+ask = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), getattr(signal, name)))
+for name in "SIGTERM", "SIGINT", "SIGHUP":
+    try:
+        ask()
+        time.sleep(10)
+    except KeyboardInterrupt:
+        print(name)
+"""
 LEFT = """\
 import os, sys
 from patchfem.__main__ import main
@@ -75,6 +87,14 @@ def test_exact_a_command_that_is_asked_to_end_shows_no_traceback(scene, when, co
                           timeout=60)
     assert done.returncode == code and said in done.stderr and "Traceback" not in done.stderr
     assert when == "end" or not done.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals that end a process elsewhere cannot be caught")
+def test_exact_an_interrupt_in_a_callback_of_the_compiler_is_not_lost():
+    """Python takes a signal in whatever it runs next; where that is called by LLVM, through ctypes, the exception was
+    dropped with a word on stderr, and the run went on."""
+    done = subprocess.run([sys.executable, "-c", SWALLOWED], text=True, capture_output=True, timeout=60)
+    assert done.stdout.split() == ["SIGTERM", "SIGINT", "SIGHUP"] and not done.stderr
 
 
 def test_always_a_profiler_has_its_say(scene):
