@@ -13,6 +13,8 @@ from .comparison import Comparison, finish, grid, taken
 from .point_laws import Smooth, loops, rows, sticking_warnings
 
 CRITERIA = ("displacement", "velocity", "force")
+ADMITTED = 1e-2  # share of the friction limit that a step may leave open before a run says so
+TURN = 0.5  # of the elastic part of the friction in a step [rad], beyond which a run says so
 
 
 def kernels(modes: ModalBasis, h: float) -> np.ndarray:
@@ -60,19 +62,26 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     failures = compiled.duhamel_loop(
         maps, coupling, solve, omega, dampers, *others, found.drive, law, CRITERIA.index(convergence), float(tolerance),
         float(relax), int(most), room, found.z, found.v, found.force, found.residual, found.iterations)
-    said = _warnings(modes, laws, law, found, convergence, tolerance, relax, failures)
+    share = admitted(modes, found.h, convergence, tolerance, relax) / law[:, 1]
+    said = [*sticking_warnings(modes, laws, found.h), *_admitting(convergence, tolerance, float(share.max(initial=0))),
+            *_warnings(modes, laws, law, found, failures, steps_per_cycle)]
     return finish(modes, found, failures, said)
 
 
-def _warnings(modes, laws, law, found, convergence, tolerance, relax, failures) -> list:
-    out = sticking_warnings(laws)
-    share = admitted(modes, found.h, convergence, tolerance, relax) / law[:, 1]
-    if share.max(initial=0.0) > 1e-2:
-        out.append(f"a {convergence} that changes by less than {tolerance:g} lets the friction be wrong by "
-                   f"{share.max():.3g} of its limit; lower accuracy.convergence_tolerance below "
-                   f"{1e-2 * tolerance / share.max():.1g} or use convergence = \"force\"")
+def _admitting(convergence: str, tolerance: float, share: float) -> list:
+    """Warning, as a list, of a criterion that lets the friction be wrong by a share of its limit."""
+    if share <= ADMITTED:
+        return []
+    cure = f"divide accuracy.convergence_tolerance by {np.ceil(share / ADMITTED):.0f}" if convergence == "force" else \
+        'set accuracy.convergence = "force"'
+    return [f"a {convergence} that changes by less than {tolerance:g} lets the friction be wrong by {share:.3g} of its "
+            f"limit; {cure}"]
+
+
+def _warnings(modes, laws, law, found, failures, steps: int) -> list:
+    out = []
     left = np.abs(found.residual) / law[:, 1:2]
-    if left.max(initial=0.0) > 1e-2:
+    if left.max(initial=0.0) > ADMITTED:
         out.append(f"the steps accepted left up to {left.max():.3g} and on the average {left[:, 1:].mean():.3g} of the "
                    "friction limit between the law and the force used")
     if failures:
@@ -80,7 +89,7 @@ def _warnings(modes, laws, law, found, convergence, tolerance, relax, failures) 
     for one, face in zip(laws, modes.interfaces):
         if isinstance(one, Smooth) and one.compliance:
             turn = found.h * np.sqrt(np.sum(face**2) / modes.mass / one.compliance)
-            if turn > 0.5:
-                out.append(f"the elastic part of the friction turns by {turn:.2g} rad in a step; it needs "
-                           f"{np.ceil(turn / 0.5):.0f} times the steps per cycle")
+            if turn > TURN:
+                out.append(f"the elastic part of the friction turns by {turn:.2g} rad in a step (limit {TURN:g}); set "
+                           f"accuracy.steps_per_cycle = {steps * int(np.ceil(turn / TURN))}")
     return out

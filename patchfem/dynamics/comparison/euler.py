@@ -25,7 +25,7 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     room = np.empty(len(law)), np.empty(modes.omega.size)
     with np.errstate(over="ignore", invalid="ignore"):
         kernels.euler_loop(*taken(modes), found.drive, law, found.h, room, found.z, found.v, found.force)
-        return finish(modes, found, 0, _warnings(modes, laws, found.h))
+        return finish(modes, found, 0, _warnings(modes, laws, found.h, steps_per_cycle))
 
 
 def damping_left(modes: ModalBasis, h: float) -> np.ndarray:
@@ -35,14 +35,17 @@ def damping_left(modes: ModalBasis, h: float) -> np.ndarray:
     return own - w * h / 2
 
 
-def _warnings(modes, laws, h) -> list:
-    out = sticking_warnings(laws)
+def _warnings(modes, laws, h, steps: int) -> list:
+    out = sticking_warnings(modes, laws, h)
     left = damping_left(modes, h)
     if np.any(np.isfinite(left)):
         i = int(np.nanargmin(left))
         own = left[i] + modes.omega[i] * h / 2
-        grows = ": its free vibration grows, divide the step by at least " \
-            f"{modes.omega[i] * h / 2 / max(own, 1e-12):.2g}" if left[i] < 0 else ""
+        grows = ""
+        if left[i] < 0:
+            times = int(np.ceil(modes.omega[i] * h / 2 / own)) if own > 0 else 0
+            grows = ": its free vibration grows; " + (f"set accuracy.steps_per_cycle = {steps * times}" if times else
+                                                      "no step of this method damps it")
         out.append(f"explicit Euler takes {modes.omega[i] * h / 2:.3g} off the damping ratio of mode "
                    f"'{modes.names[i]}' and leaves {left[i]:.3g} of {own:.3g}{grows}")
     for one, face in zip(laws, modes.interfaces):

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core import ModalBasis, PatchfemError, Start
 from .comparison import Comparison, finish, grid, taken
-from .point_laws import Coulomb, loops, rows, sticking_warnings
+from .point_laws import Coulomb, added_static, loops, low_speed, rows, sticking_warnings
 
 
 def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 400, stick_speed: float | None = None,
@@ -37,25 +37,16 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     return finish(modes, found, stops, _warnings(modes, laws, law, found, stick_speed, by_force, stops))
 
 
-def added_static(modes: ModalBasis, face, stick_speed: float, h: float) -> float:
-    """Force [N] by which the stick speed raises the static friction of a released interface in steps of h [s].
-
-    It is the force over the kinetic friction that gives the interface the stick speed within a step. With less the
-    interface is caught again, so it acts as static friction that grows as the step falls.
-    """
-    return 2 * modes.mass * stick_speed / (h * float(np.sum(np.asarray(face)**2)))
-
-
 def _warnings(modes, laws, law, found, stick_speed, by_force, stops) -> list:
-    out = sticking_warnings(laws, stick_speed)
+    out = sticking_warnings(modes, laws, found.h, stick_speed)
     for one, row, face in zip(laws, law, modes.interfaces):
         if not isinstance(one, Coulomb) or not row[3]:
             continue
         static = row[2] + added_static(modes, face, row[3], found.h)
         if not by_force and static > 1.01 * row[1]:
             out.append(f"the stick speed {row[3]:g} m/s at a step of {found.h:.3g} s holds the interface up to "
-                       f"{static:.3g} N instead of {row[1]:.3g} N, and the more the smaller the step: lower "
-                       "accuracy.stick_speed with the square of the step, or stop by force as well")
+                       f"{static:.3g} N instead of {row[1]:.3g} N, and the more the smaller the step; set "
+                       f'accuracy.stick_speed = "{low_speed(modes, face, row[1], found.h):.2g} m/s"')
         drop = 0.5 * stops * modes.mass * row[3]**2 / np.sum(face**2)
         out.append(f"below {row[3]:g} m/s the interface is stopped at once ({stops} times, up to {drop:.3g} J in all): "
                    "the speed drops from a finite value, which no rigid friction does")

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ... import compiled
-from ...core import PatchfemError
+from ...core import ModalBasis, PatchfemError
 from ...friction.protocol import Element
 from ..contacts.dispatch import COULOMB, law_of, number_of
 
 HEAD = 4  # numbers of a row before those of its law
+RAISED = 0.005  # of a static friction, by which a stick speed that is proposed raises it
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +38,9 @@ class Coulomb:
     def row(self, stick_speed: float | None = None) -> np.ndarray:
         """Numbers (HEAD,) for the compiled loops; stick_speed [m/s] overrides the law's own."""
         return np.array([0.0, self.static, self.kinetic, self.stick_speed if stick_speed is None else stick_speed])
+
+
+NO_FRICTION = Coulomb(1e-300, 1e-300)  # of an interface that bears nothing
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -106,14 +110,30 @@ def loops(laws):
     return compiled.instance("dynamics.comparison.comparison_kernels", {"law": law})
 
 
-def sticking_warnings(laws, stick_speed: float | None = None) -> list:
-    """Sentences on what the laws by themselves get wrong: those that never stick, and 3.12 as printed."""
+def added_static(modes: ModalBasis, face, stick_speed: float, h: float) -> float:
+    """Force [N] by which the stick speed raises the static friction of a released interface in steps of h [s].
+
+    It is the force over the kinetic friction that gives the interface the stick speed within a step. With less the
+    interface is caught again, so it acts as static friction that grows as the step falls.
+    """
+    return 2 * modes.mass * stick_speed / (h * float(np.sum(np.asarray(face)**2)))
+
+
+def low_speed(modes: ModalBasis, face, static: float, h: float) -> float:
+    """Stick speed [m/s] that raises a static friction [N] by RAISED of it, in steps of h [s] (`added_static`)."""
+    return RAISED * static / added_static(modes, face, 1.0, h)
+
+
+def sticking_warnings(modes: ModalBasis, laws, h: float, stick_speed: float | None = None) -> list:
+    """Sentences on what the laws by themselves get wrong in steps of h [s]: those that never stick, and 3.12 as
+    printed."""
     out = []
-    for law in laws:
+    for law, face in zip(laws, modes.interfaces, strict=True):
         if isinstance(law, Coulomb):
-            if not law.row(stick_speed)[3]:
+            if not law.row(stick_speed)[3] and law != NO_FRICTION:
                 out.append("Coulomb friction without a stick branch: the force is + or - kinetic, so a held interface "
-                           "shakes and creeps; name accuracy.stick_speed")
+                           "shakes and creeps; set accuracy.stick_speed = "
+                           f'"{low_speed(modes, face, law.static, h):.2g} m/s"')
         elif law.steepness:
             speed = float(np.arctanh(0.5)) * law.limit / law.steepness
             out.append(f"limit*tanh(v/v_0) never sticks: at half of its limit the interface creeps at {speed:.3g} m/s "

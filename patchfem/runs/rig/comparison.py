@@ -8,7 +8,6 @@ import numpy as np
 
 from ...core import Outcome
 from ...dynamics.comparison import point_laws
-from ...dynamics.comparison.point_laws import Coulomb
 from ...dynamics.cycles import hermite_extremes
 from ...dynamics.march.models import load_kernels
 from ...dynamics.second_book import gap, sampled_work
@@ -95,7 +94,7 @@ def _integrated(model, numerics, laws):
     accuracy, modes, drive, start = model.accuracy, model.rig.modes, model.rig.drive, model.rig.start
     duration = numerics.cycles * drive.period
     if not laws:
-        laws = [Coulomb(1e-300, 1e-300)] * len(modes.interfaces)
+        laws = [point_laws.NO_FRICTION] * len(modes.interfaces)
     method = module_of(f"accuracy.method={accuracy.method}")
     if accuracy.method == "duhamel":
         criterion = accuracy.convergence or "force"

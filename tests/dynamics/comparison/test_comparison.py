@@ -28,7 +28,7 @@ from numba import typeof
 from patchfem.core import BaseSine, PatchfemError, Start, frozen_array
 from patchfem.dynamics.comparison import duhamel, euler, newmark
 from patchfem.dynamics.comparison.comparison import first_forces
-from patchfem.dynamics.comparison.point_laws import Coulomb, loops, rows
+from patchfem.dynamics.comparison.point_laws import Coulomb, added_static, loops, rows
 from patchfem.structure.drives import Recorded, release
 
 DRIVE = BaseSine(1.3, 0.9)
@@ -199,7 +199,7 @@ def test_exact_stick_speed_is_static_friction_that_grows(by_force, release_at):
     """A force that rises by 1 N/s against 1 N: with v_th = .01 m/s the step of .01 s holds it up to 3 N."""
     modes = basis([0.0], [0.0], [[1.0]], [-1.0])
     drive = Recorded(np.array([0.0, 4.0]), np.array([0.0, 4.0]), 4.0, False)
-    assert newmark.added_static(modes, modes.slide, 0.01, 0.01) == pytest.approx(2.0)
+    assert added_static(modes, modes.slide, 0.01, 0.01) == pytest.approx(2.0)
     found = newmark.run(modes, drive, (Coulomb(1.0, 1.0),), 4.0, 400, 0.01, by_force)
     assert found.time[np.argmax(found.v[:, 0] > 0)] == pytest.approx(release_at, abs=0.021)
 
