@@ -6,6 +6,7 @@ from typing import NamedTuple
 from ..effects import has
 from ..model.model import Model
 from ..runs.plan import plan
+from ..scene.rules.draft import acts
 
 KNOBS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
 LEVELS = 5  # values of a knob, each twice as fine as the one before
@@ -32,12 +33,9 @@ class Setting(NamedTuple):
 def knobs_of(model: Model) -> list:
     """Knobs, of KNOBS, that change what a model computes: those of its mesh, its steps, its shear modes and its
     jumps over cycles of wear."""
-    out = ["element_size"] if model.patch is not None else []
-    if model.kind in ("bench", "rig") or (model.kind == "linear" and model.accuracy.method == "march"):
-        if plan(model).engine in ("march", "bench", "smooth"):  # a count of steps asks for the march
-            out.append("steps_per_cycle")
-            if model.soft and has(model.friction.law, "bonds"):
-                out.append("shear_modes")
+    out, engine = ["element_size"] if model.patch is not None else [], plan(model).engine
+    out += [knob for knob in ("steps_per_cycle", "shear_modes") if acts(knob, model.kind, engine)
+            and (knob != "shear_modes" or (model.soft and has(model.friction.law, "bonds")))]
     if model.wear is not None and model.patch is not None:
         out.append("jumps")
     return out

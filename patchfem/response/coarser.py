@@ -15,12 +15,14 @@ class Rung(NamedTuple):
     """One way in which a run can be coarser.
 
     runs: variants, hashable arguments of `solve`, coarse to coarser; rule(values of the run beside, *values of the
-    runs) -> error by measure; beside: the variant that they are compared with, None: the run itself.
+    runs) -> error by measure; beside: the variant that they are compared with, None: the run itself; of: what is
+    coarser: "steps", "mesh", "modes", "bonds" or "cells", "own" where it is nothing that a scene names.
     """
 
     runs: tuple
     rule: Callable
     beside: object = None
+    of: str = "own"
 
 
 def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> tuple:
@@ -41,20 +43,23 @@ def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> t
     return errors, perf_counter() - begin
 
 
-def left_open(time, space, runs) -> dict:
-    """What leaves the measures of a run open: `steps` and `space`, errors by name, and the `orders` of the former.
+def left_open(kinds, errors, runs) -> dict:
+    """What leaves the measures of a run open: errors by name under each of `kinds`, and the `orders` of the steps.
 
-    time, space: errors by name, one dict per rung; runs: measures of the run, at half and at a quarter of its steps,
-    fewer where it has no steps.
+    kinds: what each rung makes coarser; errors: by name, one dict per rung; runs: measures of the run, at half and at a
+    quarter of its steps, fewer where it has no steps.
     """
-    parts = {kind: {name: sum(one.get(name, 0.0) for one in each) for name in {name for one in each for name in one}}
-             for kind, each in (("steps", time), ("space", space))}
-    return parts | {"orders": orders(*runs) if len(runs) == 3 else {}}
+    out: dict = {}
+    for kind, part in zip(kinds, errors, strict=True):
+        mine = out.setdefault(kind, {})
+        for name, error in part.items():
+            mine[name] = mine.get(name, 0.0) + error
+    return {"parts": out, "orders": orders(*runs) if len(runs) == 3 else {}}
 
 
-def space_rung(coarser, beside=None) -> Rung:
-    """Rung whose one run has a coarser mesh, fewer modes or narrower strips, and whose change is the error.
+def space_rung(coarser, beside=None, of: str = "mesh") -> Rung:
+    """Rung whose one run has a coarser mesh, or fewer modes, and whose change is the error.
 
-    coarser, beside: variants as in `Rung`.
+    coarser, beside, of: as in `Rung`.
     """
-    return Rung((coarser,), change, beside)
+    return Rung((coarser,), change, beside, of)

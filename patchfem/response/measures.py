@@ -10,16 +10,18 @@ from ..dynamics.second_book import gap, sampled_work, share
 
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate
+NOTHING = 1e-18  # J
 SMOOTH = 4.0  # ratio of the bends at three samples, up to which they are those of one curve
 
 
 def energy_balance(book: dict):
     """Relative gap of the energy balance [1] of a run, or (n,) of many; 0 for a run without energy.
 
-    |work in - stored - dissipated| / (integral |power in| + peak stored). book: energies [J] by name.
+    |work in - stored - dissipated| / (integral |power in| + peak stored); a gap of NOTHING is the round-off of what
+    holds still. book: energies [J] by name.
     """
-    miss = book["work_in"] - book["stored"] - book["friction"] - book["viscous"]
-    return share(np.abs(miss), book["power"] + book["peak_stored"])
+    miss = np.abs(book["work_in"] - book["stored"] - book["friction"] - book["viscous"])
+    return share(miss * (miss > NOTHING), book["power"] + book["peak_stored"])
 
 
 def harmonic(time, weight, values, omega) -> complex:

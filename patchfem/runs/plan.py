@@ -74,11 +74,12 @@ def _planned(model: Model, per_point: bool) -> Plan:
     numerics, pressed = None, 0.0
     if model.rig is not None:
         from .rig import plan as of_rig
+        from .rig.engines import engine_of, knobs_idle
         from .rig.numerics import choose
 
         unknowns["modes"], chain = len(model.rig.frequencies), of_rig.chain(model.rig) | chain
         groups |= of_rig.groups(model) if model.kind == "rig" else {}
-        said[0] = of_rig.first_words(model.rig, groups)
+        said[0] = [*knobs_idle(model, engine_of(model, per_point).name), *of_rig.first_words(model.rig, groups)]
         said[2] = of_rig.sum_words(model) if model.kind == "rig" else []
     if model.patch is not None:
         from .patch import plan as of_patch

@@ -50,6 +50,10 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
     begin, model = perf_counter(), what.model
     seconds, warnings, notes = {}, list(model.source.remarks), list(model.source.notes)
     patch, coarse = None, (None, None)
+    if model.rig is not None:
+        from .rig.engines import knobs_idle
+
+        warnings += knobs_idle(model, what.engine)
     if model.patch is not None:
         from .patch import result as of_patch
 

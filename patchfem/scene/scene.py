@@ -23,10 +23,11 @@ from .keys.same import once
 from .keys.types import keys as keys_of
 from .lines import DEEPEST, TooDeep, counted, key_lines
 from .reader import Draft, apply_set
+from .rules.accuracy import knobs_unused
 from .rules.check import check
 from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
 from .rules.drive import drive_unused, waveform_unused
-from .rules.friction import kinetic_unused, temperature_unused
+from .rules.friction import kinetic_unused, rest_speed_unused, temperature_unused
 from .rules.limits import combinations, not_yet_built
 from .rules.methods import method_unused
 from .rules.structure import unseen
@@ -288,8 +289,9 @@ def _finish(found: tables.Tables, kind: str) -> tables.Tables:
     new: dict[str, Any] = {}
     if found.contact:
         new["contact"] = _contact(found.contact)
-    if found.accuracy.method in method_unused(kind):
-        new["accuracy"] = _pinned(found.accuracy)
+    without = list(knobs_unused(found, kind)) + ["method"] * (found.accuracy.method in method_unused(kind))
+    if without:
+        new["accuracy"] = _without(found.accuracy, without)
     if found.friction:
         new["friction"] = _law(found.friction)
     if found.slide:
@@ -299,11 +301,6 @@ def _finish(found: tables.Tables, kind: str) -> tables.Tables:
     if found.drive:
         new["drive"] = _drive(found.drive)
     return found.model_copy(update=new)
-
-
-@once
-def _pinned(accuracy: tables.Accuracy) -> tables.Accuracy:
-    return _without(accuracy, ["method"])
 
 
 @once
@@ -340,7 +337,8 @@ def _contact(contact: tables.Contact) -> tables.Contact:
 
 @once
 def _law(law: tables.Friction) -> tables.Friction:
-    idle = {"kinetic": kinetic_unused(law), "temperature": temperature_unused(law)}
+    idle = {"kinetic": kinetic_unused(law), "rest_speed": rest_speed_unused(law),
+            "temperature": temperature_unused(law)}
     law = _without(law, unused(law, "law", LAWS) | {key for key, without in idle.items() if without})
     return _filled(law, {"kinetic": law.static}) if takes(law.law, "kinetic") else law
 

@@ -1,10 +1,13 @@
-"""The cure that a warning names: that it acts, and that what a run answers first is named before all else."""
+"""The cures that warnings and notes name: that each acts as it is printed, of 200 scenes by chance, of a patch, of
+steps that are too few and of bolted joints that hold; and that what a run answers first is named before all else."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from scene_texts import DRIVE, MODE, NONLOCAL, POINT, SMALL_PATCH
+from remedies import drawn, ran, remedies_of, verdict
+from scene_texts import DRIVE, JOINT, JOINT_SHAKEN, MODE, NONLOCAL, POINT, SMALL_PATCH
 
 from patchfem.core import Measure
 from patchfem.model.model import build
@@ -17,6 +20,35 @@ from patchfem.scene.scene import loads
 PATCH = SMALL_PATCH.replace('element_size = "0.5 mm"\n', "")
 SHAKEN = POINT + NONLOCAL + MODE + DRIVE
 FEW = "[accuracy]\ntolerance = 1e-2\nsteps_per_cycle = 16\n"
+BENCH = JOINT + """[slide]
+kind = "sine"
+amplitude = "45 nm"
+frequency = "1 Hz"
+cycles = 3
+[accuracy]
+tolerance = 1e-2
+steps_per_cycle = {steps}
+"""
+EVERY_TIME = 10, 18, 31, 33, 34, 45, 78, 89, 116, 117, 144, 150, 163, 175  # the cheapest, of every kind
+BOWED = """[contact.crown]
+radius = "100 m"
+"""
+
+
+def ran_text(text: str):
+    return run(plan(loads(text)))
+
+
+@pytest.mark.share(*EVERY_TIME)
+@pytest.mark.parametrize("seed", range(200))
+def test_always_a_printed_remedy_does_what_it_promises(seed):
+    """Followed to the letter it ends its warning, or makes the bar it names half as wide, three quarters where it
+    promises no more than to refine."""
+    tables = drawn(seed)
+    found = ran(tables)
+    said = [] if found is None else [*found.warnings, *found.extra.get("notes", [])]
+    done = [(verdict(tables, found, one), *one) for sentence in said for one in remedies_of(sentence)]
+    assert not [one for one in done if one[0] in ("failed", "refused")]
 
 
 @pytest.mark.slow
@@ -63,7 +95,56 @@ def test_always_steps_that_are_left_out_cure_what_few_steps_do_not_show():
 def test_exact_what_a_run_answers_first_is_named_first(wide, first):
     """Errors of 16 steps; that of second order falls by 16 at 64 steps, by 64 at 128."""
     measures = {name: Measure(1.0, "1", error) for name, error in wide.items()}
-    left = {"steps": wide, "space": {}, "orders": dict.fromkeys(wide, 2.0)}
+    left = {"parts": {"steps": wide}, "orders": dict.fromkeys(wide, 2.0)}
     asked = SimpleNamespace(model=build(loads(SHAKEN + FEW)))
     seen = SimpleNamespace(plan=asked, measures=measures, patch=None, extra={"steps_per_cycle": 16, "left_open": left})
     assert loose(seen) == [first]
+
+
+@pytest.mark.parametrize("steps", [400, 1600])
+def test_exact_a_joint_that_holds_has_the_stiffness_of_its_pieces(steps):
+    """Nothing slips, so the secant is the tangential stiffness, whatever the steps; its bar says so."""
+    found = ran_text(BENCH.format(steps=steps))
+    secant, elastic = (found.measures[name] for name in ("secant_stiffness", "tangential_stiffness"))
+    assert abs(secant.value - elastic.value) <= secant.error + elastic.error
+    assert secant.error <= 2e-3 * secant.value and not found.warnings
+
+
+def test_always_what_the_mesh_leaves_open_is_not_laid_on_the_steps():
+    """The edge slip of a bowed joint does not change with the steps; a finer mesh, as advised, tells it better."""
+    first = ran_text(BENCH.format(steps=100) + BOWED)
+    said = [text for text in first.warnings if text.startswith("loop_area")]
+    assert len(said) == 1 and "steps_per_cycle" not in said[0] and "interface nodes) leaves it open" in said[0]
+    advised = re.search(r"accuracy.tolerance = (\S+) refines it", said[0])[1]
+    again = ran_text(BENCH.format(steps=100).replace("tolerance = 1e-2", f"tolerance = {advised}") + BOWED)
+    for name in ("friction_ratio_end", "loop_area"):
+        assert again.measures[name].error < first.measures[name].error / 2
+        assert abs(again.measures[name].value - first.measures[name].value) < first.measures[name].error
+
+
+def test_exact_the_ringing_of_a_start_is_no_dissipation():
+    """A flat joint below its limit dissipates nothing: the bar of its work per cycle holds 0, and the cycles that a
+    note names let the ring decay."""
+    first = ran_text(JOINT_SHAKEN)
+    loop = first.measures["loop_area"]
+    assert first.outcome == "stuck" and abs(loop.value) > loop.floor / 100 and abs(loop.value) <= loop.error
+    assert abs(first.measures["equivalent_damping"].value) <= first.measures["equivalent_damping"].error
+    told = [text for text in first.extra["notes"] if text.startswith("the start still rings at 105")]
+    assert len(told) == 1
+    cycles = re.search(r"drive.cycles = (\d+) lets", told[0])[1]
+    assert any(f"drive.cycles = {cycles} lets" in text for text in first.warnings)
+    again = ran_text(JOINT_SHAKEN.replace("cycles = 20", f"cycles = {cycles}"))
+    assert not any("rings" in text for text in again.extra["notes"])
+    damping = again.measures["equivalent_damping"]
+    assert abs(damping.value) <= damping.error <= damping.floor
+    assert not any("equivalent_damping" in text or "drive.cycles" in text for text in again.warnings)
+
+
+def test_always_a_ring_that_steps_do_not_resolve_is_followed_without_them():
+    """800 steps of a cycle are few for a ring of 88 periods in it: the exact engine is advised, and cures it."""
+    loose = "[accuracy]\ntolerance = 0.3\n"
+    first = ran_text(JOINT_SHAKEN + loose)
+    assert first.extra["engine"] == "march" and 'accuracy.method = "exact"' in first.warnings[0]
+    again = ran_text(JOINT_SHAKEN + loose + 'method = "exact"\n')
+    bars = [one.measures["secant_stiffness"].error for one in (first, again)]
+    assert bars[1] < bars[0] / 10

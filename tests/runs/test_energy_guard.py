@@ -1,6 +1,7 @@
 """A run whose energy balance does not close has not converged, whatever its amplitudes look like; stiff damping."""
 
 import pytest
+from scene_texts import FORCED
 
 import patchfem as pf
 from patchfem.core import Measure, Outcome
@@ -47,7 +48,8 @@ def test_exact_acceleration_of_a_mode_that_its_damping_locks(tmp_path):
 
 
 def test_refuses_steady_where_energy_is_lost(tmp_path, monkeypatch):
-    """A ledger that misses a millionth of the viscous loss ends not_converged, with the gap, the bar and a remedy."""
+    """A ledger that misses a millionth of the viscous loss ends not_converged, with the gap and the bar; no setting is
+    known to mend it, so none is named."""
     honest = run(tmp_path, 0.3, 4)
     assert honest.outcome is not Outcome.NOT_CONVERGED and honest.measures["energy_balance"].value < 1e-10
     kept = Run.book
@@ -55,7 +57,7 @@ def test_refuses_steady_where_energy_is_lost(tmp_path, monkeypatch):
     found = run(tmp_path, 0.3, 4)
     assert found.outcome is Outcome.NOT_CONVERGED
     assert any("energy balance of engine march misses" in line and "beyond 1e-08" in line
-               and "accuracy.steps_per_cycle" in line for line in found.warnings)
+               and "accuracy." not in line for line in found.warnings)
     assert all(measure.error is None for measure in found.measures.values())
 
 
@@ -70,3 +72,17 @@ def test_always_an_engine_closes_its_balance_as_it_says(engine, value, error, cl
 
 def test_always_linear_runs_without_a_balance_pass():
     assert unbalanced(ENGINES["exact"], {}) == ""
+
+
+def test_always_the_round_off_of_what_holds_still_is_no_missing_energy():
+    """Two masses, of which the driven one is held at half its limit: all that passes is 1.7e-20 J of round-off."""
+    held = FORCED.replace("mass = 2", "mass = 1").replace("30 N", "4.14 N").replace("90 Hz", "52.09 Hz")
+    found = pf.run(f"""[structure]
+masses = ["0.5918 kg", "0.5335 kg"]
+spring = [{{between = [1, 0], stiffness = "490700 N/m"}}, {{between = [2, 1], stiffness = "755300 N/m"}},
+          {{between = [2, 0], stiffness = "1003000 N/m"}}]
+damper = [{{between = [1, 0], coefficient = "1.449 N s/m"}}, {{between = [2, 1], coefficient = "6.438 N s/m"}}]
+interface = [{{between = [1, 0], load = "10.38 N", law = "coulomb", static = 0.723}}]
+{held.replace("cycles = 25", "cycles = 12")}""")
+    assert found.outcome is Outcome.STUCK and not found.warnings
+    assert found.measures["energy_balance"].value == 0 < found.extra["book"]["power"] < 1e-18

@@ -22,6 +22,7 @@ KINDS = ("patch", "bench", "rig", "masses", "wear", "harmonic", "soft", "linear"
 DEAR = 3.0  # planned seconds beyond which a scene is not drawn
 LONG = 15.0  # and beyond which a remedy is not tried
 BETTER = 0.5  # of what it was, at which a bar or a share is better by what any remedy promises
+REFINED = 0.75  # where it promises no more than to refine
 FACTOR = 4  # on a number, up or down, where a sentence names a key without a value
 
 
@@ -179,7 +180,8 @@ def _judged(before, after, remedy: Remedy, sets: dict) -> str:
         return "failed" if one is None or one.value is not None else "gone"
     if _over(one, asked) <= 1:
         return "gone"
-    return "better" if one.error <= BETTER * before.measures[worst].error else "failed"
+    share = REFINED if "refines" in sentence else BETTER
+    return "better" if one.error <= share * before.measures[worst].error else "failed"
 
 
 def _named(found, sentence: str) -> list:

@@ -36,9 +36,11 @@ def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
 
     ladder, made = ladder_of(model, patch, coarse, fine, steps), {}
     errors, seconds = estimate(solve, fine.values, ladder, made)
-    errors += [stated(model, fine)] if sum_error(model, fine.engine) else []
+    kinds = [one.of for one in ladder]
+    if sum_error(model, fine.engine):
+        errors, kinds = [*errors, stated(model, fine)], [*kinds, "bonds"]
     runs = [fine.values, *(made[one].values for one in ladder[0].runs)]
-    return errors, seconds, left_open(errors[:1], errors[1:], runs)
+    return errors, seconds, left_open(kinds, errors, runs)
 
 
 def ladder_of(model, patch, coarse, fine, steps: int) -> list:
@@ -51,7 +53,7 @@ def ladder_of(model, patch, coarse, fine, steps: int) -> list:
     def rule(*values) -> dict:
         return {name: times * error for name, error in step_error(*values, steps).items()}
 
-    out, meshed = [Rung((half, few), rule)], coarse is not None
+    out, meshed = [Rung((half, few), rule, of="steps")], coarse is not None
     if meshed and slips_by_elements(model):
         from .shear import mesh_rung
 
@@ -60,7 +62,8 @@ def ladder_of(model, patch, coarse, fine, steps: int) -> list:
         out.append(space_rung(few._replace(rough=True), few))
     if fine.engine.kind == LIST and choice.merge > 0:
         narrow = few._replace(choice=replace(choice, merge=FINER * choice.merge))
-        out.append(Rung((narrow,), lambda a, b: {name: MERGED * gap for name, gap in change(a, b).items()}, few))
+        out.append(Rung((narrow,), lambda a, b: {name: MERGED * gap for name, gap in change(a, b).items()}, few,
+                        "bonds"))
     return out
 
 

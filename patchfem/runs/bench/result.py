@@ -35,7 +35,7 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     if f.reading == "report" and created > 1e-6 * power:
         warnings = [*warnings, f"the law as printed created {created:.3g} J, {100 * created / power:.2g} % of the work "
                     "that went to and fro: reading = \"stretch\" creates none"]
-    warnings = [*warnings, *warming(model, patch, fine), *two_books(found, fine.engine.name, steps)]
+    warnings = [*warnings, *warming(model, patch, fine), *two_books(found, steps)]
     if patch is not None:
         warnings = [*warnings, *_overhang(model.patch, patch, fine)]
         fields = frames_of(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])

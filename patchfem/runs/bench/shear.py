@@ -86,7 +86,7 @@ def mesh_rung(model, patch, coarse, few) -> Rung:
     length = law_from(model.friction).element(1.0).length
     stiff = stiffer(*(elements(one, model.friction.static, length).stiffness.sum() for one in (patch, coarse)))
     runs = few._replace(rough=True), few._replace(springs=spread), few._replace(springs=stiff)
-    return Rung(runs, mesh_error, few)
+    return Rung(runs, mesh_error, few, "mesh")
 
 
 def mesh_error(fine: dict, rough: dict, spread: dict, stiff: dict) -> dict:

@@ -5,11 +5,16 @@ from math import ceil, log2, log10
 from .patch_rows import DECISIVE, TABLE
 
 MOST = 1e9  # times that an error exceeds what is allowed, beyond which it does not matter
-MARGIN = 2.0  # on second order: where between its nodes a contact ends changes errors that much from size to size
 TIGHTER = 0.1  # times the tolerance: a mesh of at least one halving more
 MOST_HALVINGS = 4  # of the steps, as far ahead as an order seen at two of them is trusted
 LEAST_LEFT = 0.2  # share of an allowed error that steps may be asked to meet, where the mesh takes more than the rest
-LEAST_ELEMENTS = 1e-4  # of the length, an element that is still proposed
+FARTHEST = 8  # of the steps, that are named at once where no engine without steps serves
+MORE = 4  # times the harmonics of a balance, that are proposed
+MOST_STRIPS = 64  # that are proposed: four times the strips are some twenty times the time
+SIZE = "contact.element_size"  # an even mesh finds the ends of a contact at first order, one that is chosen at second
+OF_PEAK = ("pressure_peak", "loaded_fraction")
+OF_SAMPLES = ("stick_fraction", "slip_start_phase")  # of a cycle of a balance, however many harmonics it has
+READ = "no setting is known to make it better; read it by its error"
 # what a run answers first, named before what misses its tolerance by more
 FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_ratio_peak",
          "pressure_peak", "contact_fraction")
@@ -63,13 +68,11 @@ def _finer_mesh(result, wide: dict, coarse) -> str:
     times = max(wide.values())
     if asked.mesh is not None:
         return "split the elements of contact.mesh"
-    if not asked.chosen:
-        size = max(_rounded(asked.element_size / (MARGIN * times**0.5)), _rounded(LEAST_ELEMENTS * asked.length))
-        return f'leave out contact.element_size, or set it to "{1e6 * size:.3g} um"'
     nodes, wider = result.patch.x.size, f"accuracy.tolerance = {_up(tolerance * times):g} would be met"
-    if asked.strips is not None:  # strips leave an error of second order, as the mesh does
-        return f"the mesh ({nodes} interface nodes) and the strips share it; set contact.strips.count = " \
-               f"{ceil(asked.strips[0] * times**0.5)}, or {wider}"
+    if asked.strips is not None and result.plan.model.kind == "patch":  # bars of what moves have no share of strips
+        return f"the mesh ({nodes} interface nodes) and the strips share it; {_more_strips(asked, wide)}{wider}"
+    if not asked.chosen:
+        return f"leave out {SIZE}"
     if not wide.keys() - set(DECISIVE):
         return f"a mesh finer than {nodes} interface nodes would take too long; {wider}"
     tighter = _climbing(result, coarse)
@@ -77,6 +80,17 @@ def _finer_mesh(result, wide: dict, coarse) -> str:
         return f"a mesh finer than {nodes} interface nodes would take too long; read " \
                f"{'them by their errors' if len(wide) > 1 else 'it by its error'}"
     return f"the mesh ({nodes} interface nodes) was not chosen for it; accuracy.tolerance = {tighter:.3g} refines it"
+
+
+def _more_strips(asked, wide: dict) -> str:
+    """The number of strips that meets the tolerance, where few more do; "" where there is none.
+
+    The peak of the outermost strip is that of its middle, so its error is of first order in the strips; that of all
+    else is of second order, as that of the mesh is.
+    """
+    count = asked.strips[0] * max(times if name in OF_PEAK else times**0.5 for name, times in wide.items())
+    sized = f" and leave out {SIZE}" if not asked.chosen else ""
+    return f"set contact.strips.count = {ceil(count)}{sized}, or " if count <= MOST_STRIPS else ""
 
 
 def _climbing(result, coarse) -> float | None:
@@ -95,33 +109,63 @@ def _climbing(result, coarse) -> float | None:
 def _finer_motion(result, wide: dict, coarse) -> str:
     """What cures the errors of a motion in the measure that speaks for `wide` (name -> error over what is allowed).
 
-    Steps where they leave most of it open and it was seen to fall with them, by as many as its order asks for; the mesh
-    where that leaves it open. A looser tolerance is met only where it chooses nothing: with a patch it chooses a
-    coarser mesh.
+    It is that of what leaves most of it open. Steps cure it where it was seen to fall with them, by as many as its
+    order asks for. A looser tolerance is met only where it chooses nothing: with a patch it chooses a coarser mesh.
     """
-    extra, tolerance = result.extra, result.plan.model.accuracy.tolerance
     name = max(_first(result, wide), key=wide.get)
-    times = wide[name]
-    if extra.get("engine") == "harmonic" and extra.get("map") != "march":
-        return "raise accuracy.harmonics"
-    if name in (rings := extra.get("still_rings", {})):
+    if name in (rings := result.extra.get("still_rings", {})):
         return rings[name]
-    left, steps = extra.get("left_open"), extra.get("steps_per_cycle") or extra.get("steps")
-    of_steps, rest = (left[kind].get(name, 0.0) for kind in ("steps", "space")) if left else (1.0, 0.0)
-    if steps is not None and of_steps >= rest:
-        order = left["orders"].get(name) if left else 2.0
-        if order is None:
-            return _unproven(result.plan.model, int(steps), name, wide)
-        allowed = (of_steps + rest) / times
-        share = of_steps / max(allowed - rest, LEAST_LEFT * allowed)  # by which that of the steps is to fall
-        halvings = max(1, ceil(log2(share) / order))
-        exact = _stepless(result.plan.model) if halvings > MOST_HALVINGS else ""
-        return exact or f"set accuracy.steps_per_cycle = {int(steps) * 2**halvings}"
-    if result.patch is not None:
+    steps, cause = result.extra.get("steps_per_cycle") or result.extra.get("steps"), _cause(result, name)
+    if cause == "steps" and steps is not None:
+        return _more_steps(result, name, wide, int(steps))
+    if cause == "mesh":
         return _finer_under(result, coarse)
-    if steps is None:
-        return f"accuracy.tolerance = {_up(tolerance * times):g} would be met"
-    return f"accuracy.tolerance = {TIGHTER * tolerance:.3g} refines it"
+    if cause == "modes" and result.extra["shear_modes"] < result.patch.x.size:
+        return f"set accuracy.shear_modes = {min(4 * result.extra['shear_modes'], result.patch.x.size)}"
+    if cause == "bonds":
+        return _finer_bonds(result.plan.model.accuracy)
+    if result.extra.get("engine") == "harmonic":
+        return _more_harmonics(result.extra.get("harmonics"), name) or READ
+    tolerance = result.plan.model.accuracy.tolerance
+    return f"accuracy.tolerance = {_up(tolerance * wide[name]):g} would be met"
+
+
+def _cause(result, name: str) -> str:
+    """What leaves most of a measure open: one of the kinds of `response.coarser.Rung`."""
+    extra = result.extra
+    if (left := extra.get("left_open")) is None:  # a batch, which has no steps, or a run without an estimate
+        return "steps" if extra.get("steps_per_cycle") or extra.get("steps") else \
+            "own" if result.patch is None else "mesh"
+    return max(left["parts"], key=lambda kind: left["parts"][kind].get(name, 0.0), default="own")
+
+
+def _more_steps(result, name: str, wide: dict, steps: int) -> str:
+    """As many steps as the order at which the measure `name` was seen to fall asks for, or what helps without one."""
+    model, left = result.plan.model, result.extra.get("left_open") or {"parts": {}, "orders": {name: 2.0}}
+    order = left["orders"].get(name)
+    if order is None:
+        return _unproven(model, steps, name, wide)
+    parts = [part.get(name, 0.0) for part in left["parts"].values()]
+    of_steps = left["parts"].get("steps", {}).get(name, 1.0)
+    rest = sum(parts) - of_steps if parts else 0.0
+    allowed = (of_steps + rest) / wide[name]
+    share = of_steps / max(allowed - rest, LEAST_LEFT * allowed)  # by which that of the steps is to fall
+    halvings = max(1, ceil(log2(share) / order))
+    exact = _stepless(model) if halvings > MOST_HALVINGS else ""
+    return exact or f"set accuracy.steps_per_cycle = {steps * 2**min(halvings, FARTHEST)}"
+
+
+def _finer_bonds(accuracy) -> str:
+    """What makes the sum over bonds finer: the tolerance, where nothing is pinned."""
+    pinned = [f"accuracy.{key}" for key in ("tail", "merge") if getattr(accuracy, key) is not None]
+    return f"leave out {' and leave out '.join(pinned)}" if pinned else \
+        f"accuracy.tolerance = {TIGHTER * accuracy.tolerance:.3g} refines the sum over bonds"
+
+
+def _more_harmonics(found: int | None, name: str) -> str:
+    """The harmonics that make a steady motion better, from those it has; "" where it is exact between yields, None, or
+    the measure `name` is read off samples."""
+    return "" if found is None or name.startswith(OF_SAMPLES) else f"set accuracy.harmonics = {MORE * found}"
 
 
 def _unproven(model, steps: int, name: str, wide: dict) -> str:
@@ -147,7 +191,7 @@ def _finer_under(result, coarse) -> str:
     if asked.mesh is not None:
         return "the mesh leaves it open; split the elements of contact.mesh"
     if not asked.chosen:
-        return "the mesh leaves it open; leave out contact.element_size, or make it smaller"
+        return f"the mesh leaves it open; leave out {SIZE}"
     tighter = _climbing(result, coarse)
     if tighter is None:
         return f"the mesh ({nodes} interface nodes) leaves it open, and a finer one would take too long; read it by " \
@@ -164,12 +208,6 @@ def _stepless(model) -> str:
             pinned = "leave out accuracy.steps_per_cycle and " * (model.accuracy.steps_per_cycle is not None)
             return f'{pinned}set accuracy.method = "exact", which has no steps'
     return ""
-
-
-def _rounded(size: float) -> float:
-    """A size rounded down to two digits."""
-    unit = 10.0 ** (ceil(log10(size)) - 2)
-    return int(size / unit * (1 + 1e-9)) * unit
 
 
 def _up(value: float) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...core import Outcome, say
 from ...friction.bonds.parameters import ripening
+from .loose import FARTHEST, MORE
 
 BOOKS = 1e-3  # relative gap of the two books of energy beyond which a run says so
 BOUND = 1e-3  # share of mu_s N that friction may exceed before a run says so
@@ -87,17 +88,18 @@ def of_growth(law, peak: float | None) -> list:
     return out
 
 
-def two_books(values: dict, engine: str, steps: int | None) -> list:
+def two_books(values: dict, steps: int | None, harmonics: int | None = None) -> list:
     """Warning, as a list, of friction work that the samples of a run do not show as its ledger books it.
 
-    values: measures; engine: of the run; steps: per cycle, None of an engine without steps. The trapezoidal rule is of
-    second order.
+    values: measures; steps: per cycle, harmonics: of the run, each None of an engine without. The trapezoidal rule is
+    of second order; a gap that is smaller than its error can be small by chance.
     """
     found = values.get("work_check")
     if found is None or found.value is None or found.value <= BOOKS:
         return []
-    remedy = "raise accuracy.harmonics" if engine == "harmonic" else \
-        f"set accuracy.steps_per_cycle = {steps * 2**ceil(log2(found.value / BOOKS) / 2)}" if steps else \
+    halvings = ceil(log2(max(found.value, found.error or 0.0) / BOOKS) / 2)
+    remedy = f"set accuracy.harmonics = {MORE * harmonics}" if harmonics else \
+        f"set accuracy.steps_per_cycle = {steps * 2**min(halvings, FARTHEST)}" if steps else \
         "compare with accuracy.method = \"march\""
     return [f"work_check is {found.value:.2g} (limit {BOOKS:g}): friction work by the trapezoidal rule on the samples "
             f"differs from that of the energy ledger; {remedy}"]

@@ -18,6 +18,7 @@ from ...model.model import Model
 from ...response.coarser import Rung, space_rung
 from ...response.errors import cells_error, change, jumps_error, pieces_error, step_error, tolerance_error
 from ...scene.rules import methods
+from ...scene.rules.draft import acts, pinned
 from ..effort import too_long
 from .pieces.costs import pieces, seconds_of_pieces, seconds_of_steps
 from .smooth.choice import not_smooth
@@ -152,9 +153,11 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """Rungs of the engine of pieces: the mesh, where its nodes make the elements, and half the cells of a density."""
-    out = [Rung((Variant(numerics, coarse),), pieces_error)] if coarse is not None and model.soft else []
+    out = [Rung((Variant(numerics, coarse),), pieces_error, of="mesh")] if coarse is not None and model.soft else []
     cells = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
-    return [*out, Rung((Variant(replace(numerics, pairs=numerics.pairs + 1), patch),), cells_error)] if cells else out
+    if not cells:
+        return out
+    return [*out, Rung((Variant(replace(numerics, pairs=numerics.pairs + 1), patch),), cells_error, of="cells")]
 
 
 def _fewer(numerics, share: int):
@@ -166,7 +169,7 @@ def _march_in_time(model: Model, numerics, patch) -> list:
     """Rungs of the march in time: half and a quarter of the steps."""
     halves = tuple(Variant(_fewer(numerics, share), patch) for share in (2, 4))
     rule = jumps_error if set_valued(model, numerics) else step_error
-    return [Rung(halves, lambda *values: rule(*values, numerics.steps, model.rig.displacement))]
+    return [Rung(halves, lambda *values: rule(*values, numerics.steps, model.rig.displacement), of="steps")]
 
 
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
@@ -179,7 +182,7 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     climbs = model.grooves is not None
     if shape is not None and (varies or climbs or (coarse is not None and has(model.friction.law, "bonds"))):
-        out.append(space_rung(Variant(replace(few, shear_modes=max(1, shape.size // 2)), patch), quarter))
+        out.append(space_rung(Variant(replace(few, shear_modes=max(1, shape.size // 2)), patch), quarter, "modes"))
     return [*out, *_summed(model, few, patch, solution)]
 
 
@@ -189,12 +192,12 @@ def _summed(model: Model, few, patch, solution) -> list:
     choice = solution.summed
     if choice is None or not choice.error:
         return []
-    out = [Rung((), lambda fine: stated(model, patch, choice.error, fine, solution))]
+    out = [Rung((), lambda fine: stated(model, patch, choice.error, fine, solution), of="bonds")]
     if choice.merge > 0 or choice.tail > LOOSE * model.accuracy.tolerance:
         finer = replace(choice, merge=FINER * choice.merge, tail=LESS * choice.tail)
         same, narrow = (Variant(replace(few, choice=one), patch) for one in (choice, finer))
         out.append(Rung((narrow,), lambda wide, fine: {name: MERGED * gap for name, gap in change(wide, fine).items()},
-                        same))
+                        same, "bonds"))
     return out
 
 
@@ -262,9 +265,8 @@ def unbalanced(engine: Engine, measures: dict) -> str:
     bar = max(CLOSED, found.error or 0.0) if engine.closes is None else engine.closes
     if not found.value > bar:  # a motion that is not finite has been seen before
         return ""
-    remedy = {"march": "raise accuracy.steps_per_cycle", "harmonic": "raise accuracy.harmonics"}.get(engine.name)
     return f"the energy balance of engine {engine.name} misses {found.value:.2g} of the energy that passed, beyond " \
-        f"{bar:.2g}, so a step made or lost energy{'; ' + remedy if remedy else ''}"
+        f"{bar:.2g}, so a step made or lost energy"
 
 
 @lru_cache(8)
@@ -277,3 +279,13 @@ def engine_of(model: Model, per_point: bool = False) -> Engine:
         return PIECES
     named = ENGINES.get(model.accuracy.method)
     return named or next(one for one in AUTOMATIC if not (one.lacks(model) or (per_point and one is SMOOTH)))
+
+
+def knobs_idle(model: Model, engine: str) -> list:
+    """Sentences on the knobs of [accuracy] that a rig names and that the engine it is run by does not take."""
+    by = engine if engine != "harmonic" else {"balance": "harmonic", "march": "march"}.get(steady_by(model), "exact")
+    where = {"steps_per_cycle": f"for engine '{engine}', which has no steps,",
+             "harmonics": "where the steady motion is exact from event to event"}
+    plain = f"for engine '{engine}'"
+    return [f"accuracy.{knob} has no meaning {where.get(knob, plain)} and is not used"
+            for knob in pinned(model.accuracy) if not acts(knob, model.kind, by)]

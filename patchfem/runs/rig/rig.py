@@ -82,7 +82,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     extra |= {"book": raw.book, "period": drive.period, "notes": [*_notes(model, patch, raw), *rings.notes, *told[1]]}
     extra |= _behind(model, numerics, raw.contact)
     warnings = [*warnings, *_said(model, patch, raw, outcome, found)]
-    warnings = [*warnings, *two_books(found, numerics.engine, extra.get("steps_per_cycle"))]
+    warnings = [*warnings, *two_books(found, extra.get("steps_per_cycle"), extra.get("harmonics"))]
     warnings = [*warnings, *changing_note(outcome, drive), *raw.notes, *told[0]]
     if patch is not None:
         warnings = [*warnings, *travelled(patch, raw.response.slide)]
@@ -207,8 +207,8 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         if _enough(model, numerics, found, measures) or not time:
             if spent:
                 seconds["error"] = spent
-            left = left_open(time, space, [found.values, *(made[one].values for one in _halved(engine, model, numerics,
-                                                                                               patch))])
+            runs = [found.values, *(made[one].values for one in _halved(engine, model, numerics, patch))]
+            left = left_open([one.of for one in (*rungs, *meshed)], [*time, *space], runs)
             found = replace(found, extra=found.extra | {"left_open": left})
             return found, numerics, measures | curve_measures(found.extra)
         made[Variant(numerics, patch)] = found

@@ -1,8 +1,9 @@
-"""Rules of [accuracy]: an engine of the sum over bonds must be able to sum the law of the run."""
+"""Rules of [accuracy]: an engine of the sum over bonds must be able to sum the law of the run, a knob must act."""
 
-from ...effects import has
-from .draft import Draft
+from ...effects import LAWS, has, listed
+from .draft import KNOBS, Draft, acts, pinned
 from .limits import NOT_YET_BUILT
+from .methods import Motion, motion
 
 
 def _quadrature(draft: Draft, kind: str) -> None:
@@ -20,3 +21,43 @@ def _quadrature(draft: Draft, kind: str) -> None:
         draft.say(key, "'recursion' sums reading 'stretch' with order = 1 alone; use 'auto' or 'merged'")
     elif engine != "recursion" and shear:
         draft.say(key, f"'{engine}' beside {shear}: every point has its own path there; use 'recursion' or 'auto'")
+
+
+def _knobs(draft: Draft, kind: str) -> None:
+    """Remarks on the knobs that are named and change nothing in this scene."""
+    if not kind or draft.tables.accuracy is None or not pinned(draft.tables.accuracy):
+        return
+    for knob, where in knobs_unused(draft.tables, kind).items():
+        draft.remark(f"accuracy.{knob} has no meaning {where} and is not used")
+
+
+def knobs_unused(tables, kind: str) -> dict[str, str]:
+    """The knobs of [accuracy] that are named and act on nothing in a kind of run, with where that is so, in words."""
+    accuracy, out = tables.accuracy, {}
+    method = "bench" if kind == "bench" else accuracy.method or "auto"
+    for knob in pinned(accuracy):
+        if kind not in KNOBS[knob].kinds.split():
+            out[knob] = f"in a {kind} scene"
+        elif not acts(knob, kind, method):
+            out[knob] = f"for method '{method}'" if kind != "bench" else "in a bench scene"
+        elif reason := _beside_laws(knob, accuracy, motion(tables, "rig" if kind == "bench" else kind)):
+            out[knob] = reason
+    return out
+
+
+def _beside_laws(knob: str, accuracy, found: Motion) -> str:
+    """Why a knob acts on none of the laws of a run, or on nothing that gives way; "" where it does."""
+    trait = KNOBS[knob].law
+    if trait and not any(has(one.law, trait) for one in found.laws):
+        return f"without law '{next(name for name in LAWS if has(name, trait))}'"
+    if knob in ("tail", "merge"):
+        engine = accuracy.quadrature
+        if engine in ("direct", "recursion") or (engine, knob) == ("truncated", "merge"):
+            return f"for quadrature '{engine}'"
+        return "" if engine != "auto" or any(map(listed, found.laws)) else "for a law that is summed by its recursion"
+    if knob == "shear_modes":
+        if not found.soft:
+            return "for pieces that do not give way"
+        changes = found.varies or found.spring.endswith("grooves]") or any(has(one.law, "bonds") for one in found.laws)
+        return "" if changes else f"for law '{found.laws[0].law}' under a constant load, whose elements are exact"
+    return ""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ...effects import has
 from ..keys.tables import Friction
-from .accuracy import _quadrature
+from .accuracy import _knobs, _quadrature
 from .contact import _contact, _load_line
 from .draft import SLIDES, Draft, _needs
 from .drive import check_drive, check_length
@@ -23,7 +23,7 @@ def check(draft: Draft) -> str:
     for rule in (_contact, _load_line, _normal, _frictions, _slide, check_structure, check_drive, _measured):
         rule(draft)
     kind = _kind(draft)
-    for rule in (_quadrature, _sliding, check_length, check_wear, check_grooves):
+    for rule in (_quadrature, _knobs, _idle, _sliding, check_length, check_wear, check_grooves):
         rule(draft, kind)
     return kind
 
@@ -118,6 +118,21 @@ def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[st
     if friction and not moves and "slide" not in has:
         draft.lacks_table("slide", "friction needs a motion, [slide] or [structure] with [drive]")
     return "bench" if "slide" in has else "rig"
+
+
+def _idle(draft: Draft, kind: str) -> None:
+    """Remarks on keys that mean something to a patch that slides, or that rubs, alone."""
+    contact = draft.tables.contact if kind == "patch" else None
+    still = ["holder.tangential_stiffness"] if draft.given("contact.holder.tangential_stiffness") else []
+    for key in () if contact is None else still + [f"{name}.on" for name, shape in contact.shapes.items()
+                                                   if shape.on == "lower" and name != "tilt"]:
+        draft.remark(f"contact.{key} has no meaning in a patch scene, where nothing slides, and is not used")
+    modes = draft.tables.structure.mode if kind == "linear" and draft.tables.structure is not None else ()
+    for key in ("normal", "pitch", "yaw"):
+        for index, mode in enumerate(modes or ()):
+            if getattr(mode, key):
+                at = draft.shown(f"structure.mode.{index}.{key}")
+                draft.remark(f"{at} has no meaning in a linear scene, where nothing rubs, and is not used")
 
 
 def _sliding(draft: Draft, kind: str) -> None:

@@ -1,7 +1,7 @@
 """What the rules of a scene share: the draft under check, and which key belongs to which selector."""
 
 from functools import cache
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from pydantic import BaseModel
 
@@ -23,6 +23,37 @@ ASPERITIES: dict[str, tuple[str, str]] = {
     "exponential": ("decay_length", "normal_stiffness tangential_ratio"),
     "hertz": ("radius density height_deviation", "tangential_ratio"),
 }
+
+
+class Acts(NamedTuple):
+    """Where a knob of [accuracy] acts: kinds of run, and methods or engines, of which "auto" stands for those it may
+    choose; law: a trait that one law must have, "" for any."""
+
+    kinds: str
+    methods: str
+    law: str = ""
+
+
+KNOBS: dict[str, Acts] = {
+    "steps_per_cycle": Acts("bench rig linear", "auto bench march smooth duhamel newmark euler harmonic"),
+    "tail": Acts("bench rig", "auto bench march", "bonds"),
+    "merge": Acts("bench rig", "auto bench march", "bonds"),
+    "harmonics": Acts("rig", "harmonic"),
+    "shear_modes": Acts("bench rig", "auto bench march"),
+    "convergence": Acts("rig", "duhamel"),
+    "convergence_tolerance": Acts("rig", "duhamel"),
+    "stick_speed": Acts("rig", "duhamel newmark euler", "set-valued"),
+}
+
+
+def acts(knob: str, kind: str, method: str) -> bool:
+    """Whether a knob of KNOBS acts in a kind of run by a method, or by the engine that was chosen."""
+    return kind in KNOBS[knob].kinds.split() and method in KNOBS[knob].methods.split()
+
+
+def pinned(accuracy: Any) -> list[str]:
+    """The knobs that a table [accuracy] names."""
+    return [knob for knob in KNOBS if getattr(accuracy, knob) is not None]
 
 
 class Draft(Protocol):

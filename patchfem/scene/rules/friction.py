@@ -50,6 +50,9 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
         draft.say(f"{at}.kinetic", f"{law.kinetic} is larger than static = {law.static}; kinetic <= static is wanted")
     elif kinetic_unused(law):
         draft.remark(f"{at}.kinetic has no effect while the bond length is constant; add rest_growth and slip_growth")
+    if rest_speed_unused(law):
+        draft.remark(f"{at}.rest_speed has no effect while the bond length is constant; add rest_growth and "
+                     "slip_growth")
     check_spread(draft, at, law)
     remark_temperature(draft, at, law)
     for key, other in (("rest_growth", "slip_growth"), ("slip_growth", "rest_growth")):
@@ -77,3 +80,8 @@ def kinetic_unused(law: Friction) -> bool:
     """Whether a smaller kinetic coefficient stands where no bond ever changes its length."""
     weaker = law.kinetic is not None and law.static is not None and law.kinetic < law.static
     return weaker and has(law.law, "bonds") and law.rest_growth is None and law.slip_growth is None
+
+
+def rest_speed_unused(law: Friction) -> bool:
+    """Whether a floor under the speed stands where no bond ages at rest."""
+    return law.rest_speed is not None and takes(law.law, "rest_speed") and law.rest_growth is None

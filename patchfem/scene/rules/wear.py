@@ -22,6 +22,15 @@ def check_wear(draft: Draft, kind: str) -> None:
         for key in ("jumps", "upper_share", "scheme"):
             if draft.given(f"wear.{key}"):
                 draft.remark(f"wear.{key} has no meaning without [contact] and is not used")
+    elif draft.given("wear.upper_share") and grooves_of(tables) is None and not _coated(tables.contact):
+        draft.remark("wear.upper_share has no effect on the measures without grooves or a coating: worn_depth is that "
+                     "of both pieces together")
+
+
+def _coated(contact) -> bool:
+    """Whether a piece of [contact] may have a coating."""
+    pieces = () if contact is None else (contact.upper, contact.lower)
+    return contact is not None and any(one is not None and one.coating is not None for one in (contact, *pieces))
 
 
 def _beside(tables, kind: str):

@@ -15,6 +15,7 @@ from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, steady_amplitudes, windows_of
 from ....structure.drive_sizes import largest, omega_of, slowest
 from ...results.notes import BOOKS
+from ...rig.engines import knobs_idle
 from ..answers import Answers
 from .warned import said
 
@@ -98,7 +99,8 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
     _reasons(models, runs, found)
     for case, model in enumerate(models):
         found.numerics[case] = numerics | runs.chosen[case] if runs.chosen else numerics
-        if warnings := [*model.source.remarks, *model.rig.notes, *said(model, outcome[case], found, case, loose[case])]:
+        remarks = [*model.source.remarks, *knobs_idle(model, numerics["engine"]), *model.rig.notes]
+        if warnings := [*remarks, *said(model, outcome[case], found, case, loose[case])]:
             found.warnings[case] = warnings
     return found, alone, resolved
 
