@@ -70,6 +70,22 @@ def ends(normal, x, force, gap, softness=None, row: float | None = None) -> list
     return out
 
 
+def at_steps(found: list, x, gap, jumps) -> list:
+    """Ends of contact, of which those within a cell of a jump that opens the gap lie at the jump.
+
+    found: list of End; gap: (m,) [m] of the unloaded surfaces at x (m,) [m]; jumps: places [m], each a node.
+    """
+    out = []
+    for end in found:
+        near = [k for k in (end.node, end.node + end.side) if 0 < k < x.size - 1 and x[k] in jumps
+                and gap[k + end.side] > gap[k - end.side]]
+        if near:
+            moved = (x[near[0]] - end.place) / (x[end.node + end.side] - x[end.node])
+            end = end._replace(share=float(end.share + moved), place=float(x[near[0]]))
+        out.append(end)
+    return out
+
+
 def faded(x, pressure, share: float, largest: float | None = None) -> list:
     """Ends of the nodes whose pressure exceeds `share` [1] of the `largest` [Pa], as a list of End by rising x.
 

@@ -55,6 +55,11 @@ class Gap:
         longest = np.diff(x)[beside].max(initial=0.0) or np.diff(x).max()
         return float(max(longest, self.average or spacing_of(self.profile)))
 
+    def rim(self, x) -> np.ndarray:
+        """Half the height of the steps whose edge is a node, (m,) [m] at x (m,) [m]; 0 elsewhere."""
+        return sum((np.where(x == part.at, abs(part.height) / 2, 0.0) for name, part in self.shapes if name == "step"),
+                   np.zeros(x.size))
+
     def at(self, x) -> tuple:
         """Gap of the unloaded surfaces (m,) [m] at x (m,) [m], with notes for the user and seconds by shape."""
         gap, seconds, notes = np.zeros(x.size), {}, ()

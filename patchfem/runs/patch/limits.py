@@ -29,6 +29,21 @@ class Limit(NamedTuple):
             (self.extrapolated, self.left)
 
 
+def edge_limit(values, nested: bool = True) -> Limit:
+    """`limit` of a value that hangs on where edges lie between nodes.
+
+    Beside its second order such a place has a part that comes and goes with the share of the cell that the edge has
+    passed. So no ratio takes it further than second order does, and it is held to half or all of the rest.
+    """
+    seen = limit(values, nested)
+    if seen.extrapolated == seen.value:
+        return seen
+    rest, last = seen.extrapolated - seen.value, values[-1] - values[-2]
+    rest = last / (SECOND - 1) if abs(rest) < abs(last) / (REGULAR[0] - 1) else rest
+    least = abs(rest) / (1 if len(values) == 3 else 2)
+    return seen._replace(extrapolated=values[-1] + rest, left=max(least, seen.left if len(values) > 3 else 0.0))
+
+
 def limit(values, nested: bool = True) -> Limit:
     """Limit of a series of two values or more, each on a mesh whose cells are half as long as those of the one before.
 

@@ -1,6 +1,7 @@
 """Measures of a static patch with their errors from coarser meshes."""
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ from ...mesh.nested import plan_of
 from ...scene.keys.contact import outermost
 from ..results.patch_rows import DECISIVE, TABLE
 from .condensed import pair_beside
-from .limits import limit
+from .limits import edge_limit, limit
 from .press import Patch, pressed
 from .rounding import open_ends, unresolved_rounding
 from .values import edge_cells, values
@@ -24,6 +25,8 @@ ROUND = 5e-12  # round-off, relative
 ALIKE = 1e-9  # relative error that nobody asks to be below
 OFFSET = 0.012  # cells by which an edge found between nodes may lie off
 CORNER = 0.15  # largest share of the pressure at the corner of a coating that cells coarser than it leave out
+EDGED = ("contact_fraction", "contact_half_width")  # what hangs on where edges are found between nodes
+EXTRAPOLATED = 2.0  # of what meshes hide, in 4/3 of a value less 1/3 of one on cells twice as long
 BANDED = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 
 
@@ -100,7 +103,7 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     found = [values(one) for one in reversed(series)]
     nested = all(halved(a.pair, b.pair) for a, b in pairwise((fine, *series)))
     rough = 2.0 if missed_peak else 1.0  # of meshes that pass over a rounding none shows what it does
-    least = least_of(_hidden(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
+    least = least_of(_hidden(fine, missed_peak, mine["pressure_peak"]), mine) if mine["normal_load"] > 0 else {}
     out = combined([*found, mine], least, nested, tolerance, max(ALIKE, fine.pair.rounding), rough)
     for name, (value, error) in fine.sharper.items():
         if error < out[name].error:
@@ -120,14 +123,34 @@ def combined(series: list, least: dict, nested: bool = True, tolerance: float | 
         error = None if len(series) == 1 else 0.0
         return {name: Measure(value, TABLE[name].unit, error, floors[name]) for name, value in mine.items()}
     for name, value in mine.items():
-        seen = limit([one[name] for one in series], nested)
         wanted = np.inf if tolerance is None else tolerance * abs(value) + floors[name]
-        best, error = seen.best(wanted)
-        error = max(rough * error, least.get(name, 0.0), alike * abs(value))
-        out[name] = Measure(float(best), TABLE[name].unit, float(error), floors[name])
+        known, hidden = [one[name] for one in series], least.get(name, 0.0)
+        limited = partial(edge_limit if name in EDGED else limit, nested=nested)
+        best, error = _best(limited, known, wanted, hidden, rough)
+        out[name] = Measure(float(best), TABLE[name].unit, float(max(error, alike * abs(value))), floors[name])
     if mine["pressure_peak"] > 0:
         out["loaded_fraction"] = _of_peak(out["loaded_fraction"], out["pressure_peak"])
     return out
+
+
+def _best(limited, known: list, wanted: float, hidden: float, rough: float) -> tuple:
+    """(value, error) of the values `known` on meshes, coarse to fine, by `limited`, their `limit`.
+
+    It is that of fewer meshes where their error is smaller and holds it, so that no further mesh widens a bar. hidden:
+    least error on the finest mesh, which falls with its cells; rough: factor of the others.
+    """
+    def of(count: int) -> tuple:
+        seen = limited(known[:count])
+        best, error = seen.best(wanted)
+        twice = EXTRAPOLATED if best != seen.value else 1.0
+        return best, max(rough * error, twice * hidden * 2.0**(len(known) - count))
+
+    value, error = of(len(known))
+    for count in range(3, len(known)):
+        other, narrower = of(count)
+        if narrower < error and abs(value - other) <= narrower:
+            value, error = other, narrower
+    return value, error
 
 
 def met(found: dict, tolerance: float) -> bool:
@@ -195,7 +218,7 @@ class Hidden(NamedTuple):
     length [m]; count: nodes in contact; cells: lengths [m] of those in which the contact ends; offset: cells by which
     an edge may lie off; turns: the rotation is free; spread: range of the gap and largest elastic closing [m]; corner,
     wedge, missed: pressures [Pa] at loaded corners of a coating, beside a contact of few nodes, of a rounding that is
-    passed over; open_ends [m] of rounded faces; skin: it is smooth.
+    passed over; open_ends [m] of rounded faces; skin: it is smooth; above [Pa]: the peak over the largest node inside.
     """
 
     length: float
@@ -209,10 +232,11 @@ class Hidden(NamedTuple):
     missed: float = 0.0
     open_ends: float = 0.0
     skin: bool = False
+    above: float = 0.0
 
 
-def _hidden(patch: Patch, missed_peak: float) -> Hidden:
-    """The Hidden of a Patch under load; missed_peak [Pa]: `unresolved_rounding`."""
+def _hidden(patch: Patch, missed_peak: float, peak: float) -> Hidden:
+    """The Hidden of a Patch under load; missed_peak [Pa]: `unresolved_rounding`; peak [Pa]: its pressure_peak."""
     cells, count = edge_cells(patch.x, patch.active), max(int(patch.active.sum()), 1)
     moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
     corner = 0.0 if patch.pieces is not patch.pair.compliance else \
@@ -221,7 +245,14 @@ def _hidden(patch: Patch, missed_peak: float) -> Hidden:
                   offset(patch.pair, cells.max(initial=0.0)), "moment_balance" in patch.pressure.residuals,
                   float(np.ptp(patch.gap) + moved), corner,
                   _wedge(patch) if count <= POINT and cells.any() else 0.0, missed_peak, float(open_ends(patch)),
-                  patch.skin is not None)
+                  patch.skin is not None, _above(patch, peak))
+
+
+def _above(patch: Patch, peak: float) -> float:
+    """Pressure [Pa] by which the peak lies above the largest node inside; 0 where a border of the interface, at which a
+    node holds the mean over half a cell, bears more."""
+    sigma = patch.pressure.sigma_n if patch.strips is None else patch.strips.pressure.max(axis=0)
+    return peak - float(sigma.max()) if 0 < int(np.argmax(sigma)) < sigma.size - 1 else 0.0
 
 
 def least_of(hidden: Hidden, mine: dict) -> dict:
@@ -234,7 +265,7 @@ def least_of(hidden: Hidden, mine: dict) -> dict:
     cell = max(max(cells), sum(cells) / 2) if cells else 0.0  # the average where the ends are many
     aside = cell / (2 * count**2) if count <= POINT else 1e-3 * cell
     peak = hidden.corner + (mine["pressure_peak"] / (4 * count**2) if cell and count <= FEW else 0.0)
-    peak = max(peak, hidden.wedge, hidden.missed - mine["pressure_peak"])
+    peak = max(peak, hidden.wedge, hidden.missed - mine["pressure_peak"], hidden.above)
     turned = ROUND * (abs(mine["approach"]) + hidden.spread) + abs(mine["rotation"]) * aside * hidden.turns
     fullness = mine["loaded_fraction"] / mine["pressure_peak"] if mine["pressure_peak"] else 0.0
     # an edge of a contact of few nodes lies anywhere in its cell

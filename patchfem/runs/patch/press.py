@@ -5,6 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
+from ...contact import edges
 from ...contact.unilateral import press, press_by
 from ...core import Compliance, Pressure, frozen_array
 from .approach import closed_by
@@ -25,7 +26,8 @@ class Patch:
     shear; skinned: a skin of asperities lies between the pieces; jumps: places [m] where the gap steps; sharp: an end
     of the interface is a corner that meets a face which goes on; notes: sentences for the warnings; sharper: static
     measures by name as (value, error) that cells of order 4 gave in addition, {} where none were asked for them;
-    averaging [m]: the length that a profile is averaged over where it bears, None without one.
+    averaging [m]: the length that a profile is averaged over where it bears, None without one;
+    either: (weight, Patch) with all of the node at the edge of a step below, and with all of it above, () without one.
     """
 
     pair: Pair
@@ -43,6 +45,7 @@ class Patch:
     seconds: dict
     sharper: dict = field(default_factory=dict)
     averaging: float | None = None
+    either: tuple = ()
 
     @property
     def x(self) -> np.ndarray:
@@ -80,19 +83,33 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
 
     worn (m,) [m]: depth that wear has added to the gap. PatchfemError where a profile does not fit the mesh.
     """
-    gap, notes, seconds = asked.gap.at(pair.compliance.interface.x)
+    x = pair.compliance.interface.x
+    gap, notes, seconds = asked.gap.at(x)
     gap = gap + pair.rise if worn is None else gap + pair.rise + worn
+    if pair.joint is not None and pair.joint.ripple > RIPPLE:
+        notes = (*notes, f"contact.mesh: {pair.joint.reason}")
+    rim, out = asked.gap.rim(x), _on(asked, pair, gap, notes, seconds)
+    if not rim.any():
+        return out
+    # a set ends half a cell less `behind` beyond its last node: the two ends lie about the step by these shares
+    node = int(np.argmax(rim))
+    bare = 1.0 if out.skin_share is None else 1 - float(out.skin_share[node])
+    lean = bare * edges.behind(1.0 if pair.row is None else pair.row / float(np.diff(x[node - 1:node + 2]).min()))
+    return replace(out, either=tuple((0.5 - side * lean, _on(asked, pair, gap + side * rim, notes, seconds))
+                                     for side in (-1, 1)))
+
+
+def _on(asked, pair: Pair, gap, notes: tuple, seconds: dict) -> Patch:
+    """The pair pressed on the gap (m,) [m]; notes and seconds of what made it."""
     begin = perf_counter()
     pieces, pressure, skin, strips = _how(asked)(asked, pair.compliance, gap)
-    seconds["press"] = perf_counter() - begin
+    seconds = seconds | {"press": perf_counter() - begin}
     giving = pieces.tangential
     if not asked.shear:
         giving = frozen_array(giving - pair.compliance.tangential)
     if asked.slide_spring:
         giving = frozen_array(giving + 1 / asked.slide_spring)
     ratio = asked.skin.tangential_ratio if asked.skin is not None else None
-    if pair.joint is not None and pair.joint.ripple > RIPPLE:
-        notes = (*notes, f"contact.mesh: {pair.joint.reason}")
     return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio,
                  asked.skin is not None, asked.gap.jumps, asked.singular_ends, notes, pair.seconds | seconds,
                  averaging=asked.gap.averaging(pieces.interface.x, pressure.sigma_n > 0))

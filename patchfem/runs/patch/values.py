@@ -9,26 +9,42 @@ from ...core import Outcome
 from ...elasticity.lapack import one_thread
 from .press import Patch
 
+LIKE = 2.0  # times less bent than its neighbour is still one smooth curve with it
+
 
 def peak_pressure(x, sigma, skin=None) -> float:
     """Largest pressure [Pa] of the nodal pressures sigma (m,) [Pa] at x (m,) [m].
 
-    Inside it is the vertex of the parabola through the largest node and its neighbours. At a border of the interface
-    the nodal forces of bare pieces are means over half a cell, so it is the end of the curve that has these means; a
-    skin holds the pressure at the node. skin: (m,) [1] share of the skin in the compliance of a node, None without one.
+    Inside it is the vertex of the parabola through the largest node and its neighbours (`vertex`). At a border of the
+    interface the nodal forces of bare pieces are means over half a cell, so it is the end of the curve that has these
+    means; a skin holds the pressure at the node. skin: (m,) [1] share of the skin in the compliance of a node, None
+    without one.
     """
     top = int(np.argmax(sigma))
     if top in (0, x.size - 1):
         bare = _at_border(x, sigma) if top == 0 else _at_border(-x[::-1], sigma[::-1])
         share = 0.0 if skin is None else float(skin[top])
         return share * float(sigma[top]) + (1 - share) * bare
-    if sigma[top - 1] <= 0 or sigma[top + 1] <= 0:
-        return float(sigma[top])
-    left, right = x[top] - x[top - 1], x[top + 1] - x[top]
-    before, after = (sigma[top] - sigma[top - 1]) / left, (sigma[top + 1] - sigma[top]) / right
+    return float(vertex(x, sigma[None], np.array([top]))[0])
+
+
+def vertex(x, sigma, top) -> np.ndarray:
+    """Largest pressures (q,) [Pa] of nodal ones sigma (q, m) [Pa] at x (m,) [m] that are largest at the inner nodes top
+    (q,).
+
+    Each is the vertex of the parabola through a largest node and its neighbours as long as the parabolas one node on
+    are bent like it. Beside a jump they are not: the less the flatter one is bent, the nearer it is to the node itself.
+    """
+    rows, at = np.arange(top.size), np.clip(top[:, None] + [-1, 0, 1], 1, x.size - 2)  # at a border its own once more
+    left, right = x[at] - x[at - 1], x[at + 1] - x[at]
+    here = sigma[rows[:, None], at]
+    before, after = (here - sigma[rows[:, None], at - 1]) / left, (sigma[rows[:, None], at + 1] - here) / right
     bend = (after - before) / (left + right)
-    slope = (before * right + after * left) / (left + right)
-    return float(sigma[top] - slope**2 / (4 * bend)) if bend < 0 else float(sigma[top])
+    slope = (before * right + after * left)[:, 1] / (left + right)[:, 1]
+    loaded = (sigma[rows, top - 1] > 0) & (sigma[rows, top + 1] > 0) & (bend[:, 1] < 0)
+    own = np.where(loaded, bend[:, 1], -1.0)
+    alike = np.clip(LIKE * np.minimum(bend[:, 0] / own, bend[:, 2] / own), 0.0, 1.0)
+    return sigma[rows, top] + np.where(loaded, alike * slope**2 / (-4 * own), 0.0)
 
 
 def _at_border(x, sigma) -> float:
@@ -43,7 +59,18 @@ def _at_border(x, sigma) -> float:
 
 
 def values(patch: Patch) -> dict:
-    """Value of every static measure of a pressed patch by name, in SI; `rows` has their meanings."""
+    """Value of every static measure of a pressed patch by name, in SI; `rows` has their meanings.
+
+    The node at the edge of a step stands for half a cell on either side of it: the weighted mean of the patch where all
+    of it bears and where none does.
+    """
+    if not patch.either:
+        return _values(patch)
+    parts = [(weight, _values(one)) for weight, one in patch.either]
+    return {name: sum(weight * found[name] for weight, found in parts) for name in parts[0][1]}
+
+
+def _values(patch: Patch) -> dict:
     p, interface = patch.pressure, patch.pieces.interface
     area, peak = interface.weight.sum(), peak_pressure(patch.x, p.sigma_n, patch.skin_share)
     out = {"normal_load": p.load, "contact_fraction": 0.0, "pressure_peak": peak, "moment": p.moment,
@@ -78,6 +105,12 @@ def found_ends(patch: Patch) -> list:
     """Ends of the contact set between the nodes, as a list of `contact.edges.End`; of the means over strips none."""
     if patch.strips is not None:
         return []
+    found = _between(patch)
+    return edges.at_steps(found, patch.x, patch.gap, patch.jumps) if patch.jumps else found
+
+
+def _between(patch: Patch) -> list:
+    """The ends of `found_ends` as if the gap were smooth."""
     if patch.skin is not None:
         return edges.faded(patch.x, patch.skin.pressure, edges.BEARING)
     own, bare = patch.pieces.normal, patch.pair.compliance.normal

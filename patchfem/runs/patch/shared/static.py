@@ -16,7 +16,7 @@ from .. import measures as one_by_one
 from ..condensed import Pair, shared_pairs
 from ..measures import Hidden, combined, least_of
 from ..press import with_linear_skin
-from ..values import peak_pressure
+from ..values import peak_pressure, vertex
 
 SOLVED = 1e-12  # largest residual, as `contact.unilateral` has it
 BORDER = 3  # nodes whose means give the pressure at an end
@@ -36,7 +36,7 @@ class Solved(NamedTuple):
 class Found(NamedTuple):
     """What q patches have on one level: values: name -> (q,); count: (q,) nodes in contact; cell: (q,) [m] in which the
     contact ends, 0 of full contact; spread, corner: (q,) as `Hidden` has them; top: (q,) largest nodal pressure [Pa];
-    good: (q,) whether it was solved."""
+    above: (q,) [Pa] as `Hidden` has it; good: (q,) whether it was solved."""
 
     values: dict
     count: np.ndarray
@@ -44,6 +44,7 @@ class Found(NamedTuple):
     spread: np.ndarray
     corner: np.ndarray
     top: np.ndarray
+    above: np.ndarray
     good: np.ndarray
 
 
@@ -94,7 +95,7 @@ def solved(patches, tolerance: float) -> list:
             continue
         cell = float(fine.cell[k])
         hidden = Hidden(length, int(fine.count[k]), (cell,) * bool(cell), one_by_one.offset(pair, cell), turns,
-                        float(fine.spread[k]), float(fine.corner[k]), 0.0)
+                        float(fine.spread[k]), float(fine.corner[k]), 0.0, above=float(fine.above[k]))
         mine = series[-1][k]
         found = combined([rows[k] for rows in series], least_of(hidden, mine), nested, stated, alike)
         band = one_by_one.band_words(patches[k], series[-2][k], theirs[k]) if theirs is not None else []
@@ -163,7 +164,9 @@ def _from_one_end(patches, pair: Pair, gaps, way: int) -> Found:
     corner = np.zeros(load.size) if first.skin is not None else corners(pair, ends, cells[[0, -1]])
     good = found.flaw <= SOLVED
     cell = np.where(count < m, cells[np.minimum(count, m - 1) - 1], 0.0)
-    return Found(values, count, cell, np.ptp(g, axis=1) + moved, corner, sigma.max(axis=1), good)
+    top = sigma.max(axis=1)
+    above = np.where((sigma[:, 0] < top) & (sigma[:, -1] < top), peak - top, 0.0)
+    return Found(values, count, cell, np.ptp(g, axis=1) + moved, corner, top, above, good)
 
 
 def corners(pair: Pair, sigma, cells):
@@ -174,16 +177,10 @@ def corners(pair: Pair, sigma, cells):
 
 def peaks(x, sigma, count, skin=None):
     """`values.peak_pressure` (q,) [Pa] of pressures sigma (q, m) [Pa] on the first `count` (q,) nodes at x (m,) [m]."""
-    top, rows = np.argmax(sigma, axis=1), np.arange(len(sigma))
+    top = np.argmax(sigma, axis=1)
     out = np.empty(len(sigma))
     inner = (top > 0) & (top < count - 1)
-    at, r = top[inner], rows[inner]
-    left, right = x[at] - x[at - 1], x[at + 1] - x[at]
-    before, after = (sigma[r, at] - sigma[r, at - 1]) / left, (sigma[r, at + 1] - sigma[r, at]) / right
-    bend = (after - before) / (left + right)
-    slope = (before * right + after * left) / (left + right)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        out[inner] = np.where(bend < 0, sigma[r, at] - slope**2 / (4 * bend), sigma[r, at])
+    out[inner] = vertex(x, sigma[inner], top[inner])
     first = (top == 0) & (count >= BORDER)
     if first.any():  # the pressure at the end is one linear form of the first means
         form = [peak_pressure(x[:BORDER + 1], np.array([3.0, 2.0, 1.0, 0.0]) + np.eye(4)[k] * 0.5)
