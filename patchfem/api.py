@@ -135,7 +135,8 @@ def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Pat
 def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *, out: str | Path | None = None,
           draw: int = 0, seed: int = 0, sobol: bool = False, jobs: int = 1, executor: str = "",
           resume: bool = False) -> Dataset:
-    """Run a scene for all combinations of the values of some keys: the Dataset that sweep.nc holds.
+    """Run a scene for all combinations of the values of some keys: the Dataset that sweep.nc holds; its attribute
+    `answer` says in a sentence what came out.
 
     `scene` as `load` takes it. over: key -> list of values, texts as in a scene or numbers in SI, or one text such as
     "1e-6 rad..1e-2 rad:9"; left out, those of its table [sweep]. draw: so many cases in place of all combinations,
@@ -147,6 +148,8 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
     from .campaigns.sweeps import executors
     from .campaigns.sweeps.ask import Request, cases_of
     from .campaigns.sweeps.asked import Asked
+    from .export.pages.lead import lead_of
+    from .export.sweeps.page import table_of
     from .export.sweeps.run import Place, sweep_into, swept
     from .export.sweeps.tables import contents
 
@@ -156,7 +159,8 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
     cases, by = cases_of(asked, request), executors.of(executor, jobs)
     found = swept(asked, cases, by, _on_stderr) if out is None else \
         sweep_into(asked, cases, Place(Path(out), resume), by, _on_stderr)
-    return contents(asked, cases, found, cases.keys(asked) if out is not None else ()).to_xarray()
+    answer = lead_of(table_of(asked, cases, found, (), Path(out or ""))).answer()
+    return contents(asked, cases, found, cases.keys(asked) if out is not None else (), answer).to_xarray()
 
 
 def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[str], None] | None = None) -> Answers:

@@ -22,6 +22,7 @@ MOVES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_
          "friction_force_peak", "friction_ratio_peak", "onset_level")
 STIFF = ("normal_stiffness", "tangential_stiffness")
 CHANGES = dict.fromkeys((*MOVES, *STIFF, "contact_fraction"), WITHIN) | {"pressure_peak": 1.0}  # 1: it doubles
+LEAST = 0.0101  # number of a key below which another unit is taken: 0.011 mrad, 10 mrad
 DRIVES = ("drive.", "slide.", "accuracy.", "wear.cycles")  # keys that are to change what moves, or nothing
 OPENS = {"contact.tilt.angle": ("Tilt", "length"), "contact.strips.roll": ("Roll", "width")}  # what opens a gap over it
 
@@ -81,7 +82,7 @@ def allowed(keys: list, measures: dict, trusted: dict, grid: bool = True, over: 
     found, lost = [], []
     for name, change in CHANGES.items():
         values, errors = (np.asarray(one, float) for one in measures.get(name, ([np.nan], [np.nan]))[:2])
-        if not np.isfinite(values).any():
+        if not np.any(np.abs(values) > zero_below(name)):  # none has it, or it is round-off in all
             continue
         values = np.where(trusted[name], values, np.nan)
         each = [_along(name, change, line, size, values, errors, bool(key["log"])) for line in lines]
@@ -202,12 +203,12 @@ def _between(limits: Limits, one: Allowed) -> str:
 
 def _unit(key: dict, value: float, case: int) -> tuple:
     """(unit, scale from SI) in which a value of the key is read: that in which the case is written, unless the number
-    would be below 0.01 and there is a unit for it."""
+    would be below LEAST and there is a unit for it."""
     written, size = NUMBER.match(str(key["texts"][case])), float(key["values"][case])
     unit, scale = (written[2] or "", float(written[1]) / size) if written and size else (key["unit"], 1.0)
-    if 0.01 <= abs(value * scale) < 1e4:
+    if LEAST < abs(value * scale) < 1e4:
         return unit.removesuffix("1"), scale
-    return next((step for step in reversed(LADDERS.get(key["unit"], ())) if 0.01 <= abs(value * step[1])),
+    return next((step for step in reversed(LADDERS.get(key["unit"], ())) if LEAST < abs(value * step[1])),
                 (unit.removesuffix("1"), scale))
 
 

@@ -51,7 +51,7 @@ def lead_of(table: dict) -> Lead:
 
     def where(case: int) -> str:
         return ", ".join(f"{one['name']} {shown[one['name']](case) if one['name'] in shown else one['texts'][case]}"
-                         for one in keys)
+                         for one in keys if len(set(one["texts"])) > 1 or len(keys) == 1)
 
     return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
                 allowed.sentence(limits), span(columns(table), trusted, settled),

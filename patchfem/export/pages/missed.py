@@ -8,6 +8,7 @@ from .written import label
 # what a case answers first, named before what misses its tolerance by more
 FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_ratio_peak",
          "pressure_peak", "contact_fraction")
+ZERO = 10.0  # times its value, an error beyond which a value is no more than 0
 
 
 def over(one: dict, tolerance) -> np.ndarray:
@@ -49,14 +50,22 @@ def sentence(measures: dict, tolerance, where) -> str:
     lost = {name: missed for name, missed in lost.items() if missed.any()}
     if not lost:
         return f"All {number} cases meet {asked}."
-    worst = {name: float(np.where(missed, _share(measures[name]), 0.0).max()) for name, missed in lost.items()}
-    name = max([name for name in FIRST if name in lost] or lost, key=worst.get)
-    count, size, others = int(lost[name].sum()), worst[name], len(lost) - 1
-    case = int(np.argmax(np.where(lost[name], _share(measures[name]), 0.0)))
-    known = f"{plain(100 * size, 2)} % of its value" if np.isfinite(size) else "0 within its error"
+    beyond = {name: float(np.max(_beyond(measures[name], tolerance), initial=0.0, where=missed))
+              for name, missed in lost.items()}
+    name = max([name for name in FIRST if name in lost] or lost, key=beyond.get)
+    share = np.where(lost[name], _share(measures[name]), 0.0)
+    count, case, others = int(lost[name].sum()), int(np.argmax(share)), len(lost) - 1
+    known = f"{plain(100 * share[case], 2)} % of its value" if share[case] <= ZERO else "0 within its error"
     more = f"; {others} other measure{'s' * (others > 1)} miss{'es' * (others == 1)} it somewhere" if others else ""
     return (f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {label(name)}, worst at {where(case)}: "
             f"{known}{more}.")
+
+
+def _beyond(one: dict, tolerance) -> np.ndarray:
+    """Error over what is allowed, case by case."""
+    floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(one["errors"], float) / (tolerance * np.abs(np.asarray(one["values"], float)) + floors)
 
 
 def _share(one: dict) -> np.ndarray:

@@ -26,6 +26,8 @@ def answer_of(table: dict) -> dict:
         "over_tolerance": lead.missed}, "ranking": {}, "limits": as_json(lead.limits)}
 
 
-def write_answer(table: dict, path: Path) -> None:
-    """Write sweep.json to `path`."""
-    write_text(path, json.dumps(answer_of(table), allow_nan=False, ensure_ascii=False, indent=1) + "\n")
+def write_answer(table: dict, path: Path) -> str:
+    """Write sweep.json to `path`; its sentence."""
+    found = answer_of(table)
+    write_text(path, json.dumps(found, allow_nan=False, ensure_ascii=False, indent=1) + "\n")
+    return found["answer"]

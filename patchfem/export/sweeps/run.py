@@ -101,9 +101,9 @@ def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder, pag
     """Write sweep.csv, sweep.nc, sweep.json and report.html of all cases; without a page, none is left of other
     cases."""
     write_csv(cases, found, folder.keys, folder.target / "sweep.csv")
-    netcdf.write(contents(asked, cases, found, folder.keys), folder.target / "sweep.nc")
     table = table_of(asked, cases, found, folder.keys, folder.target)
-    write_answer(table, folder.target / "sweep.json")
+    answer = write_answer(table, folder.target / "sweep.json")
+    netcdf.write(contents(asked, cases, found, folder.keys, answer), folder.target / "sweep.nc")
     if page:
         write_page(table, folder.target)
     else:

@@ -63,11 +63,12 @@ def write_csv(cases: Cases, found: Answers, keys: Sequence[str], path: Path) -> 
     return path
 
 
-def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = ()) -> netcdf.Contents:
+def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (), answer: str = "") -> netcdf.Contents:
     """What sweep.nc holds, in SI.
 
     A dimension per swept key, dots as underscores, or the one dimension `case` where the cases are rows; a variable
-    and an error per measure, outcome, the message of failed cases and the names of their folders.
+    and an error per measure, outcome, the message of failed cases and the names of their folders; answer: what the
+    sweep comes to, in a sentence.
     """
     dims = ("case",) if cases.rows else tuple(axis.name for axis in cases.axes)
     coordinates = {axis.name: ("case" if cases.rows else axis.name, _numbers(axis.values), _about(axis))
@@ -94,7 +95,7 @@ def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (
     return netcdf.Contents(data, coordinates, {
         "Conventions": "CF-1.11", "title": f"sweep over {', '.join(axis.key for axis in cases.axes)}",
         "source": f"patchfem {__version__}", "scene": asked.text, "scene_file": asked.path.name,
-        "sets": json.dumps(list(asked.sets)), **facts(asked, cases),
+        "sets": json.dumps(list(asked.sets)), "answer": answer, **facts(asked, cases),
         "scene_sha256": hashlib.sha256(asked.text.encode()).hexdigest(), "versions": json.dumps(versions())})
 
 

@@ -91,6 +91,14 @@ def test_exact_a_measure_that_cannot_be_told_is_not_among_what_moves():
     assert "before the loop area changes by 5 %" in said and "anything" not in said
 
 
+def test_exact_what_is_round_off_in_every_case_does_not_move():
+    """Loops of 1e-12 J that change their sign once kept a stuck rig from having any limit."""
+    line = 1 + 0.25 * (TILT - 0.05)
+    said = sentence(limits({"loop_area": [1e-12, -3e-12, 2e-12, -1e-12, 1e-12], "slip_amplitude": 0 * TILT,
+                            "relative_displacement_amplitude": line}))
+    assert "before anything that moves changes by 5 % (relative displacement amplitude first)" in said
+
+
 def test_exact_of_several_lines_the_one_that_allows_least():
     """E = 1 + s (t - 0.05) leaves at 0.05 + 0.05/s: 0.25 and 0.15 for slopes of 0.25 and 0.5."""
     tilt, slope = (grid.ravel() for grid in np.meshgrid(TILT, [0.25, 0.5], indexing="ij"))
