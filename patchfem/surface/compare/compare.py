@@ -37,7 +37,7 @@ class Comparison:
     shift, stretch, tilt, worn_*, amplitude_ratio, slope_ratio, abbott: Quantity; sizes: `Size` before and after; notes:
     sentences; exchanged: whether material stands above the first trace and none is missing, or a place shows in the
     other order alone; tracks; carried: what carries the registration, None without one; hidden: what a wedge may hide;
-    removed: heights left out before and after; mirrored, turned: whether one trace was, for the registration.
+    removed: heights missing or left out in each; mirrored, turned: whether one trace was, for the registration.
     """
 
     before: Profile | Areal
@@ -103,8 +103,7 @@ def compared(before: Profile | Areal, after: Profile | Areal, direction: str = "
     place = found_place(*sides, shift)
     if place.found is not None and not keep_spikes:
         place = _without_specks(place)
-    removed = tuple(int(now.missing.sum() - one.missing.sum()) for now, one in
-                    ((place.before, before), (place.after, after)))
+    removed = tuple(int(one.missing.sum()) for one in (place.before, place.after))
     return _placed(place, direction, band, removed) if place.found is not None else \
         _apart(place, direction, band, removed)
 

@@ -8,36 +8,34 @@ from ...core import frozen_array, say
 from ..profile import Profile, runs_of
 from .registration import Registration
 
-MEDIAN, WIDEST, SCRATCH = 41, 12, 3  # samples of the running median, of the widest speck, of a hollow that may be one
-STEEP = 5.0  # robust deviations of the steps of the surface, and of the noise, that both walls are steeper than
+MEDIAN, WIDEST = 41, 12  # samples of the running median, and of the widest speck at half of its height
+STEEP, SOME = 4.0, 1.5  # robust deviations of the steps of the surface, and of noise, that both walls are steeper than
+GROWN, FALLEN = 6.0, 2.0  # such parts of the height is a step of the walls of what stands above, or of a hollow
 
 
 def without_specks(found: Registration, before: Profile, after: Profile) -> tuple:
     """Both traces without what stands out of their registered difference as no surface does; the same where nothing.
 
-    A speck is 12 samples wide or less, and the difference climbs and falls at it by steps larger than five deviations
-    of those of the first trace: tops that wore off have the slopes of the surface. It is left out of the trace that
-    has the larger steps there. A hollow of more than 3 samples in the trace after stays: it may
-    be a scratch.
+    A speck is 12 samples wide or less at half of its height, and the difference climbs and falls at it by steps larger
+    than four deviations of those of the first trace: tops that wore off have the slopes of the surface. Nothing that
+    wears stands above the first trace, nor below all of it nearby: there less will do, where single steps make half of
+    a hollow. It is left out of the trace that has the larger steps there.
     """
     rest, first = np.asarray(found.rest), np.asarray(found.first)
     if rest.size < 2 * MEDIAN:
         return before, after
     off = rest - _median(rest)
-    steep = STEEP * (1.4826 * float(np.median(np.abs(np.diff(first)))) + 1.5 * found.noise)
+    steps = 1.4826 * float(np.median(np.abs(np.diff(first)))) + 1.5 * found.noise
     sides = first, first - rest
     marked = [np.zeros(before.x.size, bool), np.zeros(after.x.size, bool)]
     scale = 1 + (found.stretch[0] if found.stretch[2] else 0.0)
     for low, high in runs_of(np.abs(off) > 3 * found.noise):
-        if high - low >= WIDEST:
-            continue
-        here = slice(max(low - 1, 0), high + 2)
-        walls = np.diff(rest[here])
-        if min(walls.max(), -walls.min()) < steep:
+        here, size = slice(max(low - 1, 0), high + 2), np.abs(off[low:high + 1])
+        walls, height, at = np.diff(rest[here]), float(size.max()), low + int(np.argmax(size))
+        if (size > height / 2).sum() > WIDEST or size.size > 3 * WIDEST or \
+                min(walls.max(), -walls.min()) < _least(found, at, off[at] > 0, height, steps):
             continue
         which = int(np.argmax([np.abs(np.diff(side[here])).max() for side in sides]))
-        if which and off[(low + high) // 2] > 0 and high - low >= SCRATCH:
-            continue
         ends = found.x[max(low - 1, 0)], found.x[min(high + 1, rest.size - 1)]
         if not which:
             ends = [found.middle + (end - found.middle) / scale - found.shift for end in ends]
@@ -45,6 +43,16 @@ def without_specks(found: Registration, before: Profile, after: Profile) -> tupl
         slack = 0.5 * float(x[1] - x[0])
         marked[which] |= (x >= ends[0] - slack) & (x <= ends[1] + slack)
     return tuple(_left_out(*one) for one in zip((before, after), marked))
+
+
+def _least(found: Registration, at: int, missing: bool, height: float, steps: float) -> float:
+    """The least step [m] of both walls of a speck of a height [m]; missing: less is there than beside it."""
+    if not missing:  # unworn heights between worn tops are none
+        return max(SOME * steps, height / GROWN) if found.rest[at] < -height / 2 else float("inf")
+    near = found.first[max(at - MEDIAN, 0):at + MEDIAN + 1]
+    if found.first[at] - found.rest[at] < near.min() - 3 * found.noise:
+        return max(SOME * steps, height / FALLEN)
+    return STEEP * steps
 
 
 def _median(z) -> np.ndarray:
