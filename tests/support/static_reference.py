@@ -156,7 +156,8 @@ def solve(scene: Scene, edges, fine: float) -> tuple:
     found = []
     for a, b in zip(change[::2], change[1::2] - 1):
         ends = [edge_of(place, pressure, a, -1, scene), edge_of(place, pressure, b, 1, scene)]
-        found.append((ends[0], ends[1], (a > 0, b < place.size - 1)))
+        if ends[1] - ends[0] > 1e-6 * scene.length or active.sum() < 9:
+            found.append((ends[0], max(ends[1], ends[0] + 1e-7 * scene.length), (a > 0, b < place.size - 1)))
     index = np.flatnonzero(active)
     own = np.linalg.inv(nn[np.ix_(index, index)])
     xs = place[index]

@@ -103,8 +103,11 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     found = [values(one) for one in reversed(series)]
     nested = all(halved(a.pair, b.pair) for a, b in pairwise((fine, *series)))
     rough = 2.0 if missed_peak else 1.0  # of meshes that pass over a rounding none shows what it does
-    least = least_of(_hidden(fine, missed_peak, mine["pressure_peak"]), mine) if mine["normal_load"] > 0 else {}
+    least = least_of(_hidden(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
     out = combined([*found, mine], least, nested, tolerance, max(ALIKE, fine.pair.rounding), rough)
+    sigma = fine.pressure.sigma_n if fine.strips is None else fine.strips.pressure.max(axis=0)
+    if 0 < (top := int(np.argmax(sigma))) < sigma.size - 1:
+        out = reaching(out, float(sigma[top]))
     for name, (value, error) in fine.sharper.items():
         if error < out[name].error:
             out[name] = replace(out[name], value=value, error=error)
@@ -199,6 +202,14 @@ def _of_peak(fraction: Measure, peak: Measure) -> Measure:
     return replace(fraction, error=max(fraction.error, fraction.value * share / (1 - min(share, 0.5))))
 
 
+def reaching(found: dict, top: float) -> dict:
+    """Measures whose peak has a bar down to the largest nodal pressure `top` [Pa], of a node inside: one at a border of
+    the interface holds the mean over half a cell."""
+    peak = found["pressure_peak"]
+    peak = replace(peak, error=max(peak.error, peak.value - top))
+    return found | {"pressure_peak": peak, "loaded_fraction": _of_peak(found["loaded_fraction"], peak)}
+
+
 def halved(fine, coarse) -> bool:
     """Whether every cell of the coarse Pair was split in two."""
     bodies = ((fine.grid, coarse.grid), (fine.upper_grid, coarse.upper_grid))
@@ -218,7 +229,7 @@ class Hidden(NamedTuple):
     length [m]; count: nodes in contact; cells: lengths [m] of those in which the contact ends; offset: cells by which
     an edge may lie off; turns: the rotation is free; spread: range of the gap and largest elastic closing [m]; corner,
     wedge, missed: pressures [Pa] at loaded corners of a coating, beside a contact of few nodes, of a rounding that is
-    passed over; open_ends [m] of rounded faces; skin: it is smooth; above [Pa]: the peak over the largest node inside.
+    passed over; open_ends [m] of rounded faces; skin: it is smooth.
     """
 
     length: float
@@ -232,11 +243,10 @@ class Hidden(NamedTuple):
     missed: float = 0.0
     open_ends: float = 0.0
     skin: bool = False
-    above: float = 0.0
 
 
-def _hidden(patch: Patch, missed_peak: float, peak: float) -> Hidden:
-    """The Hidden of a Patch under load; missed_peak [Pa]: `unresolved_rounding`; peak [Pa]: its pressure_peak."""
+def _hidden(patch: Patch, missed_peak: float) -> Hidden:
+    """The Hidden of a Patch under load; missed_peak [Pa]: `unresolved_rounding`."""
     cells, count = edge_cells(patch.x, patch.active), max(int(patch.active.sum()), 1)
     moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
     corner = 0.0 if patch.pieces is not patch.pair.compliance else \
@@ -245,14 +255,7 @@ def _hidden(patch: Patch, missed_peak: float, peak: float) -> Hidden:
                   offset(patch.pair, cells.max(initial=0.0)), "moment_balance" in patch.pressure.residuals,
                   float(np.ptp(patch.gap) + moved), corner,
                   _wedge(patch) if count <= POINT and cells.any() else 0.0, missed_peak, float(open_ends(patch)),
-                  patch.skin is not None, _above(patch, peak))
-
-
-def _above(patch: Patch, peak: float) -> float:
-    """Pressure [Pa] by which the peak lies above the largest node inside; 0 where a border of the interface, at which a
-    node holds the mean over half a cell, bears more."""
-    sigma = patch.pressure.sigma_n if patch.strips is None else patch.strips.pressure.max(axis=0)
-    return peak - float(sigma.max()) if 0 < int(np.argmax(sigma)) < sigma.size - 1 else 0.0
+                  patch.skin is not None)
 
 
 def least_of(hidden: Hidden, mine: dict) -> dict:
@@ -265,7 +268,7 @@ def least_of(hidden: Hidden, mine: dict) -> dict:
     cell = max(max(cells), sum(cells) / 2) if cells else 0.0  # the average where the ends are many
     aside = cell / (2 * count**2) if count <= POINT else 1e-3 * cell
     peak = hidden.corner + (mine["pressure_peak"] / (4 * count**2) if cell and count <= FEW else 0.0)
-    peak = max(peak, hidden.wedge, hidden.missed - mine["pressure_peak"], hidden.above)
+    peak = max(peak, hidden.wedge, hidden.missed - mine["pressure_peak"])
     turned = ROUND * (abs(mine["approach"]) + hidden.spread) + abs(mine["rotation"]) * aside * hidden.turns
     fullness = mine["loaded_fraction"] / mine["pressure_peak"] if mine["pressure_peak"] else 0.0
     # an edge of a contact of few nodes lies anywhere in its cell

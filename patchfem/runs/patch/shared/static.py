@@ -36,7 +36,7 @@ class Solved(NamedTuple):
 class Found(NamedTuple):
     """What q patches have on one level: values: name -> (q,); count: (q,) nodes in contact; cell: (q,) [m] in which the
     contact ends, 0 of full contact; spread, corner: (q,) as `Hidden` has them; top: (q,) largest nodal pressure [Pa];
-    above: (q,) [Pa] as `Hidden` has it; good: (q,) whether it was solved."""
+    inside: (q,) whether no border of the interface bears as much; good: (q,) whether it was solved."""
 
     values: dict
     count: np.ndarray
@@ -44,7 +44,7 @@ class Found(NamedTuple):
     spread: np.ndarray
     corner: np.ndarray
     top: np.ndarray
-    above: np.ndarray
+    inside: np.ndarray
     good: np.ndarray
 
 
@@ -95,9 +95,10 @@ def solved(patches, tolerance: float) -> list:
             continue
         cell = float(fine.cell[k])
         hidden = Hidden(length, int(fine.count[k]), (cell,) * bool(cell), one_by_one.offset(pair, cell), turns,
-                        float(fine.spread[k]), float(fine.corner[k]), 0.0, above=float(fine.above[k]))
+                        float(fine.spread[k]), float(fine.corner[k]), 0.0)
         mine = series[-1][k]
         found = combined([rows[k] for rows in series], least_of(hidden, mine), nested, stated, alike)
+        found = one_by_one.reaching(found, float(fine.top[k])) if fine.inside[k] else found
         band = one_by_one.band_words(patches[k], series[-2][k], theirs[k]) if theirs is not None else []
         out.append(Solved(found, float(fine.top[k]), mine["approach"], band, pair.compliance.interface.x.size))
     return out
@@ -165,8 +166,8 @@ def _from_one_end(patches, pair: Pair, gaps, way: int) -> Found:
     good = found.flaw <= SOLVED
     cell = np.where(count < m, cells[np.minimum(count, m - 1) - 1], 0.0)
     top = sigma.max(axis=1)
-    above = np.where((sigma[:, 0] < top) & (sigma[:, -1] < top), peak - top, 0.0)
-    return Found(values, count, cell, np.ptp(g, axis=1) + moved, corner, top, above, good)
+    inside = (sigma[:, 0] < top) & (sigma[:, -1] < top)
+    return Found(values, count, cell, np.ptp(g, axis=1) + moved, corner, top, inside, good)
 
 
 def corners(pair: Pair, sigma, cells):
