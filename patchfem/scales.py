@@ -4,6 +4,7 @@ The one place where a value and its error become text. A number ends at the seco
 known to more than MOST digits, or to all of them, stands without an error; what is 0 within its floor is 0.
 """
 
+import re
 from itertools import pairwise
 from math import ceil, floor, isfinite, log10
 
@@ -28,7 +29,11 @@ LADDERS = {  # from the smallest unit up: (name, what one SI unit is in it)
     "m2": (("um^2", 1e12), ("mm^2", 1e6), ("m^2", 1.0)),
     "m3": (("um^3", 1e18), ("mm^3", 1e9)),
     "Hz": (("Hz", 1.0), ("kHz", 1e-3)),
+    "W": (("uW", 1e6), ("mW", 1e3), ("W", 1.0), ("kW", 1e-3)),
 }
+SPOKEN = {unit: unit for unit in LADDERS if "-" not in unit} | {"N/m": "N m-1"}  # units as sentences write them
+_UNITS = "|".join(sorted(SPOKEN, key=len, reverse=True))
+_POWER = re.compile(rf"(?<![\w.\"'-])(\d+\.?\d*e[-+]?\d+)(?![\w.])(?: ({_UNITS})(?![\w/^]))?")
 
 
 def step_of(ladder: tuple, size: float) -> tuple:
@@ -118,6 +123,15 @@ def short(value: float, unit: str, digits: int, least: float = 0.0) -> str:
     """A value [SI] with so many digits in the unit that people read, 0 below its floor: `46.68 mJ`."""
     name, scale = fitting(value, unit)
     return f"{plain(value * scale, digits)} {name}".strip() if abs(value) > least else "0"
+
+
+def tidied(text: str) -> str:
+    """A sentence whose powers of ten are written as people write them: 1.1e+02 % is 110 %, 3.02e-07 J is 302 nJ."""
+    def one(found) -> str:
+        digits, unit = len(re.sub(r"[eE].*|\D", "", found[1])), found[2]
+        return f"{plain(float(found[1]), digits)}" if unit is None else short(float(found[1]), SPOKEN[unit], digits)
+
+    return _POWER.sub(one, text)
 
 
 def _is_zero(value: float, error: float | None, least: float, ratio: bool) -> bool:

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from patchfem.scales import LADDERS, MOST, plain, rounded, short, told
+from patchfem.scales import LADDERS, MOST, plain, rounded, short, tidied, told
 
 SCALE = {name: 1 / scale for ladder in LADDERS.values() for name, scale in ladder}
 UGLY = re.compile(r"± 0(?![.\d])|(?<![\d.])-0(?![.\d])|\de[-+]?0|nan|inf|\d\.\d{11}")
@@ -65,6 +65,15 @@ def test_always_the_printed_value_lies_within_the_printed_bar(seed):
     (1.0, 0.0996, 0.0, "1", "1.00 ± 0.10"), (3.0, None, 0.0, "N", "3 N"), (None, None, 0.0, "N", "- N")])
 def test_exact_a_number_as_a_person_writes_it(value, error, least, unit, text):
     assert told(value, error, least, unit) == text
+
+
+@pytest.mark.parametrize("text, tidy", [
+    ("carries 1.1e+02 % of it", "carries 110 % of it"), ("created 3.02e-07 J per cycle", "created 302 nJ per cycle"),
+    ("accuracy.tolerance = 1e-05 refines it", "accuracy.tolerance = 1e-5 refines it"), ("at 5e-06 m/s", "at 5e-6 m/s"),
+    ("K of 4.25e+06 N/m, 2e-05 N m", "K of 4.25 N/um, 20 uN m"), ("run_1e-05.csv: 3e5", "run_1e-05.csv: 300000"),
+    ('set it to "1e-05 m"', 'set it to "1e-05 m"')])
+def test_exact_a_sentence_has_no_powers_of_ten_that_a_unit_saves(text, tidy):
+    assert tidied(text) == tidy
 
 
 def test_exact_a_value_ends_where_its_error_does():

@@ -56,6 +56,9 @@ def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle,
         print(json.dumps(answer))
 
 
+EXACT = 1e-12  # of a value, below which an error is round-off
+
+
 @dataclass(frozen=True)
 class Rows:
     """Options of a fit of a rig to rows."""
@@ -160,6 +163,7 @@ def _fit_wear(found, to: str, free, out: Path | None, json_: bool, quiet: bool) 
     from ..campaigns.wear_coefficient import wear_coefficient
     from ..export.wear_fit import fit_into
     from ..model.model import build
+    from ..scales import plain
     from ..scene.scene import loads
 
     with progress_bar(quiet or json_) as progress:
@@ -171,8 +175,8 @@ def _fit_wear(found, to: str, free, out: Path | None, json_: bool, quiet: bool) 
         print(json.dumps(answer, ensure_ascii=False))
         return
     one = answer["values"]["wear.coefficient"]
-    print(f"wear.coefficient {one['value']:.6g} {one['unit']}, {one['interval'][0]:.4g} to {one['interval'][1]:.4g} by "
-          f"the interval of {fitted.measured.name}")
+    value, low, high = (plain(number, 4) for number in (one["value"], *one["interval"]))
+    print(f"wear.coefficient {value} {one['unit']}, {low} to {high} by the interval of {fitted.measured.name}")
     print(f"results: {target}")
 
 
@@ -193,6 +197,6 @@ def _print_cost(knob: str, runs: list, names: list, text: str) -> None:
 def _shares(one, name: str) -> str:
     """Error that a run states and, in brackets, its distance to the best run, both relative to the value."""
     size = abs(one.values.get(name, 0.0))
-    stated, away = (f"{part[name] / size:.1e}" if size and name in part else "-"
-                    for part in (one.errors, one.distances))
+    shares = (part[name] / size if size and name in part else None for part in (one.errors, one.distances))
+    stated, away = ("-" if one is None else "exact" if one < EXACT else f"{one:.1e}" for one in shares)
     return f"{stated} ({away})"

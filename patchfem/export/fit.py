@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..disk.whole import whole
-from ..scales import axis_unit
+from ..scales import SPOKEN, axis_unit, fitting, plain, rounded, short
 from .drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
 
 LABEL = {"force": ("force", "N"), "friction_ratio": ("friction ratio", "1")}
@@ -60,17 +60,21 @@ def lines_of(answer: dict) -> list:
     out = [f"{answer['outcome']}: {answer['rows']} rows of {answer['measured']}, {answer['evaluations']} evaluations"]
     offsets = {f"offset of the {name}": one for name, one in answer["offsets"].items()}
     for key, one in (answer["values"] | offsets).items():
-        unit = "" if one["unit"] == "1" else f" {one['unit']}"
-        if one["interval"] is None:
-            bar = "not determined"
-        else:
-            bar = f"95 % in [{one['interval'][0]:.6g}, {one['interval'][1]:.6g}] by the " + \
-                ("profile" if one["method"] == "profile" else "linearised problem")
-        bound = f", at its {one['at_bound']} bound" if one["at_bound"] else ""
-        out.append(f"  {key:<26} {one['value']:.6g}{unit}   {bar}{bound}")
-    unit = "" if answer["unit"] == "1" else f" {answer['unit']}"
+        out.append(line_of(f"{key:<26}", one))
     share = answer["rms"] / answer["peak"]
-    out.append(f"  rms of what is left over   {answer['rms']:.4g}{unit}, {share:.2g} of the peak")
+    out.append(f"  rms of what is left over   {short(answer['rms'], answer['unit'], 4)}, {plain(share, 2)} of the peak")
     if answer["held"] is not None:
-        out.append(f"  rms of the rows held out   {answer['held']['rms']:.4g}{unit} ({answer['held']['rows']} rows)")
+        held = answer["held"]
+        out.append(f"  rms of the rows held out   {short(held['rms'], answer['unit'], 4)} ({held['rows']} rows)")
     return out
+
+
+def line_of(name: str, one: dict) -> str:
+    """A fitted value with its interval in the unit that people read; one: its object in fit.json."""
+    unit, scale = fitting(one["value"], SPOKEN.get(one["unit"], one["unit"]))
+    ends, bound = one["interval"], f", at its {one['at_bound']} bound" if one["at_bound"] else ""
+    half = None if ends is None else scale * (ends[1] - ends[0]) / 2
+    value, *ends = (rounded(number * scale, half)[0] for number in (one["value"], *(ends or ())))
+    bar = "not determined" if not ends else f"95 % in [{', '.join(ends)}] by the " + \
+        ("profile" if one["method"] == "profile" else "linearised problem")
+    return f"  {name} {f'{value} {unit}'.strip()}   {bar}{bound}"

@@ -14,6 +14,7 @@ from ..campaigns.rows.nulls import NULLS
 from ..core import G_N
 from ..disk.whole import whole, write_text
 from .drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
+from .fit import line_of
 from .fit_folder import scene_text, value_of
 from .summary import write_json
 
@@ -170,12 +171,7 @@ def lines_of(answer: dict) -> list:
     out = [f"{answer['outcome']}: {answer['readings']} readings of {answer['measured']} fitted, {answer['held']} held "
            f"out; {alike} of {len(answer['starts'])} starts end within 1 % of the least training score"]
     for key, one in answer["values"].items():
-        unit = "" if one["unit"] == "1" else f" {one['unit']}"
-        bar = "not determined" if one["interval"] is None else \
-            f"95 % in [{one['interval'][0]:.6g}, {one['interval'][1]:.6g}] by the " + \
-            ("profile" if one["method"] == "profile" else "linearised problem")
-        out.append(f"  {key:<28} {one['value']:.6g}{unit}   {bar}" +
-                   (f", at its {one['at_bound']} bound" if one["at_bound"] else ""))
+        out.append(line_of(f"{key:<28}", one))
     out.append(f"  {'rms of ln(computed/measured)':<36} {'acceleration':>12} {'displacement':>12} {'all':>8}")
     for part in PARTS:
         if answer["scores"][part] is not None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core import Measure
+from ..scales import plain
 from ..structure.drive_sizes import sinusoidal, whole
 from .rows import TABLE
 
@@ -71,6 +72,6 @@ def _of_cycles(name: str, values, window, drive, beside: float) -> str:
     if "equivalent_stiffness" not in values:
         return f"{HOLDS}, so its loop has no width"
     if name == "equivalent_damping":
-        return f"it is the ratio of mode 1, and another mode carries {100 * beside:.2g} % of the slide" \
+        return f"it is the ratio of mode 1, and another mode carries {plain(100 * beside, 2)} % of the slide" \
             if beside > SHARED else "the first mode is rigid, or leaves the interface at rest"
     return "none of the last cycles shows the force on both sides of its largest slides"

@@ -4,6 +4,7 @@ import numpy as np
 
 from ...core import say
 from ...runs.results.result import Result
+from ...scales import short
 
 RESTS = 1e-2  # of the largest distance from where it ends: within it an output has come to rest
 
@@ -29,6 +30,7 @@ def swung(time, output) -> str:
     beyond = int(np.flatnonzero(far > RESTS * far.max())[-1])
     last = np.ptp(output[time >= time[-1] - 0.1 * (time[-1] - time[0])]) / 2
     if last > RESTS * far.max():
-        return f"{first} and still by {say(float(last), 3)} half peak-to-peak at the end, {1e3 * time[-1]:.3g} ms"
-    rests = f"comes to rest at {say(end, 3)} after {1e3 * time[beyond + 1]:.3g} ms"
+        at = short(float(time[-1]), "s", 3)
+        return f"{first} and still by {say(float(last), 3)} half peak-to-peak at the end, {at}"
+    rests = f"comes to rest at {say(end, 3)} after {short(float(time[beyond + 1]), 's', 3)}"
     return f"{first}, turns {turns.size} times and {rests}" if turns.size else f"{first} and {rests}"

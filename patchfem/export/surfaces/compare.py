@@ -9,7 +9,7 @@ from ... import __version__
 from ...campaigns.compare import Pressed
 from ...campaigns.compare import data_of as pressed_data
 from ...disk.whole import write_text
-from ...scales import LADDERS, step_of
+from ...scales import LADDERS, plain, step_of
 from ...surface.areal import level_plane
 from ...surface.compare.carried import NO_LIMIT
 from ...surface.compare.compare import Comparison
@@ -55,7 +55,7 @@ def shown(one: Quantity) -> tuple:
 def _written(value: float, digits: int) -> str:
     """A number with so many digits, without a power of ten where it is below a million."""
     if value == 0 or not 1 <= abs(value) < 1e6:
-        return f"{value:.{digits}g}"
+        return plain(value, digits)
     return f"{value:.{max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)}f}"
 
 

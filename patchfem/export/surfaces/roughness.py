@@ -6,7 +6,7 @@ from pathlib import Path
 from ... import __version__
 from ...core import say
 from ...disk.whole import write_text
-from ...scales import LADDERS, step_of
+from ...scales import LADDERS, plain, step_of
 from ...surface.roughness.report import RoughnessReport, Value
 from ..drawing.inline import CSS
 from . import pictures
@@ -24,8 +24,8 @@ def shown(one: Value) -> tuple:
     if one.value is None:
         return "-", "", "" if one.unit == "1" else one.unit
     unit, scale = ("", 1.0) if one.unit == "1" else step_of(LADDERS[one.unit], one.value)
-    interval = "" if one.low is None else f"{one.low * scale:.3g} .. {one.high * scale:.3g}"
-    return f"{one.value * scale:.5g}", interval, unit
+    interval = "" if one.low is None else f"{plain(one.low * scale, 3)} .. {plain(one.high * scale, 3)}"
+    return plain(one.value * scale, 5), interval, unit
 
 
 def heading(report: RoughnessReport) -> str:
