@@ -31,10 +31,13 @@ const pictures = (() => {
     for (let k = Math.ceil(start / step); k * step <= end; k++) all.push(k * step);
     return all;
   }
+  const short = (v) => Math.abs(v) >= 1e-4 && Math.abs(v) < 1e6 ? Number(v.toPrecision(4)).toString() :
+    Number(v.toPrecision(4)).toExponential().replace("e+", "e");
+  const plain = () => new Bokeh.CustomJSTickFormatter({code: "return pictures.short(tick)"});
   function ticked(axis) {                        // labels that are numbers, not powers of ten
     axis.ticker = new Bokeh.CustomJSTicker({major_code: "return pictures.readable(cb_data.range.start, cb_data.range.end)",
       minor_code: "return pictures.ticks(cb_data.range.start, cb_data.range.end, [1, 2, 3, 4, 5, 6, 7, 8, 9], 10)"});
-    axis.formatter = new Bokeh.CustomJSTickFormatter({code: "return Number(tick.toPrecision(4)).toString()"});
+    axis.formatter = plain();
   }
 
   function figure(x, title, options) {           // x: {label, unit, log} of the axis; title: of the other one
@@ -66,7 +69,8 @@ const pictures = (() => {
 
   function bar(fig, color_mapper, title) {       // the scale of the colours
     fig.scaled = true;
-    fig.add_layout(new Bokeh.ColorBar({color_mapper, title, title_text_color: ink("--ink"),
+    const readable = color_mapper.type === "LogColorMapper" ? {formatter: plain()} : {};
+    fig.add_layout(new Bokeh.ColorBar({color_mapper, title, ...readable, title_text_color: ink("--ink"),
       title_text_font_style: "normal", major_label_text_color: ink("--ink"), background_fill_color: null}), "right");
   }
 
@@ -102,5 +106,5 @@ const pictures = (() => {
     dark.addEventListener("change", all);
   }
 
-  return {ink, colours, number, within, named, ticks, readable, figure, legend, bar, put, themed};
+  return {ink, colours, number, within, named, ticks, readable, short, figure, legend, bar, put, themed};
 })();

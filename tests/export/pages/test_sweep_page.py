@@ -158,6 +158,7 @@ def test_exact_labels_of_a_logarithmic_axis_are_numbers_that_people_read(chromiu
                          ((2e-7, 0.19), [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1]),
                          ((0.04, 700), [0.1, 0.3, 1, 3, 10, 30, 100, 300])):
         assert chromium.js(f"pictures.readable({ends[0]}, {ends[1]})") == pytest.approx(labels, rel=1e-12)
+    assert chromium.js("[2e-6, 0.05, 3, 2e7].map(pictures.short)") == ["2e-6", "0.05", "3", "2e7"]
     assert not chromium.faults
 
 
