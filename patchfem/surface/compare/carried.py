@@ -93,11 +93,11 @@ def told(by: Carried) -> str:
     """What the worn depths count from, as a sentence."""
     if by.by == "valleys":
         return (f"Depths count from the valleys between the worn tops, {100 * by.share:.0f} % of the heights, which "
-                "agree and are taken for unworn.")
+                "agree and are taken for unworn; what they lost evenly would come on top.")
     spans = ", ".join(f"{say(a, 4)} to {say(b, 4)}" for a, b in by.parts[:4])
     more = f" and {len(by.parts) - 4} more" if len(by.parts) > 4 else ""
     return (f"Depths count from the parts that agree, x = {spans}{more} of the trace after, which are taken for "
-            "unworn.")
+            "unworn; what they lost evenly or as one wedge would come on top.")
 
 
 def may_hide(found: Registration, hidden: Quantity) -> str:

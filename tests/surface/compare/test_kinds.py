@@ -43,14 +43,14 @@ def faults(kind: str, seed: int) -> tuple:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("count", [2, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [1, pytest.param(40, marks=pytest.mark.slow)])
 def test_always_no_sentence_is_false(kind, count):
     """Intervals hold 90 of 100; of 40 pairs one may be called what it is not."""
     found = [faults(kind, seed) for seed in range(HELD_OUT, HELD_OUT + count)]
     false = [text for one, _ in found for text in one]
     assert len(false) <= count // 40, false
     held = [one for _, one in found if one]
-    if count > 2 and len(held) > 20:
+    if count > 1 and len(held) > 20:
         assert (np.mean(held, axis=0) > 0.85).all(), np.mean(held, axis=0)
 
 
@@ -78,6 +78,21 @@ def test_exact_a_spike_is_found_with_its_feet_and_a_groove_stays():
                  for keep in (False, True))
     assert one.removed == (int(left.missing.sum()), 0) and kept.removed == (0, 0)
     assert one.worn.largest.value == pytest.approx(pair.worn.max(), rel=0.02) and kept.worn.largest.value > 100 * UM
+
+
+@pytest.mark.parametrize("shape", ["speck", "hollow"])
+def test_exact_dust_and_dropouts_of_many_samples_are_no_wear(shape):
+    """A Gaussian speck before, a signal lost over ten samples after: both read as micrometres of wear."""
+    pair = made("groove", HELD_OUT + 52)
+    k = np.arange(pair.before.x.size)
+    before, after = np.array(pair.before.z), np.array(pair.after.z)
+    if shape == "speck":
+        before += 60 * UM * np.exp(-0.5 * ((k - 120) / 3) ** 2)
+    else:
+        after[115:125] -= 60 * UM
+    one = compared(Profile(pair.before.x, frozen_array(before), "b"), Profile(pair.after.x, frozen_array(after), "a"))
+    assert one.removed[shape == "hollow"] >= 8
+    assert one.worn.largest.low <= pair.worn.max() <= one.worn.largest.high
 
 
 @pytest.mark.parametrize("seed", range(2))
