@@ -235,11 +235,18 @@ def using(key: str) -> str:
     return in_words((name for name in LAWS if takes(name, key)), "and")
 
 
-def refusal(word: str, least: str = "") -> str:
-    """Alternative to a law that is not carried: "use law 'coulomb' or 'tanh'; not yet built"; least: what the law must
-    carry."""
-    laws = (f"'{name}'" for name, law in LAWS.items() if {word, *least.split()} <= set(law.carries.split()))
-    return f"use law {in_words(laws, 'or')}; not yet built"
+def refusal(word: str, least: str = "", odd=None) -> str:
+    """Alternative to a law that is not carried: "use law 'coulomb' or 'tanh'; not yet built".
+
+    least: what the law must carry besides; odd: the table of the law, of which the reading or the order may be all that
+    is not carried.
+    """
+    wanted = {word, *least.split()}
+    laws = [name for name, law in LAWS.items() if wanted <= set(law.carries.split())]
+    own = odd.law if odd is not None and listed(odd) and odd.law in laws else ""
+    instead = 'reading = "stretch" with order = 1, or ' if own else ""
+    others = in_words((f"'{name}'" for name in laws if name != own), "or")
+    return f"use {instead}law {others}; not yet built"
 
 
 MEANWHILE = {  # what serves where two effects cannot stand together yet

@@ -5,7 +5,23 @@ from __future__ import annotations
 import re
 
 import pytest
-from scene_texts import BENCH, LINEAR, PATCH, PIECE, RIG, STRUCTURE, line_of, mistakes, only
+from proposals import vain, wrong
+from scene_texts import (
+    BENCH,
+    COULOMB,
+    FORCED,
+    LINEAR,
+    MODE,
+    PAIR,
+    PATCH,
+    PIECE,
+    POINT,
+    RIG,
+    STRUCTURE,
+    line_of,
+    mistakes,
+    only,
+)
 
 from patchfem.scene.keys.tables import Tables
 from patchfem.scene.keys.types import keys, model_of
@@ -396,3 +412,23 @@ OUTLINES = [
 def test_refuses_outlines_that_do_not_fit(tables, sets, key, words):
     text = PIECE + 'load = "26 lbf"\nsubstrate = "steel"\n' + tables
     assert any(f"{key}: " in line and words in line for line in mistakes(text, *sets)), mistakes(text, *sets)
+
+
+@pytest.mark.share(*range(0, 60, 4))
+@pytest.mark.parametrize("first", range(0, 1000, 10))
+def test_always_what_a_refusal_proposes_ends_its_mistake(first):
+    """Every value that a line names, tried in its place, makes the scene right or moves it to another mistake."""
+    assert not [one for seed in range(first, first + 10) for one in vain(*wrong(seed))]
+
+
+def test_exact_a_law_of_another_reading_is_not_proposed_as_itself():
+    law = 'law = "nonlocal"\nreading = "report"\nstatic = 0.2'
+    text = PAIR.replace('law = "elastic-plastic"\nstatic = 0.2', law) + FORCED
+    assert 'use reading = "stretch" with order = 1, or law \'coulomb\'' in only(text)
+    assert loads(text.replace('"report"', '"stretch"\norder = 1')).kind == "rig"
+
+
+def test_exact_wear_of_a_release_is_told_which_drives_repeat():
+    text = POINT + COULOMB + MODE + '[drive]\nkind = "free"\ndisplacement = "1 mm"\ncycles = 5\n'
+    text += '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 100\n'
+    assert "use kind 'base' or 'force'" in only(text)

@@ -40,14 +40,15 @@ def _warnings(modes, laws, h, steps: int) -> list:
     left = damping_left(modes, h)
     if np.any(np.isfinite(left)):
         i = int(np.nanargmin(left))
-        own = left[i] + modes.omega[i] * h / 2
-        grows = ""
+        lost = modes.omega * h / 2
+        own, grows = left + lost, ""
         if left[i] < 0:
-            times = int(np.ceil(modes.omega[i] * h / 2 / own)) if own > 0 else 0
+            damped = np.all(own[modes.omega > 0] > 0)
+            times = int(np.ceil(np.nanmax(lost / own))) if damped else 0
             grows = ": its free vibration grows; " + (f"set accuracy.steps_per_cycle = {steps * times}" if times else
                                                       "no step of this method damps it")
-        out.append(f"explicit Euler takes {modes.omega[i] * h / 2:.3g} off the damping ratio of mode "
-                   f"'{modes.names[i]}' and leaves {left[i]:.3g} of {own:.3g}{grows}")
+        out.append(f"explicit Euler takes {lost[i]:.3g} off the damping ratio of mode "
+                   f"'{modes.names[i]}' and leaves {left[i]:.3g} of {own[i]:.3g}{grows}")
     for one, face in zip(laws, modes.interfaces):
         share = np.sum(face**2) / modes.mass
         if not isinstance(one, Smooth):

@@ -14,6 +14,7 @@ MOST_STRIPS = 64  # that are proposed: four times the strips are some twenty tim
 SIZE = "contact.element_size"  # an even mesh finds the ends of a contact at first order, one that is chosen at second
 OF_PEAK = ("pressure_peak", "loaded_fraction")
 OF_SAMPLES = ("stick_fraction", "slip_start_phase")  # of a cycle of a balance, however many harmonics it has
+OF = {"acceleration_distortion": "absolute_acceleration_fundamental"}  # what a share is one of
 READ = "no setting is known to make it better; read it by its error"
 # what a run answers first, named before what misses its tolerance by more
 FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_ratio_peak",
@@ -115,6 +116,8 @@ def _finer_motion(result, wide: dict, coarse) -> str:
     name = max(_first(result, wide), key=wide.get)
     if name in (rings := result.extra.get("still_rings", {})):
         return rings[name]
+    if (of := result.measures.get(OF.get(name))) is not None and of.value is not None and abs(of.value) <= of.floor:
+        return f"it is a share of {OF[name]}, which is 0 within its floor; read it by its error"
     steps, cause = result.extra.get("steps_per_cycle") or result.extra.get("steps"), _cause(result, name)
     if cause == "steps" and steps is not None:
         return _more_steps(result, name, wide, int(steps))

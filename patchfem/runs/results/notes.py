@@ -9,6 +9,7 @@ from ...friction.bonds.parameters import ripening
 from .loose import FARTHEST, MORE
 
 BOOKS = 1e-3  # relative gap of the two books of energy beyond which a run says so
+RIPE = 0.3  # of their length, over which bonds may ripen before a run says so
 BOUND = 1e-3  # share of mu_s N that friction may exceed before a run says so
 
 
@@ -39,10 +40,12 @@ def warming(model, patch, response, work: float | None = None) -> list:
 def unripe(law, speed: float) -> list:
     """Warning that a printed law's bonds break before they are grown, as a list of sentences."""
     a = ripening(law, speed) if law.reading == "report" else 0.0
-    if a <= 0.3:
+    if a <= RIPE:
         return []
-    return [f"bonds ripen over {a:.2g} of their length at the peak speed {speed:.3g} m/s (limit 0.3), so friction as "
-            "printed falls below 2.18-2.21; lower friction.slip_growth, or use reading = \"stretch\""]
+    least = law.ratio / (1 / (RIPE * law.length) - law.rest_growth / speed**2)  # ripening(law, speed) = RIPE with it
+    return [f"bonds ripen over {a:.2g} of their length at the peak speed {speed:.3g} m/s (limit {RIPE:g}), so friction "
+            f"as printed falls below 2.18-2.21; set friction.slip_growth = \"{0.95e6 * least:.2g} um\", or use "
+            "friction.reading = \"stretch\""]
 
 
 def creeping(law, outcome, found) -> list:

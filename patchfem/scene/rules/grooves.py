@@ -71,7 +71,7 @@ def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
         key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
         draft.say(f"friction.{key}", unbuilt(beside, "recursion"))
     elif not carries(law, "grooves"):
-        draft.say("friction.law", f"{named(law)} {beside}: {refusal('grooves')}")
+        draft.say("friction.law", f"{named(law)} {beside}: {refusal('grooves', odd=law)}")
     accuracy = draft.tables.accuracy  # None where [accuracy] could not be read
     if has(law.law, "bonds") and accuracy is not None and accuracy.quadrature not in (None, "auto", "recursion"):
         draft.say("accuracy.quadrature", unbuilt(f"'{accuracy.quadrature}' {beside}",

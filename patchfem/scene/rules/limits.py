@@ -90,7 +90,7 @@ def _interfaces(draft: Draft, interfaces: tuple) -> None:
         if one.spread is not None and takes(one.law, "spread"):
             draft.say(f"{at}.spread", unbuilt("beside masses, where an interface has no width", "out"))
         if len(interfaces) > 1 and one.law is not None and not carries(one, "joints"):
-            draft.say(f"{at}.law", f"{named(one)} beside other interfaces: {refusal('joints')}")
+            draft.say(f"{at}.law", f"{named(one)} beside other interfaces: {refusal('joints', odd=one)}")
 
 
 def _quadrature(draft: Draft, kind: str, law: Friction, shear: str) -> None:
@@ -139,7 +139,7 @@ def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
     if contact is None or contact.strips is None:
         draft.say(key, "turns the patch about its normal: name [contact.strips], which slide each by themselves")
     elif not carries(law, "joints"):
-        draft.say(key, f"beside strips with {named(law)}: {refusal('joints')}")
+        draft.say(key, f"beside strips with {named(law)}: {refusal('joints', odd=law)}")
 
 
 def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) -> None:

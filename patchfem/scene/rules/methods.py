@@ -180,7 +180,7 @@ def _harmonic(m: Motion, method: str) -> str:
     if has(law.law, "set-valued") and not m.soft:
         return unbuilt(f"'harmonic' with a law that jumps beside {m.spring}", "march or stiff")
     if not has(law.law, "set-valued") and not carries(law, "harmonic"):
-        return f"'harmonic' with {named(law)}: use 'march', or {refusal('harmonic')}"
+        return f"'harmonic' with {named(law)}: use 'march', or {refusal('harmonic', odd=law)}"
     beside = next((key for key in ("rest_growth", "breakaway") if getattr(law, key)), "")
     beside = f"friction.{beside}" if beside else m.soft or m.lower
     return unbuilt(f"'harmonic' with law '{law.law}' beside {beside}", "march") if has(law.law, "bonds") and beside \
@@ -191,7 +191,7 @@ def _compared(m: Motion, method: str) -> str:
     """The comparison methods take one force per interface and linear modes."""
     odd = next((one for one in m.laws if not carries(one, "comparison")), None)
     if odd is not None:
-        return f"'{method}' with {named(odd)}: use 'march', or {refusal('comparison')}"
+        return f"'{method}' with {named(odd)}: use 'march', or {refusal('comparison', odd=odd)}"
     if reason := _common(m, method):
         return reason
     if m.soft:

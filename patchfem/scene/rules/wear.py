@@ -50,7 +50,8 @@ def _beside(tables, kind: str):
         yield "modes with normal, pitch or yaw", LATER.format("these keys")
     if kind == "rig" and drive is not None and (drive.kind == "free" or drive.waveform not in (None, "sine")):
         yield f"a drive '{drive.kind if drive.kind == 'free' else drive.waveform}'", \
-            "wear repeats the last cycle of a steady motion: use waveform 'sine'"
+            "wear repeats the last cycle of a steady motion: use " + \
+            ("kind 'base' or 'force'" if drive.kind == "free" else "waveform 'sine'")
     if kind == "rig" and method in ("duhamel", "newmark", "euler", "harmonic"):
         yield f"accuracy.method '{method}'", "use 'auto', 'exact' or 'march'"
     if tables.friction is not None and has(tables.friction.law, "averaged"):
