@@ -76,7 +76,7 @@ def span(measures: dict, trusted: dict, settled: np.ndarray) -> str:
                                 for part in measures[name])
         low, high = (short(one, unit, 4, zero_below(name)) for one in (values.min(), values.max()))
         ran = f"is {high} throughout" if low == high else f"runs from {low} to {high}"
-        known = np.isfinite(errors) & (errors > 0) & (values != 0)
+        known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))  # 0 is known absolutely
         share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
         band = f", known to {plain(100 * share, 1)} % or better" if share else ""
         counts, ended = there.sum(), (every & settled).sum()

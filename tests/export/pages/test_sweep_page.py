@@ -252,3 +252,10 @@ def test_exact_a_word_has_one_number_on_the_page_of_several_sweeps(table):
                                          (tuple(range(21)), False), ((0.0, 1.0, 9.0), False)])
 def test_exact_an_axis_of_a_decade_or_more_is_logarithmic(values, log):
     assert wide(values) is log
+
+
+def test_exact_round_off_is_zero_in_the_span_and_known_absolutely():
+    """A joint that holds in its first cases: -1.4e-19 J ± 1e-11 J was known to 2e11 % of its value."""
+    loop = np.array([4.2e-21, -1.4e-19, 3.7e-2]), np.array([1e-11, 1e-11, 7.4e-5]), "J"
+    text = span({"loop_area": loop}, {"loop_area": np.ones(3, bool)}, np.ones(3, bool))
+    assert text == "Loop area runs from 0 to 37 mJ, known to 0.2 % or better."
