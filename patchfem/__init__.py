@@ -54,6 +54,7 @@ if TYPE_CHECKING:
         load,
         new,
         plan,
+        plot,
         run,
         run_many,
         sweep,
@@ -61,7 +62,8 @@ if TYPE_CHECKING:
 
 __version__ = "0.4.0"
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "build", "compare", "cost", "demo", "load", "new", "plan", "run", "run_many", "sweep"]
+           "SceneError", "build", "compare", "cost", "demo", "load", "new", "plan", "plot", "run",
+           "run_many", "sweep"]
 
 
 def __getattr__(name: str):

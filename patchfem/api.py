@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from .runs.many.answers import Answers
 
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "build", "compare", "cost", "demo", "load", "new", "plan", "run", "run_many", "sweep"]
+           "SceneError", "build", "compare", "cost", "demo", "load", "new", "plan", "plot", "run",
+           "run_many", "sweep"]
 TEXT = "<text>"  # the name of a scene that came without a file
 
 
@@ -161,6 +162,24 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
         sweep_into(asked, cases, Place(Path(out), resume), by, _on_stderr)
     answer = lead_of(table_of(asked, cases, found, (), Path(out or ""))).answer()
     return contents(asked, cases, found, cases.keys(asked) if out is not None else (), answer).to_xarray()
+
+
+class SweepPlots:
+    """Pictures of sweeps, as matplotlib Axes: ``pf.plot.sweep(dataset, "loop_area")``."""
+
+    @staticmethod
+    def sweep(dataset: Dataset, measure: str, ax: Axes | None = None) -> Axes:
+        """A measure of the Dataset of a sweep over its key with most values, with the numerical errors.
+
+        Hollow points miss the tolerance; values over two decades have a logarithmic axis. ax: Axes to draw on.
+        """
+        from .export.drawing.swept import draw
+
+        figure = draw.figure(dataset, measure, onto=ax)
+        return figure.axes[0] if ax is None else ax
+
+
+plot = SweepPlots()
 
 
 def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[str], None] | None = None) -> Answers:

@@ -106,3 +106,23 @@ def test_exact_many_patches_of_one_geometry_are_those_of_a_sweep():
     for name, values in found.values.items():  # the digits of a pressure at an end are those of a cell of a micron
         near = 1e-9 if name in ("pressure_peak", "loaded_fraction") else 1e-12
         np.testing.assert_allclose(values, swept[name].values, rtol=near, atol=near * found.floors[name].max())
+
+
+def test_exact_a_picture_of_a_sweep_is_hollow_where_the_tolerance_is_missed():
+    """Values over three decades, the first two known to 100 and 5 %, a line for each of two loads."""
+    values = np.array([[1e-6, 1e-5, 1e-4, 1e-3], [2e-6, 2e-5, 2e-4, 2e-3]])
+    errors = values * [1.0, 0.05, 1e-3, 0.0]
+    found = xr.Dataset({"loop_area": (("normal_load", "slide_amplitude"), values, {"units": "J"}),
+                        "loop_area_error": (("normal_load", "slide_amplitude"), errors, {"units": "J"})},
+                       {"normal_load": ("normal_load", [10.0, 20.0], {"units": "N"}),
+                        "slide_amplitude": ("slide_amplitude", [1e-7, 1e-6, 1e-5, 1e-4], {"units": "m"})},
+                       {"tolerance": 0.01})
+    axis = pf.plot.sweep(found, "loop_area")
+    filled = [line for line in axis.lines if line.get_linestyle() == "None" and line.get_marker() == "o"]
+    assert [line.get_ydata().tolist() for line in filled] == [pytest.approx(row[2:] * 1e3) for row in values]
+    assert (axis.get_xscale(), axis.get_yscale(), axis.get_ylabel()) == ("log", "log", "loop area [mJ]")
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == ["normal load 10 N", "normal load 20 N"]
+    one = found.isel(normal_load=[0]) * 1.0
+    assert pf.plot.sweep(one.assign(loop_area=one.loop_area - 1e-4), "loop_area", ax=axis) is axis
+    with pytest.raises(pf.PatchfemError, match="no measure 'loop'; there are loop_area"):
+        pf.plot.sweep(found, "loop")
