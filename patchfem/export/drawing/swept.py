@@ -48,7 +48,7 @@ def _line(axis, x, measured: tuple, hollow, style: dict) -> None:
     """Values (n,) with their errors over x; the points for which `hollow` (n,) holds are not filled."""
     values, errors = measured
     axis.errorbar(x, values, np.nan_to_num(errors), marker="o", markerfacecolor="white", capsize=2, **style)
-    axis.plot(x[~hollow], values[~hollow], "o", color=style["color"])
+    axis.plot(x[~hollow], values[~hollow], "o", color=style["color"], zorder=3)
 
 
 def _scaled(axis, which: str, values, times: float) -> None:
