@@ -24,7 +24,7 @@ from ..values import peak_pressure
 LEAST_LEVELS, MOST_POINTS, MOST_WORK = 3, 60_000, 2.5e7  # of a level; its iterations times its points
 POINTS = 500  # of the first level at least
 END, CELL, SLOPE = 1e-4, 1 / 30, 0.8  # of the length: cell of level 0 at the ends, in the middle; its growth
-CLOSED, LIMIT = 1e-9, 4000  # of the contact: relative residual, most iterations
+CLOSED, LIMIT = 3e-8, 4000  # of the contact: relative residual, most iterations
 OVERLAP = 1e-6  # of what the pressure moves: the largest overlap of a solved contact
 
 
