@@ -24,6 +24,7 @@ POINT = 3  # nodes of a contact that no mesh of these cells resolves
 ROUND = 5e-12  # round-off, relative
 ALIKE = 1e-9  # relative error that nobody asks to be below
 OFFSET = 0.012  # cells by which an edge found between nodes may lie off
+RISING = 4.0  # times the last change of the pressure at a corner: what it may still rise by
 CORNER = 0.15  # largest share of the pressure at the corner of a coating that cells coarser than it leave out
 EDGED = ("contact_fraction", "contact_half_width")  # what hangs on where edges are found between nodes
 EXTRAPOLATED = 2.0  # of what meshes hide, in 4/3 of a value less 1/3 of one on cells twice as long
@@ -108,10 +109,27 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     sigma = fine.pressure.sigma_n if fine.strips is None else fine.strips.pressure.max(axis=0)
     if 0 < (top := int(np.argmax(sigma))) < sigma.size - 1:
         out = reaching(out, float(sigma[top]))
+    if fine.averaging is not None:
+        out = _cornered(out, fine, series[0])
     for name, (value, error) in fine.sharper.items():
         if error < out[name].error:
             out[name] = replace(out[name], value=value, error=error)
     return _bounded(_unbounded(fine), out)
+
+
+def _cornered(found: dict, fine: Patch, coarse: Patch) -> dict:
+    """The measures with a peak that holds the pressure at a corner under a profile, where it still rises.
+
+    Elsewhere the largest pressure may have settled, which its change from mesh to mesh shows alone. A corner that a
+    trace just reaches bears ever more on cells half as long.
+    """
+    now, before = (one.pressure.sigma_n[[0, -1]].max() for one in (fine, coarse))
+    peak = found["pressure_peak"]
+    lack = now + RISING * abs(now - before) - peak.value
+    if not now or lack <= peak.error:
+        return found
+    peak = replace(peak, error=float(lack))
+    return found | {"pressure_peak": peak, "loaded_fraction": _of_peak(found["loaded_fraction"], peak)}
 
 
 def combined(series: list, least: dict, nested: bool = True, tolerance: float | None = None, alike: float = ALIKE,

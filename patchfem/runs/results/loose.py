@@ -2,6 +2,7 @@
 
 from math import ceil, log2, log10
 
+from ...core import say
 from .patch_rows import DECISIVE, TABLE
 
 MOST = 1e9  # times that an error exceeds what is allowed, beyond which it does not matter
@@ -78,8 +79,9 @@ def _finer_mesh(result, wide: dict, coarse) -> str:
         return f"a mesh finer than {nodes} interface nodes would take too long; {wider}"
     tighter = _climbing(result, coarse)
     if tighter is None:
-        return f"a mesh finer than {nodes} interface nodes would take too long; read " \
-               f"{'them by their errors' if len(wide) > 1 else 'it by its error'}"
+        finer = f"points closer than {say(result.patch.averaging, 3)}" if result.patch.averaging and \
+            result.patch.sharper else f"a mesh finer than {nodes} interface nodes"
+        return f"{finer} would take too long; read {'them by their errors' if len(wide) > 1 else 'it by its error'}"
     return f"the mesh ({nodes} interface nodes) was not chosen for it; accuracy.tolerance = {tighter:.3g} refines it"
 
 

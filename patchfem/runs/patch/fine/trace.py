@@ -25,16 +25,21 @@ LEAST_LEVELS, MOST_POINTS, MOST_WORK = 3, 60_000, 2.5e7  # of a level; its itera
 POINTS = 500  # of the first level at least
 END, CELL, SLOPE = 1e-4, 1 / 30, 0.8  # of the length: cell of level 0 at the ends, in the middle; its growth
 CLOSED, LIMIT = 3e-8, 4000  # of the contact: relative residual, most iterations
+NEAR, CORNERED = 1e-3, 0.2  # of the length: what counts as a corner; its share of the largest pressure
 OVERLAP = 1e-6  # of what the pressure moves: the largest overlap of a solved contact
 
 
 class Level(NamedTuple):
-    """A solved level: forces (n,) [N], values by name, what its meshes may hide, iterations."""
+    """A solved level: forces (n,) [N], values by name, what its meshes may hide, iterations.
+
+    cornered: the pressure at a free corner may be the largest, which a few cells at the ends do not tell.
+    """
 
     force: np.ndarray
     values: dict
     hidden: Hidden
     work: int
+    cornered: bool
 
 
 def serves(asked) -> bool:
@@ -80,8 +85,9 @@ def _summed(coarse: list, series: list) -> dict:
     mine = series[-1].values
     found = combined([one.values for one in series], least_of(series[-1].hidden, mine), True, 0.0)
     ends = combined([one.values for one in coarse], {}, True, 0.0)
+    unknown = ("pressure_peak", "loaded_fraction") if series[-1].cornered else ()
     return {name: (one.value + ends[name].value - coarse[-1].values[name], one.error + ends[name].error)
-            for name, one in found.items()}
+            for name, one in found.items() if name not in unknown}
 
 
 def _ends(asked, level: int) -> list:
@@ -138,7 +144,9 @@ def _level(asked, ends: tuple, count: int, start) -> Level:
     values |= {"approach": closing, "rotation": asked.gap.angle + theta}
     hidden = Hidden(asked.length, int(touches.sum()), (asked.length / count,) * len(found), OFFSET,
                     asked.moment is not None, float(np.ptp(gap) + np.abs(moved).max()), 0.0, 0.0)
-    return Level(force, values, hidden, work)
+    near = max(1, round(NEAR * count))
+    cornered = max(force[:near].max(), force[-near:].max()) > CORNERED * force.max()
+    return Level(force, values, hidden, work, bool(cornered))
 
 
 def _pressed(asked, normal: Products, gap, start) -> tuple:
