@@ -61,8 +61,8 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         seconds["contact"] = perf_counter() - begin
         warnings += [*of_patch.strained(model.patch, patch), *patch.notes]
         if estimate and coarse[0] is None:
-            warnings.append(f"no error is estimated on {patch.x.size - 1} elements along the interface; lower "
-                            "contact.element_size")
+            fewer = "split the elements of contact.mesh" if model.patch.mesh else "leave out contact.element_size"
+            warnings.append(f"no error is estimated on {patch.x.size - 1} elements along the interface; {fewer}")
         notes += of_patch.left_out(model, patch, coarse)
     if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and model.kind != "patch":
         warnings.append("no friction acts and no motion was computed")

@@ -67,7 +67,7 @@ def test_always_a_mesh_at_its_cap_is_not_refined_by_a_tolerance(monkeypatch):
     """A measure for which no mesh is chosen misses the tolerance beside the peak: no tolerance refines it."""
     monkeypatch.setattr(ladder, "SPENT", {True: 0.0, False: 0.0})
     found = run(plan(loads(PATCH + '[contact.upper]\nchamfer = "0.2 mm"\n[accuracy]\ntolerance = 1e-6\n')))
-    said = [text for text in found.warnings if "the tolerance is 1e-06" in text]
+    said = [text for text in found.warnings if "the tolerance is 1e-6" in text]
     wide = {name: one.error / abs(one.value) for name, one in found.measures.items() if one.value and one.error}
     assert max(wide, key=wide.get) != "contact_fraction"  # and yet that is what a patch answers first
     assert len(said) == 1 and said[0].startswith("contact_fraction is known to ")

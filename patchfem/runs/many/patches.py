@@ -15,6 +15,7 @@ from ..patch.notes import slender
 from ..patch.shared import static
 from ..patch.shared.meshes import geometry_of
 from ..results.loose import loose
+from ..results.places import placeless
 from . import one_by_one
 from .answers import Answers, joined
 
@@ -66,10 +67,10 @@ def solve(models: Sequence[Model], say: Callable | None = None) -> Answers:
         said = [*model.source.remarks, *of_patch.strained_by(model.patch, one.top, one.approach),
                 *loose(seen)]
         if said:
-            out.warnings[case] = said
+            out.warnings[case] = placeless(said, model.source.path)
         notes = [*slender(model.patch, measures["normal_load"].value / area), *one.band]
         if notes:
-            out.notes[case] = notes
+            out.notes[case] = placeless(notes, model.source.path)
     out.seconds[:] = (perf_counter() - begin) / len(models)
     if not single:
         return out

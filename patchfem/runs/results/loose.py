@@ -10,7 +10,7 @@ TIGHTER = 0.1  # times the tolerance: a mesh of at least one halving more
 MOST_HALVINGS = 4  # of the steps, as far ahead as an order seen at two of them is trusted
 LEAST_LEFT = 0.2  # share of an allowed error that steps may be asked to meet, where the mesh takes more than the rest
 FARTHEST = 8  # of the steps, that are named at once where no engine without steps serves
-MORE = 4  # times the harmonics of a balance, that are proposed
+MORE, LEAST = 4, 31  # times the harmonics of a balance, and harmonics, that are proposed
 MOST_STRIPS = 64  # that are proposed: four times the strips are some twenty times the time
 SIZE = "contact.element_size"  # an even mesh finds the ends of a contact at first order, one that is chosen at second
 OF_PEAK = ("pressure_peak", "loaded_fraction")
@@ -68,11 +68,13 @@ def _finer_mesh(result, wide: dict, coarse) -> str:
     """
     asked, tolerance = result.plan.model.patch, result.plan.model.accuracy.tolerance
     times = max(wide.values())
+    if times >= MOST:
+        return READ  # it is 0
     if asked.mesh is not None:
         return "split the elements of contact.mesh"
     nodes, wider = result.patch.x.size, f"accuracy.tolerance = {_up(tolerance * times):g} would be met"
     if asked.strips is not None and result.plan.model.kind == "patch":  # bars of what moves have no share of strips
-        return f"the mesh ({nodes} interface nodes) and the strips share it; {_more_strips(asked, wide)}{wider}"
+        return f"the mesh ({nodes} interface nodes) and the strips share it; {_more_strips(asked, wide)}"
     if not asked.chosen:
         return f"leave out {SIZE}"
     if not wide.keys() - set(DECISIVE):
@@ -86,14 +88,14 @@ def _finer_mesh(result, wide: dict, coarse) -> str:
 
 
 def _more_strips(asked, wide: dict) -> str:
-    """The number of strips that meets the tolerance, where few more do; "" where there is none.
+    """The number of strips that meets the tolerance, where few more do.
 
     The peak of the outermost strip is that of its middle, so its error is of first order in the strips; that of all
     else is of second order, as that of the mesh is.
     """
     count = asked.strips[0] * max(times if name in OF_PEAK else times**0.5 for name, times in wide.items())
     sized = f" and leave out {SIZE}" if not asked.chosen else ""
-    return f"set contact.strips.count = {ceil(count)}{sized}, or " if count <= MOST_STRIPS else ""
+    return f"set contact.strips.count = {ceil(count)}{sized}" if count <= MOST_STRIPS else READ
 
 
 def _climbing(result, coarse) -> float | None:
@@ -113,7 +115,7 @@ def _finer_motion(result, wide: dict, coarse) -> str:
     """What cures the errors of a motion in the measure that speaks for `wide` (name -> error over what is allowed).
 
     It is that of what leaves most of it open. Steps cure it where it was seen to fall with them, by as many as its
-    order asks for. A looser tolerance is met only where it chooses nothing: with a patch it chooses a coarser mesh.
+    order asks for. A looser tolerance is no cure: it chooses coarser steps and meshes.
     """
     name = max(_first(result, wide), key=wide.get)
     if name in (rings := result.extra.get("still_rings", {})):
@@ -129,10 +131,8 @@ def _finer_motion(result, wide: dict, coarse) -> str:
         return f"set accuracy.shear_modes = {min(4 * result.extra['shear_modes'], result.patch.x.size)}"
     if cause == "bonds":
         return _finer_bonds(result.plan.model.accuracy)
-    if result.extra.get("engine") == "harmonic":
-        return _more_harmonics(result.extra.get("harmonics"), name) or READ
-    tolerance = result.plan.model.accuracy.tolerance
-    return f"accuracy.tolerance = {_up(tolerance * wide[name]):g} would be met"
+    balanced = result.extra.get("harmonics")  # None where a steady motion is exact between yields
+    return READ if balanced is None or name.startswith(OF_SAMPLES) else more_harmonics(balanced)
 
 
 def _cause(result, name: str) -> str:
@@ -167,10 +167,9 @@ def _finer_bonds(accuracy) -> str:
         f"accuracy.tolerance = {TIGHTER * accuracy.tolerance:.3g} refines the sum over bonds"
 
 
-def _more_harmonics(found: int | None, name: str) -> str:
-    """The harmonics that make a steady motion better, from those it has; "" where it is exact between yields, None, or
-    the measure `name` is read off samples."""
-    return "" if found is None or name.startswith(OF_SAMPLES) else f"set accuracy.harmonics = {MORE * found}"
+def more_harmonics(found: int) -> str:
+    """The harmonics that make a balance of so many better; few of them say little of how it converges."""
+    return f"set accuracy.harmonics = {max(MORE * found, LEAST)}"
 
 
 def _unproven(model, steps: int, name: str, wide: dict) -> str:

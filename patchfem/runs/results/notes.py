@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core import Outcome, say
 from ...friction.bonds.parameters import ripening
-from .loose import FARTHEST, MORE
+from .loose import FARTHEST, more_harmonics
 
 BOOKS = 1e-3  # relative gap of the two books of energy beyond which a run says so
 RIPE = 0.3  # of their length, over which bonds may ripen before a run says so
@@ -100,9 +100,14 @@ def two_books(values: dict, steps: int | None, harmonics: int | None = None) -> 
     found = values.get("work_check")
     if found is None or found.value is None or found.value <= BOOKS:
         return []
-    halvings = ceil(log2(max(found.value, found.error or 0.0) / BOOKS) / 2)
-    remedy = f"set accuracy.harmonics = {MORE * harmonics}" if harmonics else \
-        f"set accuracy.steps_per_cycle = {steps * 2**min(halvings, FARTHEST)}" if steps else \
-        "compare with accuracy.method = \"march\""
+    wide = max(found.value, found.error or 0.0) / BOOKS
+    halvings = 1 + ceil(log2(wide) / 2)  # one more: of a motion with stops the gap falls by second order on the whole
+    if harmonics:
+        remedy = more_harmonics(harmonics)
+    elif steps and halvings > FARTHEST:
+        remedy = f"{steps} steps per cycle do not follow this motion by this method"
+    else:
+        remedy = f"set accuracy.steps_per_cycle = {steps * 2**halvings}" if steps else \
+            "compare with accuracy.method = \"march\""
     return [f"work_check is {found.value:.2g} (limit {BOOKS:g}): friction work by the trapezoidal rule on the samples "
             f"differs from that of the energy ledger; {remedy}"]

@@ -15,6 +15,7 @@ from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, steady_amplitudes, windows_of
 from ....structure.drive_sizes import largest, omega_of, slowest
 from ...results.notes import BOOKS
+from ...results.places import placeless
 from ...rig.engines import knobs_idle
 from ..answers import Answers
 from .warned import said
@@ -101,7 +102,7 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
         found.numerics[case] = numerics | runs.chosen[case] if runs.chosen else numerics
         remarks = [*model.source.remarks, *knobs_idle(model, numerics["engine"]), *model.rig.notes]
         if warnings := [*remarks, *said(model, outcome[case], found, case, loose[case])]:
-            found.warnings[case] = warnings
+            found.warnings[case] = placeless(warnings, model.source.path)
     return found, alone, resolved
 
 
