@@ -23,6 +23,7 @@ MOVES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_
 STIFF = ("normal_stiffness", "tangential_stiffness")
 CHANGES = dict.fromkeys((*MOVES, *STIFF, "contact_fraction"), WITHIN) | {"pressure_peak": 1.0}  # 1: it doubles
 LEAST = 0.0101  # number of a key below which another unit is taken: 0.011 mrad, 10 mrad
+ANGLES = [name for name, _ in LADDERS["rad"]]
 DRIVES = ("drive.", "slide.", "accuracy.", "wear.cycles")  # keys that are to change what moves, or nothing
 OPENS = {"contact.tilt.angle": ("Tilt", "length"), "contact.strips.roll": ("Roll", "width")}  # what opens a gap over it
 
@@ -203,13 +204,13 @@ def _between(limits: Limits, one: Allowed) -> str:
 
 def _unit(key: dict, value: float, case: int) -> tuple:
     """(unit, scale from SI) in which a value of the key is read: that in which the case is written, unless the number
-    would be below LEAST and there is a unit for it."""
+    would be below LEAST and there is a unit for it; an angle always in the largest in which it is not."""
     written, size = NUMBER.match(str(key["texts"][case])), float(key["values"][case])
     unit, scale = (written[2] or "", float(written[1]) / size) if written and size else (key["unit"], 1.0)
-    if LEAST < abs(value * scale) < 1e4:
-        return unit.removesuffix("1"), scale
-    return next((step for step in reversed(LADDERS.get(key["unit"], ())) if LEAST < abs(value * step[1])),
-                (unit.removesuffix("1"), scale))
+    own = unit.removesuffix("1"), scale
+    if LEAST < abs(value * scale) < 1e4 and (key["unit"] != "rad" or unit not in ANGLES):
+        return own
+    return next((step for step in reversed(LADDERS.get(key["unit"], ())) if LEAST < abs(value * step[1])), own)
 
 
 def _digits(key: dict, one: Allowed) -> int:

@@ -39,6 +39,14 @@ def test_exact_a_straight_line_leaves_where_it_is_a_twentieth_off():
         "moves changes by 5 % (loop area first).")
 
 
+@pytest.mark.parametrize("unit, size", [("rad", 1e3), ("mrad", 1.0), ("urad", 1e-3)])
+def test_exact_a_limit_has_the_same_words_in_whatever_unit_its_cases_were_written(unit, size):
+    one = key(TILT / size, unit=unit) | {"unit": "rad", "log": False, "values": TILT * 1e-3}
+    values = 1 + 0.25 * (TILT - 0.05)
+    found = allowed([one], {"loop_area": (values, 0 * values)}, {"loop_area": np.ones(5, bool)})
+    assert sentence(found).startswith("Tilt may reach 0.25 mrad (between cases at 0.2 and 0.5 mrad) before")
+
+
 def test_exact_a_key_of_factors_is_read_along_its_logarithm():
     """E = 1 - 0.02 ln(t/t0) has fallen by 5 % at t0 e^2.5; what grows as t^0.5 has doubled at 4 t0."""
     tilt = np.geomspace(1e-3, 10, 9)
