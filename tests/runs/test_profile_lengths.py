@@ -81,7 +81,7 @@ def test_points_as_fine_as_a_file_hold_an_independent_program(tmp_path):
 
 
 @pytest.mark.parametrize("pieces", [
-    "contact.load_line.offset=1.5 mm", "contact.lower.coating=none",
+    "contact.lower.coating=none", pytest.param("contact.load_line.offset=1.5 mm", marks=pytest.mark.slow),
     pytest.param("contact.plane=stress", marks=pytest.mark.slow)])
 def test_points_and_cells_agree_within_their_bars(tmp_path, pieces):
     """A wave of a tenth of the length under a free rotation, of unlike pieces, in plane stress."""
