@@ -20,7 +20,7 @@ import h5py
 import numpy as np
 
 from ...disk.whole import sturdy, whole
-from .blocks import CODES, Block
+from .blocks import CODES, MEANINGS, Block
 
 NAME = "fields.vtkhdf"
 VERSION = np.array([2, 2], np.int64)  # of the format; later ones add nothing that stands here
@@ -185,6 +185,8 @@ def _arrays(group, steps, kind: str, data: dict, about: tuple) -> None:
         else:
             one = into.create_dataset(name, data=values.reshape(-1, *values.shape[2:]))
         one.attrs["units"] = units.get(name, "1")
+        if name in MEANINGS:
+            one.attrs["long_name"] = MEANINGS[name]
         if name in CODES:
             one.attrs["flag_values"] = np.array(list(CODES[name]), np.int8)
             one.attrs["flag_meanings"] = " ".join(CODES[name].values())

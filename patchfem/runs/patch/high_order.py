@@ -29,6 +29,8 @@ LEAST = 1e-9  # of the contact: the shortest stretch
 FALLS, PLACE_FALLS, SLOWEST = 5.0, 4.0, 1.6  # ratio of successive changes: the best believed, of PLACES too, the least
 PLACES = ("contact_fraction", "contact_half_width", "pressure_centre", "moment")
 SAFE, ROUND = 2.5, 1e-8  # of the rest of a series; of a value, what round-off leaves at least
+# of a value, what cells of order 4 in plane strain lack by Poisson's ratio: Hertz on grids of another program
+LOCKED = ((0.4, 0.45, 0.49, 0.499), (0.0, 2e-5, 2e-4, 5e-4))
 ROUGH = 1e-3  # round-off of the compliance beyond which a level is refused
 SLOPE, EDGE, CORNER = 1.6, 0.03, 0.6  # of level 0: growth; cell at an edge over the contact, at a corner over its size
 FALL = (0.75, 0.3, 0.3)  # of the three from level to level
@@ -84,14 +86,22 @@ def sharper(asked, patch, enough) -> dict:
         if not _apart(edges):
             break
         if len(series) >= LEAST_LEVELS:
-            found = summed(series)
+            found = summed(series, _locked(asked))
             if enough(found):
                 break
-    return summed(series) if len(series) >= LEAST_LEVELS else {}
+    return summed(series, _locked(asked)) if len(series) >= LEAST_LEVELS else {}
 
 
-def summed(series: list) -> dict:
-    """(value, error) by name: that of the level, from the third on, whose error is least."""
+def _locked(asked) -> float:
+    """Relative error that a Poisson's ratio near 0.5 leaves in plane strain, whatever the changes show."""
+    layers = [layers_of(asked, piece) for piece in (asked.lower, asked.upper)]
+    ratios = [nu for one in layers for _, nu in (one.coating, one.substrate)]
+    return float(np.interp(max(ratios), *LOCKED)) if asked.plane == "strain" else 0.0
+
+
+def summed(series: list, locked: float = 0.0) -> dict:
+    """(value, error) by name: that of the level, from the third on, whose error is least; at least the share `locked`
+    of the value."""
     out = {}
     for name in series[0].values:
         values = [level.values[name] for level in series]
@@ -99,7 +109,7 @@ def summed(series: list) -> dict:
         errors = [(max(rest(values[:k + 1], falls), _round_off(name, series[k])), k)
                   for k in range(LEAST_LEVELS - 1, len(values))]
         error, best = min(errors)
-        out[name] = values[best], error
+        out[name] = values[best], max(error, locked * abs(values[best]))
     return out
 
 

@@ -34,10 +34,42 @@ def left_out(model, patch, coarse) -> list:
     if patch.pair.coupling > COUPLED and model.kind != "patch":
         out.append("the pieces are unlike: the coupling between shear and normal closing is left out; it is "
                    f"{patch.pair.coupling:.2g} of the tangential compliance")
+    if model.kind == "patch":
+        out += frictionless(asked, patch)
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
         # a mesh of any cells has no coarser one: its second patch is finer than its first
         out += band(asked, patch if coarse[-1] is None else coarse[0])
     return out
+
+
+def frictionless(asked, patch) -> list:
+    """A note on pieces that are unlike: Dundurs' beta of their faces, and what perfect stick would change.
+
+    Unlike faces slide on each other as they are pressed. Stick holds shear stresses against that, which stiffen the
+    contact.
+    """
+    pair, held = patch.pair, np.flatnonzero(patch.active)
+    if not pair.closing.any() or not held.size:
+        return []
+    here, one = np.ix_(held, held), np.ones(held.size)
+    normal, cross = patch.pieces.normal[here], pair.closing[here]
+    stuck = normal - cross @ np.linalg.solve(patch.pieces.tangential[here], cross.T)
+    more = one @ np.linalg.solve(stuck, one) / (one @ np.linalg.solve(normal, one)) - 1
+    beta = abs(_dundurs(asked))
+    return [f"the pieces are unlike (Dundurs' beta {beta:.2g} at the interface) and the pressure is that of a "
+            "frictionless contact, whose faces slide on each other as they are pressed; perfect stick would raise "
+            f"normal_stiffness by {100 * more:.2g} %, friction by less"]
+
+
+def _dundurs(asked) -> float:
+    """Dundurs' beta of the two faces."""
+    shear, kappa = [], []
+    for piece in (asked.lower, asked.upper):
+        face = piece.coating.material if piece.coating else piece.substrate
+        shear.append(face.young / (2 + 2 * face.poisson))
+        kappa.append(3 - 4 * face.poisson if asked.plane == "strain" else (3 - face.poisson) / (1 + face.poisson))
+    (a, b), (k, q) = shear, kappa
+    return (a * (q - 1) - b * (k - 1)) / (a * (q + 1) + b * (k + 1))
 
 
 def drawn_otherwise(pair) -> list:

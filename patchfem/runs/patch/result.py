@@ -13,6 +13,7 @@ from .rounding import beyond_gentle
 from .shared import kept
 from .values import values
 
+LOCKS = 0.499  # Poisson's ratio; up to it the bars of locking cells hold
 SMALL = 0.02  # strain that is taken as small: what is of its second order is left out
 
 __all__ = ["bodies", "left_out", "measured", "probed", "solve_all", "static", "strained"]
@@ -65,7 +66,7 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
 
 
 def strained(asked, patch) -> list:
-    """Warnings where the answer leaves small strains, or where bilinear cells lock."""
+    """Warnings where the answer leaves small strains, or where cells of a given size lock."""
     beyond = ["the contact reaches the place where a rounded end is 0.097 steep, beyond which nothing touches here; "
               "lower the tilt or the load"] if beyond_gentle(patch) else []
     return strained_by(asked, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond)
@@ -83,7 +84,8 @@ def strained_by(asked, top: float, approach: float, beyond=()) -> list:
             out.append(what.format(share) + f", beyond the small strains that are assumed ({SMALL:g})")
     out += beyond
     stiff = max(m.poisson for m in stuff)
-    if asked.plane == "strain" and stiff > 0.47:
-        out.append(f"Poisson's ratio {stiff:g} in plane strain: bilinear cells lock towards 0.5; the pressure peak is "
-                   "some 2 % too high at 0.45, 7 % at 0.499 and wrong beyond")
+    if asked.plane == "strain" and stiff > LOCKS and not asked.chosen:
+        cure = "split the elements of contact.mesh" if asked.mesh is not None else "leave out contact.element_size"
+        out.append(f"Poisson's ratio {stiff:g} in plane strain (limit {LOCKS:g}): on cells of a given size, which lock "
+                   f"towards 0.5, values are off by up to twice their bars; {cure}")
     return out

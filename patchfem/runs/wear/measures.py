@@ -39,12 +39,13 @@ def worn(result, found, estimate: bool = True):
 def jumped(model, found, measures: dict) -> dict:
     """Measures of the worn patch with what the length of the jumps adds to their errors.
 
-    That is twice the change to the depth by the same jumps undivided: in a long jump a moving contact edge leaves the
-    nodes it has just taken too high, on both.
+    That is twice the change to the depth by the same jumps undivided, of a single jump four times: in a long jump a
+    moving contact edge leaves the nodes it has just taken too high, on both.
     """
+    times = max(2.0, 4 / (model.wear.jumps or 2))
     rough = values(pressed(model.patch, found.patch.pair, frozen_array(found.state.rough)))
     here = values(found.patch)
-    return {name: replace(m, error=m.error + 2 * abs(here[name] - rough[name])) for name, m in measures.items()
+    return {name: replace(m, error=m.error + times * abs(here[name] - rough[name])) for name, m in measures.items()
             if name in here and m.error is not None}
 
 
