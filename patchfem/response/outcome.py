@@ -15,8 +15,9 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
     """Outcome of a run, and its measures with the steady estimate where there is one.
 
     Under a sine, and under levels in their last one, the amplitudes of successive windows decide (`classify`), and what
-    free motion is left in them (`left_over`). A release or a step is steady once it is at rest: its amplitude below the
-    tolerance of the largest; else the same amplitudes decide, but a release never grows. A sweep or a recorded signal
+    free motion is left in them (`left_over`). A release or a step is steady once it is at rest, to the floor of its
+    amplitude; else the same amplitudes decide, but a release never grows. A motion whose middle moves on is not steady
+    (`moves_on`). A sweep or a recorded signal
     changes to the end: unless it leaves the interface stuck it is transient, without a steady estimate. So is an
     interface that holds while what it holds still rises. What rises to a motion that is known to exist, `raw.bounded`,
     does not grow. level_cycles: of each level, 0 without levels; slowest: rate
@@ -35,22 +36,57 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
         amplitudes = amplitudes[-max(1, int(level_cycles / window)):]
         extremes = None if extremes is None else extremes[-int(level_cycles):]
     if last.amplitude == 0:
-        outcome = Outcome.STEADY if amplitudes[-1] <= tolerance * amplitudes.max() else \
-            classify(amplitudes, tolerance, floor)
-        return (Outcome.TRANSIENT if outcome is Outcome.GROWS and not last.constant else outcome), measures
+        rests = amplitudes[-1] <= max(floor, measures["relative_displacement_amplitude"].floor)
+        outcome = Outcome.STEADY if rests else _held(classify(amplitudes, tolerance, floor), measures, tolerance,
+                                                     _middle(extremes, window))
+        outcome = Outcome.TRANSIENT if outcome is Outcome.GROWS and not last.constant else outcome
+        return outcome, without_bars(measures) if outcome is Outcome.GROWS else measures
     number, steady, error = (one[0] for one in settled(
         np.asarray(amplitudes, float)[None], None if extremes is None else np.asarray(extremes)[None], window,
         [np.array([np.nan if one is None else one]) for one in raw.steady],
         (tolerance, floor, slowest * window * drive.period), raw.bounded))
-    outcome = CLASSES[number]
+    outcome = _held(CLASSES[number], measures, tolerance)
     if outcome is Outcome.GROWS:
-        return outcome, {k: replace(m, error=None) for k, m in measures.items()}
+        return outcome, without_bars(measures)
     if outcome is Outcome.TRANSIENT and not np.isnan(steady):
         base = measures["relative_displacement_amplitude"]
         total = steady_error(steady, error, base.value, base.error or 0.0)
         measures = measures | {"relative_displacement_amplitude_steady":
                                Measure(float(steady), "m", float(total), base.floor)}
     return outcome, measures
+
+
+def moves_on(drift, error, amplitude, tolerance, floor) -> np.ndarray:
+    """Whether the middle of a motion moves by more than the tolerance of its amplitude [m] in a cycle; numbers or (n,).
+
+    drift [m], known to `error`, and the floor of what counts as one.
+    """
+    return np.abs(drift) > tolerance * np.abs(amplitude) + error + floor
+
+
+def _middle(extremes, window: int) -> float:
+    """Motion per cycle [m] of the middle of the output from the window before the last to that, of extremes (c, 2) [m]
+    per cycle; inf where they are not known. A window of a belt holds whole stick-slips, its cycles do not."""
+    if extremes is None or len(extremes) < 2 * window:
+        return np.inf
+    part = np.asarray(extremes)[-2 * window:].reshape(2, window, 2)
+    middle = (part[..., 0].min(axis=1) + part[..., 1].max(axis=1)) / 2
+    return float(middle[1] - middle[0]) / window
+
+
+def _held(outcome: Outcome, measures: dict, tolerance: float, middle: float = np.inf) -> Outcome:
+    """TRANSIENT in place of STEADY where the middle of the motion moves on, from cycle to cycle and by `middle` [m] in
+    each from window to window."""
+    drift, amplitude = measures.get("drift_per_cycle"), measures["relative_displacement_amplitude"]
+    if outcome is not Outcome.STEADY or drift is None or drift.value is None:
+        return outcome
+    moves = moves_on(min(abs(drift.value), abs(middle)), drift.error or 0.0, amplitude.value, tolerance, drift.floor)
+    return Outcome.TRANSIENT if moves else outcome
+
+
+def without_bars(measures: dict) -> dict:
+    """Measures of a motion that grows, which have no errors: those of a later time are others."""
+    return {name: replace(one, error=None) for name, one in measures.items()}
 
 
 def settled(amplitudes, extremes, window: int, steady, limits: tuple, bounded=False) -> tuple:

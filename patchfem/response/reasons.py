@@ -13,6 +13,7 @@ ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
 SHARED = 0.05  # of the slide, carried by another mode, from which no damping ratio is one of the first
 CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
 HOLDS = "the interface holds as a whole throughout the last cycles"
+UNBOUNDED = "no bounded motion exists at this drive"
 UNCLOSED = "the loop does not close: what the interface stores changes by more than it dissipates in the last " \
            "cycles; energy_dissipated is that of the whole run"
 
@@ -29,6 +30,12 @@ def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dic
         lacking["slip_start_phase"] = _of_phase(values, drive)
     return {name: Measure(None, TABLE[name].unit, None, TABLE[name].floor, reason=reason)
             for name, reason in lacking.items() if name not in values}
+
+
+def unbounded(values) -> dict:
+    """The measures of a steady motion that does not exist, by name: without a value, but for the load that is given."""
+    return {name: replace(one, error=None, **({} if name == "normal_load" else {"value": None, "reason": UNBOUNDED}))
+            for name, one in values.items()}
 
 
 def unclosed(values, window, drive) -> dict:

@@ -36,6 +36,13 @@ def between(m, share, out, size):
 
 
 @njit(error_model="numpy", **INNER)
+def reached(m, h, share, y, slopes):
+    """Write the state at a share [1] of the step of h [s] and its slopes into y and slopes."""
+    between(m, share, y, m.y.size - 3)
+    slope(m, m.now[TIME] + share * h, y, slopes)
+
+
+@njit(error_model="numpy", **INNER)
 def meant(m, out, size):
     """Write the mean of coordinate and rate over the whole step into out; size: not used."""
     for c in range(2):

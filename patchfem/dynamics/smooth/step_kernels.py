@@ -161,6 +161,22 @@ def between(m, share, out, size):
         out[c] = m.y[c] + value
 
 
+@njit(error_model="numpy", **INNER)
+def reached(m, h, share, y, slopes):
+    """Write the state at a share [1] of the step of h [s] and its slopes into y and slopes, by a step that ends there.
+
+    It is as exact as the step itself; its extension is of one order less, and a second derivative off it of three. For
+    a step that has its extension, which stays, as do the state at its end and the slopes there.
+    """
+    last, size = m.work.shape[0] - 14, m.y.size
+    for c in range(size):
+        m.work[13, c], m.work[14, c] = m.work[last, c], m.work[TRIAL, c]  # stages that the extension has used
+    step(m, share * h)
+    for c in range(size):
+        y[c], slopes[c] = m.work[TRIAL, c], m.work[last, c]
+        m.work[last, c], m.work[TRIAL, c] = m.work[13, c], m.work[14, c]
+
+
 @njit(error_model="numpy", fastmath=FAST, **INNER)
 def meant(m, out, size):
     """Write the mean of the first `size` entries of the state over the whole step into out, by its extension."""

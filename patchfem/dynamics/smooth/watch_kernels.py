@@ -191,21 +191,22 @@ def sizes_at(m, h, share, k, out):
 
 @njit(error_model="numpy", **INNER)
 def sharpened(m, h, k, which, at, near):
-    """Largest value of one of the six numbers near the share `at` of the step, by parabolas through places `near`
-    apart."""
-    best, out = -np.inf, k.table[PARTS + 1]
+    """Largest value of one of the six numbers near the share `at` of the step: its place by parabolas through places
+    `near` apart, and there the number of a step that ends there."""
+    out = k.table[PARTS + 1]
     for _ in range(4):
         a, b, c = 0.0, 0.0, 0.0
         at = min(max(at, near), 1 - near)
         for side in range(-1, 2):
             sizes_at(m, h, at + side * near, k, out)
             a, b, c = b, c, out[which]
-            best = max(best, c)
         bend = a - 2 * b + c
         shift = 0.5 * (a - c) / bend if bend < 0 else 0.0
-        at += min(max(shift, -1.0), 1.0) * near
+        at = min(max(at + min(max(shift, -1.0), 1.0) * near, 0.0), 1.0)
         near /= 6
-    return best
+    steps.reached(m, h, at, k.room[0], k.room[1])
+    sizes(m, m.now[steps.TIME] + at * h, k.room[0], k.room[1], out)
+    return out[which]
 
 
 @njit(error_model="numpy", **INNER)
@@ -253,10 +254,9 @@ def peaks(m, h, k):
     for part in range(PARTS + 1):
         if part % (PARTS // 2) != 0:
             sizes_at(m, h, part / PARTS, k, k.table[part])
-        for which in range(slots(m)):
-            k.tally[PEAKS + which] = max(k.tally[PEAKS + which], k.table[part, which])
     for which in range(slots(m)):
-        at, least, peak = 0, k.table[0, which], k.tally[PEAKS + which]
+        at, least, peak = 0, k.table[0, which], max(k.tally[PEAKS + which], k.table[0, which], k.table[PARTS, which])
+        k.tally[PEAKS + which] = peak
         for part in range(1, PARTS + 1):
             least = min(least, k.table[part, which])
             at = part if k.table[part, which] > k.table[at, which] else at

@@ -51,7 +51,7 @@ def unripe(law, speed: float) -> list:
 def creeping(law, outcome, found) -> list:
     """Warning of a bounded motion whose middle moves on, as a list: Dahl's creep, not a property of the joint."""
     drift = found.get("drift_per_cycle")
-    if drift is None or drift.error is None or outcome not in (Outcome.STEADY, Outcome.STUCK):
+    if drift is None or drift.error is None or outcome not in (Outcome.STEADY, Outcome.STUCK, Outcome.TRANSIENT):
         return []
     if law.breakaway or law.reading != "stretch" or abs(drift.value) <= drift.error + 1e-2 * law.length:
         return []

@@ -27,6 +27,7 @@ from .solution import gauged
 FINER, MERGED = 0.5, 2.0  # merge width of the run that shows what merging does, and times its change
 LOOSE = 1e-2  # tail over the tolerance from which it is checked by a run with less; unpinned it is a tenth of that
 LESS = 0.1  # tail of that run
+WORTH = 5.0  # seconds that an exact motion may take where steps would take less, and be off by their bars
 MOST_PIECES = 1e5  # of a period, up to which a steady motion is found by the map of its yields
 
 
@@ -105,12 +106,13 @@ def steady_by(model: Model) -> str:
 
 def dearer_pieces(model: Model) -> str:
     """Why the march is to run a model: it is not linear from yield to yield, the scene names its steps, or its yields
-    cost more than steps."""
+    cost more than steps and more than WORTH."""
     if reason := no_pieces(model):
         return reason
     if model.accuracy.steps_per_cycle is not None:
         return "its steps are named"
-    return "its yields cost more than steps" if seconds_of_pieces(model) > seconds_of_steps(model) else ""
+    dear = seconds_of_pieces(model) > max(seconds_of_steps(model), WORTH)
+    return "its yields cost more than steps" if dear else ""
 
 
 def _not_exact(model: Model) -> str:
@@ -168,8 +170,11 @@ def _fewer(numerics, share: int):
 def _march_in_time(model: Model, numerics, patch) -> list:
     """Rungs of the march in time: half and a quarter of the steps."""
     halves = tuple(Variant(_fewer(numerics, share), patch) for share in (2, 4))
-    rule = jumps_error if set_valued(model, numerics) else step_error
-    return [Rung(halves, lambda *values: rule(*values, numerics.steps, model.rig.displacement), of="steps")]
+    size, f = model.rig.displacement, model.friction
+    turn = f.bond_length if f is not None and has(f.law, "bonds") else 0.0
+    if set_valued(model, numerics):
+        return [Rung(halves, lambda *values: jumps_error(*values, numerics.steps, size), of="steps")]
+    return [Rung(halves, lambda *values: step_error(*values, numerics.steps, size, turn), of="steps")]
 
 
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
@@ -247,7 +252,7 @@ PIECES = Engine("piecewise", dearer_pieces, "pieces.run run_piecewise", _no_rung
 MARCH = Engine("march", _nothing, "march run_march", _march_in_time, _march_in_space)
 HARMONIC = Engine("harmonic", _nothing, "steady.steady run_steady", _no_rungs, _steady_in_space, 0.0, None)
 COMPARED = ("duhamel", "newmark", "euler")
-SMOOTH = Engine("smooth", not_smooth, "smooth.solve run_smooth", _smooth_in_time, _own_errors, 5e-9, None)
+SMOOTH = Engine("smooth", not_smooth, "smooth.solve run_smooth", _smooth_in_time, _own_errors, 3e-8, None)
 ENGINES = {one.name: one for one in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC, *(
     Engine(name, _nothing, "comparison run_comparison", _march_in_time, _march_in_space, closes=inf)
     for name in COMPARED))}

@@ -31,6 +31,7 @@ FAST = 2.0  # D from which a block is held fast: 0.6 and more strips per step, a
 TURNING = 0.1  # strokes per step from which they are those of the steps
 MOST_CROWDED = 500  # strips of its list, about one per step, from which steps are not halved again: four times the cost
 MOVES, MOST_HALVINGS = 1e-3, 2  # bond lengths of slip from which a block moves; of the steps that were seen: 0 to 3
+WHOLE = 1e-6  # of a cycle by which a run may miss a whole number of them: a record of 30 periods has 30
 MOST_SWING = 2.0  # radians of the block on its bonds in a step
 LEAST_KEPT = 100  # samples of a run that has no cycles
 
@@ -69,9 +70,9 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     """
     accuracy, rig, drive = model.accuracy, model.rig, model.rig.drive
     engine = engine_of(model, per_point).name
-    window = int(max(1, min(10, rig.cycles // 10)))
+    window = int(max(1, min(10, (rig.cycles + WHOLE) // 10)))
     if rig.levels:
-        window = min(window, int(rig.level_cycles))
+        window = min(window, int(rig.level_cycles + WHOLE))
     steps = steps_per_cycle(model)
     if accuracy.steps_per_cycle is None and engine == "march":
         steps = max(steps, unique_steps(model))

@@ -9,10 +9,10 @@ from ...core import Outcome, PatchfemError
 from ...core import say as length
 from ...effects import has, listed
 from ...friction.record import law_from
+from ...response import reasons
 from ...response.coarser import estimate, left_open
 from ...response.errors import with_errors
 from ...response.outcome import changing_note, settle
-from ...response.reasons import unclosed, without_value
 from ...response.rows import judged
 from ...response.run_events import events_of, with_own
 from ...response.settling import slip_period
@@ -23,7 +23,7 @@ from ..results.notes import climbing_as_one, creeping, of_growth, two_books, unb
 from ..results.result import FRAMES, Result, frames_of, on_a_mesh_of_known_error, still, without_errors
 from ..results.travel import ended, travelled
 from . import levels
-from .engines import ENGINES, Variant, unbalanced
+from .engines import ENGINES, Variant, dearer_pieces, no_pieces, unbalanced
 from .numerics import choose, crowded, quadrature_of, refuse_costly
 from .solution import borne, curve_measures
 from .start_ring import StartRing, start_ring
@@ -76,10 +76,11 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     fields = {}
     if patch is not None:
         fields = rig_fields(model, numerics, patch, raw)
-    found |= unclosed(found, raw.window, drive) | without_value(
+    found |= reasons.unclosed(found, raw.window, drive) | reasons.without_value(
         found, raw.window, drive, f is not None, rig.beside_first(raw.window.modal))
     told = _told(raw)
-    extra |= {"book": raw.book, "period": drive.period, "notes": [*_notes(model, patch, raw), *rings.notes, *told[1]]}
+    notes = [*_notes(model, numerics, patch, raw), *rings.notes, *told[1]]
+    extra |= {"book": raw.book, "period": drive.period, "notes": notes}
     extra |= _behind(model, numerics, raw.contact)
     warnings = [*warnings, *_said(model, patch, raw, outcome, found)]
     warnings = [*warnings, *two_books(found, extra.get("steps_per_cycle"), extra.get("harmonics"))]
@@ -87,6 +88,8 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     if patch is not None:
         warnings = [*warnings, *travelled(patch, raw.response.slide)]
     found = judged(found, model.accuracy.tolerance)
+    if numerics.engine == "harmonic" and outcome is Outcome.GROWS:
+        found = reasons.unbounded(found)
     return Result(what, ended(outcome, model.patch, patch, raw.response.slide), found, raw.response, raw.window, patch,
                   fields, seconds, warnings, extra)
 
@@ -108,9 +111,9 @@ def _behind(model, numerics, contact) -> dict:
     return out
 
 
-def _notes(model, patch, raw) -> list:
-    """What the law of a run means, as far as it has to be said, and what its fields leave out."""
-    f, climb = model.friction, climbing_as_one(model, patch)
+def _notes(model, numerics, patch, raw) -> list:
+    """What the law and the engine of a run mean, as far as it has to be said, and what its fields leave out."""
+    f, climb = model.friction, [*climbing_as_one(model, patch), *_of_engine(model, numerics, patch, raw)]
     if raw.levels and model.rig.onset[0] == "slip" and raw.held > 0:
         climb = [*climb, f"onset_level: a slip amplitude counts from {length(raw.held)} on, a thousandth of the slide "
                  "over which the interface gives way; below it a part of the interface may slip already"]
@@ -124,6 +127,29 @@ def _notes(model, patch, raw) -> list:
     limit = f.static * borne(model, patch)
     steady = limit > 0 and not model.rig.load_varies
     return [*of_growth(model.bonds, float(np.abs(raw.response.force).max()) / limit if steady else None), *climb]
+
+
+def _of_engine(model, numerics, patch, raw) -> list:
+    """Notes on elements that a steady motion never moves, and on a mesh whose yields are too many for the exact engine.
+    """
+    if not len(model.rig.interfaces) or no_pieces(model):
+        return []
+    if numerics.engine == "march" and model.accuracy.method == "auto" and "steps_per_cycle" not in numerics.pinned:
+        pinned = patch is not None and not model.patch.chosen
+        return [f"the motion is marched in steps, as {dearer_pieces(model)}; {'on a coarser mesh, or ' * pinned}by "
+                "accuracy.method = \"exact\" it is exact"]
+    if numerics.engine != "harmonic" or raw.outcome not in (Outcome.STEADY, Outcome.STUCK):
+        return []
+    from .pieces.run import Interfaces
+
+    slides = raw.window.extra.get("slides", raw.window.slide[:, None])
+    for group, slide in zip(Interfaces(model, numerics, patch).groups, slides.T):
+        most, half = float(group.yield_slide.max(initial=0.0)), float(np.ptp(slide)) / 2
+        if most > half:
+            return [f"part of the joint yields only at {length(most)} and never slips in this motion of "
+                    f"{length(half)}: it keeps whatever force it was left with, so the steady motion is not unique; "
+                    "this one has no mean force, accuracy.method = \"auto\" gives the one that is reached from rest"]
+    return []
 
 
 def _said(model, patch, raw, outcome, found) -> list:

@@ -9,10 +9,10 @@ from ....core import Outcome
 from ....dynamics.one_mode.sdof import ENDS
 from ....response.errors import total_error
 from ....response.measures import energy_balance
-from ....response.outcome import SMALL, settled, steady_error
+from ....response.outcome import SMALL, moves_on, settled, steady_error
 from ....response.reasons import CYCLIC, without_value
 from ....response.rows import TABLE, floor_of, larger_term
-from ....response.settling import CLASSES, steady_amplitudes, windows_of
+from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
 from ....structure.drive_sizes import largest, omega_of, slowest
 from ...results.notes import BOOKS
 from ...results.places import placeless
@@ -73,7 +73,10 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
     errors = {name: total_error(name, value, [runs.errors.get(name, nothing)], runs.least, values[MAIN])
               for name, value in values.items()}
     tolerance = np.array([model.accuracy.tolerance for model in models])
-    outcome, (steady, error) = _outcome(models, runs, tolerance)
+    moved = np.array([model.rig.displacement for model in models])
+    outcome, (steady, error) = _outcome(models, runs, tolerance, moves_on(
+        values["drift_per_cycle"], errors["drift_per_cycle"], values[MAIN], tolerance,
+        floor_of("drift_per_cycle", moved)))
     found = Answers.blank(n)
     found.outcome[:] = [str(one) for one in outcome]
     alone = runs.lost | (values["energy_balance"] > runs.closes) | (values["work_check"] > BOOKS)
@@ -81,7 +84,7 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
     still = np.array([one is Outcome.TRANSIENT for one in outcome]) & ~np.isnan(steady) & ~runs.stuck
     values["relative_displacement_amplitude_steady"] = np.where(still, steady, np.nan)
     errors["relative_displacement_amplitude_steady"] = steady_error(steady, error, values[MAIN], errors[MAIN])
-    moved, resolved, loose = np.array([model.rig.displacement for model in models]), np.ones(n, bool), np.zeros(n, bool)
+    resolved, loose = np.ones(n, bool), np.zeros(n, bool)
     for name, value in values.items():
         there = ~np.isnan(value)
         if not there.any():
@@ -106,8 +109,9 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
     return found, alone, resolved
 
 
-def _outcome(models, runs: Runs, tolerance) -> tuple:
-    """Outcomes (n), and the steady amplitudes and their errors, (n,) [m] each."""
+def _outcome(models, runs: Runs, tolerance, moves) -> tuple:
+    """Outcomes (n), and the steady amplitudes and their errors, (n,) [m] each; moves: (n,), whose middle moves on, so
+    that none is steady."""
     pick = np.arange(runs.cycles - 1, -1, -runs.window)[::-1]
     ends = (runs.extremes[:, pick, 1] - runs.extremes[:, pick, 0]) / 2
     floor = SMALL * np.array([largest(m.rig.drive) / omega_of(m.rig.drive)**2 for m in models])
@@ -119,6 +123,7 @@ def _outcome(models, runs: Runs, tolerance) -> tuple:
             steady = [np.where(bounded, known, seen) for known, seen in zip(runs.steady, steady)]
         number, *steady = settled(windows_of(runs.extremes, runs.window)[0], runs.extremes, runs.window, steady,
                                   (tolerance, floor, decay), bounded)
+    number = np.where((number == STEADY) & moves, 0, number)
     ends = [Outcome.STUCK if stuck else CLASSES[k] for stuck, k in zip(runs.stuck, number)]
     return [Outcome.TRANSIENT if loads else one for loads, one in zip(np.broadcast_to(runs.loads, len(ends)), ends)], \
         steady
