@@ -56,6 +56,7 @@ if "importlib.metadata" not in sys.modules:
 import _thread
 import atexit
 import threading
+from errno import ENAMETOOLONG
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -177,7 +178,10 @@ def _guarded(words: list, before=lambda: None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        say(plain(f"{error.filename or 'patchfem'}: {error.strerror or error}"))
+        gone = isinstance(error, FileNotFoundError) and not error.filename  # of what asks where it is
+        say(plain("patchfem: the working folder is gone; change to one that is there" if gone else
+                  f"{error.filename or 'patchfem'}: {error.strerror or error}"
+                  f"{'; name a shorter one' * (error.errno == ENAMETOOLONG)}"))
         return 4
     except Exception as error:
         if isinstance(error, ImportError) and "failed to map" in str(error):  # a library that finds no room

@@ -128,12 +128,31 @@ def fault(error: OSError, path: Path, partial: Path, need: int | None = None) ->
         written = partial.stat().st_size if partial != path and partial.exists() else 0
         limited = where.endswith(")")  # what is written so far counts against a limit, and no longer for the free room
         left = there - written if limited else there
+        if error.errno in FULL and not _places(path):
+            return Unwritten(f"{shown(path)}: no room: the table of files of its disk (inodes) is full; remove files")
         if error.errno in FULL or (error.errno is None and left < NARROW):
             wanted = f"{size_of(need)} wanted" if need is not None else f"more than {size_of(written)} wanted"
             why = f" ({os.strerror(error.errno)})" if error.errno else ""
             there = there if limited else there + written
             return Unwritten(f"{shown(path)}: no room{why}: {wanted}, {size_of(there)} {where}")
     return Unwritten(f"{shown(path)}: cannot be written ({error.strerror or error})")
+
+
+def unmade(error: OSError) -> str:
+    """Why a folder could not be made, with the way out where there is one."""
+    if error.errno == errno.ENAMETOOLONG:
+        return "its name is longer than the disk takes; name a shorter one with -o"
+    if error.errno in (errno.EEXIST, errno.ENOTDIR):
+        path = Path(error.filename or "")
+        files = [shown(one) for one in (path, *path.parents) if one.is_file()]
+        return f"{files[0]} is a file; name another folder" if files else str(error.strerror)
+    return str(error.strerror)
+
+
+def _places(path: Path) -> bool:
+    """Whether the disk of a path has a place for another file; disks without a table of them always have."""
+    found = os.statvfs(path.parent)
+    return found.f_files == 0 or found.f_favail > 0
 
 
 def size_of(count: int) -> str:

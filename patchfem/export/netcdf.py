@@ -138,7 +138,8 @@ def with_events(data: Contents, time, interface, kind, slide, count: int, meanin
                             {"units": "1", "long_name": "number of the interface (of the strip where strips yaw) "
                                                         "from 1, 0 for a border of the drive"}),
         "event_kind": ("event", np.asarray(kind, np.int8), flags),
-        "event_slide": ("event", slide, {"units": "m", "long_name": "relative displacement at the event"})})
+        "event_slide": ("event", slide, {"units": "m", "long_name": "relative displacement at the event; none at a "
+                                                            "border of the drive"})})
 
 
 READ = {"amplitude": ("m", "half peak-to-peak at the output"),

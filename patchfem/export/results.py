@@ -11,7 +11,7 @@ from pathlib import Path
 from ..core import Missing, PatchfemError
 from ..disk.claim import Claim
 from ..disk.exchange import aside, put, restore, undisturbed
-from ..disk.whole import KEPT, unfinished
+from ..disk.whole import KEPT, unfinished, unmade
 
 PAGE = "report.html"
 FILES = ("summary.json", "result.nc", "fields.vtkhdf", PAGE, "scene.resolved.toml", "fields.pvd",
@@ -46,7 +46,7 @@ class Folder:
         try:
             self.target.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise Missing(f"{self.shown}: the results folder cannot be made ({error.strerror})") from None
+            raise Missing(f"{self.shown}: the results folder cannot be made ({unmade(error)})") from None
         self.claim.take()
         try:
             restore(self.target)
@@ -58,7 +58,7 @@ class Folder:
         except BaseException as error:
             self.claim.release()
             if isinstance(error, OSError):
-                raise Missing(f"{self.shown}: the results folder cannot be made ({error.strerror})") from None
+                raise Missing(f"{self.shown}: the results folder cannot be made ({unmade(error)})") from None
             raise
         return self
 

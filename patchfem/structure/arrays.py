@@ -20,7 +20,9 @@ from . import masses, matrices
 PATCH = ("normal", "pitch", "lateral", "yaw")
 KNOWN = ("M", "K", "C", "omega", "frequency", "damping", "moving_mass", "slide", "base", "output", "force", *PATCH,
          "names")
-LONGEST = 1024  # bytes of a value: a name
+LONGEST = 1024  # bytes of a name
+WIDEST = 16  # bytes of a number
+DIRECTORY = 2**20  # bytes of the list of members of a zip file
 
 
 def read(path) -> dict:
@@ -30,6 +32,7 @@ def read(path) -> dict:
     """
     try:
         if str(path).lower().endswith(".npz"):
+            _refuse_long(path)
             with ZipFile(path) as file:
                 return {key: _member(file, key) for key in KNOWN if f"{key}.npy" in file.namelist()}
         found = variables(path, content(path))
@@ -51,10 +54,23 @@ def _member(file: ZipFile, key: str) -> np.ndarray:
         head = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}[npy.read_magic(part)]
         shape, _, kind = head(part)
     _refuse_large(key, shape)
-    if kind.itemsize > LONGEST:
+    if kind.itemsize > (LONGEST if key == "names" else WIDEST):
         raise PatchfemError(f"{key} holds values of {kind.itemsize} bytes each")
+    if key == "names" and prod(shape) > MOST_COORDINATES:
+        raise PatchfemError(f"{key} holds {prod(shape)} names; {MOST_COORDINATES} is the most")
     with file.open(f"{key}.npy") as part:
         return npy.read_array(part, allow_pickle=False)
+
+
+def _refuse_long(path) -> None:
+    """PatchfemError for a zip file whose list of members is too long to be read."""
+    with open(path, "rb") as file:
+        file.seek(max(0, file.seek(0, 2) - 2**16 - 22))
+        tail = file.read()
+    end = tail.rfind(b"PK\x05\x06")
+    size = int.from_bytes(tail[end + 12:end + 16], "little") if end >= 0 else 0
+    if size > DIRECTORY:
+        raise PatchfemError(f"it lists members in {size} bytes; {DIRECTORY} is the most")
 
 
 def _refuse_large(key: str, shape: tuple) -> None:

@@ -1,10 +1,12 @@
 """Files are whole or not there: every kind of file under limits on its size, devices, and what killed writers leave."""
 
+import errno
 import os
 import stat
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -186,3 +188,36 @@ def test_always_a_file_inside_a_draft_without_room_names_need_and_room(tmp_path)
         write_inside(tmp_path / "a.json", 2000 * "x")
     write_inside(tmp_path / "a.json", "\udce4 is no letter")
     assert (tmp_path / "a.json").read_text() == "? is no letter"
+
+
+def test_exact_a_full_table_of_files_is_told_as_that(tmp_path, monkeypatch):
+    """It said how many bytes were free, beside the few that were wanted."""
+    place = os.statvfs(tmp_path)
+    for found, said in ((9, 0), "inodes"), ((9, 5), "wanted"), ((0, 0), "wanted"):  # the last has no such table
+        full = SimpleNamespace(f_files=found[0], f_favail=found[1], f_bavail=place.f_bavail, f_frsize=place.f_frsize)
+        monkeypatch.setattr(os, "statvfs", lambda path, full=full: full)
+        with pytest.raises(Missing, match=said), whole(tmp_path / "a"):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.mark.parametrize("words", [("run",), ("sweep", "--over", "friction.static=0.2,0.3")])
+def test_always_a_folder_under_a_file_names_the_file(tmp_path, words):
+    (tmp_path / "bench.toml").write_text(BENCH)
+    (tmp_path / "FILE").write_text("")
+    answer = cli(words[0], tmp_path / "bench.toml", *words[1:], "-o", tmp_path / "FILE" / "x")
+    assert answer.code == 4 and f"{tmp_path / 'FILE'} is a file; name another folder" in answer.err
+
+
+def test_always_a_name_that_is_too_long_wants_a_shorter_one(tmp_path):
+    (tmp_path / "bench.toml").write_text(BENCH)
+    answer = cli("run", tmp_path / "bench.toml", "-o", tmp_path / ("a" * 250))
+    assert answer.code == 4 and answer.err.rstrip().endswith("name a shorter one")
+
+
+def test_always_a_working_folder_that_is_gone_is_named(tmp_path, monkeypatch):
+    (tmp_path / "bench.toml").write_text(BENCH)
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    answer = cli("run", tmp_path / "bench.toml")
+    assert answer.code == 4 and "the working folder is gone; change to one that is there" in answer.err

@@ -1,7 +1,11 @@
 """Rigs from .npz and .mat files: the same basis as from the arrays, every lack named."""
 
+import io
+import zipfile
+
 import numpy as np
 import pytest
+from numpy.lib import format as npy
 from scipy.io import savemat
 from scipy.sparse import csc_matrix
 
@@ -117,4 +121,24 @@ def test_refuses_files_that_are_none(tmp_path, name, content):
 def test_refuses_objects(tmp_path):
     np.savez(tmp_path / "a.npz", M=np.array([{}], dtype=object))
     with pytest.raises(PatchfemError, match="no objects"):
+        arrays.read(tmp_path / "a.npz")
+
+
+def test_refuses_numbers_of_many_bytes_by_the_header_alone(tmp_path):
+    """|S1024 took a kilobyte for each of two thousand squared numbers before its kind was looked at; nothing stands
+    behind this header, so that who reads on finds its end."""
+    head = io.BytesIO()
+    npy.write_array_header_1_0(head, {"descr": "|S1024", "fortran_order": False, "shape": (2000, 2000)})
+    for key, said in ("M", "M holds values of 1024 bytes each"), ("names", "holds 4000000 names; 2000 is the most"):
+        with zipfile.ZipFile(tmp_path / "a.npz", "w") as file:
+            file.writestr(f"{key}.npy", head.getvalue())
+        with pytest.raises(PatchfemError, match=said):
+            arrays.read(tmp_path / "a.npz")
+
+
+def test_refuses_a_list_of_members_that_is_too_long(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as file:
+        for number in range(40):
+            file.writestr(f"{number}" * 30_000, b"")
+    with pytest.raises(PatchfemError, match=r"lists members in \d+ bytes"):
         arrays.read(tmp_path / "a.npz")

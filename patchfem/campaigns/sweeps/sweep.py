@@ -164,8 +164,10 @@ class Clock:
     def __call__(self, count: int) -> str:
         """The line after `count` more cases: "12/144 cases, 3 min left"."""
         self.done, self.new = self.done + count, self.new + count
-        left = (self.total - self.done) * (perf_counter() - self.begin) / max(self.new, 1)
-        return f"{self.done}/{self.total} cases, {lasting(left)} left"
+        text = f"{self.done}/{self.total} cases"
+        if not self.new:  # nothing was done yet that tells how long it takes
+            return text
+        return f"{text}, {lasting((self.total - self.done) * (perf_counter() - self.begin) / self.new)} left"
 
 
 def lasting(seconds: float) -> str:

@@ -18,7 +18,7 @@ from ...campaigns.sweeps.cases import Cases
 from ...core import Measure, Missing, PatchfemError
 from ...disk.claim import Claim
 from ...disk.exchange import put
-from ...disk.whole import Unwritten, write_inside
+from ...disk.whole import Unwritten, unmade, write_inside
 from ...effects import EFFECTS
 from ...model.model import Model
 from ...runs.many.answers import FAILED, Answers
@@ -92,7 +92,7 @@ class Folder:
         try:
             (self.target / CASES).mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise Missing(f"{self.shown}: the folder of the sweep cannot be made ({error.strerror})") from None
+            raise Missing(f"{self.shown}: the folder of the sweep cannot be made ({unmade(error)})") from None
         if not self.shared:
             try:
                 self.claim.take()

@@ -22,7 +22,7 @@ from patchfem.campaigns.sweeps.executors import pool
 from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.here import Here
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.sweep import TRIES, Chunks, Work, solved
+from patchfem.campaigns.sweeps.sweep import TRIES, Chunks, Clock, Work, solved
 from patchfem.core import Missing, PatchfemError
 from patchfem.runs.many.answers import FAILED, Answers, joined
 from patchfem.scene.axes import read
@@ -109,6 +109,12 @@ def test_exact_what_died_is_tried_alone_after_all_others_and_given_up():
     chunks.take()
     assert chunks.take(idle=False) is None and chunks.take() == [0] and chunks.take() is None
     assert chunks.died([0]) == [] and chunks.take() == [0] and chunks.died([0]) == [0] and chunks.take() is None
+
+
+def test_exact_the_time_left_is_told_when_something_was_done():
+    """0/4000 cases, 0 s left."""
+    clock = Clock(4000, 0)
+    assert clock(0) == "0/4000 cases" and clock(1).startswith("1/4000 cases, ") and clock(0).endswith(" left")
 
 
 class Prompt:
