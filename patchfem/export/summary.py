@@ -53,13 +53,22 @@ def read_summary(path: Path) -> dict:
     text = path.read_text(encoding="utf-8")
     try:
         _shape().model_validate_json(text, strict=True)
-        return json.loads(text)
+        return json.loads(text, parse_int=_whole)
     except RecursionError:
         raise ValueError("nested deeper than a summary is") from None
     except ValueError as fault:  # of pydantic, with many lines
+        if not hasattr(fault, "errors"):
+            raise
         first = fault.errors(include_url=False)[0]
         at = ".".join(map(str, first["loc"]))
         raise ValueError(f"{path.name} is no summary of a run: {at + ': ' * bool(at)}{first['msg']}") from None
+
+
+def _whole(digits: str) -> int:
+    """A whole number; ValueError for one that no float can hold."""
+    if len(digits) > 300:
+        raise ValueError(f"a whole number of {len(digits)} digits is none of a run")
+    return int(digits)
 
 
 @cache

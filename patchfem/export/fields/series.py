@@ -7,9 +7,15 @@ import h5py
 import numpy as np
 
 from ...core import Missing, PatchfemError
+from ..readback import HUGE, numeric, readable, wanted
 from .blocks import NAMES, Block, joined
 from .vtkhdf import NAME
 
+TAILS = {"displacement": (3,), "stress": (6,)}  # of arrays with several values a place
+BODY = {"PointData": ("displacement",), "CellData": ("material", "stress", "von_mises")}
+LINE = {"PointData": ("displacement", "gap", "normal_stress"), "CellData": ()}
+LEAST = {"lower": BODY, "upper": BODY, "interface": LINE}  # what a reader relies on
+MOST = 4  # nodes of a cell
 APART = 3.0  # of the usual step between frames: a longer one divides the pressed state from the last cycle
 
 
@@ -73,17 +79,44 @@ class Series:
         except OSError as error:
             raise PatchfemError(f"{path}: not a readable HDF5 file ({error})") from None
         try:
-            self.root = self.file["VTKHDF"]
-            self.times = self.root["Steps/Values"][:]
-            old = self.root.attrs["Type"] == b"UnstructuredGrid"
-            texts = [] if old else self.root["lower/FieldData/units"][:]
-            self.units = dict(text.decode().rstrip("]").split(" [", 1) for text in texts)
-        except (KeyError, ValueError) as error:
+            with readable(path, "a series of fields of patchfem"):
+                self._open()
+        except PatchfemError:
             self.file.close()
-            raise PatchfemError(f"{path}: not a series of fields of patchfem ({error})") from None
-        if old:
-            self.file.close()
-            raise PatchfemError(f"{path}: written by an older patchfem, without blocks; run its scene again")
+            raise
+
+    def _open(self) -> None:
+        self.root = self.file["VTKHDF"]
+        if self.root.attrs["Type"] == b"UnstructuredGrid":
+            raise PatchfemError(f"{self.path}: written by an older patchfem, without blocks; run its scene again")
+        self.times = self.root["Steps/Values"][:]
+        wanted(self.times.ndim == 1 and self.times.size and numeric(self.times) and np.isfinite(self.times).all(),
+               "Steps/Values are no times")
+        texts = self.root["lower/FieldData/units"][:]
+        self.units = dict(text.decode().rstrip("]").split(" [", 1) for text in texts)
+        for name in NAMES:
+            self._looked(name, self.root[name])
+
+    def _looked(self, name: str, group) -> None:
+        """ValueError for a block whose cells or arrays are not those of its points in every frame."""
+        points, nodes, ends, types = (group[one][:] for one in ("Points", "Connectivity", "Offsets", "Types"))
+        wanted(points.ndim == 2 and points.shape[1] == 3 and len(points) and numeric(points)
+               and np.abs(points).max() < HUGE, f"{name}/Points are no places")  # NaN is not below it
+        wanted(all(one.ndim == 1 and one.size and one.dtype.kind in "iu" for one in (nodes, ends, types)),
+               f"{name}: its cells are no whole numbers")
+        sizes = np.diff(ends.astype(np.int64))
+        wanted(len(sizes) == len(types) and ends[0] == 0 and ends[-1] == len(nodes) and sizes.min() >= 2
+               and sizes.max() <= MOST and nodes.min() >= 0 and nodes.max() < len(points),
+               f"{name}: its cells are not of its points")
+        for kind, size in ("PointData", len(points)), ("CellData", len(types)):
+            lacks = sorted(set(LEAST[name][kind]) - set(group[kind]))
+            wanted(not lacks, f"{name}/{kind} lacks {', '.join(lacks)}")
+            for one, rows in group[kind].items():
+                first = group[f"Steps/{kind}Offsets/{one}"][:]
+                wanted(rows.dtype.kind in "iuf" and rows.shape[1:] == TAILS.get(one, ()),
+                       f"{name}/{kind}/{one} holds {rows.ndim}-dimensional {rows.dtype}")
+                wanted(first.shape == self.times.shape and first.dtype.kind in "iu" and first.min() >= 0
+                       and first.max() + size <= len(rows), f"{name}/{kind}/{one} does not reach to the last frame")
 
     def __enter__(self) -> "Series":
         return self
@@ -103,10 +136,8 @@ class Series:
         if not -count <= number < count:
             raise PatchfemError(f"--frame: {number} is not there, {self.path} has frames 0 to {count - 1}")
         number %= count
-        try:
+        with readable(self.path, f"frame {number}"):
             blocks = {name: self._block(self.root[name], number) for name in NAMES}
-        except (KeyError, OSError) as error:
-            raise PatchfemError(f"{self.path}: frame {number} cannot be read ({error})") from None
         one = joined(blocks)
         return Frame(blocks, one.points, one.connectivity, one.offsets, one.types, one.point_data, one.cell_data,
                      self.units | {"part": "1"}, float(self.times[number]), number)

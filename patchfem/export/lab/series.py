@@ -10,6 +10,7 @@ from ... import __version__
 from ...core import Missing, PatchfemError
 from ...inputs.columns import read_columns
 from ...inputs.paths import BESIDE, UNITS
+from ..readback import numeric, variables
 
 LOOPS = (("slide", "friction_force"), ("relative_displacement", "friction_force"), ("displacement", "force"),
          ("displacement", "friction_ratio"), ("displacement", "fitted"))  # slide, resistance: the first of one counts
@@ -71,26 +72,19 @@ def histories_of(folder: Path) -> Histories:
 
 
 def _of_run(path: Path) -> Histories:
-    import h5netcdf
-
-    try:
-        with h5netcdf.File(path, "r") as file:
-            title = str(file.attrs.get("title", ""))
-            found = {name: (one.dimensions, np.asarray(one[...]), str(one.attrs.get("units", "1")))
-                     for name, one in file.variables.items()}
-    except (OSError, KeyError, ValueError) as fault:
-        raise PatchfemError(f"{path}: cannot be read as netCDF: {fault}") from None
-    arrays = {name: (values, unit) for name, (_, values, unit) in found.items() if values.dtype.kind in "iuf"}
+    about, found = variables(path)
+    title = str(about.get("title", ""))
+    arrays = {name: (one.values, one.unit) for name, one in found.items() if numeric(one.values)}
     columns = []
     for name, (dims, values, unit) in found.items():
-        if "time" not in dims or name == "time" or values.dtype.kind not in "iuf":
+        if "time" not in dims or name == "time" or not numeric(values):
             continue
         if len(dims) == 1:
             columns.append(Column(name, unit, values.astype(float), 0))
         elif len(dims) == 2:
             rows = values if dims[1] == "time" else values.T
             columns += [Column(name, unit, row.astype(float), k) for k, row in enumerate(rows, 1)]
-    if not columns:
+    if not columns or "time" not in found:
         raise PatchfemError(f"{path}: a static patch has no history; its fields are exported as .pvd, .vtu, .vtkhdf, "
                             "or .csv of the interface")
     return Histories(title, found["time"][1].astype(float), columns, arrays)

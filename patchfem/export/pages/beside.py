@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...scales import LADDERS, axis_unit
+from ..readback import numeric, readable, variables, wanted
 from ..summary import read_summary
 from .charts import COLOURS, mark
 from .document import Section, document
@@ -66,19 +67,14 @@ def read(folder: Path) -> Run:
 def _arrays(path: Path) -> dict:
     if not path.is_file():
         return {}
-    import h5netcdf
-
-    wanted = {name for _, *axes in CHARTS for name, _ in axes}
-    out = {}
-    try:
-        with h5netcdf.File(path, "r") as file:
-            for name in wanted & set(file.variables):
-                values = np.asarray(file[name][...], float)
-                unit = file[name].attrs.get("units", "1")
-                one = values[0] if values.ndim == 2 else values
-                out[name] = (one, unit if isinstance(unit, str) else str(unit))
-    except OSError as fault:
-        raise PatchfemError(f"{path}: cannot be read as netCDF: {fault}") from None
+    shown, out = {name for _, *axes in CHARTS for name, _ in axes}, {}
+    for name, one in variables(path, shown)[1].items():
+        with readable(path, "results of a run"):
+            wanted(numeric(one.values) and one.values.ndim in (1, 2) and one.values.size > 0,
+                   f"{name} holds {one.values.ndim}-dimensional {one.values.dtype}")
+        values = one.values[0] if one.values.ndim == 2 else one.values
+        if np.isfinite(values).any():
+            out[name] = (values.astype(float), one.unit)
     return out
 
 

@@ -21,6 +21,7 @@ from ...runs.many.answers import Answers
 from ...runs.results.result import meaning
 from ..pages import sweep
 from ..pages.written import NUMBER
+from ..readback import HUGE, wanted
 from .tables import facts, names_of
 
 WHOLE, SHORT = "report.html", "summary.json"  # what a click on a case opens: its page where it has one
@@ -111,13 +112,28 @@ def read_table(folder: Path) -> dict:
     try:
         with open(folder / "sweep.csv", newline="", encoding="utf-8") as file:
             head, *rows = csv.reader(file)
+        wanted(rows and "outcome" in head and "message" in head, "sweep.csv has no case")
+        lengths = {number for number, row in enumerate(rows, 2) if len(row) != len(head)}
+        wanted(not lengths, f"sweep.csv: a row of {len(head)} fields is wanted in line {min(lengths, default=0)}")
         with h5netcdf.File(folder / "sweep.nc", "r") as file:
-            return _table(folder, [dict(zip(head, row)) for row in rows], head[:head.index("outcome")], file)
+            return _whole(_table(folder, [dict(zip(head, row)) for row in rows], head[:head.index("outcome")], file))
     except FileNotFoundError as fault:
         name = Path(fault.filename).name if fault.filename else "sweep.nc"
         raise PatchfemError(f"{folder}: no folder of a sweep: it has no {name}") from None
-    except (OSError, ValueError, KeyError) as fault:
-        raise PatchfemError(f"{folder}: its sweep cannot be read: {fault}") from None
+    except Exception as fault:  # damaged files have many ways to fail
+        said = " ".join(str(fault).split())[:200]
+        raise PatchfemError(f"{folder}: its sweep cannot be read: {said or type(fault).__name__}") from None
+
+
+def _whole(table: dict) -> dict:
+    """The table; ValueError where its columns are not as long as it has cases, or hold no numbers of results."""
+    count = len(table["outcome"])
+    parts = [(one["name"], one["values"]) for one in table["keys"]]
+    parts += [(name, one[part]) for name, one in table["measures"].items() for part in ("values", "errors", "floors")]
+    for name, values in parts:
+        wanted(np.shape(values) == (count,), f"{name} has {np.size(values)} values for {count} cases")
+        wanted(np.abs(values[np.isfinite(values)]).max(initial=0.0) < HUGE, f"{name} holds a number beyond {HUGE:g}")
+    return table
 
 
 def _table(folder: Path, rows: list, keys: list, file) -> dict:
@@ -142,7 +158,9 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
                                                   ("--over", f"{one['name']}={','.join(dict.fromkeys(one['texts']))}")]
     held = {name: float(file.attrs[name]) for name in ("tolerance", "patch_length", "patch_width")
             if name in file.attrs}
-    return {**titles(columns, tomllib.loads(text).get("title") or folder.resolve().name), **_shared(held, columns),
+    title = tomllib.loads(text).get("title") or folder.resolve().name
+    wanted(isinstance(title, str) and isinstance(sets, list), "sweep.nc: its scene or its --set are none")
+    return {**titles(columns, title), **_shared(held, columns),
             "version": str(file.attrs["source"]).removeprefix("patchfem "), "scene": text, "seconds": float("nan"),
             "command": shlex.join(["patchfem", "sweep", str(file.attrs["scene_file"]),
                                    *(word for one in sets for word in ("--set", one)), *overs]),
