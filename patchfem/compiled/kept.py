@@ -8,6 +8,8 @@ from contextlib import suppress
 from numba.core import caching
 
 SEAL = 32  # bytes of the hash before the content
+# numba 0.61 keeps the name of the class to itself
+LOCATOR = getattr(caching, "UserProvidedCacheLocator", None) or caching._UserProvidedCacheLocator
 PARTS = ("_index_path", "_version", "_source_stamp")  # of numba's file, which this stands on
 
 
@@ -22,7 +24,7 @@ def kept_on_disk(function):
     return function
 
 
-class Place(caching.UserProvidedCacheLocator):
+class Place(LOCATOR):
     """The folder of the compiled code, whether or not it can be written and whatever the environment names to numba."""
 
     @classmethod
