@@ -73,7 +73,7 @@ def _finer_mesh(result, wide: dict, coarse) -> str:
     if asked.mesh is not None:
         return "split the elements of contact.mesh"
     nodes, wider = result.patch.x.size, f"accuracy.tolerance = {_up(tolerance * times):g} would be met"
-    if asked.strips is not None and result.plan.model.kind == "patch":  # bars of what moves have no share of strips
+    if asked.strips is not None and asked.strips[0] > 1 and result.plan.model.kind == "patch":  # of bars
         return f"the mesh ({nodes} interface nodes) and the strips share it; {_more_strips(asked, wide)}"
     if not asked.chosen:
         return f"leave out {SIZE}"
