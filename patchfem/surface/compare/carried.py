@@ -10,9 +10,9 @@ from .quantity import SIDE, Quantity, refused
 from .registration import REACH, Registration
 
 PART, SAMPLES, FILLED = 0.05, 40, 0.7  # of the length, samples, and share of unworn heights of a part that carries
-WORN, FEW = 2 * REACH, 6  # noises from which a height is clearly worn, and how many of them are asked for
+WORN, BROAD, LEAST = 2 * REACH, 16, 0.005  # deviations of a rubbed place, its samples at half of them, share of x
 CURVED, BOWED = 30.0, 0.75  # chi-squared of a bow in an unworn part, and its size in noises, from which it is none
-TURNS, HIGHER, VALLEYS = 8, 0.3, 0.1  # worn tops, their height over the valleys in rms, share of the valleys
+TURNS, HIGHER, VALLEYS = 8, 0.65, 0.1  # worn tops, share of unworn heights that lie lower than they, share of valleys
 HIDDEN = "mean worn depth that the tilt, to the end of its interval, may be as a wedge; even wear has no limit"
 NO_LIMIT = "no limit"
 
@@ -29,26 +29,40 @@ class Carried(NamedTuple):
 def carried(found: Registration) -> Carried:
     """What tells the worn heights of a registration from unworn ones.
 
-    Unworn parts are runs of a twentieth of the length or more whose heights are unworn and straight, beside heights
-    that are clearly worn; a part that is bowed is the foot of wear that runs out slowly. Valleys carry where worn tops
-    stand between them, more than eight of them, higher than they. Without either, wear that is the same everywhere, a
-    wedge, or a bow may be anything.
+    Unworn parts are runs of a twentieth of the length or more whose heights are unworn and straight, beside rubbed
+    places (`_rubbed`); a part that is bowed is the foot of wear that runs out slowly. Valleys carry where more than
+    eight worn tops stand between them. Without either, wear that is the same everywhere, a wedge, or a bow may be
+    anything: specks where interpolation errs are no rubbed place.
     """
-    rest, noise, x = np.asarray(found.rest), found.noise, found.x
+    off, x = median_of_five(found.rest / found.scatter), found.x
     share = float(found.used.mean())
-    if (rest > WORN * noise).sum() < FEW:
+    places = deep_runs(off)
+    tops = len(places) >= TURNS and _higher(found, off) > HIGHER
+    if not tops and not _broad(found, off, places):
         return Carried("", (), share)
-    runs = runs_of(median_of_five(rest) <= REACH * noise)
-    long = [(a, b) for a, b in runs if _carries(found, a, b)]
+    long = [(a, b) for a, b in runs_of(off <= REACH) if _carries(found, a, b)]
     if long:
         return Carried("parts", tuple((float(x[a]), float(x[b])) for a, b in long), share)
-    tops = runs_of(median_of_five(rest) > REACH * noise)
-    high = found.first - np.polyval(np.polyfit(x, found.first, 1), x)
-    worn = rest > WORN * noise
-    above = float(high[worn].mean() - high[found.used].mean()) if found.used.any() else 0.0
-    if len(tops) >= TURNS and above > HIGHER * float(high.std()) and share > VALLEYS:
-        return Carried("valleys", (), share)
-    return Carried("", (), share)
+    return Carried("valleys" if tops and share > VALLEYS else "", (), share)
+
+
+def deep_runs(off) -> list:
+    """First and last of each run of depths (n,) [deviations] that are no noise, and clearly none at the deepest."""
+    return [(a, b) for a, b in runs_of(off > REACH) if off[a:b + 1].max() > WORN]
+
+
+def _broad(found: Registration, off, places: list) -> bool:
+    """Whether one of the deep places is wider than a speck, at half of its depth too."""
+    least = LEAST * (found.x[-1] - found.x[0])
+    return any((off[a:b + 1] > off[a:b + 1].max() / 2).sum() >= BROAD and found.x[b] - found.x[a] > least
+               for a, b in places)
+
+
+def _higher(found: Registration, off) -> float:
+    """Share of the unworn heights that lie lower than a clearly worn one, in the mean of these: 1 for tops cut off."""
+    high = found.first - np.polyval(np.polyfit(found.x, found.first, 1), found.x)
+    unworn = np.sort(high[off <= REACH])
+    return float(np.searchsorted(unworn, high[off > WORN]).mean() / max(unworn.size, 1))
 
 
 def _carries(found: Registration, first: int, last: int) -> bool:
@@ -67,8 +81,9 @@ def _carries(found: Registration, first: int, last: int) -> bool:
 
 
 def raised(found: Registration) -> bool:
-    """Whether heights stand clearly above the first trace."""
-    return int((median_of_five(-np.asarray(found.rest)) > WORN * found.noise).sum()) >= FEW
+    """Whether heights stand clearly above the first trace, wider than a speck."""
+    off = median_of_five(-found.rest / found.scatter)
+    return _broad(found, off, deep_runs(off))
 
 
 def hidden_wear(found: Registration | None, by: Carried | None) -> Quantity:

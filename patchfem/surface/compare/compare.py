@@ -16,7 +16,7 @@ from .flanks import Flanks, flanks_of
 from .place import Match
 from .quantity import SIDE, Quantity, around, refused
 from .ratios import BEYOND, Size, at_step, likeness, loose, of_noise, ratio, scattered, size_along, size_of
-from .registration import Registration, register
+from .registration import Registration, gain_of, register
 from .same import Place, found_place
 from .specks import without_specks
 from .tracks import Tracks, beside_flanks, of_flanks, pieces_of, tracks_of
@@ -37,7 +37,8 @@ class Comparison:
     shift, stretch, tilt, worn_*, amplitude_ratio, slope_ratio, abbott: Quantity; sizes: `Size` before and after; notes:
     sentences; exchanged: whether material stands above the first trace and none is missing, or a place shows in the
     other order alone; tracks; carried: what carries the registration, None without one; hidden: what a wedge may hide;
-    removed: heights missing or left out in each; mirrored, turned: whether one trace was, for the registration.
+    removed: heights missing or left out in each; mirrored, turned: whether one trace was, for the registration; gain:
+    heights after over before where they differ by one factor, None where not.
     """
 
     before: Profile | Areal
@@ -63,6 +64,7 @@ class Comparison:
     removed: tuple = (0, 0)
     mirrored: bool = False
     turned: bool = False
+    gain: float | None = None
 
     @property
     def values(self) -> dict:
@@ -128,6 +130,7 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
     by = carried(found)
     hidden = hidden_wear(found, by)
     notes, step = _steps(before, after)
+    gain = gain_of(found) if not (by.by or raised(found)) else None
     notes += _told(found)
     worn, tracks = worn_depth.of_registration(found), Tracks(())
     if by.by:
@@ -139,7 +142,7 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
     flat = pieces_of(found, tracks, band[1], True)
     ratios, sizes = [], [tuple(_pooled(side, step, band) for side in zip(*one)) for one in (flat, pieces)]
     for name, text, alike, noise in zip(("amplitude", "slope"), (AMPLITUDE, SLOPE), _alike(flat, step, band),
-                                        of_noise(sizes[0], found.noise, step, band)):
+                                        of_noise(sizes[0], float(np.sqrt(np.mean(found.scatter**2))), step, band)):
         one, other = (ratio(name, text, *pair[::-1], alike) for pair in sizes)
         off = abs(np.log(one.value / other.value)) if one.value and other.value else 0.0
         ratios.append(loose(one, float(np.hypot(np.hypot(BEYOND, noise), off))))
@@ -148,7 +151,7 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
     grew = worn.deposited > (worn.area.high or 0.0) and not (worn.mean.low or 0.0) > 0
     return Comparison(before, after, direction, "place", place.match, around(found.shift, found.errors[2], "m", SHIFT),
                       stretch, around(found.slope, found.errors[1], "rad", TILT), worn, *ratios, None, sizes[0], found,
-                      None, tuple(notes), grew, tracks, by, hidden, removed, place.mirrored, place.turned)
+                      None, tuple(notes), grew, tracks, by, hidden, removed, place.mirrored, place.turned, gain)
 
 
 def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Comparison:

@@ -19,7 +19,7 @@ MAX, MEAN, AREA = ("largest worn depth, without what noise adds to a largest val
                    "mean worn depth over the common length",
                    "worn area of the section, that is worn volume per width")
 TAIL = (0.02, 0.25)  # share of the lowest heights that both Abbott curves are laid on each other over
-DEPOSIT = 4.0  # noises above the trace before from which a height is a deposit, not noise
+DEPOSIT = 4.0  # deviations above the trace before from which a height is a deposit, not noise
 SLIGHT = 0.5  # noises: wear less deep than that passes for none (test_registration)
 
 
@@ -39,7 +39,7 @@ def of_registration(found: Registration) -> Worn:
     """Worn depth over the common part of two registered traces.
 
     All depths are added up, so that noise of both signs cancels on the unworn heights, but not what stands more than 4
-    noises above the first trace: that is deposited. The interval of the sums has the noise of the worn heights, the
+    deviations above the first trace: that is deposited. The interval of the sums has the noise of the worn heights, the
     uncertainty of shift, tilt and offset with what the deeper half of the unworn heights doubts of them, and the wear
     that hides in the noise: as many heights as are worn by 2.5 to 5 noises, by half a noise each. The largest
     depth is that of `largest`.
@@ -54,7 +54,7 @@ def summed(found: Registration, inside) -> tuple:
     """(worn area [m2], its standard deviation, length [m], deposited area) of the samples inside (n,), all for bool."""
     width = np.where(inside, widths(found.x), 0.0)
     length, rest = float(width.sum()), found.rest
-    deposit = rest < -DEPOSIT * found.noise
+    deposit = rest < -DEPOSIT * found.scatter
     weight = np.where(deposit, 0.0, width)
     area = float(weight @ rest)
     far = ~found.used & ~deposit
@@ -71,8 +71,8 @@ def summed(found: Registration, inside) -> tuple:
 
 
 def balance(found: Registration) -> float:
-    """(what is missing less what grew) / (both), by the heights beyond 4 noises: 1 for wear alone, 0 for neither."""
-    rest = np.where(np.abs(found.rest) > DEPOSIT * found.noise, found.rest, 0.0)
+    """(what is missing less what grew) / (both), by heights beyond 4 deviations: 1 for wear alone, 0 for neither."""
+    rest = np.where(np.abs(found.rest) > DEPOSIT * found.scatter, found.rest, 0.0)
     both = float(np.abs(rest).sum())
     return float(rest.sum()) / both if both > 0 else 0.0
 
@@ -84,7 +84,7 @@ def widths(x) -> np.ndarray:
 
 
 def _largest(found: Registration) -> Quantity:
-    if float(found.rest.max()) <= 4.5 * found.noise:  # the largest of the noise of the whole trace
+    if float((found.rest / found.scatter).max()) <= 4.5:  # the largest of the noise of the whole trace
         return Quantity(0.0, 0.0, max(float(found.rest.max()), 0.0) + found.noise, "m", MAX)
     return around(*largest(found, neighbours(found)), "m", MAX, 0.0)
 

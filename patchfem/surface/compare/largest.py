@@ -9,39 +9,46 @@ from .registration import Registration
 LONGEST = 1025  # samples of a window
 PARTS = 8  # of a window, whose means the parabola must meet
 ALIKE = 2.5  # deviations that a misfit of noise may have: 97 of 100 windows of noise alone fit
+CAPPED, TAIL = 3.0, 8.0  # deviations that a height of a window counts with at most, and that none may have
+FEW_TAILS = 2.0  # variance of a few heights, over that of normal noise
 BLUNT = 8.0  # noises below the top within which a depth may be the largest
 DOUBT = 3.0  # deviations that a depth loses in the choice of the largest: a sharper window must show it clearly
+SHORT = 4.5  # the same for a few heights
 DRAWS = 300
 
 
 def largest(found: Registration, together: float) -> tuple:
     """(value, standard deviation) [m] of the largest worn depth w of a registration.
 
-    Depths are w + noise, and the largest of n of them is too large by about noise * sqrt(2 log n). So each depth is
-    read from the parabola through the longest window (5 to 1025 heights) around it that shows no misfit beyond the
-    noise, neither in its mean square nor in the means of its eight parts; where no window fits, it is the height
-    itself. What is left of the excess is the mean one of `DRAWS` draws of the noise through the same windows, and is
-    taken off. The deviation has that of the draws, that excess, which the draws see by half for a flat floor, and what
-    the registration leaves open. together: how many neighbouring heights err alike (`registration.together`).
+    Depths are w + noise, and the largest of n of them is too large by about noise * sqrt(2 log n); the noise is that of
+    each height (`Registration.scatter`), larger on steep flanks, with tails. So each depth is read from the parabola
+    through the longest window (5 to 1025 heights) around it that shows no misfit beyond the noise, neither in its mean
+    square, in which a single height counts three deviations at most, nor in the means of its eight parts; where no
+    window fits, it is the height itself. What is left of the excess is the mean one of `DRAWS` draws of the noise
+    through the same windows, and is taken off. The deviation has that of the draws, that excess, which the draws see by
+    half for a flat floor, and what the registration leaves open. together: how many neighbouring heights err alike
+    (`registration.together`).
     """
-    rest, noise = np.asarray(found.rest), found.noise
+    rest, noise = np.asarray(found.rest), found.scatter
     start, size = _windows(rest, noise, together)
     smooth, deviation = np.empty(rest.size), np.empty(rest.size)
     for first, length, members, rows in _shared(start, size, np.arange(rest.size)):
         smooth[members] = rows @ (_base(length).T @ rest[first:first + length])
-        deviation[members] = noise * np.sqrt((rows**2).sum(axis=1) * _alike(length, together))
-    top = int(np.argmax(smooth - DOUBT * deviation))
+        pull = (rows @ _base(length).T) * noise[first:first + length]
+        deviation[members] = np.sqrt((pull**2).sum(axis=1) * _alike(length, together))
+    doubt = np.where(size < 2 * PARTS, SHORT, DOUBT) * deviation
+    top = int(np.argmax(smooth - doubt))
     near = np.flatnonzero(smooth + BLUNT * deviation > smooth[top] - BLUNT * deviation[top])
     low, high = int(start[near].min()), int((start + size)[near].max())
-    drawn = noise * np.random.default_rng(0).standard_normal((DRAWS, high - low))
+    drawn = noise[low:high] * np.random.default_rng(0).standard_normal((DRAWS, high - low))
     peaks, ranks = np.empty(DRAWS), np.full(DRAWS, -np.inf)
     for first, length, members, rows in _shared(start, size, near):
         moved = np.sqrt(_alike(length, together)) * drawn[:, first - low:first - low + length] @ _base(length) @ rows.T
-        rank = smooth[members] + moved - DOUBT * deviation[members]
+        rank = smooth[members] + moved - doubt[members]
         best = np.argmax(rank, axis=1)
         here = rank[np.arange(DRAWS), best]
         better = here > ranks
-        peaks[better] = (here + DOUBT * deviation[members][best])[better]
+        peaks[better] = (here + doubt[members][best])[better]
         ranks[better] = here[better]
     excess = float(peaks.mean() - smooth[top])
     part = slice(int(start[top]), int(start[top] + size[top]))
@@ -60,8 +67,8 @@ def _shared(start, size, heights):
 
 
 def _alike(length: int, together: float) -> float:
-    """Variance of a parabola's height over that of independent noise: single heights know no neighbours."""
-    return together if length > 1 else 1.0
+    """Variance of a parabola's height over that of independent normal noise: a few heights show the tails of noise."""
+    return max(together, FEW_TAILS) if length < 2 * PARTS else together
 
 
 @lru_cache(maxsize=16)
@@ -70,7 +77,7 @@ def _base(length: int) -> np.ndarray:
     return np.linalg.qr(np.vander(np.linspace(-1, 1, length), 3))[0] if length > 1 else np.ones((1, 1))
 
 
-def _windows(rest, noise: float, together: float) -> tuple:
+def _windows(rest, noise, together: float) -> tuple:
     """First sample and length of the longest window around each depth that a parabola fits; 1 where none does.
 
     Of windows of a length, the one whose middle is nearest is taken.
@@ -81,7 +88,8 @@ def _windows(rest, noise: float, together: float) -> tuple:
     while length <= min(LONGEST, count):
         apart = max(length // PARTS, 1)
         first = np.arange(0, count - length + 1, apart)
-        good = first[_fits(np.lib.stride_tricks.sliding_window_view(rest, length)[first], noise, together)]
+        cut = (np.lib.stride_tricks.sliding_window_view(one, length)[first] for one in (rest, noise))
+        good = first[_fits(*cut, together)]
         if not good.size:
             break
         after = np.searchsorted(good + length // 2, here).clip(1, max(good.size - 1, 1))
@@ -96,15 +104,18 @@ def _windows(rest, noise: float, together: float) -> tuple:
     return np.clip((here - half // 2) // apart * apart, start, start + size - half), half
 
 
-def _fits(windows, noise: float, together: float) -> np.ndarray:
-    """Whether a parabola leaves no more than noise in each window (m, length)."""
+def _fits(windows, noise, together: float) -> np.ndarray:
+    """Whether a parabola leaves no more than noise (m, length) in each window (m, length)."""
     length = windows.shape[1]
     base = _base(length)
     left = windows - (windows @ base) @ base.T
     free = length - 3
-    good = (left**2).sum(axis=1) <= noise**2 * (free + ALIKE * np.sqrt(2 * free * together))
+    off = np.abs(left) / noise
+    good = (np.minimum(off, CAPPED)**2).sum(axis=1) <= free + ALIKE * np.sqrt(2 * free * together)
+    good &= off.max(axis=1) < TAIL
     if length >= 2 * PARTS:
         edges = np.linspace(0, length, PARTS + 1).astype(int)[:-1]
         means = np.add.reduceat(left, edges, axis=1)
-        good &= (np.abs(means) <= ALIKE * noise * np.sqrt(together * length / PARTS)).all(axis=1)
+        expected = np.sqrt(np.add.reduceat(noise**2, edges, axis=1) * together)
+        good &= (np.abs(means) <= ALIKE * expected).all(axis=1)
     return good

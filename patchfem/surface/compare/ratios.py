@@ -133,11 +133,12 @@ def of_noise(sizes: tuple, noise: float, step: float, band: tuple) -> tuple:
     """Relative share of the noise [m] of a height difference in the amplitude and the slope of registered traces.
 
     Half of the mean square that white noise of one trace adds: it may be another one in each, and where the first trace
-    is read between its samples, less. noise [m]: of the difference.
+    is read between its samples, less. That takes most of it from the slope, of which all counts. noise [m]: of the
+    difference.
     """
     least = [min(one[part] for one in sizes) for part in (0, 1)]
     squares = noise**2 * 2 * step * (1 / band[0] - 1 / band[1]), noise**2 / step**2
-    return tuple(float(0.5 * added / max(size**2, 1e-300)) for added, size in zip(squares, least))
+    return tuple(float(share * added / max(size**2, 1e-300)) for share, added, size in zip((0.5, 1.0), squares, least))
 
 
 def scattered(trace: Profile, step: float, band: tuple = BAND) -> tuple:

@@ -6,6 +6,7 @@ mean of the worn depth away with the tilt.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -24,9 +25,11 @@ BESIDE = 1  # samples next to a worn one that do not count: the wear runs out in
 NOISY, MOST = 0.05, 51  # share of noise in a slope, and samples of a parabola
 WIDER = 1.15  # the interval of the stretch, without it, holds 92 of 100
 BENT, GROWN = 0.8, 0.5  # of the noise that a bend, or heights that grew, must leave at most to be taken
+ALL = 0.8  # of the differences, at most, that one factor of the heights leaves
 SIDES = 20  # parts of the trace whose low depths show a bend
 ROUNDS = 100
 DIGITS = 1e-5  # of the height: least noise that is counted with
+LEVELS, EACH, TAILS, QUIETEST = 8, 64, 4.0, 0.3  # levels of roughness, heights of one, its deviations, least of noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +75,19 @@ class Registration:
     def middle(self) -> float:
         """Place [m] in the second trace at which the offset holds."""
         return float(self.x[0] + self.x[-1]) / 2
+
+    @cached_property
+    def scatter(self) -> np.ndarray:
+        """Standard deviation (n,) [m] of each depth: noise, interpolation between samples, shift times slope.
+
+        Interpolation errs where a height lies off the cubic through its neighbours, a shift where the trace is steep:
+        the deviations are those of the depths of equal misfit, times those of equal slope.
+        """
+        z, rest = np.pad(self.first, 3, "edge"), np.asarray(self.rest)
+        off = np.abs(z[3:-3] - (9 * (z[2:-4] + z[4:-2]) - z[:-6] - z[6:]) / 16)
+        off = np.maximum(off, np.maximum(np.roll(off, 1), np.roll(off, -1)))
+        out = _deviations(rest, off, QUIETEST * self.noise)
+        return out * _deviations(rest / out, np.abs(self.gradient[:, 2]), QUIETEST)
 
 
 def register(before: Profile, after: Profile, shift: float, lowest: float = LOWEST) -> Registration:
@@ -293,6 +309,30 @@ class _Fit:
             frozen_array(first), frozen_array(rest), used, frozen_array(gradient[:, :free] / turn),
             frozen_array(covariance * np.outer(turn, turn)), stretch, frozen_array(doubt * turn),
             float(state[4] * (np.ptp(x) / 2 / self.half) ** 2))
+
+
+def gain_of(found: Registration) -> float | None:
+    """Heights of the second trace over those of the first where one factor explains how they differ, None where not."""
+    along = np.vander(np.linspace(-1, 1, found.x.size), 3)
+    high, rest = (z - along @ np.linalg.lstsq(along, z, rcond=None)[0] for z in (found.first, found.rest))
+    share = float(high @ rest) / max(float(high @ high), 1e-300)
+    return 1 - share if float(np.std(rest - share * high)) < ALL * float(np.std(rest)) else None
+
+
+def _deviations(rest, rough, least: float) -> np.ndarray:
+    """Standard deviation (n,) of depths about zero as a rising function of the roughness (n,), `least` at least.
+
+    Of the heights of a level of roughness the side of zero with the smaller median counts: no wear, or nothing that
+    grew, and of that side what lies within four deviations.
+    """
+    parts = np.array_split(np.argsort(rough, kind="stable"), int(np.clip(rest.size // EACH, 1, LEVELS)))
+    found = []
+    for part in parts:
+        sides = [np.abs(side) for side in (rest[part][rest[part] < 0], rest[part][rest[part] > 0]) if side.size > 3]
+        side = min(sides, key=np.median, default=np.zeros(1))
+        side = side[side <= TAILS * 1.4826 * np.median(side)]
+        found.append(max(float(np.sqrt(np.mean(side**2))), least))
+    return np.interp(rough, [float(np.median(rough[part])) for part in parts], np.maximum.accumulate(found))
 
 
 def _bend(along, rest) -> float:

@@ -10,7 +10,7 @@ from .registration import Registration
 
 MEDIAN, WIDEST = 41, 12  # samples of the running median, and of the widest speck at half of its height
 STEEP, SOME = 4.0, 1.5  # robust deviations of the steps of the surface, and of noise, that both walls are steeper than
-GROWN, FALLEN = 6.0, 2.0  # such parts of the height is a step of the walls of what stands above, or of a hollow
+GROWN, FALLEN = 9.0, 2.0  # such parts of the height is a step of the walls of what stands above, or of a hollow
 
 
 def without_specks(found: Registration, before: Profile, after: Profile) -> tuple:
@@ -18,8 +18,8 @@ def without_specks(found: Registration, before: Profile, after: Profile) -> tupl
 
     A speck is 12 samples wide or less at half of its height, and the difference climbs and falls at it by steps larger
     than four deviations of those of the first trace: tops that wore off have the slopes of the surface. Nothing that
-    wears stands above the first trace, nor below all of it nearby: there less will do, where single steps make half of
-    a hollow. It is left out of the trace that has the larger steps there.
+    wears stands above the first trace, nor below all of it nearby: there less will do, a ninth of the height of what
+    grew, half of a hollow. It is left out of the trace that has the larger steps there.
     """
     rest, first = np.asarray(found.rest), np.asarray(found.first)
     if rest.size < 2 * MEDIAN:
@@ -50,7 +50,8 @@ def _least(found: Registration, at: int, missing: bool, height: float, steps: fl
     if not missing:  # unworn heights between worn tops are none
         return max(SOME * steps, height / GROWN) if found.rest[at] < -height / 2 else float("inf")
     near = found.first[max(at - MEDIAN, 0):at + MEDIAN + 1]
-    if found.first[at] - found.rest[at] < near.min() - 3 * found.noise:
+    stands = found.first[at] - float(np.median(near)) > height / 2  # in the first trace itself, over a track
+    if found.first[at] - found.rest[at] < near.min() - 3 * found.noise and not stands:
         return max(SOME * steps, height / FALLEN)
     return STEEP * steps
 

@@ -60,12 +60,12 @@ class Tracks(NamedTuple):
 def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
     """Tracks of a registration: runs of worn heights longer than three of the longest waves [m], hardly any unworn.
 
-    A height of a run counts as worn where the median of five is deeper than 2.5 noises. Edges are those of
+    A height of a run counts as worn where the median of five is deeper than 2.5 deviations. Edges are those of
     `extent.edge`. Tops that wore off stand between unworn valleys and are no track. together: how many neighbouring
     heights err alike.
     """
     rest, noise = np.asarray(found.rest), found.noise
-    runs = runs_of(median_of_five(rest) > REACH * noise)
+    runs = runs_of(median_of_five(rest / found.scatter) > REACH)
     spans = tuple((a, b) for a, b in runs if found.x[b] - found.x[a] > LONG * longest
                   and (rest[a:b + 1] <= REACH * noise).mean() < UNWORN)
     valley = _valley(found, spans, longest)

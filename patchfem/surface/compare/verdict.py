@@ -37,12 +37,14 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
         headline = f"{EXCHANGED}; as given: {headline}"
     elif any(_elsewhere(one) for one in parts):
         headline = f"{ELSEWHERE}; {headline}"
+    if any(_gain(one, "") and word != "no change shown" for one, word in zip(parts, words)):
+        headline += " by a factor of all heights, as the gain of an instrument"
     over = _over(parts)
     headline = f"{headline}; {over}" if over else headline
     out = []
     for one, word, name in zip(parts, words, names):
         out += [*_variant(one, name), _worn(one, name), *_reference(one)]
-        out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name)]
+        out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name), *_gain(one, name)]
         out += _apart(one)
     out += [_direction(*each) for each in directions]
     return headline, out
@@ -92,6 +94,14 @@ def _slope(ratio: Quantity, name: str) -> str:
     tail = "no change is shown" if word == "no change shown" else \
         f"{'flatter' if word == 'reduced' else 'steeper'}, at {sure(ratio)}"
     return f"The slope{name} is {_range(ratio)} of that before: {tail}."
+
+
+def _gain(one: Comparison, name: str) -> list:
+    """That waves or slopes changed by one factor of all heights, as a sentence."""
+    if one.gain is None or {changed(one.amplitude_ratio), changed(one.slope_ratio)} == {"no change shown"}:
+        return []
+    return [f"All heights{name} after are {one.gain:.4g} times those before: a gain of the instrument does that and "
+            "wear does not; calibrate z of both measurements."]
 
 
 def _sure(mean: Quantity) -> bool:

@@ -1,57 +1,78 @@
 """Every kind of pair that a laboratory brings: no sentence is false, no "at most" stands below what wore off.
 
-The rules were set on seeds 0 to 8 and 1000 to 1040; the seeds here are others.
+Of `known_pairs` the rules were set on seeds 41000 to 41019, of `worn_kinds` on seeds 0 to 8 and 1000 to 1040.
 """
 
+import known_pairs
 import numpy as np
 import pytest
 from pairs import UM
-from worn_kinds import KINDS, made
+from worn_kinds import made
 
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compared
+from patchfem.surface.compare.depth import widths
 from patchfem.surface.compare.verdict import EXCHANGED, verdicts
 from patchfem.surface.profile import Profile, despiked
 
 HELD_OUT = 52000
-UNWORN = ("unworn", "even", "wedge", "arch", "deposits", "dust", "dropouts", "bent", "exchanged", "elsewhere")
-WORN = tuple(kind for kind in KINDS if kind not in UNWORN)
+FIRST = {"wedge": 41002, "dropouts": 41001, "mirrored": 41014, "turned": 41014, "scale": 41001, "elsewhere": 41001,
+         "groove": 41002}  # else 41000: what was read wrongly before, and what is found soon
+DEAR = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("elsewhere", "bent groove", "dusty groove",
+                                                                "worn elsewhere")]
+OWN = ("arch", "trough", "coarse", "dusty groove", "bent groove", "worn elsewhere")  # of worn_kinds
+RUBBED = (*known_pairs.RUBBED, "trough", "coarse", "dusty groove", "bent groove", "worn elsewhere")
+GROWN = ("deposits", "exchanged")
+
+
+def made_pair(kind: str, seed: int) -> tuple:
+    """Both traces and the worn depths [m] at the samples of the second, of either generator."""
+    if kind in OWN:
+        one = made(kind, seed)
+        return one.before, one.after, one.worn
+    one = known_pairs.pair(kind, seed)
+    return *known_pairs.profiles(one), one.worn
 
 
 def faults(kind: str, seed: int) -> tuple:
     """Sentences that are false of a pair, and whether each interval of mean and largest depth holds the truth."""
-    pair = made(kind, seed)
-    one = compared(pair.before, pair.after)
+    before, after, worn = made_pair(kind, seed)
+    one = compared(before, after)
     headline, sentences = verdicts([one])
-    text, out, held = " ".join((headline, *sentences)), [], []
-    worn = pair.worn[::-1] if one.mirrored else pair.worn
-    if kind in UNWORN and (headline.startswith("worn") or "; worn" in headline):
-        out.append(f"{kind} {seed}: {headline}")
-    if "at most" in text and one.worn.mean.high < worn.mean():
-        out.append(f"{kind} {seed}: at most {one.worn.mean.high}")
-    if kind not in ("exchanged", "deposits") and headline.startswith(EXCHANGED):
-        out.append(f"{kind} {seed}: {headline}")
-    if (one.registration is None) != headline.startswith("not comparable") and not one.exchanged:
-        out.append(f"{kind} {seed}: {headline}")
-    if one.mirrored != (kind == "mirrored" and one.registration is not None) or \
-            one.turned != (kind == "turned" and one.registration is not None):
-        out.append(f"{kind} {seed}: mirrored {one.mirrored}, turned {one.turned}")
-    if one.registration is not None and one.worn.mean.value is not None and not one.exchanged:
-        there = np.interp(one.registration.x, pair.after.x, worn)
-        held = [q.low <= true <= q.high for q, true in ((one.worn.mean, there.mean()), (one.worn.largest, there.max()))]
-    return out, held
+    text, held = " ".join((headline, *sentences)), []
+    false = [kind not in RUBBED and headline.replace("; ", "").startswith("worn"),
+             kind not in RUBBED and "at most" in text,
+             kind in known_pairs.SAME and any(word in headline for word in ("reduced", "increased", "flatter")),
+             kind == "scale" and ("reduced" in headline or "increased" in headline) and "calibrate z" not in text,
+             kind not in GROWN and headline.startswith(EXCHANGED),
+             one.mirrored != (kind == "mirrored" and one.registration is not None),
+             one.turned != (kind == "turned" and one.registration is not None),
+             (one.registration is None) != headline.startswith("not comparable") and not one.exchanged]
+    if one.registration is not None and one.worn.mean.value is not None:
+        x = one.registration.x
+        there, width = np.interp(x, after.x, worn), widths(x)
+        held = [q.low <= true <= q.high for q, true in ((one.worn.mean, width @ there / width.sum()),
+                                                        (one.worn.largest, there.max()))]
+        false.append("at most" in text and one.worn.mean.high < there.mean())
+    return [f"{kind} {seed}: {text}"] * any(false), held
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("count", [1, pytest.param(40, marks=pytest.mark.slow)])
-def test_always_no_sentence_is_false(kind, count):
-    """Intervals hold 90 of 100; of 40 pairs one may be called what it is not."""
-    found = [faults(kind, seed) for seed in range(HELD_OUT, HELD_OUT + count)]
-    false = [text for one, _ in found for text in one]
-    assert len(false) <= count // 40, false
-    held = [one for _, one in found if one]
-    if count > 1 and len(held) > 20:
-        assert (np.mean(held, axis=0) > 0.85).all(), np.mean(held, axis=0)
+@pytest.mark.parametrize("kind", [*(kind for kind in (*known_pairs.KINDS, *OWN)
+                                    if kind not in [one.values[0] for one in DEAR]), *DEAR])
+def test_always_no_sentence_is_false(kind):
+    """One pair of a kind: edges, specks of interpolation and gains of z once had a false depth or word each."""
+    false, held = faults(kind, FIRST.get(kind, HELD_OUT if kind in OWN else 41000))
+    assert not false and all(held), (false, held)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kinds, first, count", [(known_pairs.KINDS, 41000, 14), (OWN, HELD_OUT, 40)])
+def test_always_no_sentence_of_200_pairs_is_false(kinds, first, count):
+    """Intervals hold 90 to 100 of 100; one of 50 pairs may be called what it is not, as chance does at 95 of 100."""
+    found = [faults(kind, seed) for kind in kinds for seed in range(first, first + count)]
+    false, held = [text for one, _ in found for text in one], [one for _, one in found if one]
+    assert len(false) <= len(found) // 50, false
+    assert (np.mean(held, axis=0) >= 0.9).all(), np.mean(held, axis=0)
 
 
 def test_exact_even_wear_has_no_limit_and_the_tilt_is_half_its_length_of_wear():
@@ -68,30 +89,33 @@ def test_exact_even_wear_has_no_limit_and_the_tilt_is_half_its_length_of_wear():
 
 
 def test_exact_a_spike_is_found_with_its_feet_and_a_groove_stays():
-    pair = made("groove", HELD_OUT + 51)
+    pair = made("groove", HELD_OUT + 99)
     assert despiked(pair.after) is pair.after
     z = np.array(pair.before.z)
-    z[300] += 200 * UM
+    z[50] += 200 * UM
     left = despiked(Profile(pair.before.x, frozen_array(z), "before"))
-    assert left.missing[300] and left.missing.sum() <= 3 and "--keep-spikes" in left.notes[-1]
+    assert left.missing[50] and left.missing.sum() <= 3 and "--keep-spikes" in left.notes[-1]
     one, kept = (compared(Profile(pair.before.x, frozen_array(z), "before"), pair.after, keep_spikes=keep)
                  for keep in (False, True))
     assert one.removed == (int(left.missing.sum()), 0) and kept.removed == (0, 0)
     assert one.worn.largest.value == pytest.approx(pair.worn.max(), rel=0.02) and kept.worn.largest.value > 100 * UM
 
 
-@pytest.mark.parametrize("shape", ["speck", "hollow"])
+@pytest.mark.parametrize("shape", ["speck", "hollow", "grown"])
 def test_exact_dust_and_dropouts_of_many_samples_are_no_wear(shape):
-    """A Gaussian speck before, a signal lost over ten samples after: both read as micrometres of wear."""
-    pair = made("groove", HELD_OUT + 52)
+    """A Gaussian speck before, a signal lost over ten samples after: both read as micrometres of wear; a speck of nine
+    samples after, as material that grew."""
+    pair = made("groove", HELD_OUT + 75)
     k = np.arange(pair.before.x.size)
     before, after = np.array(pair.before.z), np.array(pair.after.z)
     if shape == "speck":
         before += 60 * UM * np.exp(-0.5 * ((k - 120) / 3) ** 2)
+    elif shape == "grown":
+        after += 9 * UM * np.exp(-0.5 * ((k - 120) / 3.8) ** 2)
     else:
         after[115:125] -= 60 * UM
     one = compared(Profile(pair.before.x, frozen_array(before), "b"), Profile(pair.after.x, frozen_array(after), "a"))
-    assert one.removed[shape == "hollow"] >= 8
+    assert one.removed[shape != "speck"] >= 8
     assert one.worn.largest.low <= pair.worn.max() <= one.worn.largest.high
 
 

@@ -1,0 +1,145 @@
+"""Pairs of traces of known truth, before and after, of the kinds that a laboratory brings to `compare`.
+
+Written from what a stylus does, without sight of the method that compares them. A pair is made of one long surface that
+two traces run over; each trace has its own start, tilt, offset and noise. Lengths in m. Seeds 41000 to 41019 served to
+set rules.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from patchfem.core import frozen_array
+from patchfem.surface.profile import Profile
+
+KINDS = ("unworn", "even", "wedge", "groove", "edge", "run-in", "deposits", "dust", "dropouts", "bent", "mirrored",
+         "turned", "exchanged", "elsewhere", "scale")
+SAME = ("unworn", "even", "wedge", "dust", "mirrored", "turned", "elsewhere")  # the waves did not change
+RUBBED = ("groove", "edge", "run-in", "dropouts", "bent")  # beside heights that are unworn
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two traces and what is true of them: depths (m) at the points of the trace after, > 0 where material went."""
+
+    kind: str
+    seed: int
+    before: tuple  # x, z (n) each
+    after: tuple
+    worn: np.ndarray = field(repr=False)  # worn depth at each point of after
+    shift: float = 0.0  # of the trace after: x on the piece less x of the file, beyond that of the trace before
+    spoilt: tuple = (0, 0)  # points that are dust or dropouts in either trace
+
+
+def surface(draw, length: float, style: str):
+    """Heights (m) over x (m), as fine as the finest trace: self-affine, turned or with a plateau."""
+    step = 0.25e-6
+    count = int(2 ** np.ceil(np.log2(length / step)))
+    wave = np.fft.rfftfreq(count, step)
+    hurst, roll, tip = draw.uniform(0.6, 0.9), 1 / draw.uniform(60e-6, 300e-6), 1 / draw.uniform(4e-6, 10e-6)
+    power = np.maximum(wave, roll) ** (-1 - 2 * hurst) / (1 + (wave / tip) ** 6)
+    power[0] = 0.0
+    heights = np.fft.irfft(np.sqrt(power) * np.exp(2j * np.pi * draw.random(wave.size)), count)
+    heights *= 1 / heights.std()
+    x = step * np.arange(count)
+    if style == "turned":
+        feed = draw.uniform(60e-6, 110e-6)
+        phase = 2 * np.pi * x / feed + 0.25 * np.cumsum(draw.normal(size=count)) * np.sqrt(step / feed)
+        heights = np.cos(phase) + 0.2 * np.cos(2 * phase + 0.7) + 0.25 * heights
+    elif style == "plateau":
+        heights = np.where(heights > 0, 0.3 * heights, heights)
+    return x, heights / heights.std() * draw.uniform(0.2e-6, 2.5e-6)
+
+
+def trough(x, start: float, stop: float, depth: float, ramp: float):
+    """A track of the given depth whose sides rise over `ramp`."""
+    into = np.clip((x - start) / ramp, 0, 1)
+    out = np.clip((stop - x) / ramp, 0, 1)
+    return depth * (3 * into**2 - 2 * into**3) * (3 * out**2 - 2 * out**3)
+
+
+def pair(kind: str, seed: int) -> Pair:
+    """The pair of `kind` that `seed` draws."""
+    draw = np.random.default_rng([seed, KINDS.index(kind)])
+    style = ("self-affine", "turned", "plateau")[draw.integers(3)]
+    length, spacing = draw.uniform(1.5e-3, 6e-3), draw.choice([0.5e-6, 1e-6, 2e-6])
+    reach = draw.uniform(-0.04, 0.04) * length
+    margin = 0.06 * length
+    x, new = surface(draw, (3.2 if kind == "elsewhere" else 1.0) * length + 2 * margin, style)
+    start = margin
+    rms = new.std()
+    depth = draw.uniform(0.5, 4) * rms
+    wear = np.zeros_like(x)
+    if kind == "even":
+        wear += depth
+    elif kind == "wedge":
+        share = (x - start) / length
+        wear += depth * (share if draw.random() < 0.5 else 1 - share)
+    elif kind in ("groove", "exchanged", "bent", "dropouts"):
+        a = start + draw.uniform(0.2, 0.4) * length
+        b = a + draw.uniform(0.2, 0.35) * length
+        wear += trough(x, a, b, depth, draw.uniform(20e-6, 150e-6))
+    elif kind == "edge":  # rubbed from within the trace to beyond its end
+        a = start + draw.uniform(0.25, 0.6) * length
+        wear += trough(x, a, x[-1] + 1e-3, depth, draw.uniform(20e-6, 150e-6))
+    old = new - wear
+    if kind == "run-in":  # tops cut, valleys whole
+        level = np.quantile(new, draw.uniform(0.5, 0.85))
+        old = np.where(new > level, level + draw.uniform(0.0, 0.15) * (new - level), new)
+        wear = new - old
+    elif kind == "deposits":
+        for _ in range(draw.integers(1, 4)):
+            a = start + draw.uniform(0.05, 0.8) * length
+            grown = trough(x, a, a + draw.uniform(0.03, 0.12) * length, draw.uniform(0.5, 3) * rms, 30e-6)
+            old, wear = old + grown, wear - grown
+    noise = draw.uniform(1e-9, 8e-9)
+    begin = start + reach
+    if kind == "elsewhere":
+        begin = start + draw.uniform(1.2, 2.0) * length
+
+    def traced(heights, place, spacing, gain=1.0, stretch=1.0):
+        points = np.arange(0, length, spacing)
+        inside = place + stretch * points
+        keep = inside < x[-1]
+        points, inside = points[keep], inside[keep]
+        z = gain * np.interp(inside, x, heights) + noise * draw.normal(size=points.size)
+        z += draw.uniform(-0.8e-3, 0.8e-3) * points + draw.uniform(-5e-6, 5e-6)
+        return points, np.round(z, 9), inside
+
+    second = draw.choice([0.5e-6, 1e-6, 2e-6]) if kind == "scale" else spacing
+    gain = draw.uniform(0.97, 1.03) if kind == "scale" else 1.0
+    stretch = draw.uniform(0.99, 1.01) if kind == "scale" else 1.0
+    xb, zb, _ = traced(new, start, spacing)
+    xa, za, inside = traced(old, begin, second, gain, stretch)
+    worn = np.interp(inside, x, wear)
+    spoilt = [0, 0]
+    if kind == "dust":
+        which = draw.integers(1, 4)  # before, after, both
+        for k, z in enumerate((zb, za)):
+            if which & (k + 1):
+                for at in draw.integers(5, z.size - 5, draw.integers(1, 4)):
+                    width = draw.integers(1, 5)
+                    z[at: at + width] += draw.uniform(8, 25) * rms
+                    spoilt[k] += int(width)
+    if kind == "dropouts":
+        for k, z in enumerate((zb, za)):
+            for at in draw.integers(5, z.size - 5, draw.integers(1, 3)):
+                width = draw.integers(1, 4)
+                z[at: at + width] -= draw.uniform(10, 30) * rms
+                spoilt[k] += int(width)
+    if kind == "bent":
+        za += draw.choice([-1, 1]) * draw.uniform(2, 6) * rms * ((xa / xa[-1] - 0.5) ** 2 * 4)
+    if kind == "mirrored":
+        za = za[::-1].copy()
+    if kind == "turned":
+        za = -za
+    before, after = (xb, zb), (xa, za)
+    if kind == "exchanged":
+        before, after, worn = after, before, -np.interp(xb + start, inside, worn)
+    return Pair(kind, seed, before, after, worn, begin - start, tuple(spoilt))
+
+
+def profiles(one: Pair) -> tuple:
+    """Both traces as `Profile`."""
+    return tuple(Profile(*map(frozen_array, trace), name) for trace, name in ((one.before, "before"),
+                                                                              (one.after, "after")))
