@@ -1,13 +1,15 @@
 """The friction loop of the last cycles: range of the slide, stiffness and damping of the interface, mean motion.
 
 Everything works on samples that may be unevenly spaced, as those of an exact run are, which have both sides of every
-event. Between samples values and rates make a cubic.
+event. Between samples values and rates make a cubic. A law with a memory turns where its samples do: between the two
+beside a turn it may give way by all it has, so nothing is read there.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from ..effects import has
 from .measures import ROUND
 
 CLOSE = 1e-9  # of a period: nearer samples are the two sides of an event
@@ -31,12 +33,21 @@ def cycle_spans(time, period: float) -> list:
     return [(time[-1] - (count - k) * period, time[-1] - (count - k - 1) * period) for k in range(count)]
 
 
-def turns_of(time, slide, rate, force, period: float, jumps: bool = False) -> list:
+def at_turns(model) -> str:
+    """How the force is read where the slide of a Model turns, as `turns_of` takes it."""
+    law = model.friction.law
+    if has(law, "memoryless") and not model.soft:
+        return "jumps"
+    return "slide" if model.soft or has(law, "timeless") or has(law, "bonds") else "rate"
+
+
+def turns_of(time, slide, rate, force, period: float, by: str = "rate") -> list:
     """(smallest, largest) Turn of the slide of every whole cycle of a window, oldest first.
 
-    time, slide, rate, force: (k,) samples [s, m, m/s, N]; period [s]. jumps: the force jumps where the slide turns;
-    then it is the mean of the values before and after the rest there. The force is None where the slide is largest at a
-    border of the cycle and turns farther than a sample from it: the force there is not that of a turn.
+    time, slide, rate, force: (k,) samples [s, m, m/s, N]; period [s]. by: what the force there is: where it "jumps" the
+    mean of the values before and after the rest; where the "slide" makes it that of the sample of the largest slide, and
+    straight on along the slide; where its "rate" counts it is straight in time. The force is None where the slide is
+    largest at a border of the cycle and turns farther than a sample from it: the force there is not that of a turn.
     """
     out, near = [], CLOSE * period
     for begin, end in cycle_spans(time, period):
@@ -45,11 +56,9 @@ def turns_of(time, slide, rate, force, period: float, jumps: bool = False) -> li
         for way in (-1, 1):
             at, value, share = _turn(time[part], way * slide[part], way * rate[part], near)
             at += part.start
-            if not jumps and share == 0.0 and at in (part.start, part.stop - 1):
+            if by != "jumps" and share == 0.0 and at in (part.start, part.stop - 1):
                 at, share = _crossed(way * rate, at, at == part.start)
-            pull = _beside(slide, force, at, way * value) if jumps else None if at is None else \
-                float(force[at] + share * (force[min(at + 1, len(force) - 1)] - force[at]))
-            pair.append(Turn(way * value, pull))
+            pair.append(Turn(way * value, None if at is None else _pull(way * slide, force, at, share, value, by)))
         out.append(tuple(pair))
     return out
 
@@ -80,6 +89,17 @@ def _crossed(v, at: int, first: bool) -> tuple:
     if 0 <= k < v.size - 1 and v[k] > 0 >= v[k + 1]:
         return k, float(v[k] / (v[k] - v[k + 1]))
     return None, 0.0
+
+
+def _pull(slide, force, at: int, share: float, value: float, by: str) -> float | None:
+    """Force [N] at a largest slide `value`, `share` of the way from sample `at` to the next; by: as `turns_of`."""
+    if by == "rate":
+        return float(force[at] + share * (force[min(at + 1, len(force) - 1)] - force[at]))
+    top = at + int(share > 0 and slide[at + 1] > slide[at])
+    if by == "jumps":
+        return _beside(slide, force, top, value)
+    rise = slide[top] - slide[at - 1] if share > 0 and at > 0 else 0.0
+    return float(force[top] + (force[top] - force[at - 1]) * (value - slide[top]) / rise if rise > 0 else force[top])
 
 
 def _beside(slide, force, at: int, value: float) -> float | None:

@@ -25,8 +25,8 @@ class Seen:
     energies of the whole run; load [N], None where nothing rubs; stiffness K [N/m] of the first mode as the contact
     meets it, 0 where no damping ratio refers to it; sine: the drive ends as a sine. loop: (slide (k,), first harmonics
     of slide and force, work per cycle [J]), None where the window holds no whole cycle (its slide is not read);
-    ledger (4, k) [J] or None; known: name -> value that the engine has itself, None where it has none. jumps: the
-    friction force jumps where the slide turns; still: half range of the slide [m] up to which it is round-off.
+    ledger (4, k) [J] or None; known: name -> value that the engine has itself, None where it has none. by: how
+    the force is read where the slide turns, as `loops.turns_of` takes it; still: half range of the slide [m] up to which it is round-off.
     """
 
     window: Response
@@ -40,7 +40,7 @@ class Seen:
     loop: tuple | None = None
     ledger: np.ndarray | None = None
     known: dict = field(default_factory=dict)
-    jumps: bool = False
+    by: str = "rate"
     still: float = 0.0
 
     @cached_property
@@ -53,7 +53,7 @@ class Seen:
     def turns(self) -> list:
         """(smallest, largest) Turn of the interface's slide in every whole cycle of the window."""
         w = self.window
-        return turns_of(w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.jumps)
+        return turns_of(w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.by)
 
     @cached_property
     def cycle(self) -> dict:

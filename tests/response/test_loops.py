@@ -126,16 +126,42 @@ def test_exact_secant_where_the_force_jumps(rest, fall):
     way = 1 - 2 * (turn % 2)
     slide = -way * np.cos(np.clip(part * pi / (pi - rest), 0, pi))
     force = np.where(part < pi - rest, way * np.where(part < pi / 2, 1.0, 1 - fall), way * 0.123)
-    turns = loops.turns_of(phase / OMEGA, slide, np.zeros(phase.size), force, PERIOD, True)
+    turns = loops.turns_of(phase / OMEGA, slide, np.zeros(phase.size), force, PERIOD, "jumps")
     assert loops.secant_stiffness(turns) * loops.half_range(turns) == pytest.approx(-fall / 2, abs=1e-12)
     assert loops.half_range(turns) == pytest.approx(1.0, abs=2e-4)  # samples alone, without rates
+
+
+@pytest.mark.parametrize("early", [0.1, 0.4, 0.7, 0.95])
+def test_exact_secant_where_a_cubic_overshoots_a_rest(early):
+    """A slide that stops inside a step: the cubic through its rates overshoots the rest, whose own force, 0.123, is
+    neither side of the jump. early: of a step, from the stop to the first sample at rest."""
+    phase = 2 * pi * (np.arange(3 * 400 + 1) + early) / 400 - 1.0 - np.mod(pi - 0.2 - 1.0, 2 * pi / 400)
+    turn, part = np.divmod(phase, pi)
+    way, angle = 1 - 2 * (turn % 2), part * pi / (pi - 0.2)
+    rate = np.where(angle < pi, way * np.sin(angle), -1e-18 * way) * pi / (pi - 0.2) * OMEGA
+    force = np.where(angle < pi, way * np.where(angle < pi / 2, 1.0, 0.6), way * 0.123)
+    turns = loops.turns_of(phase / OMEGA, -way * np.cos(np.minimum(angle, pi)), rate, force, PERIOD, "jumps")
+    assert loops.secant_stiffness(turns) * loops.half_range(turns) == pytest.approx(-0.2, abs=1e-9)
+
+
+@pytest.mark.parametrize("early", [0.05, 0.3, 0.5, 0.8])
+@pytest.mark.parametrize("length", [1e-4, 1e-3, 2.0])
+def test_exact_secant_of_a_reversal_that_no_step_resolves(length, early):
+    """A slider gives way over a length far below a step at the turn, and holds its limit there all the same; one that
+    holds has its own stiffness."""
+    phase = 2 * pi * (np.arange(3 * 100 + 1) + early) / 100
+    slide, force = np.sin(phase), np.zeros(phase.size)
+    for k in range(1, phase.size):
+        force[k] = np.clip(force[k - 1] + (slide[k] - slide[k - 1]) / length, -1, 1)
+    turns = loops.turns_of(phase / OMEGA, slide, OMEGA * np.cos(phase), force, PERIOD, "slide")
+    assert loops.secant_stiffness(turns) == pytest.approx(1 / max(1.0, length), rel=1e-6)
 
 
 def test_always_no_secant_without_slide_or_sides():
     time = np.linspace(0, PERIOD, 9)
     zero, force = np.zeros(9), np.arange(9.0)
-    assert loops.secant_stiffness(loops.turns_of(time, zero, zero, force, PERIOD, True)) is None
-    up = loops.turns_of(time, time, 1 + zero, force, PERIOD, True)  # both ends of the window are its turns
+    assert loops.secant_stiffness(loops.turns_of(time, zero, zero, force, PERIOD, "jumps")) is None
+    up = loops.turns_of(time, time, 1 + zero, force, PERIOD, "jumps")  # both ends of the window are its turns
     assert up[0][1].force is None and loops.secant_stiffness(up) is None
     assert loops.turns_of(time[:5], zero[:5], zero[:5], force[:5], PERIOD) == [] and loops.half_range([]) == 0.0
 

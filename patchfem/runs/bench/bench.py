@@ -5,8 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ...effects import has
-from ...response.loops import half_range, interface_loop, secant_stiffness, turns_of
+from ...response.loops import at_turns, half_range, interface_loop, secant_stiffness, turns_of
 from ...response.measures import harmonic, ledger_measures, step_harmonic, work_check
 from .closed import closed
 from .engine import CLOSED, STEPPED, Engine, engine_of
@@ -52,15 +51,11 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
     engine = engine_of(model, slide, 1 if patch is None else patch.x.size, watch.choice)
     out, more = _slid(model, patch, (time, slide), frames, engine, watch)
     values = _values(model, time, slide, out, first, omega) | \
-        {"work_check": work_check(out.ledger[0], [(slide, out.force), *more.pop("pairs", ())], _jumps(model))}
+        {"work_check": work_check(out.ledger[0], [(slide, out.force), *more.pop("pairs", ())],
+                                 at_turns(model) == "jumps")}
     span = time[-1]  # endless where a slide is endlessly slow
     rate = np.gradient(slide, time / span) / span if time.size > 2 else np.zeros(time.size)
     return BenchRun(time, slide, rate, *out, values, perf_counter() - begin, first, engine, **more)
-
-
-def _jumps(model) -> bool:
-    """Whether the force jumps where the slide turns: under a law without memory, and pieces that do not give way."""
-    return has(model.friction.law, "memoryless") and not model.soft
 
 
 def _slid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) -> tuple:
@@ -102,7 +97,7 @@ def _values(model, time, slide, out, first, omega) -> dict:
         weight[1:] += np.diff(t) / 2
         weight[:-1] += np.diff(t) / 2
         means = np.divide(np.diff(work[first:]), np.diff(q), out=(f[1:] + f[:-1]) / 2, where=np.diff(q) != 0)
-        turns = turns_of(t, q, np.zeros(t.size), f, t[-1] - t[0], _jumps(model))
+        turns = turns_of(t, q, np.zeros(t.size), f, t[-1] - t[0], at_turns(model))
         found |= interface_loop(half_range(turns), harmonic(t, weight, q - q.mean(), omega),
                                 step_harmonic(t, means, omega), work[-1] - work[first], 0.0)
         secant = secant_stiffness(turns)

@@ -14,6 +14,7 @@ from ...dynamics.second_book import gap, sampled_work
 from ...effects import has, module_of
 from ...friction.record import law_from
 from ...response import run_events
+from ...response.loops import at_turns
 from ...response.measures import window_amplitudes, window_ends
 from ...response.outcome import steady_of
 from ...response.rows import measures_of
@@ -59,12 +60,12 @@ def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=N
     book = _book(done)
     span = kept.time[-1] - kept.time[0]
     work = float(np.trapezoid(kept.force, kept.slide)) * drive.period / span if span > 0 else 0.0
-    spent, known, jumps = book["friction"], {}, False
+    spent, known, by = book["friction"], {}, "rate"
     if model.friction is not None:
         known["work_check"] = _work_check(response, book)
-        jumps = has(model.friction.law, "memoryless")
+        by = at_turns(model)
     values = measures_of(seen(model, patch, kept, extremes[-last:], book, n, loop=sampled_loop(kept, drive, work),
-                              ledger=np.array([[spent], [0.0], [spent], [0.0]]), known=known, jumps=jumps))
+                              ledger=np.array([[spent], [0.0], [spent], [0.0]]), known=known, by=by))
     stuck, own = False, {}
     if model.friction is not None:
         values |= other_measures(kept, drive, n)

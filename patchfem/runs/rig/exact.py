@@ -116,7 +116,7 @@ def _values(model, numerics, patch, drive, done) -> tuple:
         if not apart:  # the loop of strips is that of their samples
             known["work_check"] = _work_check(done)
     values = measures_of(seen(model, patch, window, extremes, done.ledger, 400, drive=drive, loop=loop, ledger=ledger,
-                              known=known, jumps=True))
+                              known=known, by="jumps"))
     if model.friction is None:
         return values, False
     if not apart:

@@ -10,6 +10,7 @@ from ...dynamics.second_book import gap
 from ...effects import has
 from ...response import run_events
 from ...response.ends import end_error
+from ...response.loops import at_turns
 from ...response.measures import peaks_between, step_harmonic, window_amplitudes, window_ends
 from ...response.outcome import steady_of
 from ...response.rows import measures_of
@@ -57,7 +58,6 @@ class Read:
             least = 1e-15 * peak_speed(rig.drive) * rig.drive.period
             self.held = least if contact.set_valued else 1e-3 * contact.length
             self.creeps = has(model.friction.law, "creeps")  # it never holds, nor sticks
-            self.jumps = has(model.friction.law, "memoryless") and not model.soft
             self.held *= not self.creeps
 
     def solution(self, done, seconds: float, prepare: dict) -> Solution:
@@ -104,7 +104,7 @@ class Read:
         energy = book["power"] + book["peak_stored"]
         known["work_check"] = gap(book["sampled"], book["booked"], book["passed"], energy)
         found = measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps, drive=drive,
-                                 loop=self._loop(part, drive), ledger=ledger, known=known, jumps=self.jumps,
+                                 loop=self._loop(part, drive), ledger=ledger, known=known, by=at_turns(self.model),
                                  still=self.held if self.contact.set_valued else 0.0))
         others = not self.model.rig.strips_slide_apart
         return found | (other_measures(part.window, drive, self.numerics.steps) if others else {})
