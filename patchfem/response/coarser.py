@@ -46,8 +46,8 @@ def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> t
 def left_open(kinds, errors, runs) -> dict:
     """What leaves the measures of a run open: errors by name under each of `kinds`, and the `orders` of the steps.
 
-    kinds: what each rung makes coarser; errors: by name, one dict per rung; runs: measures of the run, at half and at a
-    quarter of its steps, fewer where it has no steps.
+    kinds: what each rung makes coarser, "end" for a run that ends beside the asked end; errors: by name, one dict per
+    rung; runs: measures of the run, at half and at a quarter of its steps, fewer where it has no steps.
     """
     out: dict = {}
     for kind, part in zip(kinds, errors, strict=True):

@@ -45,9 +45,9 @@ def turns_of(time, slide, rate, force, period: float, by: str = "rate") -> list:
     """(smallest, largest) Turn of the slide of every whole cycle of a window, oldest first.
 
     time, slide, rate, force: (k,) samples [s, m, m/s, N]; period [s]. by: what the force there is: where it "jumps" the
-    mean of the values before and after the rest; where the "slide" makes it that of the sample of the largest slide, and
-    straight on along the slide; where its "rate" counts it is straight in time. The force is None where the slide is
-    largest at a border of the cycle and turns farther than a sample from it: the force there is not that of a turn.
+    mean of the values before and after the rest; where the "slide" makes it that of the sample of the largest slide,
+    and straight on along the slide; where its "rate" counts it is straight in time. The force is None where the slide
+    is largest at a border of the cycle and turns farther than a sample from it: the force there is not that of a turn.
     """
     out, near = [], CLOSE * period
     for begin, end in cycle_spans(time, period):

@@ -14,6 +14,7 @@ SHARED = 0.05  # of the slide, carried by another mode, from which no damping ra
 CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
 HOLDS = "the interface holds as a whole throughout the last cycles"
 UNBOUNDED = "no bounded motion exists at this drive"
+STILL = "the output stands still: the first harmonic of its acceleration is 0 within its floor"
 UNCLOSED = "the loop does not close: what the interface stores changes by more than it dissipates in the last " \
            "cycles; energy_dissipated is that of the whole run"
 
@@ -74,6 +75,8 @@ def _of_cycles(name: str, values, window, drive, beside: float) -> str:
         return "only a drive that ends as a sine has it"
     if not whole(window.time[-1] - window.time[0], drive):
         return "the run holds no whole cycle of the drive"
+    if name in ACCELERATIONS and ACCELERATIONS[0] in values:
+        return STILL
     if name in ACCELERATIONS:
         return "the output has no acceleration"
     if "equivalent_stiffness" not in values:

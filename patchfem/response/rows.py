@@ -14,7 +14,7 @@ from ..core import Response, Row
 from ..structure.drive_sizes import whole
 from .loops import drift, half_range, interface_loop, secant_stiffness, turns_of
 from .measures import acceleration_peak, energy_balance, ledger_measures, slip_measures
-from .spectrum import odd_harmonics, wave_measures
+from .spectrum import FLOOR, odd_harmonics, wave_measures
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,8 @@ class Seen:
     meets it, 0 where no damping ratio refers to it; sine: the drive ends as a sine. loop: (slide (k,), first harmonics
     of slide and force, work per cycle [J]), None where the window holds no whole cycle (its slide is not read);
     ledger (4, k) [J] or None; known: name -> value that the engine has itself, None where it has none. by: how
-    the force is read where the slide turns, as `loops.turns_of` takes it; still: half range of the slide [m] up to which it is round-off.
+    the force is read where the slide turns, as `loops.turns_of` takes it; still: half range of the slide [m] up to
+    which it is round-off.
     """
 
     window: Response
@@ -115,11 +116,12 @@ ROWS = (
     Row("energy_balance", "1", 1e-8,
         "work in that is neither stored nor dissipated over the run, over the power that passed and the peak stored",
         lambda s: energy_balance(s.book), group="energy", term=("1", lambda _: 1.0)),
-    Row("absolute_acceleration_fundamental", "m s-2", 1e-4,
+    Row("absolute_acceleration_fundamental", "m s-2", FLOOR,
         "first harmonic of the acceleration at the output, base motion included",
         lambda s: s.waves.get("absolute_acceleration_fundamental")),
     Row("acceleration_distortion", "1", 1e-6,
-        "third over first harmonic of the acceleration at the output, base motion included",
+        "third over first harmonic of the acceleration at the output, base motion included; without a value where the "
+        "output stands still",
         lambda s: s.waves.get("acceleration_distortion")),
     Row("drift_per_cycle", "m", 1e-11,
         "time mean of the slide in the last cycle less that in the first of the last cycles, per cycle between them",

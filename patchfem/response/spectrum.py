@@ -4,6 +4,7 @@ shows: a reading acts on what was computed and never on the model."""
 import numpy as np
 
 ROUND = 1e-12  # of the largest acceleration of the drive
+FLOOR = 1e-4  # of a first harmonic [m s-2], below which the output stands still
 READINGS = ("peak", "fundamental", "rms", "lowpass")
 HARMONICS = 64  # that a low pass is taken of
 SAMPLES = 1024  # of a cycle behind it
@@ -65,18 +66,19 @@ def odd_harmonics(window, drive) -> tuple:
 
 def wave_measures(first: float, third: float, size: float = 0.0) -> dict:
     """absolute_acceleration_fundamental [m s-2] and acceleration_distortion [1] by name, from the sizes of the first
-    and the third harmonic; the latter None where the first is round-off beside the drive's `size` [m s-2]."""
+    and the third harmonic; the latter None where `distorted` has no value; size: of the drive [m s-2]."""
     ratio = distorted(first, third, size)
     return {"absolute_acceleration_fundamental": float(first),
             "acceleration_distortion": None if np.isnan(ratio) else float(ratio)}
 
 
 def distorted(first, third, size):
-    """Third over first harmonic of an acceleration (3.4); NaN where the first is round-off beside the drive's `size`.
+    """Third over first harmonic of an acceleration (3.4); NaN where it is a ratio of zeros: the first is 0 within its
+    floor, or round-off beside the drive's `size`.
 
     first, third: sizes of the harmonics [m s-2]; all of them numbers or (n,).
     """
-    there = np.asarray(first) > ROUND * size
+    there = np.asarray(first) > np.maximum(ROUND * np.asarray(size), FLOOR)
     return np.where(there, third / np.where(there, first, 1.0), np.nan)[()]
 
 

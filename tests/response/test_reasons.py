@@ -1,4 +1,4 @@
-"""Why a run has no value of a measure: loops that do not close."""
+"""Why a run has no value of a measure: loops that do not close, a ratio of zeros."""
 
 from types import SimpleNamespace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import BaseSine, Measure, Segment
-from patchfem.response.reasons import UNCLOSED, unclosed
+from patchfem.response.reasons import STILL, UNCLOSED, unclosed
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -118,3 +118,14 @@ def test_exact_a_release_that_slides_keeps_its_loop():
     book = result.window.extra["ledger"]
     assert book[2, -1] - book[2, 0] > abs(book[1, -1] - book[1, 0])
     assert found["loop_area"].value == pytest.approx(book[0, -1] - book[0, 0], rel=1e-9)
+
+
+@pytest.mark.parametrize(("force", "there"), [("1e-9 N", False), ("1 N", True)])
+def test_exact_no_distortion_of_an_output_that_stands_still(force, there):
+    """The reversible motion behind 30 N of friction moves 1 kg by 8 mm/s^2 under 1 N, by nothing under a nanonewton."""
+    text = RELEASED.partition("[drive]")[0].replace("slide = 1.0", "slide = 1.0\nbase = 0.0") + \
+        f'[drive]\nkind = "force"\nforce = "{force}"\nfrequency = "80 Hz"\ncycles = 20\n'
+    found = run(loads(text)).measures
+    first, ratio = (found[name] for name in ("absolute_acceleration_fundamental", "acceleration_distortion"))
+    assert (ratio.value is not None) == there == (first.value > first.floor)
+    assert ratio.reason == ("" if there else STILL)

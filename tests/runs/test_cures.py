@@ -30,6 +30,7 @@ tolerance = 1e-2
 steps_per_cycle = {steps}
 """
 EVERY_TIME = 10, 18, 31, 33, 34, 45, 78, 89, 116, 117, 144, 150, 163, 175  # the cheapest, of every kind
+FAILED = 460, 482, 484, 725, 746  # of 500 more
 BOWED = """[contact.crown]
 radius = "100 m"
 """
@@ -40,7 +41,7 @@ def ran_text(text: str):
 
 
 @pytest.mark.share(*EVERY_TIME)
-@pytest.mark.parametrize("seed", range(200))
+@pytest.mark.parametrize("seed", [*range(200), *FAILED])
 def test_always_a_printed_remedy_does_what_it_promises(seed):
     """Followed to the letter it ends its warning, or makes the bar it names half as wide, three quarters where it
     promises no more than to refine."""
@@ -143,8 +144,8 @@ def test_exact_the_ringing_of_a_start_is_no_dissipation():
 def test_always_a_ring_that_steps_do_not_resolve_is_followed_without_them():
     """800 steps of a cycle are few for a ring of 88 periods in it: the exact engine is advised, and cures it."""
     loose = "[accuracy]\ntolerance = 0.3\n"
-    first = ran_text(JOINT_SHAKEN + loose)
+    first = ran_text(JOINT_SHAKEN + loose + 'method = "march"\n')
     assert first.extra["engine"] == "march" and 'accuracy.method = "exact"' in first.warnings[0]
     again = ran_text(JOINT_SHAKEN + loose + 'method = "exact"\n')
-    bars = [one.measures["secant_stiffness"].error for one in (first, again)]
+    bars = [one.measures["equivalent_damping"].error for one in (first, again)]
     assert bars[1] < bars[0] / 10

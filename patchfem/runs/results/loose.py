@@ -1,8 +1,9 @@
 """Warnings of measures that are known less well than the tolerance asks: the worst one, how well, and what cures it."""
 
-from math import ceil, log2, log10
+from math import ceil, log2, log10, pi
 
 from ...core import say
+from ...effects import has
 from .patch_rows import DECISIVE, TABLE
 
 MOST = 1e9  # times that an error exceeds what is allowed, beyond which it does not matter
@@ -11,11 +12,12 @@ MOST_HALVINGS = 4  # of the steps, as far ahead as an order seen at two of them 
 LEAST_LEFT = 0.2  # share of an allowed error that steps may be asked to meet, where the mesh takes more than the rest
 FARTHEST = 8  # of the steps, that are named at once where no engine without steps serves
 MORE, LEAST = 4, 31  # times the harmonics of a balance, and harmonics, that are proposed
+MOST_HARMONICS = 500  # that are proposed at once
 MOST_STRIPS = 64  # that are proposed: four times the strips are some twenty times the time
 SIZE = "contact.element_size"  # an even mesh finds the ends of a contact at first order, one that is chosen at second
 OF_PEAK = ("pressure_peak", "loaded_fraction")
 OF_SAMPLES = ("stick_fraction", "slip_start_phase")  # of a cycle of a balance, however many harmonics it has
-OF = {"acceleration_distortion": "absolute_acceleration_fundamental"}  # what a share is one of
+RINGS = "ring_"  # measures of a ring beside the motion, which an engine without steps need not have
 READ = "no setting is known to make it better; read it by its error"
 # what a run answers first, named before what misses its tolerance by more
 FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_ratio_peak",
@@ -44,7 +46,8 @@ def _first(result, wide: dict) -> list:
     """Those of FIRST among `wide` (name -> error over what is allowed) that are not 0 within it, else the worst."""
     known = result.measures
     out = [name for name in FIRST if name in wide and known[name].error < abs(known[name].value)]
-    return out or [max(wide, key=wide.get)]
+    asked = {name: times for name, times in wide.items() if not name.startswith(RINGS)} or wide
+    return out or [max(asked, key=asked.get)]
 
 
 def _said(result, wide: dict, remedy: str) -> str:
@@ -68,6 +71,10 @@ def _finer_mesh(result, wide: dict, coarse) -> str:
     """
     asked, tolerance = result.plan.model.patch, result.plan.model.accuracy.tolerance
     times = max(wide.values())
+    peak = result.measures.get("pressure_peak")
+    if "worn_depth_max" in _first(result, wide) and peak is not None and peak.value is None:
+        return "it wears deepest where the pressure has no bound, so a finer mesh is not known to settle it; read it " \
+               "by its error"
     if times >= MOST:
         return READ  # it is 0
     if asked.mesh is not None:
@@ -120,11 +127,11 @@ def _finer_motion(result, wide: dict, coarse) -> str:
     name = max(_first(result, wide), key=wide.get)
     if name in (rings := result.extra.get("still_rings", {})):
         return rings[name]
-    if (of := result.measures.get(OF.get(name))) is not None and of.value is not None and abs(of.value) <= of.floor:
-        return f"it is a share of {OF[name]}, which is 0 within its floor; read it by its error"
     steps, cause = result.extra.get("steps_per_cycle") or result.extra.get("steps"), _cause(result, name)
     if cause == "steps" and steps is not None:
         return _more_steps(result, name, wide, int(steps))
+    if cause == "end":
+        return _to_a_sample(result.extra["cycles"], int(steps))
     if cause == "mesh":
         return _finer_under(result, coarse)
     if cause == "modes" and result.extra["shear_modes"] < result.patch.x.size:
@@ -132,11 +139,12 @@ def _finer_motion(result, wide: dict, coarse) -> str:
     if cause == "bonds":
         return _finer_bonds(result.plan.model.accuracy)
     balanced = result.extra.get("harmonics")  # None where a steady motion is exact between yields
-    return READ if balanced is None or name.startswith(OF_SAMPLES) else more_harmonics(balanced)
+    return READ if balanced is None or name.startswith(OF_SAMPLES) else \
+        more_harmonics(balanced, _sharp(result))
 
 
 def _cause(result, name: str) -> str:
-    """What leaves most of a measure open: one of the kinds of `response.coarser.Rung`."""
+    """What leaves most of a measure open: one of the kinds of `response.coarser.left_open`."""
     extra = result.extra
     if (left := extra.get("left_open")) is None:  # a batch, which has no steps, or a run without an estimate
         return "steps" if extra.get("steps_per_cycle") or extra.get("steps") else \
@@ -156,8 +164,15 @@ def _more_steps(result, name: str, wide: dict, steps: int) -> str:
     allowed = (of_steps + rest) / wide[name]
     share = of_steps / max(allowed - rest, LEAST_LEFT * allowed)  # by which that of the steps is to fall
     halvings = max(1, ceil(log2(share) / order))
-    exact = _stepless(model) if halvings > MOST_HALVINGS else ""
+    exact = _stepless(model) if halvings > MOST_HALVINGS and not name.startswith(RINGS) else ""
     return exact or f"set accuracy.steps_per_cycle = {steps * 2**min(halvings, FARTHEST)}"
+
+
+def _to_a_sample(cycles: float, steps: int) -> str:
+    """As many steps, up to twice as many, as end a run of so many cycles closest to the end that was asked for; they
+    have a half and a quarter."""
+    found = min(range(4 * ceil(steps / 4), 2 * steps + 4, 4), key=lambda n: abs(cycles * n - round(cycles * n)))
+    return f"the run ends between two samples; set accuracy.steps_per_cycle = {found}, which has one nearer to its end"
 
 
 def _finer_bonds(accuracy) -> str:
@@ -167,9 +182,20 @@ def _finer_bonds(accuracy) -> str:
         f"accuracy.tolerance = {TIGHTER * accuracy.tolerance:.3g} refines the sum over bonds"
 
 
-def more_harmonics(found: int) -> str:
-    """The harmonics that make a balance of so many better; few of them say little of how it converges."""
-    return f"set accuracy.harmonics = {max(MORE * found, LEAST)}"
+def more_harmonics(found: int, sharp: float = 0.0) -> str:
+    """The harmonics that make a balance of so many better; few of them say little of how it converges.
+
+    sharp: how many the friction itself asks for.
+    """
+    return f"set accuracy.harmonics = {max(MORE * found, LEAST, min(ceil(sharp), MOST_HARMONICS))}"
+
+
+def _sharp(result) -> float:
+    """Harmonics that show how fast a friction turns that follows the speed: the largest speed over that of the law."""
+    law, slip = result.plan.model.friction, result.measures.get("slip_amplitude")
+    if law is None or slip is None or not has(law.law, "creeps"):
+        return 0.0
+    return 2 * pi / result.extra["period"] * slip.value / law.reference_speed
 
 
 def _unproven(model, steps: int, name: str, wide: dict) -> str:

@@ -68,7 +68,8 @@ class Read:
             if not self.creeps:
                 rings, own = run_events.rings(done.window, rig.modes, rig.drive, None, self.held)
             stuck = run_events.all_stick(done.window, self.held) and not self.creeps
-        own = own | self.between(done.window)
+        late, between = self.late(done.window), self.between(done.window)
+        own = own | {name: late.get(name, 0.0) + between.get(name, 0.0) for name in late | between}
         last = min(window, len(done.amplitudes))
         values = self.values(done, done.amplitudes[-last:], done.response.extra.get("ledger"), stuck) | rings
         levels, probe = self._levels(done) if rig.levels else ((), None)
@@ -77,14 +78,17 @@ class Read:
         return Solution(values, done.response, done.window, window_amplitudes(done.amplitudes, window),
                         steady_of(rig.drive, *ends), outcome, done.snapshots, done.ledger, seconds, self.contact,
                         prepare, done.message, levels, probe, held=self.held, own=own, summed=self.summed(),
-                        extremes=done.amplitudes)
+                        extremes=done.amplitudes, extra={"late": late})
 
     def between(self, window) -> dict:
-        """What the peaks of a run may lie above its samples, and what its end at a sample leaves open, by name."""
-        found, steps = peaks_between(window, self.model.grooves is not None), self.numerics.cycles * self.numerics.steps
-        late = end_error(window, self.model.rig.drive.period, steps - round(steps))
-        late = {name: LATE * error for name, error in late.items()}
-        return late | {name: error + late.get(name, 0.0) for name, error in found.items()}
+        """What the peaks of a run may lie above its samples, by name."""
+        return peaks_between(window, self.model.grooves is not None)
+
+    def late(self, window) -> dict:
+        """What the end of a run at a sample leaves open, by name."""
+        steps = self.numerics.cycles * self.numerics.steps
+        found = end_error(window, self.model.rig.drive.period, steps - round(steps))
+        return {name: LATE * error for name, error in found.items()}
 
     def summed(self):
         """How the bonds are summed, a Choice; None of a law that is no sum."""

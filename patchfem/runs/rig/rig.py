@@ -234,7 +234,9 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
             if spent:
                 seconds["error"] = spent
             runs = [found.values, *(made[one].values for one in _halved(engine, model, numerics, patch))]
-            left = left_open([one.of for one in (*rungs, *meshed)], [*time, *space], runs)
+            late = [one for one in (found.extra.get("late"),) if one]
+            kinds = [*(one.of for one in (*rungs, *meshed)), *["end"] * len(late)]
+            left = left_open(kinds, [*time, *space, *late], runs)
             found = replace(found, extra=found.extra | {"left_open": left})
             return found, numerics, measures | curve_measures(found.extra)
         made[Variant(numerics, patch)] = found

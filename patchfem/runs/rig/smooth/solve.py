@@ -42,8 +42,10 @@ class _Smooth(Read):
     """The measures of a run of high order: what the integrator knows comes before what samples show."""
 
     def between(self, window) -> dict:
-        """{}: peaks are looked for inside the steps."""
+        """{}: peaks are looked for inside the steps, and it ends where it is asked to."""
         return {}
+
+    late = between
 
     def summed(self):
         """None: no list of bonds."""
