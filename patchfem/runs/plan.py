@@ -90,7 +90,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
         unknowns, chain = of_patch.sizes(grids) | unknowns, chain | of_patch.chain(model.patch)
         seconds, pressed = of_patch.effort(model.patch, grids, tolerance)
         groups |= of_patch.groups(model)
-        said[1] = of_patch.verdict(groups)
+        said[1] = of_patch.verdict(groups, model.patch)
     if model.rig is not None:
         engine, steps, more = of_rig.cost(model, per_point, unknowns)
         seconds, numerics = seconds + more, choose(model, per_point)
@@ -124,7 +124,9 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: list) -> list:
         out.append(f"run will refuse: {text}")
     out += [*said[1], *said[2]]
     if "slip_length" in groups:
-        out.append(f"the pieces shear elastically by about {say(groups['slip_length'], 3)} before the patch slips")
+        about = f"by about {say(groups['slip_length'], 3)} before the patch slips"
+        out.append(f"the pieces shear elastically {about}" if model.patch.shear else
+                   f"the pieces are rigid in shear here; elastic ones give way {about}, which [contact.shear] adds")
     if model.kind == "rig" and model.soft and model.rig.load_varies:
         out.append(f"{model.soft} by tangential modes of all nodes, as the load changes with the motion; half as many "
                    "check them")

@@ -198,3 +198,8 @@ def test_refuses_with_the_key_that_was_meant(tmp_path):
     assert bare.code == 2 and "acceleration: unknown key; did you mean 'drive.acceleration'?" in bare.err
     lost = cli("help")
     assert lost.code == 2 and "`patchfem --help`" in lost.err and "`patchfem run --help`" in lost.err
+
+
+def test_exact_a_second_interface_reads_in_the_units_of_the_first():
+    one = {"value": 1.0, "error": 0.0, "unit": "1"}
+    assert pair("stick_fraction_2", one) == pair("stick_fraction", one) == "100 %"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from any_mesh_cases import FORMATS, drawn
 from command_line import cli
-from scene_texts import COATED, COULOMB, MODE, NONLOCAL, PIECE, POINT, SHEAR
+from scene_texts import COATED, COULOMB, MODE, NONLOCAL, PIECE, POINT, SHEAR, SLIDE
 
 from patchfem.core import NotConverged, Outcome, PatchfemError
 from patchfem.mesh.files import EDGE_TAGS
@@ -213,3 +213,21 @@ def test_refuses_an_approach_on_a_soft_holder_and_takes_it_on_a_stiff_one():
         ran(TURNING + LINE.format(5) + holder.format(1), False)
     found = ran(TURNING + LINE.format(5) + holder.format(1e7), False)
     assert found.measures["approach"].value == pytest.approx(2e-7, rel=1e-9)
+
+
+@pytest.mark.parametrize("tilt, more", [
+    (10, ""), (1, ""), (20, ""), (1, '[contact.crown]\nradius = "1 m"\n'),
+    (1, '[contact.step]\nheight = "1 um"\nat = "0 mm"\n')])
+def test_always_a_plan_calls_no_contact_full_that_is_not(tilt, more):
+    """At 10 urad bars still touch all over, elastic pieces on 94 %; a crown leaves 6 %."""
+    text = COATED.replace('element_size = "0.5 mm"\n', "") + f'[contact.tilt]\nangle = "{tilt} urad"\n{more}'
+    scene = loads(text, "a.toml", ["accuracy.tolerance=1e-2"])
+    whole = any(text.endswith("full contact") for text in plan(scene).verdict)
+    assert whole == (run(scene).measures["contact_fraction"].value == 1.0)
+
+
+def test_exact_a_plan_says_which_pieces_are_rigid_in_shear():
+    rigid, soft = (plan(loads(COATED + more + COULOMB + SLIDE, "a.toml")) for more in ("", SHEAR))
+    assert rigid.chain["pieces_shear"] == "rigid" and soft.chain["pieces_shear"] != "rigid"
+    assert any(text.endswith("which [contact.shear] adds") for text in rigid.verdict)
+    assert any(text.startswith("the pieces shear elastically") for text in soft.verdict)

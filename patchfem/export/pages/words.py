@@ -40,9 +40,10 @@ def units(name: str, value: float, unit: str, error: float | None = None) -> lis
 
     value, error and unit: in SI; value times scale is in the unit.
     """
-    if name.endswith("fraction"):
+    kind = re.sub(r"_\d+$", "", name)  # of an interface after the first
+    if kind.endswith("fraction"):
         return [("%", 100.0)]
-    if name.endswith("phase"):
+    if kind.endswith("phase"):
         return [DEG]
     if unit == "m s-2":
         return [("g", 1 / G)]

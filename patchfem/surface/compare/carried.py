@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import say
+from ...scales import plain
 from ..profile import runs_of
 from .quantity import SIDE, Quantity, refused
 from .registration import REACH, Registration
@@ -118,10 +119,11 @@ def told(by: Carried) -> str:
 def may_hide(found: Registration, hidden: Quantity) -> str:
     """What may hide where nothing carries the registration, and what would settle it, as a sentence."""
     bow = f" A bow of {say(abs(found.bend), 3)}, taken out, may be a bent datum or wear as well." if found.bend else ""
+    tilt, most = (plain(1e6 * one, 3) for one in (abs(found.slope), 2 * hidden.value / float(found.x[-1] - found.x[0])))
     return ("Even wear of any depth would look the same, and so would a wedge that the mounting turned back; the tilt "
-            f"of {1e6 * abs(found.slope):.3g} urad between the traces may itself be up to {say(hidden.value, 3)} of "
-            f"wear in the mean, half of it times the length.{bow} Only an unworn flank beside the rubbed part, or a "
-            "reference mark, in both traces would settle it.")
+            f"of {tilt} urad between the traces, up to {most} urad by its interval, may itself be up to "
+            f"{say(hidden.value, 3)} of wear in the mean, half of it times the length.{bow} Only an unworn flank "
+            "beside the rubbed part, or a reference mark, in both traces would settle it.")
 
 
 def median_of_five(rest) -> np.ndarray:

@@ -3,6 +3,8 @@
 Of `known_pairs` the rules were set on seeds 41000 to 41019, of `worn_kinds` on seeds 0 to 8 and 1000 to 1040.
 """
 
+import re
+
 import known_pairs
 import numpy as np
 import pytest
@@ -86,6 +88,9 @@ def test_exact_even_wear_has_no_limit_and_the_tilt_is_half_its_length_of_wear():
     assert one.hidden.value == pytest.approx((tilt + (one.tilt.high - one.tilt.low) / 2) * length / 2, rel=1e-9)
     text = verdicts([one])[1][0]
     assert "at most" not in text and "Even wear of any depth" in text and "reference mark" in text
+    found = re.search(r"up to ([\d.]+) urad by its interval, may itself be up to ([\d.]+) ([un])m", text)
+    said, hidden, unit = found.groups()
+    assert float(said) * 1e-6 * length / 2 == pytest.approx(float(hidden) * {"u": UM, "n": 1e-9}[unit], rel=0.01)
 
 
 def test_exact_a_spike_is_found_with_its_feet_and_a_groove_stays():
