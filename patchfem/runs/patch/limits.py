@@ -23,11 +23,6 @@ class Limit(NamedTuple):
     extrapolated: float
     left: float
 
-    def best(self, wanted: float) -> tuple:
-        """(value, error): that of the finest mesh where its error is at most `wanted`, else the narrower of the two."""
-        return (self.value, self.error) if self.error <= wanted or self.error <= self.left else \
-            (self.extrapolated, self.left)
-
 
 def edge_limit(values, nested: bool = True) -> Limit:
     """`limit` of a value that hangs on where edges lie between nodes.

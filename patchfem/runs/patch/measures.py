@@ -100,12 +100,13 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     series, mine = [one for one in coarse if one is not None], values(fine)
     if not series:
         return _bounded(_unbounded(fine), combined([mine], {}))
-    missed_peak = unresolved_rounding(fine)
+    missed_peak, series = unresolved_rounding(fine), _alike(fine, series)
     found = [values(one) for one in reversed(series)]
-    nested = all(halved(a.pair, b.pair) for a, b in pairwise((fine, *series)))
+    nested = all(halved(a.pair, b.pair) and _stretches(a) == _stretches(b) for a, b in pairwise((fine, *series)))
     rough = 2.0 if missed_peak else 1.0  # of meshes that pass over a rounding none shows what it does
     least = least_of(_hidden(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
-    out = combined([*found, mine], least, nested, tolerance, max(ALIKE, fine.pair.rounding), rough)
+    edged = tuple(mine) if fine.jumps else EDGED
+    out = combined([*found, mine], least, nested, tolerance, max(ALIKE, fine.pair.rounding), rough, edged)
     sigma = fine.pressure.sigma_n if fine.strips is None else fine.strips.pressure.max(axis=0)
     if 0 < (top := int(np.argmax(sigma))) < sigma.size - 1:
         out = reaching(out, float(sigma[top]))
@@ -115,6 +116,21 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
         if error < out[name].error:
             out[name] = replace(out[name], value=value, error=error)
     return _bounded(_unbounded(fine), out)
+
+
+def _alike(fine: Patch, series: list) -> list:
+    """Of the coarser patches, fine to coarse, those whose contact falls into as many stretches beside a step as that of
+    the finest, from it on, two at least: another stretch says nothing of how the others settle."""
+    count = 0
+    while count < len(series) and _stretches(series[count]) == _stretches(fine):
+        count += 1
+    return series[:max(count, 2)]
+
+
+def _stretches(patch: Patch) -> tuple:
+    """How many stretches bear, of a patch beside a step and of its two parts; () of others."""
+    parts = [patch.active, *(one.active for _, one in patch.either)] if patch.jumps and patch.strips is None else []
+    return tuple(int(np.count_nonzero(np.diff(bears.astype(int)) > 0) + bears[0]) for bears in parts)
 
 
 def _cornered(found: dict, fine: Patch, coarse: Patch) -> dict:
@@ -133,11 +149,12 @@ def _cornered(found: dict, fine: Patch, coarse: Patch) -> dict:
 
 
 def combined(series: list, least: dict, nested: bool = True, tolerance: float | None = None, alike: float = ALIKE,
-             rough: float = 1.0) -> dict:
+             rough: float = 1.0, edged: tuple = EDGED) -> dict:
     """Measures by name from their values on meshes, coarse to fine, each a dict by name.
 
     least: errors that the meshes may agree to hide; nested, tolerance: as `measures` has them; alike: relative error
-    that stays; rough: factor of the errors. Without a coarser mesh there are no errors, without a load they are 0.
+    that stays; rough: factor of the errors; edged: names of what hangs on edges. Without a coarser mesh there are no
+    errors, without a load they are 0.
     """
     mine, floors, out = series[-1], _floors(), {}
     if len(series) == 1 or not mine["normal_load"] > 0:
@@ -146,7 +163,7 @@ def combined(series: list, least: dict, nested: bool = True, tolerance: float | 
     for name, value in mine.items():
         wanted = np.inf if tolerance is None else tolerance * abs(value) + floors[name]
         known, hidden = [one[name] for one in series], least.get(name, 0.0)
-        limited = partial(edge_limit if name in EDGED else limit, nested=nested)
+        limited = partial(edge_limit if name in edged else limit, nested=nested)
         best, error = _best(limited, known, wanted, hidden, rough)
         out[name] = Measure(float(best), TABLE[name].unit, float(max(error, alike * abs(value))), floors[name])
     if mine["pressure_peak"] > 0:
@@ -157,21 +174,23 @@ def combined(series: list, least: dict, nested: bool = True, tolerance: float | 
 def _best(limited, known: list, wanted: float, hidden: float, rough: float) -> tuple:
     """(value, error) of the values `known` on meshes, coarse to fine, by `limited`, their `limit`.
 
-    It is that of fewer meshes where their error is smaller and holds it, so that no further mesh widens a bar. hidden:
-    least error on the finest mesh, which falls with its cells; rough: factor of the others.
+    It is that of fewer meshes where their error is smaller and holds the finest, so that no further mesh widens a bar.
+    hidden: least error on the finest mesh, which falls with its cells; rough: factor of the others.
     """
-    def of(count: int) -> tuple:
-        seen = limited(known[:count])
-        best, error = seen.best(wanted)
-        twice = EXTRAPOLATED if best != seen.value else 1.0
-        return best, max(rough * error, twice * hidden * 2.0**(len(known) - count))
+    def of(count: int) -> list:
+        seen, hides = limited(known[:count]), hidden * 2.0**(len(known) - count)
+        twice = EXTRAPOLATED if seen.extrapolated != seen.value else 1.0
+        plain = seen.value, max(rough * seen.error, hides)
+        further = seen.extrapolated, max(rough * seen.left, twice * hides)
+        return [plain] if plain[1] <= wanted else [plain, further]
 
-    value, error = of(len(known))
-    for count in range(3, len(known)):
-        other, narrower = of(count)
-        if narrower < error and abs(value - other) <= narrower:
-            value, error = other, narrower
-    return value, error
+    def width(one: tuple) -> float:
+        return one[1]
+
+    value, error = min(of(len(known)), key=width)
+    others = [one for count in range(3, len(known)) for one in of(count)
+              if abs(known[-1] - one[0]) <= one[1]]
+    return min([(value, error), *others], key=width)
 
 
 def met(found: dict, tolerance: float) -> bool:
@@ -247,7 +266,7 @@ class Hidden(NamedTuple):
     length [m]; count: nodes in contact; cells: lengths [m] of those in which the contact ends; offset: cells by which
     an edge may lie off; turns: the rotation is free; spread: range of the gap and largest elastic closing [m]; corner,
     wedge, missed: pressures [Pa] at loaded corners of a coating, beside a contact of few nodes, of a rounding that is
-    passed over; open_ends [m] of rounded faces; skin: it is smooth.
+    passed over; open_ends [m] of rounded faces; skin: it is smooth; between [m]: of cells, those between two stretches.
     """
 
     length: float
@@ -261,11 +280,13 @@ class Hidden(NamedTuple):
     missed: float = 0.0
     open_ends: float = 0.0
     skin: bool = False
+    between: float = 0.0
 
 
 def _hidden(patch: Patch, missed_peak: float) -> Hidden:
     """The Hidden of a Patch under load; missed_peak [Pa]: `unresolved_rounding`."""
     cells, count = edge_cells(patch.x, patch.active), max(int(patch.active.sum()), 1)
+    first, last = ~patch.active[[0, -1]]
     moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
     corner = 0.0 if patch.pieces is not patch.pair.compliance else \
         corner_layer(patch.pair, patch.pressure.sigma_n[[0, -1]], np.diff(patch.x)[[0, -1]])  # a skin evens it out
@@ -273,7 +294,7 @@ def _hidden(patch: Patch, missed_peak: float) -> Hidden:
                   offset(patch.pair, cells.max(initial=0.0)), "moment_balance" in patch.pressure.residuals,
                   float(np.ptp(patch.gap) + moved), corner,
                   _wedge(patch) if count <= POINT and cells.any() else 0.0, missed_peak, float(open_ends(patch)),
-                  patch.skin is not None)
+                  patch.skin is not None, float(cells[int(first):cells.size - int(last)].sum()))
 
 
 def least_of(hidden: Hidden, mine: dict) -> dict:
@@ -291,9 +312,10 @@ def least_of(hidden: Hidden, mine: dict) -> dict:
     fullness = mine["loaded_fraction"] / mine["pressure_peak"] if mine["pressure_peak"] else 0.0
     # an edge of a contact of few nodes lies anywhere in its cell
     near = max(hidden.offset, 1.0 if count <= POINT else 1 / count**2)
-    off = (0.0 if hidden.skin else near * sum(cells)) + hidden.open_ends
+    near *= not hidden.skin
+    off, outer = (near * cells_of + hidden.open_ends for cells_of in (sum(cells), sum(cells) - hidden.between))
     return {"normal_load": 1e-10 * load, "pressure_peak": peak, "contact_fraction": off / length,
-            "contact_half_width": off / 2, "loaded_fraction": peak * fullness,
+            "contact_half_width": outer / 2, "loaded_fraction": peak * fullness,
             "pressure_centre": ROUND * length + aside, "moment": (ROUND * length + aside) * load,
             "rotation": turned / length, "approach": ROUND * hidden.spread}
 
