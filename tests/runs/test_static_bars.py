@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scene_texts import PIECE
@@ -10,8 +13,13 @@ from static_scenes import KINDS, above, drawn, judged, line, missed, text_of, wi
 
 import patchfem as pf
 from patchfem.contact import edges
+from patchfem.model.model import build
+from patchfem.model.pieces import bodies_of
+from patchfem.runs.patch.condensed import condensed
 from patchfem.runs.patch.limits import edge_limit, limit
+from patchfem.runs.patch.press import pressed, zigzags
 from patchfem.runs.patch.values import peak_pressure
+from patchfem.scene.scene import loads
 
 TITANIUM = 'substrate = {young = "120 GPa", poisson = 0.32, density = "4370 kg/m^3"}\n'
 NARROW = '[contact]\nlength = "40 mm"\nwidth = "1 m"\nheight = "20 mm"\nload = "9100 N"\n' + TITANIUM + \
@@ -155,3 +163,27 @@ def test_always_the_bar_of_a_single_jump_holds_the_worn_peak():
     """Hertz worn in one jump: 39.4 MPa where 30.6 MPa are left (19 jumps); the bar was 7.7 MPa."""
     worn = pf.run(WORN).measures["pressure_peak"]
     assert abs(worn.value - 30.56e6) <= worn.error <= 0.5 * worn.value
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 0.067])
+def test_exact_a_zigzag_is_the_share_of_the_pressure_that_alternates(amplitude):
+    x, turns = np.cumsum(1.1 ** np.arange(30.0)), (-1.0) ** np.arange(30)
+    assert zigzags(x, 1 + 0 * x) <= 1e-12 and zigzags(x, np.sqrt(1 - np.linspace(-1, 1, 30)**2)) == 0
+    assert zigzags(x, 1 + amplitude * turns) == pytest.approx(amplitude / (1 + amplitude), abs=1e-12)
+
+
+@pytest.mark.parametrize("worn, said", [(0.0, 0), (4e-9, 1)])
+def test_a_ripple_is_said_where_the_pressure_zigzags(worn, said):
+    """One join, which is expected to ripple by 6.7 %: a smooth pressure has none, one on alternating nodes has."""
+    asked = build(loads(PIECE + 'load = "2000 N"\nelement_size = "0.5 mm"\n' + TITANIUM)).patch
+    pair = condensed(asked, *bodies_of(asked))
+    pair = replace(pair, joint=SimpleNamespace(ripple=0.067, reason="is expected to ripple by 6.7 %"))
+    patch = pressed(asked, pair, worn * (-1.0) ** np.arange(pair.compliance.interface.x.size))
+    assert [text for text in patch.notes if "ripple" in text] == said * ["contact.mesh: is expected to ripple by 6.7 %"]
+
+
+def test_no_tighter_tolerance_is_offered_against_what_a_poisson_ratio_leaves():
+    """It was 1e-5, which left the peak at 2e-4."""
+    stiff = PIECE + 'load = "100 N"\n' + TITANIUM.replace("0.32", "0.49") + '[contact.crown]\nradius = "1 m"\n'
+    (text,) = [text for text in pf.run(stiff, **{"accuracy.tolerance": 1e-4}).warnings if "is known to" in text]
+    assert "Poisson" in text and "refines" not in text

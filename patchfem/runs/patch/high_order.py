@@ -86,13 +86,13 @@ def sharper(asked, patch, enough) -> dict:
         if not _apart(edges):
             break
         if len(series) >= LEAST_LEVELS:
-            found = summed(series, _locked(asked))
+            found = summed(series, locked(asked))
             if enough(found):
                 break
-    return summed(series, _locked(asked)) if len(series) >= LEAST_LEVELS else {}
+    return summed(series, locked(asked)) if len(series) >= LEAST_LEVELS else {}
 
 
-def _locked(asked) -> float:
+def locked(asked) -> float:
     """Relative error that a Poisson's ratio near 0.5 leaves in plane strain, whatever the changes show."""
     layers = [layers_of(asked, piece) for piece in (asked.lower, asked.upper)]
     ratios = [nu for one in layers for _, nu in (one.coating, one.substrate)]

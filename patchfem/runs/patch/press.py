@@ -11,7 +11,7 @@ from ...core import Compliance, Pressure, frozen_array
 from .approach import closed_by
 from .condensed import Pair, condensed
 
-RIPPLE = 1e-2  # expected ripple of the pressure on pieces whose nodes do not match, from which it is said
+RIPPLE = 1e-2  # of the pressure on pieces whose nodes do not match, expected and found, from which it is said
 
 
 @dataclass(frozen=True, eq=False, slots=True, weakref_slot=True)
@@ -86,9 +86,9 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
     x = pair.compliance.interface.x
     gap, notes, seconds = asked.gap.at(x)
     gap = gap + pair.rise if worn is None else gap + pair.rise + worn
-    if pair.joint is not None and pair.joint.ripple > RIPPLE:
-        notes = (*notes, f"contact.mesh: {pair.joint.reason}")
     rim, out = asked.gap.rim(x), _on(asked, pair, gap, notes, seconds)
+    if pair.joint is not None and pair.joint.ripple > RIPPLE and zigzags(out.x, out.pressure.sigma_n) > RIPPLE:
+        out = replace(out, notes=(*notes, f"contact.mesh: {pair.joint.reason}"))
     if not rim.any():
         return out
     # a set ends half a cell less `behind` beyond its last node: the two ends lie about the step by these shares
@@ -97,6 +97,17 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
     lean = bare * edges.behind(1.0 if pair.row is None else pair.row / float(np.diff(x[node - 1:node + 2]).min()))
     return replace(out, either=tuple((0.5 - side * lean, _on(asked, pair, gap + side * rim, notes, seconds))
                                      for side in (-1, 1)))
+
+
+def zigzags(x, sigma) -> float:
+    """Largest zigzag of pressures sigma (m,) [Pa] at x (m,) [m] over their peak: of three loaded nodes in turn above,
+    below and above the line through their neighbours, or the other way round, half of the least distance."""
+    share = np.diff(x)[:-1] / (x[2:] - x[:-2])
+    off = sigma[1:-1] - (1 - share) * sigma[:-2] - share * sigma[2:]
+    three = np.stack([off[:-2], -off[1:-1], off[2:]])
+    bears = np.min([sigma[k:sigma.size - 4 + k] for k in range(5)], axis=0, initial=np.inf) > 0
+    alike = bears & ((three > 0).all(axis=0) | (three < 0).all(axis=0))
+    return float(np.abs(three[:, alike]).min(axis=0).max(initial=0.0) / 2 / sigma.max(initial=1e-300))
 
 
 def _on(asked, pair: Pair, gap, notes: tuple, seconds: dict) -> Patch:

@@ -86,12 +86,22 @@ def _finer_mesh(result, wide: dict, coarse) -> str:
         return f"leave out {SIZE}"
     if not wide.keys() - set(DECISIVE):
         return f"a mesh finer than {nodes} interface nodes would take too long; {wider}"
+    if asked.chosen and _locks(result, wide):
+        return "cells of any mesh leave that in plane strain at this Poisson's ratio; read it by its error"
     tighter = _climbing(result, coarse)
     if tighter is None:
         finer = f"points closer than {say(result.patch.averaging, 3)}" if result.patch.averaging and \
             result.patch.sharper else f"a mesh finer than {nodes} interface nodes"
         return f"{finer} would take too long; read {'them by their errors' if len(wide) > 1 else 'it by its error'}"
     return f"the mesh ({nodes} interface nodes) was not chosen for it; accuracy.tolerance = {tighter:.3g} refines it"
+
+
+def _locks(result, wide: dict) -> bool:
+    """Whether the measures that speak for `wide` are known as well as Poisson's ratio allows."""
+    from ..patch.high_order import locked
+
+    share, known = locked(result.plan.model.patch), result.measures
+    return all(known[name].error <= share * abs(known[name].value) for name in _first(result, wide))
 
 
 def _more_strips(asked, wide: dict) -> str:
