@@ -78,7 +78,7 @@ def face(body: Body, plane: str, inner, growth: float, corner: float) -> tuple:
     top, thick = float(np.diff(inner).min()), body.thickness
     points, sizes = [0.0, body.height], [top, corner]
     if thick:
-        points, sizes = [*points, thick], [*sizes, max(top, thick / 4)]
+        points, sizes = [*points, thick], [*sizes, max(top, min(thick / 4, corner))]
     deep = spread(points, sizes, 0.0, body.height, growth, min(body.height, body.length) / 4)
     place, count = cells_of.numbering(x.size - 1, deep.size - 1, ORDER)
     m, rows, columns, entries = (x.size - 1) * ORDER + 1, [], [], []
