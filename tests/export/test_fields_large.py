@@ -223,6 +223,8 @@ def test_always_an_exported_series_is_about_as_small_as_the_fields(tmp_path, mon
     """zlib and a mesh in every frame made it 2.4 times as large; every number is that of the fields."""
     monkeypatch.setattr(vtkhdf, "LARGE", 0)
     piece, line = waves(12, 90, 60), waves(12, 90, 1)
+    piece.cell_data["material"] = np.zeros((1, 90 * 60), np.int8)
+    line.point_data.update(dict.fromkeys(("gap", "normal_stress"), np.zeros((1, len(line.points)), np.float32)))
     blocks, steps = {"lower": piece, "upper": piece, "interface": line}, {"stress": 4096.0, "von_mises": 5000.0,
                                                                            "displacement": 2e-10}
     vtkhdf.write_series(tmp_path / NAME, blocks, np.arange(12) * 1e-4, UNITS, dict.fromkeys(blocks, steps))
