@@ -8,8 +8,6 @@ import re
 from itertools import pairwise
 from math import ceil, floor, isfinite, log10
 
-import numpy as np
-
 MOST = 7  # digits of a value in a text; what its error changes beyond them nobody reads
 ALONE = 6  # digits of a value whose error is not known
 ROUND_OFF = 1e-6, 0.1  # of its floor, below which a number with a unit, and a ratio, is round-off however well known
@@ -50,6 +48,8 @@ def axis_unit(values, unit: str) -> tuple:
 
     unit: a key of LADDERS.
     """
+    import numpy as np  # sentences of `check` have no arrays
+
     values = np.asarray(values)
     return step_of(LADDERS[unit], np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
@@ -57,6 +57,8 @@ def axis_unit(values, unit: str) -> tuple:
 def wide_scale(values) -> bool:
     """Whether an axis of these values is better logarithmic: the smallest above 0 is under a thousandth of the
     largest, and none is negative."""
+    import numpy as np
+
     values = np.asarray(values, float)
     above = values[np.isfinite(values) & (values > 0)]
     return bool(above.size and above.max() > 1e3 * above.min() and not np.any(values < 0))

@@ -7,6 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ..effects import shown_absent
+from ..scales import tidied
 from .shared import Json, Refused, Sets, flag, model_of, note, say, scene_of
 from .sweep import Over
 
@@ -19,7 +20,7 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
     """
     notes = []
     found = scene_of(scene, set_, lambda tables, folder, whole: _faults(tables, folder, whole, notes))
-    notes = _tidied(dict.fromkeys([*found.notes, *notes]))
+    notes = [tidied(text) for text in dict.fromkeys([*found.notes, *notes])]
     cases = len(_swept(scene, set_, Over())[1]) if found.sweep else None
     for remark in found.remarks:
         say(f"{scene}: {remark}")
@@ -30,15 +31,6 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
                          | ({"cases": cases} if cases else {})))
     else:
         print(f"{scene}: a {found.kind} scene without mistakes" + (f", {cases} cases" if cases else ""))
-
-
-def _tidied(notes) -> list:
-    """Notes with their numbers as `run` writes them."""
-    if not notes:
-        return []
-    from ..scales import tidied  # loads numpy, which a scene without notes does not need
-
-    return [tidied(text) for text in notes]
 
 
 def _swept(scene: Path, sets, what: Over) -> tuple:
