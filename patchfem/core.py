@@ -47,7 +47,8 @@ _SENTENCES = {
     Outcome.DONE: "Finished as asked.",
     Outcome.STEADY: "The motion repeats from window to window within the tolerance.",
     Outcome.STUCK: "The interface holds as a whole in the last cycles.",
-    Outcome.TRANSIENT: "The run ended before the motion settled; ask for more cycles or read the *_steady estimates.",
+    Outcome.TRANSIENT: "The run ended before the motion settled; more cycles may help where the drive no longer "
+                       "changes.",
     Outcome.GROWS: "The motion still rises and no bounded steady motion was found; friction does not limit it.",
     Outcome.EXCEEDS_TRAVEL: "The motion passed the stop of the flexure; the run ended there.",
     Outcome.LEAVES_CONTACT: "The slide passed the end of the piece, where the pieces no longer overlap; lower the "
