@@ -6,12 +6,15 @@ from ..model.model import Model
 
 
 def link(model: Model) -> dict:
-    """Last links of the stiffness chain: grooves, and bonds, or slip."""
+    """Last links of the stiffness chain: grooves, and of every interface bonds, or slip."""
     load = model.nominal_load
     if not load > 0:
         return {}
     valley = {"grooves": model.grooves.stiffness(load)} if model.grooves is not None else {}
-    return valley | _of_law(model.friction, load)
+    others = model.rig.interfaces[1:] if model.rig is not None else ()
+    return valley | _of_law(model.friction, load) | {
+        f"bonds_{k}": _of_law(one.numbers, load if one.load is None else one.load)["bonds"]
+        for k, one in enumerate(others, 2)}
 
 
 def _of_law(f, load: float) -> dict:

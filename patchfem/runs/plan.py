@@ -79,7 +79,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
 
         unknowns["modes"], chain = len(model.rig.frequencies), of_rig.chain(model.rig) | chain
         groups |= of_rig.groups(model) if model.kind == "rig" else {}
-        said[0] = [*knobs_idle(model, engine_of(model, per_point).name), *of_rig.first_words(model.rig, groups)]
+        said[0] = knobs_idle(model, engine_of(model, per_point).name)
         said[2] = of_rig.sum_words(model) if model.kind == "rig" else []
     if model.patch is not None:
         from .patch import plan as of_patch
@@ -112,6 +112,8 @@ def _planned(model: Model, per_point: bool) -> Plan:
         chain |= law.link(model)
         groups |= law.groups(model)
         said[2] = [*said[2], *law.words(model)]
+    if model.rig is not None:
+        said[0] = [*said[0], *of_rig.first_words(model.rig, groups, chain)]
     return Plan(model, model.kind, model.source.effects, model.absent, engine, unknowns, steps, round(seconds, 2),
                 int(sum(part.bytes for part in parts)), chain, groups, tuple(_verdict(model, groups, parts, said)),
                 parts)

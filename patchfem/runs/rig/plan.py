@@ -17,6 +17,7 @@ from .smooth.choice import smooth_cost
 STEADY = {"events": "the map from event to event, exact", "yields": "the map from yield to yield, exact",
           "balance": "harmonic balance", "march": "a march that is brought to repeat"}
 STEP, STEP_MODE = 7e-7, 1e-7  # seconds of a step of one mode, and of each further one
+STIFF = 10.0  # times the stiffness of the mode, from which a link holds the block
 GROWS, JOINT = 3.0, 2.5  # times that where bonds grow, and for each of several interfaces
 CLIMB = 3e-6  # seconds of a sample over grooves
 
@@ -102,12 +103,20 @@ def _lever(rig) -> float:
     return slide / base if rig.by_modes and base > 0 else 1.0
 
 
-def first_words(rig, found: dict) -> list:
-    """The sentence on D of one mode: whether the block sticks, and whether friction bounds its motion."""
+def first_words(rig, found: dict, chain: dict) -> list:
+    """The sentence on D of one mode: whether the block sticks, and whether friction bounds its motion.
+
+    chain: links of the stiffness chain by name; one that is not STIFF beside the mode lets a block move that sticks.
+    """
     d = found.get("D")
     if d is None or rig.modes.omega.size != 1 or not rig.by_modes or rig.kind == "free":
         return []
     d *= _lever(rig)
+    soft = [name for name, link in chain.items() if name != "mode" and not isinstance(link, str)
+            and link < STIFF * rig.stiffness]
+    if d >= 1 and soft:
+        return [f"D = {d:.3g} >= 1, but the interface gives way elastically: {soft[-1]} {chain[soft[-1]]:.4g} N/m "
+                f"beside {rig.stiffness:.4g} N/m of the mode"]
     if d >= 1:
         return [f"D = {d:.3g} >= 1: the block should stick"]
     if d > pi / 4:
