@@ -40,6 +40,7 @@ FALLS = 0.5  # least order at which an error falls with the step
 GAPS = ("energy_balance", "work_check")
 LAST = 1e-13  # of the amplitude, the last digits of a mean over it
 APART = ("friction_force_peak", "friction_work", "energy_stored", "energy_dissipated")  # not of the last cycles
+GIVEN = "normal_load"  # no motion changes it
 OF_MESH = 1.5  # times the change by a coarser mesh of pieces that slip part by part
 OF_MOST = 0.5  # of the largest relative change of these
 OF_STIFFNESS = ("relative_displacement_amplitude", "absolute_acceleration_peak", "friction_force_peak",
@@ -140,6 +141,7 @@ def tolerance_error(fine: dict, coarse: dict, moved: float = np.inf) -> dict:
     typical = typical_change(fine, {name: gap for name, gap in gaps.items() if abs(fine[name]) > floor_of(name, moved)})
     size = abs(fine.get("relative_displacement_amplitude", 0.0))
     least = {name: OF_TYPICAL * typical * (size if name == "drift_per_cycle" else abs(fine[name])) for name in gaps}
+    least |= {name: 0.0 for name in gaps if of_first(name) == GIVEN}
     return {name: max(OF_CHANGE * gap, least[name], 0.0 if name in GAPS else OF_FLOOR**2 * float(floor_of(name, moved)))
             for name, gap in gaps.items()}
 
@@ -159,7 +161,7 @@ def cells_error(fine: dict, coarse: dict) -> dict:
     gaps = change(fine, coarse)
     typical = typical_change(fine, gaps)
     held = {name for name, gap in gaps.items()  # energies of the whole run, and a force that its limit bounds
-            if of_first(name) in APART and (of_first(name) != APART[0] or gap <= ROUND * abs(fine[name]))}
+            if of_first(name) in (*APART, GIVEN) and (of_first(name) != APART[0] or gap <= ROUND * abs(fine[name]))}
     return {name: gap if name in held else max(gap, OF_CELLS * typical * abs(fine[name])) for name, gap in gaps.items()}
 
 
