@@ -6,6 +6,7 @@ trapezoidal rule on slide and force as they are sampled knows nothing of it.
 
 import numpy as np
 
+NOTHING = 1e-18  # J, the work of what stands still
 ROUND = 1e-10  # of the energy that passes through a run, below which friction work is round-off
 
 
@@ -30,7 +31,8 @@ def gap(sampled, booked, passed, energy=0.0):
     sampled, booked: friction work [J]; passed: sum of its sizes [J]; energy [J] that passed through the whole run, of
     which ROUND counts besides, so that a stuck interface shows no round-off. Numbers of one run, or (n,) of many.
     """
-    return share(np.abs(sampled - booked), passed + ROUND * energy)
+    apart = np.abs(sampled - booked)
+    return share(apart * (apart > NOTHING), passed + ROUND * energy)
 
 
 def share(part, whole):

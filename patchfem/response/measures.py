@@ -11,6 +11,7 @@ from ..dynamics.second_book import gap, sampled_work, share
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate
 NOTHING = 1e-18  # J
+REST = 1e-15  # m, range of a slide below which nothing moves
 SMOOTH = 4.0  # ratio of the bends at three samples, up to which they are those of one curve
 
 
@@ -47,6 +48,8 @@ def slip_measures(window: Response, drive, steps_per_cycle: int) -> dict:
     From uniform samples. The interface sticks while less than SHARE of its slide is irreversible, or it does not slide
     at all; where that share passes SHARE is found between the middles of the steps.
     """
+    if np.ptp(window.slide) <= REST:  # a law without a stiffness swings its traction, and so its slip, at a rest
+        return {"slip_amplitude": 0.0, "stick_fraction": 1.0}
     slip = window.slip
     out = {"slip_amplitude": float(slip.max() - slip.min()) / 2}
     if slip.size < 2 or np.ptp(slip) <= slip_noise(window):  # it ended where it began, or never slipped

@@ -13,7 +13,7 @@ import numpy as np
 from ..core import Response, Row
 from ..structure.drive_sizes import whole
 from .loops import drift, half_range, interface_loop, secant_stiffness, turns_of
-from .measures import acceleration_peak, energy_balance, ledger_measures, slip_measures
+from .measures import REST, acceleration_peak, energy_balance, ledger_measures, slip_measures
 from .spectrum import FLOOR, odd_harmonics, wave_measures
 
 
@@ -64,7 +64,7 @@ class Seen:
         """
         if self.loop is None or self.load is None:
             return {}
-        moves = self.sine and np.ptp(self.window.slide) > 2 * self.still
+        moves = self.sine and np.ptp(self.window.slide) > max(2 * self.still, REST)
         found = interface_loop(half_range(self.turns) if moves else 0.0, *self.loop[1:], self.stiffness)
         return found | {"secant_stiffness": secant_stiffness(self.turns)} if moves else found
 
