@@ -23,6 +23,7 @@ WORKSHOP = {  # as scales.LADDERS
 GROUPS = ("motion", "friction", "energy", "patch", "wear")
 NO_SLIP = 1e-15  # m, the last digits of a slide
 WHOLE_RUN = "over the whole run"
+MARCHED = "over the cycles of the motion, not those of wear"
 OF_WHAT = {  # said behind a value that would otherwise be taken for another, or for more than it says
     "loop_area": "per cycle", "friction_work": WHOLE_RUN, "energy_dissipated": WHOLE_RUN, "energy_created": WHOLE_RUN,
     "stick_fraction": "of the interface as a whole", "equivalent_damping": "a damping ratio of mode 1"}
@@ -220,9 +221,9 @@ def group_of(name: str, pressed: bool = True) -> str:
 def table_of(measures: dict) -> list[str]:
     """Lines of all measures in their groups, each with its error in people's units, or why it has no value."""
     width = max(map(len, measures), default=0)
-    out, pressed = [], "contact_fraction" in measures
+    out, pressed, worn = [], "contact_fraction" in measures, "worn_volume" in measures
     for group in GROUPS:
-        lines = [f"  {name:<{width}}  {_value(name, one)}" for name, one in measures.items()
+        lines = [f"  {name:<{width}}  {_value(name, one, worn)}" for name, one in measures.items()
                  if group_of(name, pressed) == group]
         out += [group, *lines] if lines else []
     return out
@@ -241,9 +242,10 @@ def fragment(summary: dict, sentence: str, cycles: float | None, released: str =
     return f"<div>{title}{answer}{warnings}<table>{''.join(rows)}</table></div>"
 
 
-def _value(name: str, one: dict) -> str:
+def _value(name: str, one: dict, worn: bool) -> str:
     if one.get("reason"):
         return f"- ({one['reason']})"
     of_what = OF_WHAT.get(re.sub(r"_\d+$", "", name))
+    of_what = MARCHED if worn and of_what == WHOLE_RUN else of_what
     unknown = UNKNOWN if one["error"] is None and one["value"] is not None else ""
     return f"{pair(name, one)}{unknown}{f', {of_what}' if of_what else ''}"
