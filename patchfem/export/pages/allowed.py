@@ -1,8 +1,8 @@
 """How far a swept key may go: until anything that moves changes by 5 %, and until the largest pressure doubles.
 
 A limit stands between two cases, the last one surely within and the first one surely beyond; where these are
-neighbours, a straight line between them (over the logarithm of a key that grows by factors) says about where. A case
-that did not settle, or whose measure misses its tolerance, is neither.
+neighbours, a straight line between them (over the logarithm of a key that grows by factors) says about where, unless a
+straight line through the logarithm of the change says another place. A case that did not settle, or whose measure misses its tolerance, is neither.
 """
 
 from collections.abc import Sequence
@@ -21,6 +21,7 @@ WITHIN = 0.05  # of its value in the first case, in which a measure is said to s
 MOVES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "loop_area",
          "friction_force_peak", "friction_ratio_peak", "onset_level")
 STIFF = ("normal_stiffness", "tangential_stiffness")
+ALIKE = 0.15  # of the place, within which both lines are to agree: a change may begin anywhere between two cases
 CHANGES = dict.fromkeys((*MOVES, *STIFF, "contact_fraction"), WITHIN) | {"pressure_peak": 1.0}  # 1: it doubles
 LEAST = 0.0101  # number of a key below which another unit is taken: 0.011 mrad, 10 mrad
 ANGLES = [name for name, _ in LADDERS["rad"]]
@@ -35,7 +36,7 @@ class Allowed(NamedTuple):
     first case [SI] and its relative change up to the last one; start: place of the first case; inside, beyond: places
     of the last case that is surely within and of the first that is surely not (None: none is); whole: no case of the
     line is left open; about: where it leaves, as a share of the way from the one to the other, NaN where the cases
-    between them are left open; value: of the key at that place, or at `inside` [SI].
+    between them are left open or do not tell it; value: of the key at that place, or at `inside` [SI].
     """
 
     name: str
@@ -121,8 +122,10 @@ def _along(name: str, change: float, line: np.ndarray, size: np.ndarray, values:
     way = np.log(1 + way) if factors and change >= 1 else way  # a power of the key is straight in both logarithms
     part = float((way[1] - way[0]) / (way[2] - way[0]))
     low, high = float(size[last]), float(size[next_one])
-    place = exp(log(low) + part * log(high / low)) if factors and low > 0 else low + part * (high - low)
-    return ends._replace(about=part, value=place)
+    bent = log(change / away[inside]) / log(away[beyond] / away[inside]) if share[inside] * ends.change > 0 else 1.0
+    place, other = (exp(log(low) + one * log(high / low)) if factors and low > 0 else low + one * (high - low)
+                    for one in (part, bent))
+    return ends._replace(about=part, value=place) if abs(other - place) <= ALIKE * abs(place) else ends
 
 
 def as_json(limits: Limits) -> list:
@@ -143,10 +146,10 @@ def sentence(limits: Limits) -> str:
         return ""
     moving, ends = _moving(limits), [one for one in limits.found if one.beyond is not None and one.resolved()]
     parts = [moving] if moving else []
-    parts += [f"the {label(one.name)} doubles at {_at(limits, one)}" for one in ends if one.change >= 1]
-    stiff = [f"{_at(limits, one)} ({one.name.partition('_')[0]})" for one in ends if one.name in STIFF]
+    parts += [f"the {label(one.name)} doubles {_where(limits, one)}" for one in ends if one.change >= 1]
+    stiff = [f"{_where(limits, one)} ({one.name.partition('_')[0]})" for one in ends if one.name in STIFF]
     if stiff:
-        parts.append(f"the stiffness of the patch changes by {100 * WITHIN:g} % at {' and '.join(stiff)}")
+        parts.append(f"the stiffness of the patch changes by {100 * WITHIN:g} % {' and '.join(stiff)}")
     where = "" if moving or not parts else f"As {limits.key['name']} grows, "
     return f"{where}{'; '.join(parts)}." if parts else ""
 
@@ -159,17 +162,17 @@ def _moving(limits: Limits) -> str:
     name = OPENS.get(limits.key["name"], (limits.key["name"],))[0]
     ends = sorted((one for one in moving if one.beyond is not None or not one.whole), key=lambda one: one.value)
     if not ends:
-        far = _at(limits, moving[0], limits.most) + _brackets(_gap(limits, limits.most))
+        far = _at(limits, moving[0], limits.most) + _brackets(_gap(limits, moving[0], limits.most))
         return "" if limits.lost else f"{name} may reach {far}: nothing that moves changes by {100 * WITHIN:g} %"
     least, *_, last = *ends, ends[-1]
     what = "anything that moves" if not limits.lost else "the " + " or the ".join(label(one.name) for one in moving)
     held = f"before {what} changes by {100 * WITHIN:g} %"
     if least.beyond is None:
-        far = _at(limits, least) + _brackets(_gap(limits, least.value))
+        far = _at(limits, least) + _brackets(_gap(limits, least))
         return f"{name} may reach at least {far} {held}: the cases after it are open"
     between = f"between cases at {_between(limits, least)}"
-    later = "" if last is least or last.beyond is None else f"; {label(last.name)} at {_at(limits, last)}"
-    return (f"{name} may reach {_at(limits, least)}{_brackets(_gap(limits, least.value), between)} {held} "
+    later = "" if last is least or last.beyond is None else f"; {label(last.name)} {_where(limits, last)}"
+    return (f"{name} may reach {_at(limits, least)}{_brackets(_gap(limits, least), between)} {held} "
             f"({label(least.name)} first{later})")
 
 
@@ -185,8 +188,15 @@ def _at(limits: Limits, one: Allowed, value: float | None = None) -> str:
     return f"{plain(value * scale, _digits(limits.key, one))} {unit}".strip()
 
 
-def _gap(limits: Limits, value: float) -> str:
-    """What an angle opens over the patch; "" for another key, and where the size of the patch is not known."""
+def _where(limits: Limits, one: Allowed) -> str:
+    """The place of a limit, or the cases at both sides of one that they do not tell."""
+    return f"at {_at(limits, one)}" if isfinite(one.about) else f"between {_between(limits, one)}"
+
+
+def _gap(limits: Limits, one: Allowed, value: float | None = None) -> str:
+    """What an angle opens over the patch, as `_at` writes it; "" for another key, and where the size of the patch is
+    not known."""
+    value = float(f"{one.value if value is None else value:.{_digits(limits.key, one)}g}")
     side = (limits.over or {}).get(OPENS.get(limits.key["name"], ("", ""))[1])
     if not side or not value:
         return ""

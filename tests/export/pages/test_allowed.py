@@ -57,6 +57,23 @@ def test_exact_a_key_of_factors_is_read_along_its_logarithm():
     assert limits({"pressure_peak": (tilt / 1e-3)**-0.5}, tilt=tilt, factors=True).found[0].beyond is None
 
 
+def test_exact_a_place_that_the_cases_do_not_tell_is_not_told():
+    """1 - (t - 15)^2 / 2000 from 15 urad on, as a patch that opens there, is 5 % off at 25 urad. A straight line between
+    the cases at 10 and 31.6 urad reads 18.6; the cases around it are told instead."""
+    tilt = np.geomspace(1e-3, 1, 7)
+    found = limits({"tangential_stiffness": 1 - np.maximum(1e3 * tilt - 15, 0)**2 / 2000,
+                    "pressure_peak": (tilt / 1e-3)**0.5}, tilt=tilt, factors=True)
+    assert sentence(found) == ("As contact.tilt.angle grows, the pressure peak doubles at 4 urad; the stiffness of the "
+                               "patch changes by 5 % between 10 and 32 urad (tangential).")
+    assert as_json(found)[0]["low"] < 25e-6 < as_json(found)[0]["high"]
+
+
+def test_exact_the_gap_is_that_of_the_angle_as_it_is_written():
+    """0.169 mrad, written 0.17, opens 2.2 um over 12.7 mm."""
+    said = sentence(limits({"loop_area": 1 + (TILT - 0.05) * 0.05 / 0.119}))
+    assert said.startswith("Tilt may reach 0.17 mrad (2.2 um over the patch, between")
+
+
 def test_exact_errors_widen_the_ends_and_then_no_place_between_is_told():
     """5 % of 1 with the errors of both: 1.04 +- 0.02 is open, 1.09 +- 0.02 is beyond."""
     values = [1, 1.001, 1.04, 1.09, 1.2]
