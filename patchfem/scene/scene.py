@@ -279,6 +279,8 @@ def _unquoted(text: str, line: int) -> str:
         return f"; a decimal is written with a point: {key} = {value.replace(',', '.')}"
     if value.lower() in ("true", "false"):
         return f"; {key} = {value.lower()}"
+    if percent := re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*%", value):
+        return f"; a share is a plain number: {key} = {float(percent[1]) / 100:.12g}"
     quoted = re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE]$)[a-zA-Z%\u00b5\u03bc][a-zA-Z\u00b5\u03bc/^0-9 -]*|"
                           r"[a-zA-Z][\w./ -]*", value)
     return f'; a quantity or a word stands in quotes: {key} = "{value}"' if quoted and len(value) < 60 else ""

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator
 
-from .types import Positive, Share, Speed, Table, whole
+from .types import Positive, Share, Speed, Table, number, whole
 
 
 def _still_summed(value: object) -> object:
@@ -21,7 +21,7 @@ Summing = Annotated[Literal["auto", "direct", "truncated", "merged", "recursion"
 class Accuracy(Table):
     """The tolerance from which every numerical choice follows, and the knobs that pin one."""
 
-    tolerance: Positive = 1e-3
+    tolerance: number(gt=0, lt=1) = 1e-3
     method: Literal["auto", "exact", "march", "duhamel", "newmark", "euler", "harmonic"] = "auto"
     steps_per_cycle: whole(4, 10_000_000) | None = None
     quadrature: Summing = "auto"
