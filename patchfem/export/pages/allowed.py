@@ -2,7 +2,8 @@
 
 A limit stands between two cases, the last one surely within and the first one surely beyond; where these are
 neighbours, a straight line between them (over the logarithm of a key that grows by factors) says about where, unless a
-straight line through the logarithm of the change says another place. A case that did not settle, or whose measure misses its tolerance, is neither.
+straight line through the logarithm of the change says another place. A case that did not settle, or whose measure
+misses its tolerance, is neither.
 """
 
 from collections.abc import Sequence

@@ -104,11 +104,13 @@ def _along(line: np.ndarray, measures: dict, outcome: np.ndarray) -> list:
 
 
 def _once(found: list) -> list:
-    """The changes without those that say less of one slip that begins at one place."""
-    said = (SLIPS, STATES["stick_fraction"][0], STATES["slip_amplitude"][0])
-    places = {one.what: one.at for one in found if one.what in said}
-    return [one for one in found if one.what not in said or not any(
-        places.get(other) == one.at for other in said[:said.index(one.what)])]
+    """The changes without those that say less of one slip that begins, or ends, at one place."""
+    for said in ((SLIPS, STATES["stick_fraction"][0], STATES["slip_amplitude"][0]),
+                 (ENDS["stuck"], STATES["stick_fraction"][1])):
+        places = {one.what: one.at for one in found if one.what in said}
+        found = [one for one in found if one.what not in said or not any(
+            places.get(other) == one.at for other in said[:said.index(one.what)])]
+    return found
 
 
 def _ends(line: np.ndarray, outcome: np.ndarray) -> list:

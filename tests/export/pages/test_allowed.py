@@ -58,8 +58,8 @@ def test_exact_a_key_of_factors_is_read_along_its_logarithm():
 
 
 def test_exact_a_place_that_the_cases_do_not_tell_is_not_told():
-    """1 - (t - 15)^2 / 2000 from 15 urad on, as a patch that opens there, is 5 % off at 25 urad. A straight line between
-    the cases at 10 and 31.6 urad reads 18.6; the cases around it are told instead."""
+    """1 - (t - 15)^2 / 2000 from 15 urad on, as a patch that opens there, is 5 % off at 25 urad. A straight line
+    between the cases at 10 and 31.6 urad reads another place; the cases around it are told instead."""
     tilt = np.geomspace(1e-3, 1, 7)
     found = limits({"tangential_stiffness": 1 - np.maximum(1e3 * tilt - 15, 0)**2 / 2000,
                     "pressure_peak": (tilt / 1e-3)**0.5}, tilt=tilt, factors=True)

@@ -67,6 +67,12 @@ def test_exact_slip_is_told_once_by_what_says_most():
          "1 mrad on (not yet at 0.5) the motion grows.")
 
 
+def test_exact_that_slip_ends_is_told_once():
+    stick = np.array([0.5, 0.8, 1, 1, 1]), np.zeros(5)
+    assert said([1] * 5, outcome=["steady", "steady", "stuck", "stuck", "stuck"], stick_fraction=stick) == \
+        "As contact.tilt.angle grows: from 0.2 mrad on (not yet at 0.1) the interface holds as a whole."
+
+
 def test_exact_failed_cases_are_passed_over():
     fraction = [1, np.nan, 0.9, 0.6, 0.3]
     assert said(fraction, outcome=["done", "failed", "done", "done", "done"]) == \

@@ -217,6 +217,8 @@ def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_relati
         f"{start} runs from 29.39 nm to 8.261 mm, known to 3 % or better."
     assert span(amplitude, {"relative_displacement_amplitude": np.array([False, True])}, both) == \
         f"{start} in the cases that meet the tolerance is 8.261 mm throughout, known to 0.001 % or better."
+    amplitude["relative_displacement_amplitude"] = ([0.0, 1.963e-5], [1e-13, 2e-14], "m")
+    assert span(amplitude, {"relative_displacement_amplitude": both}, both) == f"{start} runs from 0 to 19.63 um."
     assert span({"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}, {}, both[:1]) == ""
 
 
