@@ -49,7 +49,7 @@ def lines_of(report: RoughnessReport, verbose: bool = False) -> list:
     out.append(f"  {'':<20} {'value':>10}  {'5 .. 95 %':<20} unit")
     for one in report.values:
         value, interval, unit = shown(one)
-        tail = one.reason if one.value is None else ""
+        tail = one.reason
         out.append(f"  {one.name:<20} {value:>10}  {interval:<20} {unit:<4} {tail}".rstrip())
         if verbose:
             out.append(f"  {'':<20}   {one.text}")
@@ -70,7 +70,7 @@ def data_of(report: RoughnessReport) -> dict:
     measures = {}
     for one in report.values:
         measures[one.name] = {"value": one.value, "low": one.low, "high": one.high, "unit": one.unit}
-        if one.value is None:
+        if one.reason:
             measures[one.name]["reason"] = one.reason
     out = {"file": report.source, "kind": report.kind, "length": report.length, "step": report.step,
            "shape": list(report.shape), "cutoff": report.cutoff,

@@ -5,7 +5,7 @@ import numpy as np
 from ...core import say
 from ..profile import Profile
 from .carried import may_hide, told
-from .compare import Comparison
+from .compare import Comparison, identical
 from .quantity import SIDE, Quantity
 
 EXCHANGED = "material grew, or the files are in the wrong order"
@@ -136,6 +136,8 @@ def _variant(one: Comparison, name: str) -> list:
 
 
 def _worn(one: Comparison, name: str) -> str:
+    if identical(one.before, one.after):
+        return f"Worn depth{name}: none; the heights before and after are the same."
     mean = one.worn.mean
     above = ""
     if one.worn.deposited > DEPOSITED * (one.worn.area.value or 0.0) and one.worn.deposited > 0:

@@ -18,13 +18,15 @@ from .spectrum import BAND, amplitude_of, refuse_band, spectrum_of
 from .tip import Tip, tip_check
 
 FEWEST = 16  # samples of a trace with a report
+UNTOLD = "the trace does not tell its interval"
 ROUND = 1e-14  # of the largest height: what levelling leaves of a straight line
 PRINTED = {"Ra": "Pa", "Rq": "Pq", "Skew": "Psk", "RzDin": "RzDin", "MaxDev": "MaxDev", "ASH": "ASH",
            "Wa": "Pa", "Wq": "Pq", "WMaxDev": "MaxDev"}  # names of a Dektak, which filters nothing unless asked
 
 
 class Value(NamedTuple):
-    """A parameter [SI] with its interval, 5 to 95 %, its unit and definition; reason: why there is no value."""
+    """A parameter [SI] with its interval, 5 to 95 %, its unit and definition; reason: why there is no value, or
+    no interval of one."""
 
     name: str
     value: float | None
@@ -190,6 +192,8 @@ def _value(row, value, found: Intervals) -> Value:
         flat = found.heights.power == 0
         reason = "the trace is flat" if flat else "the trace is shorter than one cut-off" \
             if found.heights.section is not None and not len(found.heights.sections) else "the trace holds none"
+    elif row.kind == "wave" and low is not None and not low <= value <= high:
+        low, high, reason = None, None, UNTOLD
     return Value(row.name, value, low, high, row.unit, row.text, reason)
 
 
@@ -213,8 +217,10 @@ def _spiky(profile: Profile) -> tuple:
     found = spikes(profile)
     if not found.any():
         return ()
-    return (f"{profile.source}: {found.sum()} of {found.size} heights are spikes (the first at x = "
-            f"{say(profile.x[np.argmax(found)])}); they count in every parameter",)
+    one, place = found.sum() == 1, say(profile.x[np.argmax(found)])
+    what, counts = (f"is a spike (at x = {place})", "it counts") if one else \
+        (f"are spikes (the first at x = {place})", "they count")
+    return (f"{profile.source}: {found.sum()} of {found.size} heights {what}; {counts} in every parameter",)
 
 
 def _skewed(source: str, values: list) -> tuple:

@@ -70,6 +70,8 @@ def test_exact_a_trace_on_itself_shows_no_change():
     assert found.hidden.value < 1e-9 and found.hidden.high is None
     assert (found.amplitude_ratio.value, found.slope_ratio.value) == pytest.approx((1.0, 1.0), rel=1e-14)
     assert verdicts([found])[0] == "no change shown"
+    assert found.shift.value == found.tilt.value == 0
+    assert verdicts([found])[1][0] == "Worn depth: none; the heights before and after are the same."
 
 
 def test_always_levelling_both_traces_takes_the_wear_away():

@@ -58,8 +58,9 @@ def test_exact_spikes_are_told_and_count():
     z = trace.z.copy()
     z[1000] += 50 * UM
     report = report_of(Profile(trace.x, z, "made.csv"))
-    assert report.notes[0] == ("made.csv: 1 of 4001 heights are spikes (the first at x = 1 mm); they count in every "
-                               "parameter")
+    assert report.notes[0] == ("made.csv: 1 of 4001 heights is a spike (at x = 1 mm); it counts in every parameter")
+    wave = report["dominant_wavelength"]
+    assert wave.low <= wave.value <= wave.high if wave.low is not None else "does not tell" in wave.reason
     assert report["Pt"].value > 50 * UM
 
 
