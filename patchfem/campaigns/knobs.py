@@ -34,6 +34,7 @@ def knobs_of(model: Model) -> list:
     """Knobs, of KNOBS, that change what a model computes: those of its mesh, its steps, its shear modes and its
     jumps over cycles of wear."""
     out, engine = ["element_size"] if model.patch is not None else [], plan(model).engine
+    engine = "bench" if model.kind == "bench" else engine  # that of its sum over bonds takes the same steps
     out += [knob for knob in ("steps_per_cycle", "shear_modes") if acts(knob, model.kind, engine)
             and (knob != "shear_modes" or (model.soft and has(model.friction.law, "bonds")))]
     if model.wear is not None and model.patch is not None:

@@ -39,7 +39,7 @@ def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle,
                               f"the knobs are {', '.join(campaign.KNOBS)}"))
     knobs = [over] if over else campaign.knobs_of(found)
     if not knobs:
-        raise Refused(f"{scene}: no knob changes what this scene computes: its answer is exact")
+        raise Refused(f"{scene}: no knob changes what this scene computes")
     from ..export.cost import answer_of, shown, write, write_picture
 
     target, curves, answer = out if out is not None else Path("out") / f"{found.source.path.stem}-cost", {}, {}

@@ -9,7 +9,7 @@ from time import perf_counter, process_time, sleep
 import numpy as np
 import pytest
 from command_line import cli
-from scene_texts import PIECE
+from scene_texts import BENCH, PIECE
 
 import patchfem as pf
 from patchfem.campaigns import cost, knobs
@@ -195,3 +195,11 @@ def test_exact_python_has_the_answer_and_the_files_of_the_command(tmp_path, monk
     monkeypatch.undo()
     with pytest.raises(pf.PatchfemError, match="this scene has the knobs element_size"):
         pf.cost(scene, over="shear_modes")
+
+
+def test_exact_a_bench_without_pieces_has_the_steps_as_its_knob():
+    """A law with a memory and one without; settings that gave the same run would be one."""
+    for text in (BENCH, BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')):
+        found = build(loads(text))
+        assert knobs.knobs_of(found) == ["steps_per_cycle"]
+    assert len(curve(found, "steps_per_cycle")) > 2
