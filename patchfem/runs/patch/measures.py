@@ -43,8 +43,8 @@ def plane_band(asked, patch: Patch) -> list:
     try:
         mine, theirs = values(patch), values(pressed(other, pair_beside(other, patch.pair)))
     except PatchfemError as error:
-        return [f"{_assumed(asked)}; the truth lies towards plane {other.plane}, where the patch has no answer "
-                f"({error})"]
+        return [f"{_assumed(asked)}; the truth lies between plane strain and plane stress, and in plane "
+                f"{other.plane} the patch has no answer ({error})"]
     return band_words(asked, mine, theirs)
 
 
@@ -68,7 +68,8 @@ def band_words(asked, mine: dict, theirs: dict) -> list:
     shares = [(name, theirs[name] / mine[name] - 1) for name in (first, *BANDED) if name != "approach" and mine[name]]
     parts += [f"{name} by {100 * share:+.2g} %" for name, share in shares if abs(share) > 1e-3]
     other = "stress" if asked.plane == "strain" else "strain"
-    return [f"{_assumed(asked)}; the truth lies towards plane {other}, which would change {', '.join(parts)}"] \
+    return [f"{_assumed(asked)}; the truth lies between plane strain and plane stress; plane {other} would change "
+            f"{', '.join(parts)}"] \
         if parts else []
 
 
