@@ -192,7 +192,8 @@ def _value(row, value, found: Intervals) -> Value:
         flat = found.heights.power == 0
         reason = "the trace is flat" if flat else "the trace is shorter than one cut-off" \
             if found.heights.section is not None and not len(found.heights.sections) else "the trace holds none"
-    elif row.kind == "wave" and low is not None and not low <= value <= high:
+    elif row.kind == "wave" and low is not None and not (
+            found.heights.step <= low <= value <= high <= found.heights.length):
         low, high, reason = None, None, UNTOLD
     return Value(row.name, value, low, high, row.unit, row.text, reason)
 
