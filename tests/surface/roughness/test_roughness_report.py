@@ -59,7 +59,7 @@ def test_exact_spikes_are_told_and_count():
     z[1000] += 50 * UM
     report = report_of(Profile(trace.x, z, "made.csv"))
     assert report.notes[0] == ("made.csv: 1 of 4001 heights is a spike (at x = 1 mm); it counts in every parameter")
-    z[1000] += 950 * UM  # its interval was 4 nm to 68 um on a step of 0.5 um
+    z[1000] += 950 * UM  # its interval was 4 nm to 68 um on a step of 1 um
     wave = report_of(Profile(trace.x, z, "made.csv"))["dominant_wavelength"]
     assert wave.value > 0 and wave.low is wave.high is None and "does not tell" in wave.reason
     assert report["Pt"].value > 50 * UM
