@@ -135,7 +135,7 @@ def test_exact_a_text_and_a_file_are_told_apart(tmp_path):
      {"young": 1e11, "poisson": 0.3, "density": 8000}),
     ("contact.crown", '{radius = "2 m", on = "lower"}', {"radius": 2, "on": "lower"}),
     ("contact.shear", "{}", {}),
-    ("accuracy.tolerance", "0.01", 0.01), ("accuracy.tolerance", "1", 1),
+    ("accuracy.tolerance", "0.01", 0.01), ("accuracy.tolerance", "0.5", np.float64(0.5)),
 ])
 def test_exact_a_value_sets_what_its_text_sets(key, written, value, tmp_path):
     (tmp_path / "a.toml").write_text(SMALL_PATCH, "utf-8")

@@ -39,7 +39,8 @@ ask = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), getattr(signal, name))
 for name in "SIGTERM", "SIGINT", "SIGHUP":
     try:
         ask()
-        time.sleep(10)
+        for _ in range(100):
+            time.sleep(0.1)
     except KeyboardInterrupt:
         print(name)
 """
