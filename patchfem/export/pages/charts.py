@@ -185,7 +185,7 @@ def histories(history: dict, window: dict | None, period: float | None, title: s
                      [line(since * per, window["displacement"] * scale, "accent")]))
     moves = np.any(window["base"])
     out.append(chart(title, axis("time", name), axis("acceleration", "g"),
-                     [line(since * per, window["acceleration"] / G_N, "warm", "block" if moves else ""),
+                     [line(since * per, window["acceleration"] / G_N, "warm", "output" if moves else ""),
                       line(since * per, window["base"] / G_N, "soft", "base", dash="dashed") if moves else None]))
     return out
 

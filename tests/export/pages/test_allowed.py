@@ -8,7 +8,7 @@ import pytest
 from page_data import own_part
 from test_changes import TILT, key
 
-from patchfem.export.pages.allowed import allowed, as_json, sentence
+from patchfem.export.pages.allowed import _change, allowed, as_json, sentence
 from patchfem.export.pages.sweep import page
 from patchfem.export.sweeps.answer import answer_of
 
@@ -172,3 +172,8 @@ def test_always_the_sentence_of_a_sweep_without_numbers_is_empty():
     table = swept() | {"keys": [key(words=True) | {"unit": "1", "log": False, "texts": list("abcde")}]}
     found = answer_of(table)
     assert found["limits"] == [] and "moment, worst at contact.tilt.angle e" in found["answer"]
+
+
+def test_exact_the_last_digits_of_a_value_are_no_change():
+    """The friction force of the tilted rig was said to change by -4.26e-11 %."""
+    assert [_change(share) for share in (-4.26e-13, -0.0836, 58.6)] == ["0 %", "-8.36 %", "&times; 59.6"]
