@@ -27,8 +27,7 @@ Read the package in this order. A module imports its own entry of the list and t
 23. `campaigns`   many runs: fits, error against cost, sweeps
 24. `export`      summary, netCDF, VTK, report
 25. `api`         load, build, plan and run from Python
-26. `torture`     seeded attacks on the command line
-27. `commands`    the verbs of the command line
+26. `commands`    the verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used.
 """

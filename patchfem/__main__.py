@@ -74,7 +74,6 @@ from .commands.start import cite, demo, doctor, new, schema
 from .commands.streams import plain, ready
 from .commands.study import cost, fit
 from .commands.sweep import sweep
-from .commands.torture import torture_of
 
 VERBS = (new, demo, check, plan, run, sweep, profile, compare, cost, fit, mesh, import_, export, view, report, schema,
          doctor, cite)
@@ -86,7 +85,6 @@ app = App(name="patchfem", version=__version__, help_format="plaintext", suppres
                "for a scene of your own: patchfem new.")
 for verb in VERBS:
     app.command(verb, name=verb.__name__.rstrip("_"))
-app.command(torture_of(lambda words: _guarded(words)), name="torture", show=False)
 
 
 @app.command(name="--install-completion")

@@ -72,12 +72,12 @@ def test_exact_the_planted_modules_run_where_python_looks_for_them(planted):
 
 
 def test_always_every_interpreter_that_is_started_leaves_out_the_working_folder():
-    """Lists of words that begin with the interpreter name -P next; the attacks start it as a person may."""
+    """Lists of words that begin with the interpreter name -P next."""
     seen = 0
     for name, text in sources(Path(__file__).parents[2]).items():
         for node in nodes_of(text) if "sys.executable" in text else ():
             words = [ast.unparse(one) for one in node.elts] if isinstance(node, ast.List) else []
-            if words[:1] in (["sys.executable"], ["PYTHON"]) and "torture" not in name:
+            if words[:1] in (["sys.executable"], ["PYTHON"]):
                 assert words[1] == "'-P'", name
                 seen += 1
     assert seen >= 4

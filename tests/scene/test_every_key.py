@@ -8,6 +8,7 @@ from typing import get_args
 import numpy as np
 import pytest
 from scene_texts import COATED, DRIVE, FORCED, GROWING, KILOGRAM, MODE, NONLOCAL, PAIR, PIECE, PLASTIC, POINT
+from torture.toml import known, text_of
 
 from patchfem.core import Missing, NotConverged, PatchfemError
 from patchfem.runs.plan import plan
@@ -16,7 +17,6 @@ from patchfem.scene.keys.quantities import KINDS
 from patchfem.scene.keys.tables import Tables
 from patchfem.scene.keys.types import model_of
 from patchfem.scene.scene import SceneError, loads
-from patchfem.torture.toml import known, text_of
 
 FLAT = PIECE + 'load = "26 lbf"\nelement_size = "2 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
 SHAKEN = KILOGRAM + DRIVE.replace("cycles = 30", "cycles = 6")

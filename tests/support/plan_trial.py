@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from torture import grammar
+from torture.toml import text_of
+from torture.trial import Trial
 
 from patchfem.core import Missing, PatchfemError
 from patchfem.runs.plan import plan
 from patchfem.scene.scene import SceneError, loads
-from patchfem.torture import grammar
-from patchfem.torture.toml import text_of
-from patchfem.torture.trial import Trial
 
 MOST = 60.0  # seconds
 # a process starts with the memory of the one that it is forked from as its peak: a small one stands in between

@@ -9,11 +9,11 @@ from ast import literal_eval
 
 import numpy as np
 from remedies import KINDS, _loose
+from torture import scenes
+from torture.toml import text_of
+from torture.trial import Trial
 
 from patchfem.scene.scene import SceneError, loads
-from patchfem.torture import scenes
-from patchfem.torture.toml import text_of
-from patchfem.torture.trial import Trial
 
 WORD = r"'[^']*'|\"[^\"]*\""
 LIST = rf"((?:{WORD})(?:(?:, | or )(?:{WORD}))*)"

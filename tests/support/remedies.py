@@ -9,14 +9,14 @@ import re
 from typing import NamedTuple
 
 import numpy as np
+from torture import grammar
+from torture.toml import text_of
+from torture.trial import Trial
 
 from patchfem.core import NotConverged, PatchfemError
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import SceneError, loads
-from patchfem.torture import grammar
-from patchfem.torture.toml import text_of
-from patchfem.torture.trial import Trial
 
 KINDS = ("patch", "bench", "rig", "masses", "wear", "harmonic", "soft", "linear", "rig", "bench")
 DEAR = 3.0  # planned seconds beyond which a scene is not drawn

@@ -1,12 +1,12 @@
-"""A small share of every campaign, always; the whole of one by `patchfem torture --share 1 --campaign NAME`."""
+"""A small share of every campaign, always; the whole: `python tests/support/torture --campaign NAME --share 1`."""
 
 import os
 
 import pytest
+from torture import driver
+from torture.driver import CAMPAIGNS, torture
 
 from patchfem.__main__ import _guarded
-from patchfem.torture import driver
-from patchfem.torture.driver import CAMPAIGNS, torture
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a trial is a forked process")
 ALWAYS = {"grammar": 0.001, "bytes": 0.001, "words": 0.003, "energy": 0.003, "profiles": 0.002, "instruments": 0.003,

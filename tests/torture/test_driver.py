@@ -10,10 +10,10 @@ import time
 import h5py
 import numpy as np
 import pytest
+from torture import driver, results
+from torture.trial import Trial, Wrong, alone, captured
 
 from patchfem.__main__ import _guarded
-from patchfem.torture import driver, results
-from patchfem.torture.trial import Trial, Wrong, alone, captured
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a trial is a forked process")
 

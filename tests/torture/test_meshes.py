@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from torture import meshes
 
 from patchfem.mesh.files import pair_mesh, read_bodies
-from patchfem.torture import meshes
 
 
 @pytest.mark.parametrize("name, form", [("m.msh", meshes._msh), ("m.inp", meshes._inp), ("m.unv", meshes._unv)])

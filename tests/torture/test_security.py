@@ -8,9 +8,9 @@ import pytest
 from command_line import cli
 from house import nodes_of, sources
 from scene_texts import BENCH, MODE
+from torture.hostile import Planted
 
 import patchfem
-from patchfem.torture.hostile import Planted
 
 HOUSE = Path(__file__).parents[2]
 CODE = {"eval", "exec", "compile", "__import__"}  # built-ins that make code of text
@@ -20,9 +20,7 @@ NETWORK = {"socket", "socketserver", "ssl", "urllib", "http", "ftplib", "smtplib
 WORDS = re.compile(rf"\b({'|'.join(CODE)})\(|\b({'|'.join(UNSAFE | NETWORK)})\b|np\.load\(|allow_pickle|shell|\bos\.")
 HARMLESS = {("compiled.kept", "pickle"),  # numba's own form of machine code, in a folder that is the user's own
             ("compiled", "compile()"), ("compiled", "exec()"),  # a loop of the package with its law put in
-            ("torture.hostile", "pickle"), ("torture.hostile", "os.system"),  # planted, and must not be run
-            ("__main__", "shell=shell"),  # the name of the shell whose completions are written
-            ("torture.hostile", "allow_pickle=True"), ("torture.tables", "allow_pickle=True")}
+            ("__main__", "shell=shell")}  # the name of the shell whose completions are written
 FINE = "re.compile('x'); from .http import x; np.load(a, allow_pickle=False); json.load(f)"
 
 

@@ -3,7 +3,8 @@
 Most of them run as they are; what may not stand together is left to the program to refuse.
 """
 
-from ..effects import LAWS, WAVEFORMS
+from patchfem.effects import LAWS, WAVEFORMS
+
 from .trial import Trial
 
 OF_LAWS = {  # key -> (low, high, unit) of a rig with a motion of some 50 um and 30 N of friction

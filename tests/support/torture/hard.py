@@ -135,7 +135,7 @@ def thin_coating(trial: Trial) -> None:
 
 def first_touch(trial: Trial) -> None:
     """A crown under a small load: Hertz's half width sqrt(4 P R/(pi E*)) far below the height of the pieces."""
-    from ..scene.keys.materials import MATERIALS
+    from patchfem.scene.keys.materials import MATERIALS
 
     steel = MATERIALS["steel"]
     stiff = steel.young / (1 - steel.poisson**2) / 2

@@ -89,7 +89,7 @@ def torture(command: Callable, share: float, names: list, seed: int, only: int |
                 if text:
                     faults.append((index, text))
                     say(f"{name} {index}: {text}\n"
-                        f"  again: patchfem torture --campaign {name} --seed {seed} --only {index}")
+                        f"  again: python tests/support/torture --campaign {name} --seed {seed} --only {index}")
             out.append(Row(name, len(numbers), faults, perf_counter() - begin))
     return out
 

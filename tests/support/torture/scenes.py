@@ -111,7 +111,7 @@ def _add(trial: Trial, tables: dict) -> None:
 
 def of_kind(trial: Trial, kind: str | None):
     """A value for a key: a quantity of its kind over thirty decades, else a number or a word."""
-    from ..scene.keys.quantities import KINDS
+    from patchfem.scene.keys.quantities import KINDS
 
     if kind is None:
         return trial.draw(*NUMBERS, *TEXTS, *grammar.LAWS, *grammar.WAVEFORMS, "stretch", "merged", "harmonic", "upper")

@@ -2,8 +2,8 @@
 
 from functools import cache
 
-from ..scene.keys.tables import Tables
-from ..scene.keys.types import keys, kind_of, model_of
+from patchfem.scene.keys.tables import Tables
+from patchfem.scene.keys.types import keys, kind_of, model_of
 
 
 def text_of(tables: dict) -> str:

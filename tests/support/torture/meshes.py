@@ -5,8 +5,9 @@ What leaves no meaning (a group that lacks, a node that is not there or has no p
 
 import numpy as np
 
-from ..mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh, write_mesh
-from ..mesh.tensor import graded_grid
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh, write_mesh
+from patchfem.mesh.tensor import graded_grid
+
 from .results import ran
 from .tables import wounded
 from .toml import text_of

@@ -57,7 +57,7 @@ def passive(found, tables: dict) -> None:
 def solved(trial: Trial, tables: dict, most: float = 3.0, valid: bool = False):
     """The Result of a scene, None where it is refused, found no end or is announced as longer than `most` seconds;
     valid: Wrong where it is refused."""
-    from ..api import NotConverged, PatchfemError, load, plan, run
+    from patchfem.api import NotConverged, PatchfemError, load, plan, run
 
     text = text_of(tables)
     (trial.folder / "scene.toml").write_text(text, "utf-8")

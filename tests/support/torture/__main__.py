@@ -1,0 +1,46 @@
+"""Attack the installed patchfem with seeded scenes, files, kills and limits; exit code 3 where something gave way.
+
+Example: python tests/support/torture --share 0.001 --campaign grammar
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from torture import driver
+
+
+def main(words=None) -> int:
+    """The program; exit code."""
+    parser = argparse.ArgumentParser(prog="torture", description=__doc__.splitlines()[0])
+    parser.add_argument("--share", type=float, default=0.02, help="of every campaign, above 0 and up to 1")
+    parser.add_argument("--campaign", default="", help="one campaign, or several with commas")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", type=int, help="place of one trial in one --campaign, from 0 on")
+    given = parser.parse_args(words)
+    names = given.campaign.split(",") if given.campaign else list(driver.CAMPAIGNS)
+    if unknown := [name for name in names if name not in driver.CAMPAIGNS]:
+        parser.error(f"--campaign {unknown[0]}: one of {', '.join(driver.CAMPAIGNS)}")
+    if not 0 < given.share <= 1:
+        parser.error(f"--share {given.share}: above 0 and up to 1 is wanted")
+    if given.only is not None and (len(names) != 1 or given.only < 0):
+        parser.error("--only N: the place of one trial in one --campaign, from 0 on")
+    if sys.platform == "win32":
+        print("a system on which a process can fork is needed, as Linux and macOS", file=sys.stderr)
+        return 4
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    from patchfem.__main__ import _guarded
+
+    rows = driver.torture(_guarded, given.share, names, given.seed, given.only, say)
+    print(driver.table(rows), flush=True)
+    return 3 if any(row.faults for row in rows) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
