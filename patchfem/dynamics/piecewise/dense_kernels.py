@@ -11,7 +11,7 @@ from .series_kernels import fastest, largest, motion_series, powers, value
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def unfold(row, h, plant, clock, room):
     """Fill the room with the series of the piece of a row over h [s]; the highest power."""
-    n, faces = plant.square.size, plant.faces.shape[0]
+    n, faces = len(plant.square), len(plant.reach)
     segment = clock.segments[int(row[3])]
     start = HEAD + 2 * n
     for i in range(n):
@@ -23,7 +23,7 @@ def unfold(row, h, plant, clock, room):
     motion_series(room.nodes[:n, :2].T, room.polys[faces], room.springs, plant, room.waves[0], h, top, room.coefs,
                   room.pull)
     for f in range(faces):
-        speed_series(plant.faces[f], room.coefs, top, room.polys[f])
+        speed_series(plant.faces[f], len(plant.square), room.coefs, top, room.polys[f])
     return top
 
 
@@ -34,7 +34,7 @@ def evaluate(rows, owner, tau, plant, clock, room, out):
     out (j, 2 n + 1 + 6 i): z, v, drive [m s-2], then of every interface slide [m], rate [m/s], force [N], slip [m],
     work and loss [J].
     """
-    n, faces, last, top, h = plant.square.size, plant.faces.shape[0], -1, 0, 1.0
+    n, faces, last, top, h = len(plant.square), len(plant.reach), -1, 0, 1.0
     for j in range(owner.size):
         row = rows[owner[j]]
         if owner[j] != last:
@@ -63,7 +63,7 @@ def evaluate(rows, owner, tau, plant, clock, room, out):
 @njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
 def peak(rows, plant, clock, moving, room):
     """Largest |acceleration| [m s-2] of the output over the pieces of rows, that of a moving base included."""
-    best, poly = 0.0, room.polys[plant.faces.shape[0]]
+    best, poly = 0.0, room.polys[len(plant.reach)]
     for j in range(rows.shape[0]):
         h = rows[j, 1]
         if h <= 0:
@@ -71,7 +71,7 @@ def peak(rows, plant, clock, moving, room):
         top = unfold(rows[j], h, plant, clock, room)
         for k in range(top - 1):
             part = 0.0
-            for i in range(plant.square.size):
+            for i in range(len(plant.square)):
                 part += plant.output[i] * room.coefs[k + 2, i]
             poly[k] = part * (k + 1) * (k + 2) / (h * h) + moving * room.waves[0, k]
         best = largest(poly, top - 2, best, room.hulls)

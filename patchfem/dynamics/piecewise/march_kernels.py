@@ -53,12 +53,12 @@ def arrive(clock, stop, left):
 def write(row, motion, span, theta, first, plant, table, memory, clock):
     """A row of a piece as it begins: time, span, phase, segment, what begins it, cycle, then z, v, then of every
     interface force, springs, share that slips, its limit, slip, work, loss, direction."""
-    n = plant.square.size
+    n = len(plant.square)
     row[0] = clock.now[0] * clock.period[0] + clock.now[1]
     row[1], row[2], row[3], row[4], row[5], row[6] = span, theta, clock.now[2], first, clock.now[0], clock.now[1]
     for i in range(n):
         row[HEAD + i], row[HEAD + n + i] = motion[0, i], motion[1, i]
-    for f in range(plant.faces.shape[0]):
+    for f in range(len(plant.reach)):
         at = HEAD + 2 * n + EACH * f
         row[at] = memory.force[f]
         row[at + 1], row[at + 2], row[at + 3] = tangent(f, table, memory)
@@ -70,8 +70,8 @@ def write(row, motion, span, theta, first, plant, table, memory, clock):
 def advance(u, h, top, motion, plant, table, memory, clock, books, room):
     """Move coordinates, slides and elements to u, with the energies that the elements take; whether the output passes
     the travel."""
-    n, coefs, ledger = plant.square.size, room.coefs, books.ledger
-    for f in range(plant.faces.shape[0]):
+    n, coefs, ledger = len(plant.square), room.coefs, books.ledger
+    for f in range(len(plant.reach)):
         stiff, share, limit = tangent(f, table, memory)
         step = moved(room.polys[f], top, u)
         work = (memory.force[f] + 0.5 * stiff * step) * step
@@ -90,7 +90,7 @@ def advance(u, h, top, motion, plant, table, memory, clock, books, room):
         motion[0, i] += u * place
         motion[1, i] = rate / h
         out += plant.output[i] * motion[0, i]
-    for f in range(plant.faces.shape[0]):
+    for f in range(len(plant.reach)):
         place = 0.0
         for i in range(n):
             place += plant.faces[f, i] * motion[0, i]
@@ -110,10 +110,10 @@ def widen(out, clock, books):
 def stored(motion, plant, table, memory):
     """Energy of the modes and of the elements [J]."""
     out = 0.0
-    for i in range(plant.square.size):
+    for i in range(len(plant.square)):
         out += motion[1, i]**2 + plant.square[i] * motion[0, i]**2
     out *= 0.5 * plant.mass
-    for f in range(plant.faces.shape[0]):
+    for f in range(len(plant.reach)):
         out += carried(f, table, memory)[1]
     return out
 
@@ -122,9 +122,9 @@ def stored(motion, plant, table, memory):
 def wait(motion, plant, table, memory):
     """A little longer [s] than until the next element yields, by the speeds of the slides."""
     out = 1e300
-    for f in range(plant.faces.shape[0]):
+    for f in range(len(plant.reach)):
         speed = 0.0
-        for i in range(plant.square.size):
+        for i in range(len(plant.square)):
             speed += plant.faces[f, i] * motion[1, i]
         gap = threshold(f, 1.0 if speed > 0 else -1.0, table, memory) - memory.place[f]
         if speed * gap > 0:
@@ -136,7 +136,7 @@ def wait(motion, plant, table, memory):
 def output_of(motion, plant):
     """Motion of the output [m]."""
     out = 0.0
-    for i in range(plant.square.size):
+    for i in range(len(plant.square)):
         out += plant.output[i] * motion[0, i]
     return out
 
@@ -150,7 +150,7 @@ def happen(what, face, sign, plant, table, memory, clock):
         turn(face, memory)
         clock.rest[face] = 1.0
         if plant.along == face:
-            clock.rest[plant.faces.shape[0]] = 1.0
+            clock.rest[len(plant.reach)] = 1.0
     elif what == OUTPUT_TURNS:
         clock.rest[face] = 1.0
     if what == YIELDS or what == TURNS:
@@ -160,9 +160,9 @@ def happen(what, face, sign, plant, table, memory, clock):
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def passed(top, plant, motion, room, travel, u):
     """u at which the output, monotone up to `u`, passes +-travel [m]; NONE if it does not."""
-    faces = plant.faces.shape[0]
+    faces = len(plant.reach)
     poly = room.polys[faces + 1]
-    speed_series(plant.output, room.coefs, top, poly)
+    speed_series(plant.output, len(plant.square), room.coefs, top, poly)
     here, step = output_of(motion, plant), moved(poly, top, u)
     if abs(here + step) <= travel or step == 0.0:
         return NONE
@@ -177,7 +177,7 @@ def march(stop, motion, plant, table, memory, clock, books, room, rows):
     where r = 0. Returns (DONE, FULL, TRAVEL or PILED, rows used). Cost: 0.2 to 0.5 us a piece of one mode.
     """
     used, first, now = 0, 1.0, clock.now
-    faces = plant.faces.shape[0]
+    faces = len(plant.reach)
     for f in range(faces):
         memory.force[f] = carried(f, table, memory)[0]
     while now[0] < stop[0] or (now[0] == stop[0] and now[1] < stop[1]):

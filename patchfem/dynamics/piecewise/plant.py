@@ -13,6 +13,10 @@ kinds, series = kernels("dynamics.piecewise.drive_kernels"), kernels("dynamics.p
 class Plant(NamedTuple):
     """Modes as the loop takes them.
 
+    The loop asks `square` how many modes there are and `reach` how many interfaces. Of one mode behind one interface
+    both are tuples: their length is then part of their type, so that the same text is compiled for one of each, three
+    times as fast.
+
     square: (n,) omega^2 [1/s2]; damping: (n, n) D [1/s], coupled: whether it is more than its diagonal; base, output:
     (n,); faces: (i, n); mass [kg]; reach: (i,) |face|^2/mass [1/kg], how much a spring there adds to a square of a
     rate; square_most, damping_most: norms of the modes' own; along: number of an interface that
@@ -38,9 +42,12 @@ def plant_of(modes: ModalBasis) -> Plant:
     output = np.array(modes.output, float)
     along = next((k for k, face in enumerate(faces) if not np.any(np.outer(face, output) - np.outer(output, face))), -1)
     coupled = bool(np.any(damping != np.diag(np.diag(damping))))
-    return Plant(np.array(modes.omega, float)**2, np.ascontiguousarray(damping), np.array(modes.base, float),
-                 np.ascontiguousarray(faces), output, (faces**2).sum(axis=1) / modes.mass, float(modes.mass),
-                 float(modes.omega.max()**2), float(np.linalg.norm(damping, 2)), int(coupled), along)
+    square, reach = np.array(modes.omega, float)**2, (faces**2).sum(axis=1) / modes.mass
+    if faces.shape == (1, 1):
+        square, reach = tuple(square.tolist()), tuple(reach.tolist())
+    return Plant(square, np.ascontiguousarray(damping), np.array(modes.base, float), np.ascontiguousarray(faces),
+                 output, reach, float(modes.mass), float(modes.omega.max()**2), float(np.linalg.norm(damping, 2)),
+                 int(coupled), along)
 
 
 class Clock(NamedTuple):

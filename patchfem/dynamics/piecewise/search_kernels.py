@@ -30,11 +30,11 @@ def heading(poly, top, rests):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def speed_series(row, coefs, top, poly):
-    """Fill poly (top,) with the series of the rate over u of row (n,) times the coordinates."""
+def speed_series(row, count, coefs, top, poly):
+    """Fill poly (top,) with the series of the rate over u of row (n,) times the coordinates, `count` of them."""
     for k in range(top):
         part = 0.0
-        for i in range(row.size):
+        for i in range(count):
             part += row[i] * coefs[k + 1, i]
         poly[k] = (k + 1) * part
 
@@ -71,11 +71,11 @@ def next_event(top, plant, table, memory, clock, room):
 
     u = 0: the state changes before anything moves.
     """
-    faces, polys = plant.faces.shape[0], room.polys
+    faces, polys = len(plant.reach), room.polys
     u, what, face, sign = 1.0, NOTHING, 0, 0.0
     for f in range(faces):
         poly = polys[f]
-        speed_series(plant.faces[f], room.coefs, top, poly)
+        speed_series(plant.faces[f], len(plant.square), room.coefs, top, poly)
         order, way = heading(poly, top, clock.rest[f] == 1.0)
         if way == 0.0:
             continue
@@ -95,7 +95,7 @@ def next_event(top, plant, table, memory, clock, room):
             u, what, face, sign = root, YIELDS, f, way
     if plant.along < 0:
         poly, spare = polys[faces + 1], polys[faces]
-        speed_series(plant.output, room.coefs, top, poly)
+        speed_series(plant.output, len(plant.square), room.coefs, top, poly)
         order, way = heading(poly, top, clock.rest[faces] == 1.0)
         for k in range(order, top):
             spare[k] = way * poly[k]

@@ -59,7 +59,7 @@ def points(x):
 def fastest(plant, springs):
     """Bound [1/s] of the rates of the modes with springs (i,) [N/m] between the interfaces."""
     square = plant.square_most
-    for f in range(springs.size):
+    for f in range(len(plant.reach)):
         square += springs[f] * plant.reach[f]
     return 0.5 * plant.damping_most + sqrt(0.25 * plant.damping_most**2 + square)
 
@@ -82,7 +82,8 @@ def single_series(motion, force, spring, plant, wave, h, top, coefs):
 def double_series(motion, force, spring, plant, wave, h, top, coefs):
     """`motion_series` of two modes with one interface and dampers of their own, all in registers."""
     squared, face_1, face_2, base_1, base_2 = h * h, plant.faces[0, 0], plant.faces[0, 1], plant.base[0], plant.base[1]
-    stiff_1, stiff_2, stiff = squared * plant.square[0], squared * plant.square[1], squared * spring / plant.mass
+    second = len(plant.square) - 1  # no constant: of one mode, where nothing comes here, it would not compile
+    stiff_1, stiff_2, stiff = squared * plant.square[0], squared * plant.square[second], squared * spring / plant.mass
     damp_1, damp_2, pull = h * plant.damping[0, 0], h * plant.damping[1, 1], squared * force / plant.mass
     here_1, here_2, after_1, after_2 = motion[0, 0], motion[0, 1], h * motion[1, 0], h * motion[1, 1]
     coefs[0, 0], coefs[0, 1], coefs[1, 0], coefs[1, 1] = here_1, here_2, after_1, after_2
@@ -103,28 +104,28 @@ def motion_series(motion, force, springs, plant, wave, h, top, coefs, pull):
     motion (2, n): coordinates and rates at first; force (i,) [N] there; springs (i,) [N/m]; wave: series of a; pull:
     room (i,).
     """
-    n, faces, squared = plant.square.size, plant.faces, h * h
-    if n == 1 and springs.size == 1:
+    n, faces, squared = len(plant.square), plant.faces, h * h
+    if n == 1 and len(plant.reach) == 1:
         single_series(motion, force[0], springs[0], plant, wave, h, top, coefs)
         return
-    if n == 2 and springs.size == 1 and not plant.coupled:
+    if n == 2 and len(plant.reach) == 1 and not plant.coupled:
         double_series(motion, force[0], springs[0], plant, wave, h, top, coefs)
         return
     for i in range(n):
         coefs[0, i], coefs[1, i] = motion[0, i], h * motion[1, i]
-    for f in range(springs.size):
+    for f in range(len(plant.reach)):
         pull[f] = force[f] / plant.mass
     for k in range(top - 1):
         scale, damp = TWICE[k + 2] * squared, TWICE[k + 2] * h * (k + 1)
         if k > 0:
-            for f in range(springs.size):
+            for f in range(len(plant.reach)):
                 part = 0.0
                 for i in range(n):
                     part += faces[f, i] * coefs[k, i]
                 pull[f] = part * springs[f] / plant.mass
         for i in range(n):
             part = -plant.square[i] * coefs[k, i] - plant.base[i] * wave[k]
-            for f in range(springs.size):
+            for f in range(len(plant.reach)):
                 part -= faces[f, i] * pull[f]
             lost = 0.0
             if plant.coupled:

@@ -23,7 +23,7 @@ def carry(u, h, top, slopes, marks, plant, table, memory, room, spare):
     spare: the slopes of one number (2, n), the force on them (i,), their series (terms, n).
     """
     one, force, coefs = spare
-    n, faces, zero = plant.square.size, plant.faces.shape[0], room.waves[1]
+    n, faces, zero = len(plant.square), len(plant.reach), room.waves[1]
     for s in range(slopes.shape[2]):
         for i in range(n):
             one[0, i], one[1, i] = slopes[0, i, s], slopes[1, i, s]
@@ -53,9 +53,9 @@ def follow(stop, motion, slopes, marks, plant, table, memory, clock, books, room
     slopes (2, n, s) of the motion and marks (i, t + 2, s) of the memory's turning places, to s numbers, move along;
     spare: room as `carry` has it; seen (2, i): most elements that slip, fewest groups that stay.
     """
-    for f in range(plant.faces.shape[0]):
+    for f in range(len(plant.reach)):
         memory.force[f] = carried(f, table, memory)[0]
-    now, faces, n, pieces = clock.now, plant.faces.shape[0], plant.square.size, 0
+    now, faces, n, pieces = clock.now, len(plant.reach), len(plant.square), 0
     for k in range(room.waves.shape[1]):
         room.waves[1, k] = 0.0
     while now[0] < stop[0] or (now[0] == stop[0] and now[1] < stop[1]):

@@ -30,7 +30,7 @@ def rates_at_four(coefs, i, top, u):
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def sums(x, u, h, top, plant, clock, books, room):
     """Add the work of the drive, the viscous loss and the phasor of a piece up to u to the books, by Gauss points."""
-    n, count, ledger, nodes = plant.square.size, points(x * u), books.ledger, room.nodes
+    n, count, ledger, nodes = len(plant.square), points(x * u), books.ledger, room.nodes
     work, lost, passed_by = 0.0, 0.0, 0.0
     for g in range(0, count, 4):  # four points at a time in registers
         place = (u * _PLACE[count, g], u * _PLACE[count, g + 1], u * _PLACE[count, g + 2], u * _PLACE[count, g + 3])

@@ -19,7 +19,7 @@ RINGS = 0.95 * 3 * np.pi
 
 def serves(plant: Plant, clock: Clock, travel: float) -> bool:
     """Whether these loops take a run: one mode, one interface that it moves, sines, no travel of the output."""
-    one = plant.square.size == 1 and plant.faces.shape[0] == 1 and plant.faces[0, 0] != 0
+    one = len(plant.square) == 1 and len(plant.reach) == 1 and plant.faces[0, 0] != 0
     return bool(one and travel == np.inf and np.all(clock.segments[:, 2] == kinds.SINE))
 
 
