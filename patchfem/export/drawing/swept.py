@@ -4,8 +4,8 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...scales import LADDERS, axis_unit, plain, short
-from ..pages.missed import over
-from ..pages.written import label
+from ..missed import over
+from ..written import label
 from .pictures import drawing, styled
 
 DECADES = 2  # of values, all above 0, from which their axis is logarithmic

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...scales import LADDERS, plain, short, step_of
+from ..written import NUMBER, bare, label
 from .changes import lines_of, shown_of
 from .words import linked, zero_below
-from .written import NUMBER, bare, label
 
 WITHIN = 0.05  # of its value in the first case, in which a measure is said to stay
 MOVES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "loop_area",

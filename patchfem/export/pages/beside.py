@@ -12,11 +12,11 @@ from ...core import PatchfemError
 from ...scales import LADDERS, axis_unit
 from ..readback import numeric, readable, variables, wanted
 from ..summary import read_summary
+from ..written import NUMBER
 from .charts import COLOURS, mark
 from .document import Section, document
 from .sweep import label
 from .words import linked, meaning, pair
-from .written import NUMBER
 
 TALL = 410  # pixels of a picture
 POINTS = 4000  # of one line in a picture

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..written import bare, resolved
 from .words import NO_SLIP
-from .written import bare, resolved
 
 MOST, WORDS = 3, 40  # changes in the sentence, and words, which the later changes give way to
 WHOLE = 1 - 1e-12  # a contact fraction of 1 but for round-off

@@ -5,10 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...scales import plain, short
-from . import allowed, missed
+from .. import missed
+from ..written import NUMBER, label
+from . import allowed
 from .changes import changes, shown_of
 from .words import zero_below
-from .written import NUMBER, label
 
 EXACT = 1e-6  # of a value, up to which no error is told: the values are shown to four digits
 SETTLED = ("steady", "stuck", "done", "no_contact")

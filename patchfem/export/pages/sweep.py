@@ -8,12 +8,12 @@ import numpy as np
 
 from ...core import Outcome
 from ...scales import LADDERS, axis_unit, rounded
+from ..missed import over
+from ..written import NUMBER, brief, label
 from . import allowed
 from .document import Section, document
 from .lead import FIRST, SETTLED, Lead, columns, lead_of
-from .missed import over
 from .words import linked, zero_below
-from .written import NUMBER, brief, label
 
 DRAWN, LISTED = 20_000, 400  # cases in the pictures and in the table; sweep.csv has them all
 

@@ -20,8 +20,8 @@ from ...disk.whole import write_text
 from ...runs.many.answers import Answers
 from ...runs.results.result import meaning
 from ..pages import sweep
-from ..pages.written import NUMBER
 from ..readback import HUGE, wanted
+from ..written import NUMBER
 from .tables import facts, names_of
 
 WHOLE, SHORT = "report.html", "summary.json"  # what a click on a case opens: its page where it has one

@@ -5,7 +5,7 @@ import pytest
 from scene_texts import PIECE
 
 import patchfem as pf
-from patchfem.export.pages.missed import counted, over, sentence
+from patchfem.export.missed import counted, over, sentence
 
 NAN = np.nan
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...scales import plain
+from ..scales import plain
 from .written import label
 
 # what a case answers first, named before what misses its tolerance by more
