@@ -11,10 +11,13 @@ from math import cos
 
 import numpy as np
 
-from ...core import ModalBasis, NotConverged, PatchfemError, Start, frozen_array
+from ...core import ModalBasis, PatchfemError, Start, frozen_array
+from ..periodic import Grows, Lap, Shooting
 from .batches import gather, turning_points, values_at
 from .engine import Engine
 from .signals import ORDER
+
+LONGEST = 400  # cycles of the run between steps of Newton's method that lead away
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -129,46 +132,53 @@ def _saltation(piece, after, system):
 
 
 def steady(modes: ModalBasis, drive, static, kinetic, start: Start | None = None, cycles: int = 30,
-           periods: int = 1, tolerance: float = 1e-12, most: int = 60) -> Steady:
+           periods: int = 1) -> Steady:
     """Periodic response to a sine from rest or `start`, after `cycles` of a run that bring it near.
 
-    drive: one Segment of a sine; static, kinetic [N]: one or (i,). Newton's method on the period map; where it leads
-    away, more cycles are run. NotConverged where neither settles, PatchfemError for a drive that does not repeat.
+    drive: one Segment of a sine; static, kinetic [N]: one or (i,). NotConverged as `periodic.Shooting.repeating`,
+    PatchfemError for a drive that does not repeat.
     """
     if len(drive.segments) != 1:
         raise PatchfemError("drive: a periodic response needs one sine that goes on; march this one")
     n = modes.omega.size
     begin = np.zeros(2 * n) if start is None else np.concatenate([start.z, start.v])
-    state, used = _after(modes, drive, static, kinetic, begin, cycles), 0
-    one = period_map(modes, drive, static, kinetic, state, periods)
-    for used in range(1, most + 1):
-        miss = one.end - state
-        size = _size(one, n)
-        better = _newton(modes, drive, static, kinetic, state, one, size, periods)
-        if _norm(miss, size, n) <= tolerance:  # the last step squares what is left
-            state, one = better or (state, one)
-            break
-        if better is None:
-            cycles = min(2 * cycles, 400)  # Newton's direction leads away: come nearer by more cycles of the run
-            state = _after(modes, drive, static, kinetic, state, cycles)
-            one = period_map(modes, drive, static, kinetic, state, periods)
-        else:
-            state, one = better
-        if better is None and _grows(modes, drive, static, kinetic, state, one, periods):
-            return _result(modes, state, one, n, "unbounded", used)
-    else:
-        raise NotConverged(f"dynamics: no periodic response after {most} steps of Newton's method; give a start nearer "
-                           "to it, or march")
-    return _result(modes, state, one, n, None, used - 1)
+    shooting = Events(modes, drive, static, kinetic, periods)
+    try:
+        lap, used = shooting.repeating(shooting.run(begin, cycles), (2 * cycles, LONGEST))
+    except Grows as found:
+        return _result(modes, found.lap, "unbounded", found.steps)
+    return _result(modes, lap, None, used)
 
 
-def _after(modes, drive, static, kinetic, state, cycles: int):
-    """State after some cycles of the run."""
-    n = modes.omega.size
-    engine = Engine(modes, drive, static, kinetic, cycles, Start(state[:n], state[n:]))
-    for _ in engine.pieces():
-        pass
-    return np.concatenate([engine.z, engine.v])
+class Events(Shooting):
+    """The map from event to event over whole periods of a drive; arguments as `steady`."""
+
+    def __init__(self, modes: ModalBasis, drive, static, kinetic, periods: int = 1):
+        self.modes, self.drive, self.forces, self.periods = modes, drive, (static, kinetic), periods
+        part = drive.segments[0]
+        self.moved_by = max(abs(part.amplitude) / part.omega**2 * float(np.abs(modes.base).max()), 1e-300)
+
+    def lap(self, point) -> Lap:
+        """The Lap of a state (2n,)."""
+        found = period_map(self.modes, self.drive, *self.forces, point, self.periods)
+        scale = _size(found, self.modes.omega.size)
+        return Lap(point, found, found.slope, scale, (point - found.end) / scale, scale[0] / self.moved_by)
+
+    def moved(self, lap: Lap, step):
+        """The state a step away, whose stuck faces stay at rest."""
+        return _projected(lap.found.pieces[0].flow, self.modes.omega.size) @ (lap.point + step)
+
+    def after(self, lap: Lap, periods: int):
+        """The state after some periods of the run from that of a Lap."""
+        return self.run(lap.point, periods)
+
+    def run(self, state, periods: int):
+        """The state after some periods of the run."""
+        n = self.modes.omega.size
+        engine = Engine(self.modes, self.drive, *self.forces, periods, Start(state[:n], state[n:]))
+        for _ in engine.pieces():
+            pass
+        return np.concatenate([engine.z, engine.v])
 
 
 def _size(one: Map, n: int):
@@ -177,39 +187,6 @@ def _size(one: Map, n: int):
     rates = max(float((np.abs(p.coefs[1:]) * ORDER[1:, None]).sum(axis=0).max() / p.unit) for p in one.pieces)
     moved = max(places, 1e-300)
     return np.concatenate([np.full(n, moved), np.full(n, max(rates, 1e-300))])
-
-
-def _norm(miss, size, n: int) -> float:
-    return float(np.abs(miss / size).max()) if size[n] > 1e-299 else 0.0
-
-
-def _newton(modes, drive, static, kinetic, state, one, size, periods):
-    """A better (state, Map) along Newton's direction, None where there is none."""
-    n = modes.omega.size
-    # least squares: a stuck slide may rest anywhere in a range, which makes the matrix singular
-    left = (one.slope - np.eye(2 * n)) * size / size[:, None]
-    step = np.linalg.lstsq(left, -(one.end - state) / size, rcond=1e-11)[0] * size
-    now = _norm(one.end - state, size, n)
-    held = _projected(one.pieces[0].flow, n)
-    for share in (1.0, 0.5, 0.2, 0.05):
-        trial = held @ (state + share * step)
-        try:
-            other = period_map(modes, drive, static, kinetic, trial, periods)
-        except NotConverged:
-            continue
-        if _norm(other.end - trial, np.maximum(size, _size(other, n)), n) < (1 - 0.4 * share) * now:
-            return trial, other
-    return None
-
-
-def _grows(modes, drive, static, kinetic, state, one, periods) -> bool:
-    """Whether the output gains as much in the second of two runs of 60 cycles as in the first."""
-    sizes, here = [_swing(one, modes)], state
-    for _ in range(2):
-        here = _after(modes, drive, static, kinetic, here, 60)
-        sizes.append(_swing(period_map(modes, drive, static, kinetic, here, periods), modes))
-    first, second = sizes[1] - sizes[0], sizes[2] - sizes[1]
-    return first > 1e-6 * sizes[0] and second > 0.99 * first
 
 
 def _swing(one: Map, modes) -> float:
@@ -221,14 +198,13 @@ def _swing(one: Map, modes) -> float:
     return float(np.ptp(np.concatenate(values))) / 2
 
 
-def _result(modes, state, one, n, regime, used) -> Steady:
-    values = np.linalg.eigvals(one.slope)
-    values = values[np.argsort(-np.abs(values))]
+def _result(modes, lap: Lap, regime, used) -> Steady:
+    one, state, n = lap.found, lap.point, modes.omega.size
     signs = np.array([p.signs for p in one.pieces if p.span > 0])
     if regime is None:
         slips = bool(np.any(signs != 0)) or signs.shape[1] == 0
         rests = bool(np.any(signs == 0))
         most = max(one.stops)
         regime = "stuck" if not slips else "sliding" if not rests else f"{most} stop{'s' if most != 1 else ''}"
-    return Steady(Start(frozen_array(state[:n]), frozen_array(state[n:])), _norm(one.end - state, _size(one, n), n),
-                  frozen_array(values, complex), _swing(one, modes), regime, one.stops, one.alone, used)
+    return Steady(Start(frozen_array(state[:n]), frozen_array(state[n:])), lap.miss,
+                  frozen_array(lap.multipliers(), complex), _swing(one, modes), regime, one.stops, one.alone, used)

@@ -17,8 +17,6 @@ import numpy as np
 
 from ...core import ModalBasis
 
-ROUNDING = 1e-5  # of a multiplier on the unit circle
-
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Mark:
@@ -95,23 +93,3 @@ def product(steps) -> np.ndarray:
         rest = steps[-1:] if len(steps) % 2 else steps[:0]
         steps = np.concatenate([steps[1::2] @ steps[0:len(steps) - len(rest):2], rest])
     return steps[0]
-
-
-def multipliers(matrix) -> np.ndarray:
-    """Floquet multipliers (s,) complex, the eigenvalues of a monodromy matrix (s, s), largest magnitude first."""
-    found = np.linalg.eigvals(matrix)
-    return found[np.argsort(-np.abs(found))]
-
-
-def is_stable(found) -> bool:
-    """Whether no disturbance grows from cycle to cycle: no multiplier (s,) exceeds 1 in magnitude, but for
-    round-off."""
-    return bool(np.abs(found).max() <= 1 + ROUNDING)
-
-
-def kind_of_loss(found) -> str:
-    """How a motion that is not stable leaves: "fold" or "branch" (through +1), "doubling" (through -1), "torus"."""
-    worst = found[0]
-    if abs(worst.imag) > 1e-6 * abs(worst):  # a pair off the real axis, beyond round-off
-        return "torus"
-    return "doubling" if worst.real < 0 else "fold"

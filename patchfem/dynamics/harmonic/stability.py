@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .floquet import Fading, Mark, is_stable, monodromy, multipliers
+from ..periodic import is_stable, multipliers
+from .floquet import Fading, Mark, monodromy
 from .laws import Flow, Stretch
 
 

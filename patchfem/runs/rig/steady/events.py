@@ -10,9 +10,9 @@ from ....compiled import load
 from ....core import Outcome, PatchfemError, Start
 from ....dynamics.events.histories import simulate
 from ....dynamics.events.steady_events import steady
-from ....dynamics.harmonic.floquet import is_stable
 from ....dynamics.one_mode import sdof
 from ....dynamics.one_mode.steady import response
+from ....dynamics.periodic import is_stable
 from ....response.measures import half_swing
 from ....response.spectrum import wave_measures
 from ....structure.drive_sizes import largest

@@ -8,9 +8,9 @@ import numpy as np
 from ....core import NotConverged, Outcome, Start
 from ....dynamics.grooves.run import GroovesModel
 from ....dynamics.harmonic import orbits
-from ....dynamics.harmonic.floquet import is_stable
 from ....dynamics.harmonic.laws import synthesis
 from ....dynamics.march import march as hub
+from ....dynamics.periodic import is_stable
 from ....response.measures import peaks_between
 from ..interface import model_of
 from ..march import Read
@@ -165,4 +165,4 @@ def disturbed(modes, drive, contact, motion) -> np.ndarray:
 
 def lasts(found) -> bool:
     """Whether no disturbance grows, but for what the steps of a march leave open."""
-    return is_stable(found / (1 + ROUGH)) if found.size else True
+    return is_stable(found / (1 + ROUGH))

@@ -10,7 +10,7 @@ from time import perf_counter
 import numpy as np
 
 from ....core import Outcome
-from ....dynamics.harmonic.floquet import is_stable
+from ....dynamics.periodic import is_stable
 from ....dynamics.piecewise import histories
 from ....dynamics.piecewise.elements import books_begin
 from ....dynamics.piecewise.steady import steady
@@ -69,7 +69,7 @@ def _largest(one) -> float:
 
 
 def _stable(one) -> bool:
-    return is_stable(one.multipliers) if one.multipliers.size else True
+    return is_stable(one.multipliers)
 
 
 def _regime(one) -> str:

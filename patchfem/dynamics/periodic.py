@@ -1,0 +1,176 @@
+"""Motions that repeat with their drive: Newton's method on the map of an engine over a period, and how they last.
+
+The numbers x of a motion at phase 0 of the drive repeat where P(x) = x, with P the map over a period, or over half of
+one turned over. Newton's step solves (P' - 1) dx = x - P(x), every number over its size, and is shortened until it
+leads nearer. Where no share of it does, the run goes on, longer every time, and the search continues from there. The
+eigenvalues of P' are Floquet's multipliers: what a period makes of a small disturbance.
+
+An engine gives its map as a `Shooting`. Method: Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
+Systems, 2004, ch. 7; damping as in Deuflhard 2004.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.linalg.lapack import dgesv
+
+from ..core import NotConverged
+
+SHARES = 1.0, 0.5, 0.2, 0.05  # of a step that are tried
+MOST = 40  # steps of Newton's method
+GROWN = 1e-6  # of what the drive moves a free mass: the most that a motion misses when it closes
+FAR = 1e9  # the largest size to which a step leads: that of a mode with a damping ratio of 5e-10
+WATCHED = 60  # periods of a run that may grow
+UNDAMPED = 2e-9  # of the largest multiplier below 1: FAR again
+ROUND = 1e-14  # a miss that a step more would not make smaller
+ROUNDING = 1e-5  # of a multiplier on the unit circle
+
+
+@dataclass(eq=False, slots=True)
+class Lap:
+    """A point and what a period makes of it.
+
+    point and found are the engine's own; slope (m, m): derivative of the numbers at the end to those at the start;
+    scale (m,): size of every number; gap (m,): start less end over it. size: of the motion over what the drive moves a
+    free mass by. alike: start and end have the same numbers, else gap is of those they share and slope tells no step;
+    same: they are of the same state besides. kept (k,): numbers that no step changes. miss: the largest gap.
+    """
+
+    point: Any
+    found: Any
+    slope: np.ndarray
+    scale: np.ndarray
+    gap: np.ndarray
+    size: float
+    alike: bool = True
+    same: bool = True
+    kept: np.ndarray | tuple = ()
+    miss: float = field(init=False)
+
+    def __post_init__(self):
+        self.miss = float(np.abs(self.gap).max())
+
+    def closed(self, tolerance: float) -> bool:
+        """Whether the motion repeats to a tolerance of its size."""
+        return self.miss <= tolerance and self.miss * self.size <= GROWN and self.alike and self.same
+
+    def step(self) -> np.ndarray:
+        """Newton's step (m,), least squares where a slide may rest anywhere."""
+        scale, out = self.scale, np.zeros(self.scale.size)
+        left = (self.slope - np.eye(scale.size)) * scale / scale[:, None]
+        if not len(self.kept):
+            return solved(left, self.gap) * scale
+        free = self._free()
+        out[free] = solved(left[np.ix_(free, free)], self.gap[free])
+        return out * scale
+
+    def multipliers(self) -> np.ndarray:
+        """Floquet multipliers of the numbers that a step may change, the largest first."""
+        free = self._free()
+        return multipliers(self.slope[np.ix_(free, free)])
+
+    def _free(self) -> np.ndarray:
+        out = np.ones(self.scale.size, bool)
+        out[list(self.kept)] = False
+        return out
+
+
+class Grows(NotConverged):
+    """A motion that gains as much in every period, so that none repeats; lap: the last one."""
+
+    def __init__(self, lap: Lap, steps: int):
+        super().__init__("dynamics: the motion grows from period to period, so none repeats")
+        self.lap, self.steps = lap, steps
+
+
+class Shooting:
+    """The map of an engine over a period; `repeating` finds its fixed point."""
+
+    def lap(self, point) -> Lap:
+        """The Lap of a point of the engine. NotConverged where the engine does not reach its end."""
+        raise NotImplementedError
+
+    def moved(self, lap: Lap, step):
+        """The point that lies a step (m,) from that of a Lap."""
+        raise NotImplementedError
+
+    def after(self, lap: Lap, periods: int):
+        """The point to which a run from the end of a Lap comes in some periods."""
+        raise NotImplementedError
+
+    def grows(self, lap: Lap) -> bool:
+        """Whether no disturbance dies out, and the motion gains as much in the second of two runs of WATCHED periods
+        as in the first."""
+        if not lap.alike or np.abs(lap.multipliers()).max(initial=0.0) < 1 - UNDAMPED:
+            return False
+        sizes = [lap.size]
+        for _ in range(2):
+            lap = self.lap(self.after(lap, WATCHED))
+            sizes.append(lap.size)
+        first, second = np.diff(sizes)
+        return bool(first > 1e-6 * sizes[0] and second > 0.99 * first)
+
+    def repeating(self, point, periods: tuple = (10, 160), tolerance: float = 1e-12) -> tuple:
+        """(Lap of the motion that repeats, steps of Newton's method) from a point near it.
+
+        periods: of the run where Newton's method leads away, at first and at most. Grows where that run does;
+        NotConverged where MOST steps and the runs between them do not settle.
+        """
+        lap = self.lap(point)
+        for used in range(MOST):
+            closed = lap.closed(tolerance)
+            if closed and lap.miss <= ROUND:
+                return lap, used
+            better = self._newton(lap, SHARES[:1] if closed else SHARES)
+            if closed:  # the last step squares what is left, where it keeps the numbers
+                return (better if better is not None and better.alike else lap), used
+            if better is not None:
+                lap = better
+                continue
+            lap, periods = self.lap(self.after(lap, periods[0])), (min(2 * periods[0], periods[1]), periods[1])
+            if self.grows(lap):
+                raise Grows(lap, used + 1)
+        raise NotConverged(f"dynamics: no motion repeats after {MOST} steps of Newton's method; start nearer, or march")
+
+    def _newton(self, lap: Lap, shares) -> Lap | None:
+        """A better Lap by the first of some shares of Newton's step that leads to one, None where none does."""
+        if not lap.alike:
+            return None
+        step = lap.step()
+        for share in shares:
+            try:
+                other = self.lap(self.moved(lap, share * step))
+            except NotConverged:
+                continue
+            # what nothing bounds misses ever less of its size, the farther a step leads
+            if other.miss < (1 - 0.4 * share) * lap.miss and other.size <= FAR:
+                return other
+        return None
+
+
+def solved(left, right) -> np.ndarray:
+    """x (n,) of left x = right; least squares where the matrix is singular to round-off."""
+    factors, _, out, info = dgesv(left, right)
+    sizes = np.abs(factors.diagonal())
+    if info == 0 and sizes.min(initial=np.inf) > 1e-13 * sizes.max(initial=0.0):
+        return out
+    return np.linalg.lstsq(left, right, rcond=1e-13)[0]
+
+
+def bound(residual: float, found) -> float:
+    """Relative error of a motion that closes to a residual, over its size: the more, the nearer to 1 a multiplier of
+    `found` (m,) lies."""
+    return residual / max(float(np.abs(1 - np.asarray(found)).min(initial=1.0)), 1e-12)
+
+
+def multipliers(matrix) -> np.ndarray:
+    """Floquet multipliers (s,) complex, the eigenvalues of the map of a period (s, s), largest magnitude first."""
+    found = np.linalg.eigvals(matrix)
+    return found[np.argsort(-np.abs(found))]
+
+
+def is_stable(found) -> bool:
+    """Whether no disturbance grows from cycle to cycle: no multiplier (s,) exceeds 1 in magnitude, but for
+    round-off."""
+    return bool(np.abs(found).max(initial=0.0) <= 1 + ROUNDING)
