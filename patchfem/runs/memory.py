@@ -44,7 +44,7 @@ def code(model: Model, engine: str) -> Code:
     if engine == "harmonic":
         from .rig.engines import steady_by
 
-        by = {"events": "exact", "yields": "piecewise"}.get(steady_by(model), engine)
+        by = steady_by(model).like
     if by == "exact":
         rig = model.rig
         return FEW if not rig.interfaces or (len(rig.frequencies) == 1 and rig.drive.segments) else EVENTS

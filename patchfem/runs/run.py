@@ -130,7 +130,11 @@ def _keeping(kept: Kept | None, what: Plan, patch):
 
 def marches(what: Plan) -> bool:
     """Whether a run is a march in time, which keeps its state on the way."""
-    return what.engine == "march" and what.model.rig is not None
+    if what.model.rig is None:
+        return False
+    from .rig.engines import ENGINES
+
+    return ENGINES[what.engine].resumes
 
 
 def _unloaded(model: Model) -> bool:

@@ -22,7 +22,7 @@ from patchfem.core import Missing, NotConverged, PatchfemError
 from patchfem.model.model import build
 from patchfem.response.errors import change
 from patchfem.response.rows import TABLE, of_first
-from patchfem.runs.rig.engines import no_pieces
+from patchfem.runs.rig.engines import PIECES
 from patchfem.runs.rig.numerics import choose
 from patchfem.runs.run import run
 from patchfem.scene.scene import SceneError, load
@@ -118,7 +118,7 @@ def _finer(s: dict, path, model, extra: dict) -> tuple:
         found = run(load(path, [*sets, "accuracy.harmonics=129"])).measures
         known = {name: m for name, m in found.items() if m.value is not None}
         return {k: m.value for k, m in known.items()}, {k: m.error or 0.0 for k, m in known.items()}, "harmonics"
-    if extra["engine"] == "march" and not no_pieces(model):
+    if extra["engine"] == "march" and not PIECES.lacks(model):
         return _values(load(path, [*sets, "accuracy.method=exact"])), {}, "pieces"
     steps = extra.get("steps_per_cycle") or 400
     runs = [_values(load(path, [*sets, "accuracy.method=march", f"accuracy.steps_per_cycle={share * steps}"]))

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core import NotConverged, Outcome, Response
 from ...response.measures import half_swing
-from ..rig.engines import ENGINES, HARMONIC, MARCH, steady_by
+from ..rig.engines import ENGINES, MARCH, steady_by
 from ..rig.numerics import choose
 
 SAMPLES = 400  # of a cycle without friction
@@ -45,8 +45,9 @@ class Watcher:
     def __init__(self, model, patch, say=None, windowed: bool = True, before: Watcher | None = None):
         self.model, self.patch, self.say, self.windowed = model, patch, say, windowed
         self.numerics = choose(model)
-        steady = self.numerics.engine == HARMONIC.name
-        self.by = "" if not steady else "line" if model.kind == "linear" and not model.rig.bends else steady_by(model)
+        steady = ENGINES[self.numerics.engine].steady
+        line = model.kind == "linear" and not model.rig.bends
+        self.by = "" if not steady else "line" if line else steady_by(model).name
         self.made, self.before = {}, before.made if before is not None else {}
 
     def __call__(self, drive, near=None) -> Watched | None:
@@ -115,7 +116,7 @@ class Watcher:
         from ...response.measures import acceleration_peak
         from ..rig.steady.balance import SAMPLES, Balance
 
-        one = self._once("balance", lambda: Balance(self.model, self.numerics, self.patch, self.say))
+        one = self._once("balance", lambda: Balance(self.model, self.numerics, self.patch, 0, self.say))
         found = point(one.modes, drive, one.group, one.harmonics, one.tolerance, start=near)
         window = periodic_response(found, one.modes, drive, SAMPLES)
         return Watched(window, acceleration_peak(window), found.amplitude(one.modes.output), found)
@@ -123,13 +124,13 @@ class Watcher:
     def _events(self, drive, near) -> Watched | None:
         from ..rig.steady.events import Events
 
-        raw = self._once("events", lambda: Events(self.model, self.numerics, self.patch, self.say)).point(drive)[0]
+        raw = self._once("events", lambda: Events(self.model, self.numerics, self.patch, 0, self.say)).point(drive)[0]
         return _seen(raw)
 
     def _run(self, drive, near) -> Watched | None:
         model = replace(self.model, rig=replace(self.model.rig, drive=drive))
         few = replace(self.numerics, whole=False)  # what is before the window is neither kept nor measured
-        if self.numerics.engine != MARCH.name:
+        if ENGINES[self.numerics.engine] is not MARCH:
             return _seen(ENGINES[self.numerics.engine].run(model, few, self.patch, 0, self.say, None))
         from ..rig.march import Read, marched
 

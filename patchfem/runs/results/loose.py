@@ -242,9 +242,9 @@ def _finer_under(result, coarse) -> str:
 def _stepless(model) -> str:
     """The exact engine where it follows a motion that steps do not resolve; "" where none does."""
     if model.kind == "rig":
-        from ..rig.engines import no_closed_form, no_pieces
+        from ..rig.engines import inexact
 
-        if model.accuracy.method != "exact" and not (no_closed_form(model) and no_pieces(model)):
+        if model.accuracy.method != "exact" and not inexact(model):
             pinned = "leave out accuracy.steps_per_cycle and " * (model.accuracy.steps_per_cycle is not None)
             return f'{pinned}set accuracy.method = "exact", which has no steps'
     return ""

@@ -1,7 +1,7 @@
 """The engines of a rig as records: what each cannot do, how it solves, how a run of it can be coarser, what it costs.
 
-`engine_of` takes the engine that the scene names, or the first that can. What a named engine does not take the rules of
-the scene have refused, `scene.rules.methods`.
+`engine_of` takes the engine that the scene names, or the first that can. What each takes is one table for the rules of
+the scene and for this choice, `scene.rules.methods.TAKES`. Nothing else asks for an engine by its name.
 """
 
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import lru_cache
 from importlib import import_module
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,94 +41,124 @@ class Variant(NamedTuple):
 CLOSED = 1e-8  # gap of an energy balance that is kept to round-off: a billion steps leave less
 
 
-class Engine(NamedTuple):
-    """One engine of a rig.
+def late(where: str) -> Callable:
+    """The function that "module function" of this folder names, imported now."""
+    module, function = where.split()
+    return getattr(import_module(f"patchfem.runs.rig.{module}"), function)
 
-    lacks(model) -> why it has no answer to a model that names no engine, "" where it has; solve: "module function" of
-    this folder, function(model, numerics, patch, frames, say, progress) -> Solution; in_time(model, numerics, patch)
-    and in_space(model, numerics, patch, coarse, solution) -> Rungs of its error; least: relative error that stays;
-    closes: gap of the energy balance beyond which a run has not converged, None where the engine's own error of the
-    balance says it, infinite of methods that are shown with what they lose.
+
+class Engine(NamedTuple):
+    """One engine of a rig; what it takes stands under its name in `scene.rules.methods.TAKES`.
+
+    method: the accuracy.method that names it, "" where only "auto" comes to it. dearer(model) -> why a model that names
+    no engine is better served by the next one, "" where not. solve: function(model, numerics, patch, frames, say,
+    progress) -> Solution; chosen: function(model, Numerics) -> Numerics as the engine has them; refuse: function(model,
+    numerics), which raises Missing where a run would not end; cost: function(model, numerics, unknowns) -> (steps,
+    seconds); words: function(model, numerics) -> sentences of a plan; notes: function(model, numerics, patch, Solution)
+    -> notes of a run. All of these are "module function" of this folder, "" where there is none. in_time(model,
+    numerics, patch) and in_space(model, numerics, patch, coarse, solution) -> Rungs of its error; least: relative error
+    that stays; closes: gap of the energy balance beyond which a run has not converged, None where the engine's own
+    error of the balance says it, infinite of methods that are shown with what they lose. tells: numbers of a run that
+    its summary has; resumes: it keeps its state on the way; steady: it finds motions that repeat.
     """
 
     name: str
-    lacks: Callable
+    method: str
     solve: str
     in_time: Callable
     in_space: Callable
+    cost: str
+    dearer: Callable = lambda model: ""
+    chosen: str = ""
+    refuse: str = ""
+    words: str = "plan summed_words"
+    notes: str = ""
     least: float = 1e-9
     closes: float | None = CLOSED
+    tells: tuple = ()
+    resumes: bool = False
+    steady: bool = False
 
     @property
     def run(self) -> Callable:
         """The function that solves, imported when it is first wanted."""
-        module, function = self.solve.split()
-        solve = getattr(import_module(f"patchfem.runs.rig.{module}"), function)
+        solve = late(self.solve)
         return lambda model, *given: gauged(model, solve(model, *given))
 
+    def lacks(self, model: Model, steady: bool = False) -> str:
+        """The first thing in a model that the engine does not take, as words behind it; "" where it takes all. steady:
+        under the sine of a curve, not the drive's own waveform."""
+        return methods.lacking(self.name, _met(model, steady))
 
-def no_closed_form(model: Model, steady: bool = False) -> str:
-    """Why a run has no exact solution; empty where it has one. steady: under the sine of a curve, not the drive's own
-    waveform."""
-    return methods.no_closed_form(*_met(model, steady))
+    def ask(self, hook: str, *given) -> Any:
+        """What the function of one of its fields gives, None where it has none."""
+        where = getattr(self, hook)
+        return late(where)(*given) if where else None
 
 
-def no_pieces(model: Model) -> str:
-    """Why a run is not linear from yield to yield; empty where it is."""
-    return methods.no_pieces(*_met(model))
+def inexact(model: Model, steady: bool = False) -> str:
+    """Why no engine of accuracy.method = "exact" takes a model, "" where one does; steady as in `Engine.lacks`."""
+    reasons = [one.lacks(model, steady) for one in ENGINES.values() if one.method == EXACT.method]
+    return reasons[-1] if all(reasons) else ""
 
 
-def _met(model: Model, steady: bool = False) -> tuple:
-    """What a model confronts an exact engine with, as `scene.rules.methods` asks."""
+def _met(model: Model, steady: bool = False) -> methods.Motion:
+    """What a model confronts an engine with."""
     rig = model.rig
-    laws = [one.numbers.law for one in rig.interfaces]
     spring = "[structure.stiffening]" if rig.cubic is not None else \
         "structure.bonded.wavelength" if rig.interlock is not None else \
         f"[{model.grooves.key}]" if model.grooves is not None else ""
     waveform = "" if steady or rig.kind == "free" else rig.waveform
-    return (laws, model.soft, "under a load that changes" if rig.load_varies else "", rig.strips_slide_apart, waveform,
-            spring)
+    return methods.Motion([one.numbers for one in rig.interfaces], model.soft,
+                          "under a load that changes" if rig.load_varies else "", rig.strips_slide_apart, spring,
+                          waveform)
 
 
-def steady_by(model: Model) -> str:
-    """How the steady motion of a model is found: by the map of "events" or of "yields", which are exact, by a "balance"
-    of harmonics, or, over grooves where no balance knows the law, by a "march" that is brought to repeat.
+class Finder(NamedTuple):
+    """One way to a steady motion: words of a plan; solve: "module class" of this folder; like: the engine whose code it
+    runs and whose knobs act on it."""
+
+    name: str
+    words: str
+    solve: str
+    like: str
+
+
+FINDERS = {one.name: one for one in (
+    Finder("events", "the map from event to event, exact", "steady.events Events", "exact"),
+    Finder("yields", "the map from yield to yield, exact", "steady.yields Yields", "piecewise"),
+    Finder("march", "a march that is brought to repeat", "steady.marched Marched", "march"),
+    Finder("balance", "harmonic balance", "steady.balance Balance", "harmonic"))}
+
+
+def steady_by(model: Model) -> Finder:
+    """How the steady motion of a model is found: by the map of events or of yields, which are exact, by a balance of
+    harmonics, or, over grooves where no balance knows the law, by a march that is brought to repeat.
 
     A scene that names its harmonics has its balance. So has one whose springs ring without end between yields.
     """
-    if not no_closed_form(model, steady=True):
-        return "events"
+    if not EXACT.lacks(model, steady=True):
+        return FINDERS["events"]
     if model.grooves is not None and (model.soft or not methods.balances_over_grooves(model.friction)):
-        return "march"
+        return FINDERS["march"]
     named = model.accuracy.harmonics is not None
-    return "balance" if named or no_pieces(model) or pieces(model) > MOST_PIECES else "yields"
+    return FINDERS["balance" if named or PIECES.lacks(model) or pieces(model) > MOST_PIECES else "yields"]
 
 
-def dearer_pieces(model: Model) -> str:
-    """Why the march is to run a model: it is not linear from yield to yield, the scene names its steps, or its yields
-    cost more than steps and more than WORTH."""
-    if reason := no_pieces(model):
-        return reason
+def dear_pieces(model: Model) -> str:
+    """Why the march is to run elements that stick or slip: the scene names its steps, or their yields cost more than
+    steps and more than WORTH."""
     if model.accuracy.steps_per_cycle is not None:
         return "its steps are named"
     dear = seconds_of_pieces(model) > max(seconds_of_steps(model), WORTH)
     return "its yields cost more than steps" if dear else ""
 
 
-def _not_exact(model: Model) -> str:
-    """Why a run is better not exact; empty where it has an exact solution that costs no more than it is worth."""
-    return no_closed_form(model) or too_long(model)
-
-
-def set_valued(model: Model, numerics) -> bool:
+def set_valued(model: Model) -> bool:
     """Whether a march meets Coulomb's law as it stands, without a compliance of pieces, skin or holder in series."""
     laws, patch = [one.numbers.law for one in model.rig.interfaces], model.patch
     gives = patch is not None and bool(patch.gives_way or patch.slide_spring)
-    return numerics.engine == "march" and not gives and any(has(law, "set-valued") for law in laws)
-
-
-def _nothing(model: Model) -> str:
-    return ""
+    return not gives and any(has(law, "set-valued") for law in laws)
 
 
 def _no_rungs(*_) -> list:
@@ -169,12 +199,21 @@ def _fewer(numerics, share: int):
 
 def _march_in_time(model: Model, numerics, patch) -> list:
     """Rungs of the march in time: half and a quarter of the steps."""
-    halves = tuple(Variant(_fewer(numerics, share), patch) for share in (2, 4))
+    if not set_valued(model):
+        return _halves_in_time(model, numerics, patch)
+    size = model.rig.displacement
+    return [Rung(_halves(numerics, patch), lambda *values: jumps_error(*values, numerics.steps, size), of="steps")]
+
+
+def _halves_in_time(model: Model, numerics, patch) -> list:
+    """Rungs of steps that meet no jump of the friction: half and a quarter of them."""
     size, f = model.rig.displacement, model.friction
     turn = f.bond_length if f is not None and has(f.law, "bonds") else 0.0
-    if set_valued(model, numerics):
-        return [Rung(halves, lambda *values: jumps_error(*values, numerics.steps, size), of="steps")]
-    return [Rung(halves, lambda *values: step_error(*values, numerics.steps, size, turn), of="steps")]
+    return [Rung(_halves(numerics, patch), lambda *values: step_error(*values, numerics.steps, size, turn), of="steps")]
+
+
+def _halves(numerics, patch) -> tuple:
+    return tuple(Variant(_fewer(numerics, share), patch) for share in (2, 4))
 
 
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
@@ -231,7 +270,7 @@ def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
 
 def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """Rungs of a steady motion: what it leaves open itself, and the mesh where its nodes make the elements."""
-    meshed = _pieces_in_space(model, numerics, patch, coarse, solution) if steady_by(model) == "yields" else []
+    meshed = _pieces_in_space(model, numerics, patch, coarse, solution) if steady_by(model).like == PIECES.name else []
     return [*_own_errors(model, numerics, patch, coarse, solution), *meshed]
 
 
@@ -247,14 +286,21 @@ def _smooth_in_time(model: Model, numerics, patch) -> list:
     return [Rung((wider,), lambda *values: tolerance_error(*values, model.rig.displacement))]
 
 
-EXACT = Engine("exact", _not_exact, "exact run_exact", _no_rungs, _exact_in_space)
-PIECES = Engine("piecewise", dearer_pieces, "pieces.run run_piecewise", _no_rungs, _pieces_in_space)
-MARCH = Engine("march", _nothing, "march run_march", _march_in_time, _march_in_space)
-HARMONIC = Engine("harmonic", _nothing, "steady.steady run_steady", _no_rungs, _steady_in_space, 0.0, None)
+EXACT = Engine("exact", "exact", "exact run_exact", _no_rungs, _exact_in_space, "plan events_cost", dearer=too_long,
+               refuse="plan refuse_events")
+PIECES = Engine("piecewise", "exact", "pieces.run run_piecewise", _no_rungs, _pieces_in_space, "plan pieces_cost",
+                dearer=dear_pieces, chosen="numerics by_pieces")
+SMOOTH = Engine("smooth", "", "smooth.solve run_smooth", _smooth_in_time, _own_errors, "plan smooth_cost",
+                dearer=not_smooth, chosen="numerics by_error", least=3e-8, closes=None, tells=("iterations",))
+MARCH = Engine("march", "march", "march run_march", _march_in_time, _march_in_space, "plan march_cost",
+               chosen="numerics by_steps", refuse="numerics refuse_costly",
+               notes="remarks marched_elements", tells=("steps_per_cycle", "iterations"), resumes=True)
+HARMONIC = Engine("harmonic", "harmonic", "steady.steady run_steady", _no_rungs, _steady_in_space, "plan steady_cost",
+                  words="plan steady_words", notes="remarks unmoved_elements", least=0.0, closes=None, steady=True)
 COMPARED = ("duhamel", "newmark", "euler")
-SMOOTH = Engine("smooth", not_smooth, "smooth.solve run_smooth", _smooth_in_time, _own_errors, 3e-8, None)
 ENGINES = {one.name: one for one in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC, *(
-    Engine(name, _nothing, "comparison run_comparison", _march_in_time, _march_in_space, closes=inf)
+    Engine(name, name, "comparison run_comparison", _halves_in_time, _march_in_space, "plan march_cost",
+           chosen="numerics by_named_steps", closes=inf, tells=("steps_per_cycle", "iterations"))
     for name in COMPARED))}
 AUTOMATIC = (EXACT, PIECES, SMOOTH, MARCH)  # in the order in which they are tried
 
@@ -276,19 +322,21 @@ def unbalanced(engine: Engine, measures: dict) -> str:
 
 @lru_cache(8)
 def engine_of(model: Model, per_point: bool = False) -> Engine:
-    """The engine that a scene names, or the first of AUTOMATIC that lacks nothing.
+    """The engine that a scene names, of several of that name the first that takes the model, or the first of AUTOMATIC
+    that takes it and is not dearer than the next.
 
     per_point: bonds are followed at every node, which the smooth engine does not.
     """
-    if model.accuracy.method == "exact" and no_closed_form(model):
-        return PIECES
-    named = ENGINES.get(model.accuracy.method)
-    return named or next(one for one in AUTOMATIC if not (one.lacks(model) or (per_point and one is SMOOTH)))
+    named = [one for one in ENGINES.values() if one.method == model.accuracy.method]
+    if named:
+        return next((one for one in named if len(named) > 1 and not one.lacks(model)), named[-1])
+    return next(one for one in AUTOMATIC if not (one.lacks(model) or one.dearer(model)
+                                                 or (per_point and one is SMOOTH)))
 
 
 def knobs_idle(model: Model, engine: str) -> list:
     """Sentences on the knobs of [accuracy] that a rig names and that the engine it is run by does not take."""
-    by = engine if engine != "harmonic" else {"balance": "harmonic", "march": "march"}.get(steady_by(model), "exact")
+    by = steady_by(model).like if ENGINES[engine].steady else engine
     where = {"steps_per_cycle": f"for engine '{engine}', which has no steps,",
              "harmonics": "where the steady motion is exact from event to event"}
     plain = f"for engine '{engine}'"

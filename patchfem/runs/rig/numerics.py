@@ -12,7 +12,7 @@ from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
 from ...structure.drive_sizes import fastest, largest, omega_of, sinusoidal
 from ..effort import steps_per_cycle
-from .engines import COMPARED, engine_of
+from .engines import engine_of
 from .pieces.costs import pairs_of
 
 COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
@@ -68,24 +68,41 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
 
     per_point: bonds are followed at every node. PatchfemError for a method that cannot do it.
     """
-    accuracy, rig, drive = model.accuracy, model.rig, model.rig.drive
-    engine = engine_of(model, per_point).name
+    accuracy, rig = model.accuracy, model.rig
+    engine = engine_of(model, per_point)
     window = int(max(1, min(10, (rig.cycles + WHOLE) // 10)))
     if rig.levels:
         window = min(window, int(rig.level_cycles + WHOLE))
     steps = steps_per_cycle(model)
-    if accuracy.steps_per_cycle is None and engine == "march":
-        steps = max(steps, unique_steps(model))
-    if not sinusoidal(drive) and accuracy.steps_per_cycle is None:
+    if not sinusoidal(rig.drive) and accuracy.steps_per_cycle is None:
         steps = max(steps, int(np.ceil(LEAST_KEPT / rig.cycles)))
-    if accuracy.steps_per_cycle is None and engine == "march":
-        steps = ending(steps, rig.cycles)
     pinned = {k for k in ("steps_per_cycle", "tail", "merge", "shear_modes") if getattr(accuracy, k) is not None}
-    if engine in COMPARED:
-        steps, pinned = accuracy.steps_per_cycle or COMPARED_STEPS, pinned | {"steps_per_cycle"}
-    return Numerics(engine, steps, rig.cycles, window, accuracy.shear_modes, per_point or model.side == "lower",
-                    frozenset(pinned), local=local_of(accuracy.tolerance) if engine == "smooth" else 0.0,
-                    pairs=pairs_of(model) if engine == "piecewise" else 0)
+    found = Numerics(engine.name, steps, rig.cycles, window, accuracy.shear_modes, per_point or model.side == "lower",
+                     frozenset(pinned))
+    return engine.ask("chosen", model, found) or found
+
+
+def by_steps(model: Model, found: Numerics) -> Numerics:
+    """The choices of a march: steps that have one solution each, and end where the run ends."""
+    if "steps_per_cycle" in found.pinned:
+        return found
+    return replace(found, steps=ending(max(found.steps, unique_steps(model)), model.rig.cycles))
+
+
+def by_named_steps(model: Model, found: Numerics) -> Numerics:
+    """The choices of a comparison method, whose steps no error chooses."""
+    return replace(found, steps=model.accuracy.steps_per_cycle or COMPARED_STEPS,
+                   pinned=found.pinned | {"steps_per_cycle"})
+
+
+def by_error(model: Model, found: Numerics) -> Numerics:
+    """The choices of the smooth engine: the error of a step."""
+    return replace(found, local=local_of(model.accuracy.tolerance))
+
+
+def by_pieces(model: Model, found: Numerics) -> Numerics:
+    """The choices of the engine of yields: how finely a density is cut."""
+    return replace(found, pairs=pairs_of(model))
 
 
 def local_of(tolerance: float) -> float:

@@ -8,14 +8,12 @@ from ...effects import has
 from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
 from ...structure.drive_sizes import largest, omega_of
-from ..effort import exact_effort
-from .engines import no_pieces, steady_by
+from ..effort import exact_effort, refuse_endless
+from .engines import ENGINES, PIECES, steady_by
 from .numerics import bonds_cost, chatters, choose, halvings, lists_grow, quadrature_of, stalls
 from .pieces.costs import pieces, seconds_of_pieces, words
-from .smooth.choice import smooth_cost
+from .smooth import choice
 
-STEADY = {"events": "the map from event to event, exact", "yields": "the map from yield to yield, exact",
-          "balance": "harmonic balance", "march": "a march that is brought to repeat"}
 STEP, STEP_MODE = 7e-7, 1e-7  # seconds of a step of one mode, and of each further one
 STIFF = 10.0  # times the stiffness of the mode, from which a link holds the block
 GROWS, JOINT = 3.0, 2.5  # times that where bonds grow, and for each of several interfaces
@@ -28,18 +26,41 @@ def chain(rig) -> dict:
 
 
 def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
-    """Engine, steps of all passes and seconds of a coupled run."""
-    numerics, rig, f, soft = choose(model, per_point), model.rig, model.friction, bool(model.soft)
-    if numerics.engine == "exact":
-        return "exact", *exact_effort(model)
-    if numerics.engine == "piecewise":
-        return "piecewise", int(pieces(model) * numerics.cycles), seconds_of_pieces(model)
-    if numerics.engine == "smooth":
-        return "smooth", *smooth_cost(model)
-    if numerics.engine == "harmonic":
-        points = 1 if rig.waveform == "sine" else 120
-        sizes = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.interfaces))
-        return "harmonic", points, 0.1 + 0.05 * points + 8e-10 * sizes**3
+    """Engine, steps of all passes and seconds of a coupled run; sizes that are foreseen go into `unknowns`."""
+    numerics = choose(model, per_point)
+    return numerics.engine, *ENGINES[numerics.engine].ask("cost", model, numerics, unknowns)
+
+
+def events_cost(model: Model, numerics, unknowns: dict) -> tuple:
+    """Steps and seconds of a run from event to event."""
+    return exact_effort(model)
+
+
+def refuse_events(model: Model, numerics) -> None:
+    """Raise Missing where a run from event to event would not end."""
+    refuse_endless(model)
+
+
+def pieces_cost(model: Model, numerics, unknowns: dict) -> tuple:
+    """Pieces and seconds of a run from yield to yield."""
+    return int(pieces(model) * numerics.cycles), seconds_of_pieces(model)
+
+
+def smooth_cost(model: Model, numerics, unknowns: dict) -> tuple:
+    """Steps and seconds of a run of high order."""
+    return choice.smooth_cost(model)
+
+
+def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:
+    """Points of a curve of steady motions and the seconds that they take."""
+    points = 1 if model.rig.waveform == "sine" else 120
+    sizes = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(model.rig.interfaces))
+    return points, 0.1 + 0.05 * points + 8e-10 * sizes**3
+
+
+def march_cost(model: Model, numerics, unknowns: dict) -> tuple:
+    """Steps of a march and its coarser runs, and their seconds."""
+    rig, f, soft = model.rig, model.friction, bool(model.soft)
     steps = int(numerics.cycles * numerics.steps)
     each, points = _step(rig, f), unknowns.get("interface_points", 1)
     if model.grooves is not None:
@@ -57,7 +78,7 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
     elif soft:
         each = 3e-9 * points + 5e-7
     passes = 0.75 + 2**(halvings(model) + 1) - 1  # a half and a quarter of the steps, and each halving of them
-    return numerics.engine, int(steps * passes), steps * passes * each
+    return int(steps * passes), steps * passes * each
 
 
 def _step(rig, f) -> float:
@@ -125,14 +146,22 @@ def first_words(rig, found: dict, chain: dict) -> list:
 
 
 def sum_words(model: Model) -> list:
-    """Sentences on how the bonds of law 'nonlocal' are summed, or on which engine takes elements that stick or slip."""
+    """Sentences on how the engine of a rig takes its law."""
     if model.friction is None:
         return []
     numerics = choose(model)
-    if numerics.engine == "harmonic":
-        return [f"steady motion by {STEADY[steady_by(model)]}"]
+    return ENGINES[numerics.engine].ask("words", model, numerics)
+
+
+def steady_words(model: Model, numerics) -> list:
+    """The sentence on how a steady motion is found."""
+    return [f"steady motion by {steady_by(model).words}"]
+
+
+def summed_words(model: Model, numerics) -> list:
+    """Sentences on how the bonds of law 'nonlocal' are summed, or on which engine takes elements that stick or slip."""
     if not has(model.friction.law, "bonds"):
-        return words(model, numerics.engine) if not no_pieces(model) else []
+        return [] if PIECES.lacks(model) else words(model, numerics.engine)
     found = quadrature_of(model, numerics)
     seconds = 0.0 if found.engine == "recursion" else bonds_cost(model, numerics)[1]
     out = ["sum over bonds by " + found.said()]

@@ -12,8 +12,8 @@ from ..bench.closed import over_steps
 from ..bench.engine import steps_of
 from ..results.travel import ended
 from ..rig.engines import ENGINES
+from ..rig.fields import fields_of
 from ..rig.numerics import choose
-from ..rig.rig import rig_fields
 
 UNBOUNDED = (Outcome.GROWS, Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES, Outcome.NOT_CONVERGED)
 LEAST_FRAMES, MOST_FRAMES = 64, 800
@@ -81,7 +81,7 @@ def _rig(model, patch, frames: int) -> Rubbed:
     settled, _ = settle(found, wanted, model.accuracy.tolerance, model.rig.drive)
     outcome = ended(settled if settled in UNBOUNDED else None, model.patch, patch, found.response.slide)
     if shaped:
-        fields = rig_fields(model, numerics, patch, found)
+        fields = fields_of(model, numerics, patch, found)
         local, tau = fields["slip"][1:], fields["shear_stress"][1:]
         if model.grooves is not None:
             slide, time, window = fields["holder_slide"][1:], fields["time"][1:], found.response

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ...effects import LAWS, WAVEFORMS, carries, has, named, refusal, unbuilt, waves
+from ...effects import WAVEFORMS, carries, has, named, refusal, unbuilt, waves
 from ..keys.tables import Tables
 from .draft import Draft
 
@@ -12,17 +12,69 @@ KEY = "accuracy.method"
 
 
 class Motion(NamedTuple):
-    """What an engine meets: laws of all interfaces; soft: what lets the patch slip part by part; varies: how the load
-    changes; apart: strips slide each by themselves; spring that bends, or grooves; drive as its table; lower:
-    the key that puts the pressure on the lower piece. Texts are empty where there is nothing."""
+    """What a method meets: tables of the laws of all interfaces; soft: what lets the patch slip part by part; varies:
+    how the load changes; yaws: strips slide each by themselves; spring that bends, or grooves; waveform of the drive,
+    none of a release and of the sine of a curve; drive as its table; lower: the key that puts the pressure on the lower
+    piece. Texts are empty where there is nothing."""
 
     laws: list
     soft: str
     varies: str
-    apart: bool
+    yaws: bool
     spring: str
-    drive: Any
-    lower: str
+    waveform: str
+    drive: Any = None
+    lower: str = ""
+
+
+class Takes(NamedTuple):
+    """What an engine takes: law: the word of `effects.carries` that every law must have, "" for any; beside: words of
+    BESIDE for what may stand beside it."""
+
+    law: str
+    beside: str
+
+
+BESIDE = {  # word -> what a Motion has of it, as words behind an engine; "" where it has none
+    "no-law": lambda m: "" if m.laws else "for law 'none'",
+    "load": lambda m: m.varies,
+    "yaw": lambda m: "beside strips that yaw" if m.yaws else "",
+    "yaw-levels": lambda m: "beside strips that yaw, level by level" if m.yaws and m.waveform == "levels" else "",
+    "parts": lambda m: f"beside {m.soft}" if m.laws and m.soft else "",
+    "grooves": lambda m: f"beside {m.spring}" if m.spring.endswith("grooves]") else "",
+    "spring": lambda m: f"beside {m.spring}" if m.spring and not m.spring.endswith("grooves]") else "",
+    "faces": lambda m: "beside several interfaces" if len(m.laws) > 1 else "",
+    "levels": lambda m: "level by level" if m.waveform == "levels" else ""}
+TAKES = {  # engine -> what it takes; the records of `runs.rig.engines` refer to it by name
+    "exact": Takes("exact", "no-law yaw faces levels"),
+    "piecewise": Takes("pieces", "parts faces levels"),
+    "smooth": Takes("", ""),
+    "march": Takes("", " ".join(BESIDE)),
+    "harmonic": Takes("", "no-law parts grooves spring faces levels"),
+    **dict.fromkeys(("duhamel", "newmark", "euler"), Takes("comparison", "no-law faces levels"))}
+METHODS = {"exact": ("exact", "piecewise")}  # accuracy.method -> engines of that name, where they are several
+
+
+def lacking(engine: str, m: Motion) -> str:
+    """The first thing in a Motion that an engine of TAKES does not take, as words behind it; "" where it takes all."""
+    takes = TAKES[engine]
+    odd = _odd(takes.law, m)
+    if odd is not None:
+        return f"for law '{odd.law}'" + (f" beside {m.soft}" if m.soft else "")
+    beside = takes.beside.split()
+    return next((words for word, of in BESIDE.items() if word not in beside and (words := of(m))), "")
+
+
+def _odd(word: str, m: Motion):
+    """The first law of a Motion that an engine which asks for a word of `carries` does not take; None where it takes
+    all.
+
+    An exact engine of slips as a whole has no law beside pieces that give way; one of yields has elements behind a
+    law that holds without a stretch only there.
+    """
+    behind = {"exact": lambda law: not m.soft, "pieces": lambda law: m.soft or not has(law, "set-valued")}.get(
+        word, lambda law: True)
+    return next((one for one in m.laws if word and not (carries(one, word) and behind(one.law))), None)
 
 
 def check_method(draft: Draft, kind: str) -> None:
@@ -52,8 +104,10 @@ def motion(tables: Tables, kind: str) -> Motion:
     apart = rubs and contact is not None and contact.strips is not None and bool(turning(tables))
     lower = [f"contact.{name}.on = 'lower'" for name, one in (contact.shapes if contact is not None else {}).items()
              if one.on == "lower"]
+    drive = tables.drive
     return Motion(laws, contact.gives_way if rubs and contact is not None else "", beside_load(cause), apart,
-                  bending(structure) or (climbed(tables) if rubs else ""), tables.drive,
+                  bending(structure) or (climbed(tables) if rubs else ""),
+                  drive.waveform or "" if drive is not None and drive.kind != "free" else "", drive,
                   lower[0] if rubs and lower else "")
 
 
@@ -101,59 +155,17 @@ def beside_load(cause: str) -> str:
     return f"beside a mode's {cause.rpartition('.')[2]}"
 
 
-def no_closed_form(laws: list, soft: str, varies: str, apart: bool, waveform: str, spring: str) -> str:
-    """Why a run has no exact solution; empty where it has one.
-
-    laws: names; waveform: "" where the engine drives by sines of its own; the others as in a Motion. Constants and
-    sines have closed forms, and a sweep or the rows of a record have series between the events.
-    """
-    odd = next((law for law in laws if "exact" not in LAWS[law].carries.split()), laws[0] if soft and laws else "")
-    if odd:
-        return f"for law '{odd}'" + (f" beside {soft}" if soft else "")
-    if varies:
-        return varies
-    if apart and waveform == "levels":
-        return "beside strips that yaw, level by level"
-    return f"beside {spring}" if spring else ""
-
-
-def no_pieces(laws: list, soft: str, varies: str, apart: bool, waveform: str, spring: str) -> str:
-    """Why a run is not linear from yield to yield, as elements that stick or slip make it; empty where it is.
-
-    Arguments as in `no_closed_form`. Coulomb's law is such a law where the pieces give way.
-    """
-    odd = next((law for law in laws if "pieces" not in LAWS[law].carries.split()
-                or (has(law, "set-valued") and not soft)), "" if laws else "none")
-    if odd:
-        return f"for law '{odd}'" + (f" beside {soft}" if soft else "")
-    if varies:
-        return varies
-    if apart:
-        return "beside strips that yaw"
-    return f"beside {spring}" if spring else ""
-
-
 def balances_over_grooves(law) -> bool:
     """Whether the harmonic balance takes the law of a [friction] table along the flanks of grooves."""
     return carries(law, "varying-load") and carries(law, "harmonic") and not has(law.law, "bonds")
 
 
 def _exact(m: Motion, method: str) -> str:
-    waveform = m.drive.waveform if m.drive is not None and m.drive.kind != "free" else ""
-    laws = [one.law for one in m.laws]
-    meets = m.soft, m.varies, m.apart, waveform, m.spring
-    why = no_closed_form(laws, *meets)
-    yields = laws and all("pieces" in LAWS[law].carries.split() for law in laws)
-    if why and yields and (m.soft or not all("exact" in LAWS[law].carries.split() for law in laws)):
-        why = no_pieces(laws, *meets)
-    return f"no exact solution exists {why}; use 'march' or leave method out" if why else ""
-
-
-def _common(m: Motion, method: str) -> str:
-    """What only the march takes."""
-    if m.apart:
-        return unbuilt(f"'{method}' beside strips that yaw", "march")
-    return unbuilt(f"'{method}' {m.varies} takes the load as constant", "march") if m.varies else ""
+    reasons = {engine: lacking(engine, m) for engine in METHODS[method]}
+    if not all(reasons.values()):
+        return ""
+    why = next((reason for engine, reason in reasons.items() if _odd(TAKES[engine].law, m) is None), reasons["exact"])
+    return f"no exact solution exists {why}; use 'march' or leave method out"
 
 
 def _harmonic(m: Motion, method: str) -> str:
@@ -165,16 +177,12 @@ def _harmonic(m: Motion, method: str) -> str:
                 "'march' or leave method out")
     if drive is not None and drive.kind == "base" and drive.waveform == "sweep" and drive.displacement is not None:
         return "'harmonic' keeps the acceleration over a sweep; give drive.acceleration"
-    if reason := _common(m, method):
-        return reason
-    if not m.laws or not no_closed_form([one.law for one in m.laws], m.soft, "", False, "", m.spring):
-        return ""
-    if m.spring.endswith("grooves]"):  # by a balance, or a march that is brought to repeat
-        return ""
+    if why := lacking(method, m):
+        return unbuilt(f"'{method}' {why}", "march")
+    if not m.laws or not all(lacking(engine, m) for engine in METHODS["exact"]) or m.spring.endswith("grooves]"):
+        return ""  # over grooves by a balance, or a march that is brought to repeat
     law = m.laws[0]
     if len(m.laws) > 1:
-        if not no_pieces([one.law for one in m.laws], m.soft, "", False, "", m.spring):
-            return ""
         return unbuilt("'harmonic' beside several interfaces where a law has no exact solution or a spring bends",
                        "march")
     if has(law.law, "set-valued") and not m.soft:
@@ -189,11 +197,8 @@ def _harmonic(m: Motion, method: str) -> str:
 
 def _compared(m: Motion, method: str) -> str:
     """The comparison methods take one force per interface and linear modes."""
-    odd = next((one for one in m.laws if not carries(one, "comparison")), None)
+    odd = _odd("comparison", m)
     if odd is not None:
         return f"'{method}' with {named(odd)}: use 'march', or {refusal('comparison', odd=odd)}"
-    if reason := _common(m, method):
-        return reason
-    if m.soft:
-        return f"'{method}' takes an interface as a whole, not {m.soft}; use 'march' or leave method out"
-    return unbuilt(f"'{method}' beside {m.spring}", "march") if m.spring else ""
+    why = lacking(method, m)
+    return unbuilt(f"'{method}' {why}", "march") if why else ""

@@ -19,7 +19,7 @@ from patchfem.runs.plan import plan
 from patchfem.runs.rig.interface import contact_model
 from patchfem.runs.rig.numerics import choose as settings_of
 from patchfem.runs.rig.numerics import quadrature_of
-from patchfem.runs.rig.rig import created_warning
+from patchfem.runs.rig.remarks import created_warning
 from patchfem.scene import scene
 from patchfem.scene.keys.tables import Accuracy
 

@@ -8,7 +8,7 @@ from ....core import Measure
 from ....effects import has
 from ....model.model import Model
 from ...results.loose import loose
-from ...rig.rig import said_of_law
+from ...rig.remarks import said_of_law
 from ..answers import Answers
 
 

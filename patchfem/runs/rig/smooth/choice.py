@@ -20,17 +20,14 @@ FARTHER = 7.0  # of a series, whose order is higher
 
 
 def not_smooth(model: Model) -> str:
-    """Why a rig is marched rather than integrated at high order; empty where it is not."""
+    """Why a rig that the smooth engine may take is marched rather than integrated at high order; empty where it is not.
+    """
     rig, accuracy = model.rig, model.accuracy
     pinned = next((f"accuracy.{key}" for key in PINNED if getattr(accuracy, key) is not None), "")
     if pinned or accuracy.quadrature not in ("auto", "recursion"):
         return f"with {pinned or 'accuracy.quadrature'}"
-    if model.friction is None or len(rig.modes.interfaces) > 1 or rig.bends or model.grooves is not None:
+    if len(rig.modes.interfaces) > 1:
         return "beside other forces"
-    if rig.levels:
-        return "level by level"
-    if rig.load_varies or rig.strips_slide_apart or model.soft:
-        return "of points that slide by themselves"
     if model.side == "lower" and has(model.friction.law, "bonds"):
         return "under a pressure that stays"
     element = element_of(model)

@@ -41,7 +41,7 @@ class Balance:
 
     tries_another = False
 
-    def __init__(self, model, numerics, patch, say):
+    def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         load("dynamics.harmonic.cycle_kernels", say)
         rig = model.rig
         parts = []

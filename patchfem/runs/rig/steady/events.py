@@ -28,7 +28,7 @@ class Events:
 
     tries_another = False
 
-    def __init__(self, model, numerics, patch, say):
+    def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         self.model, self.numerics, self.modes, self.patch, self.say = model, numerics, model.rig.modes, patch, say
         self.forces = forces_of(model, patch)
         self.alone = self.modes.omega.size == 1 and len(self.modes.interfaces) == 1

@@ -8,7 +8,7 @@ motion that repeats with the drive; its regime, multipliers and stability are na
 from dataclasses import replace
 
 from ....core import BaseSine, NotConverged
-from ..engines import steady_by
+from ..engines import FINDERS, PIECES, late, steady_by
 from ..solution import Solution
 from .curves import columns, largest_of, levels_of
 
@@ -19,25 +19,12 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
     Where the map of yields does not settle, the balance of harmonics is tried.
     """
     by = steady_by(model)
-    if by == "events":
-        from .events import Events
-
-        return _found(Events(model, numerics, patch, say), model)
-    if by == "yields":
-        from .yields import Yields
-
-        try:
-            return _found(Yields(model, numerics, patch, frames, say), model)
-        except NotConverged:
-            if len(model.rig.interfaces) > 1:
-                raise
-    if by == "march":
-        from .marched import Marched
-
-        return _found(Marched(model, numerics, patch, frames, say), model)
-    from .balance import Balance
-
-    return _found(Balance(model, numerics, patch, say), model)
+    try:
+        return _found(late(by.solve)(model, numerics, patch, frames, say), model)
+    except NotConverged:
+        if by.like != PIECES.name or len(model.rig.interfaces) > 1:
+            raise
+    return _found(late(FINDERS["balance"].solve)(model, numerics, patch, frames, say), model)
 
 
 def _found(finder, model) -> Solution:

@@ -1,0 +1,81 @@
+"""Frames of the interface in the last cycle of a coupled run: pressure, gap, shear stress and slip at its nodes."""
+
+import numpy as np
+
+from ...effects import has, listed
+from ...friction.record import law_from
+from ..bench.averaged import limit_tractions
+from ..results.result import FRAMES, frames_of, still
+
+
+def fields_of(model, numerics, patch, raw) -> dict:
+    """Interface frames of the last cycle by name; patch: the solved Patch, raw: a Solution."""
+    sigma, f = patch.pressure.sigma_n, model.friction
+    if model.soft and patch.strips is not None:  # strips have no common field of shear
+        return still(patch)
+    if model.rig.load_varies:
+        return _under_changing_load(patch, raw)
+    if not raw.snapshots:
+        at = np.linspace(max(0, len(raw.window.time) - 1 - len(raw.window.time) // numerics.window),
+                         len(raw.window.time) - 1, FRAMES).round().astype(int)
+        tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
+        if f is not None and has(f.law, "averaged"):
+            tau = limit_tractions(model, patch, raw.window.force[at])
+        slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
+        return frames_of(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
+    from ...slip.fields import element_fields, point_fields
+
+    shots = raw.snapshots
+    if model.soft and model.grooves is not None:
+        from ..bench.shear import climbed_fields
+
+        tau, local = climbed_fields(patch, raw.contact, [(s["slide"], s["nodes"]) for s in shots])
+        return frames_of(patch, np.array([s["time"] for s in shots]), tau, local, np.array([s["slide"] for s in shots]))
+    time = np.array([s["time"] for s in shots])
+    shear = bool(model.soft)
+    pointed = shear or (numerics.per_point and model.grooves is None)
+    if has(f.law, "bonds") and not listed(f) and pointed:
+        tau, local = point_fields(patch, model.bonds, raw.contact.reduction, [(s["slide"], s["bonds"]) for s in shots])
+    elif shear:
+        length = 0.0 if raw.contact.reduction is None else law_from(f).element(1.0).length
+        states = [(s["slide"], s["stretch"]) for s in shots]
+        tau, local = element_fields(patch, raw.contact.reduction, states, length)
+    else:
+        tau = np.array([s["force"] / patch.pressure.load * sigma for s in shots])
+        local = np.array([np.full(sigma.size, s["slip"]) for s in shots])
+    return frames_of(patch, time, tau, local, np.array([s["slide"] for s in shots]))
+
+
+def _under_changing_load(patch, raw) -> dict:
+    """Interface frames (f, x) of a run, the pressed state first; status 0 open, 1 stick, 2 slip."""
+    law, sets, weight = raw.contact.law, raw.contact.sets, patch.pieces.interface.weight
+    shots = raw.snapshots
+    time, slide = (np.array([0.0] + [shot[key] for shot in shots]) for key in ("time", "slide"))
+    nodal = np.stack([patch.pressure.sigma_n * weight] + [shot["nodal"] for shot in shots])
+    lift = np.array([0.0] + [shot["heave"] for shot in shots])[:, None]
+    turn = np.array([0.0] + [shot["turn"] for shot in shots])[:, None]
+    gap = np.maximum(sets.opening + lift + turn * sets.x + nodal @ sets.c, 0.0)
+    gap[nodal > 0] = 0.0
+    gap[0] = patch.pressure.gap
+    tau, local = np.zeros_like(nodal), np.zeros_like(nodal)
+    for k, shot in enumerate(shots, 1):
+        tau[k], stretch = _shear(law, shot, nodal[k])
+        local[k] = slide[k] - stretch - shot["bend"]
+    moved = np.abs(np.diff(local, axis=0, prepend=local[:1]))
+    moved[:2] = 0.0  # the first moving frame has no frame before it to slip from
+    status = np.where(nodal > 0, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0).astype(np.int8)
+    return {"time": time, "normal_stress": nodal / weight, "gap": gap, "shear_stress": tau / weight, "slip": local,
+            "status": status, "holder_slide": slide}
+
+
+def _shear(law, shot, nodal) -> tuple:
+    """(friction forces (m,) [N], stretches (m,) [m]) of the nodes in a snapshot."""
+    from ...dynamics.march import varying_load
+
+    top, bottom, _ = shot["memory"]
+    if law.kind == varying_load.PLASTIC:
+        return law.static * top, law.length * np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0)
+    if law.kind == varying_load.POINTS:
+        return law.static / law.length * bottom, np.divide(bottom, top, out=np.zeros_like(top), where=top > 0)
+    total = nodal.sum()
+    return (shot["force"] / total * nodal if total > 0 else 0 * nodal), np.zeros_like(nodal)

@@ -1,0 +1,120 @@
+"""What has to be said of a coupled run: warnings of its law, load and engine, notes on what they mean."""
+
+import numpy as np
+
+from ...core import Outcome
+from ...core import say as length
+from ...effects import has
+from ...response.outcome import changing_note
+from ..results.notes import climbing_as_one, creeping, of_growth, two_books, unbounded, unripe, warming
+from ..results.travel import travelled
+from .engines import ENGINES, PIECES, dear_pieces
+from .solution import borne
+
+
+def warnings_of(run) -> list:
+    """Warnings of a `rig.Coupled`."""
+    model, patch, raw, found = run.model, run.patch, run.raw, run.measures
+    book, harmonics = raw.book, raw.extra.get("harmonics")
+    steps = run.numerics.steps if "steps_per_cycle" in ENGINES[run.numerics.engine].tells else \
+        raw.extra.get("steps_per_cycle")
+    out = [*model.rig.notes, *_as_one_point(model, patch, run.numerics), *warming(model, patch, raw.response,
+                                                                                 book["friction"])]
+    if run.rubs:
+        out += said_of_law(model, run.outcome, found, float(np.abs(raw.window.slide_rate).max()))
+    out += created_warning(model, book, model.rig.cycles)
+    if patch is not None and model.rig.load_varies and raw.contact is not None and raw.contact.reduction is not None:
+        out += modes_note(model, raw.contact.reduction.stiffness.size, raw.contact.sets.x.size)
+    if model.grooves is not None and model.soft:
+        out += modes_note(model, raw.contact.shear.stiffness.size, raw.contact.shear.points.size)
+    out += [*two_books(found, steps, harmonics), *changing_note(run.outcome, run.drive), *raw.notes]
+    if raw.message and raw.outcome is not Outcome.LEAVES_GROOVES:
+        out.append(raw.message)
+    return [*out, *(travelled(patch, raw.response.slide) if patch is not None else ())]
+
+
+def notes_of(run) -> list:
+    """Notes of a `rig.Coupled`: what its law and its engine mean, what its fields leave out, how its motion ended."""
+    model, raw, rig = run.model, run.raw, run.model.rig
+    ended = [raw.message] if raw.message and raw.outcome is Outcome.LEAVES_GROOVES else []
+    if run.patch is not None and run.patch.strips is not None and model.soft:
+        return ["strips that slip part by part have no common shear stress: the fields hold the pressure",
+                *run.rings.notes, *ended]
+    out, f = [*_of_bonds(model, run.patch, raw), *climbing_as_one(model, run.patch)], model.friction
+    if len(rig.interfaces):
+        out += ENGINES[run.numerics.engine].ask("notes", model, run.numerics, run.patch, raw) or []
+    if raw.levels and rig.onset[0] == "slip" and raw.held > 0:
+        out.append(f"onset_level: a slip amplitude counts from {length(raw.held)} on, a thousandth of the slide over "
+                   "which the interface gives way; below it a part of the interface may slip already")
+    if f is not None and has(f.law, "creeps"):
+        out.append(f"law '{f.law}' never holds: under a constant force of half its limit it creeps at "
+                   f"{1e3 * 0.5493 * f.reference_speed:.3g} mm/s")
+    return [*out, *run.rings.notes, *ended]
+
+
+def _as_one_point(model, patch, numerics) -> list:
+    """The sentence, in a list, on a patch that moves as one point would."""
+    f, moves = model.friction, model.rig.load_varies or model.rig.strips_slide_apart
+    if patch is None or f is None or has(f.law, "averaged") or model.soft or numerics.per_point or moves:
+        return []
+    return ["nothing spatial acts on the motion: with a rigid slide, constant load and the pressure on the upper piece "
+            "the patch moves exactly as one point under the same load; add [contact.shear]"]
+
+
+def _of_bonds(model, patch, raw) -> list:
+    """Notes, as a list, on bonds that grow."""
+    f = model.friction
+    if f is None or not has(f.law, "bonds"):
+        return []
+    limit = f.static * borne(model, patch)
+    steady = limit > 0 and not model.rig.load_varies
+    return of_growth(model.bonds, float(np.abs(raw.response.force).max()) / limit if steady else None)
+
+
+def marched_elements(model, numerics, patch, raw) -> list:
+    """The note of a march on a mesh whose yields are too many for the exact engine."""
+    if PIECES.lacks(model) or model.accuracy.method != "auto" or "steps_per_cycle" in numerics.pinned:
+        return []
+    pinned = patch is not None and not model.patch.chosen
+    return [f"the motion is marched in steps, as {dear_pieces(model)}; {'on a coarser mesh, or ' * pinned}by "
+            "accuracy.method = \"exact\" it is exact"]
+
+
+def unmoved_elements(model, numerics, patch, raw) -> list:
+    """The note of a steady motion on elements that it never moves."""
+    if PIECES.lacks(model) or raw.outcome not in (Outcome.STEADY, Outcome.STUCK):
+        return []
+    from .pieces.run import Interfaces
+
+    slides = raw.window.extra.get("slides", raw.window.slide[:, None])
+    for group, slide in zip(Interfaces(model, numerics, patch).groups, slides.T):
+        most, half = float(group.yield_slide.max(initial=0.0)), float(np.ptp(slide)) / 2
+        if most > half:
+            return [f"part of the joint yields only at {length(most)} and never slips in this motion of "
+                    f"{length(half)}: it keeps whatever force it was left with, so the steady motion is not unique; "
+                    "this one has no mean force, accuracy.method = \"auto\" gives the one that is reached from rest"]
+    return []
+
+
+def said_of_law(model, outcome, found, peak: float) -> list:
+    """Warnings of the law of a run; found: its measures by name, peak: its largest speed of the slide [m/s]."""
+    if not has(model.friction.law, "bonds"):
+        return []
+    return [*unbounded(model.bonds), *unripe(model.bonds, peak), *creeping(model.bonds, outcome, found)]
+
+
+def created_warning(model, book: dict, cycles: float) -> list:
+    """A sentence for the energy that the printed law made in steps where it gave back more than it had stored."""
+    if model.friction is None or model.friction.reading != "report":
+        return []
+    made, work = book.get("created", 0.0), book.get("dissipated", 0.0)
+    if made <= 1e-9 * work or made <= 0:
+        return []
+    return [f"the printed law created {made / cycles:.3g} J per cycle, {100 * made / max(work, 1e-300):.3g} % of what "
+            "it dissipated; reading = \"stretch\" creates none"]
+
+
+def modes_note(model, kept: int, nodes: int) -> list:
+    """The sentence on the shear modes of points whose normal force changes."""
+    return [f"{model.soft}: the load changes with the motion, so no exact set of elements exists; {kept} "
+            f"tangential modes of {nodes} nodes stand for what gives way (accuracy.shear_modes)"]
