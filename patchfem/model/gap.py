@@ -5,6 +5,7 @@ and the keys of that table; `effects.SHAPES` lists them.
 """
 
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from time import perf_counter
 
@@ -37,12 +38,27 @@ class Gap:
     @property
     def angle(self) -> float:
         """Angle [rad] at which a tilted upper piece is held."""
-        return next((part.angle for name, part in self.shapes if name == "tilt" and part.on == "upper"), 0.0)
+        return next((angle for part, angle in self._stated("angle") if part.on == "upper"), 0.0)
+
+    @property
+    def tilt(self) -> float | None:
+        """Size of the angle [rad] between the pieces, whichever is turned, None where none is."""
+        return next((abs(angle) for _, angle in self._stated("angle")), None)
 
     @property
     def jumps(self) -> tuple:
         """Places [m] where the gap jumps, at the edge of a step."""
-        return tuple(part.at for name, part in self.shapes if name == "step")
+        return tuple(place for _, (place, _) in self._stated("edge"))
+
+    @property
+    def wave(self) -> float:
+        """Length [m] of the shortest wave of the shapes, which the cells have to show; infinite without one."""
+        return min((wave for _, wave in self._stated("wave")), default=inf)
+
+    def _stated(self, what: str) -> list:
+        """(keys of the table, what the shape states of it) of every shape that states `what`, of `gaps.Stated`."""
+        known = [(part, getattr(gaps.STATED.get(name), what, None)) for name, part in self.shapes]
+        return [(part, of(part)) for part, of in known if of is not None]
 
     def averaging(self, x, loaded) -> float | None:
         """Length [m] that the profile is averaged over where nodes x (m,) [m] are `loaded` (m,) bool: the longest cell
@@ -57,7 +73,7 @@ class Gap:
 
     def rim(self, x) -> np.ndarray:
         """Half the height of the steps whose edge is a node, (m,) [m] at x (m,) [m]; 0 elsewhere."""
-        return sum((np.where(x == part.at, abs(part.height) / 2, 0.0) for name, part in self.shapes if name == "step"),
+        return sum((np.where(x == place, abs(height) / 2, 0.0) for _, (place, height) in self._stated("edge")),
                    np.zeros(x.size))
 
     def at(self, x) -> tuple:

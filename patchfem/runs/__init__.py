@@ -1,5 +1,17 @@
 """Where the pillars meet: plan and run of a scene.
 
-In: a `Scene`. Out: `Result` with measures, errors, histories and fields. `plan` says what would run, `run` runs it;
-`patch/`, `bench/` and `rig/` solve the three kinds, `results/` holds what all of them hand back. Read `run` first.
+In: a `Scene`. Out: `Result` with measures, errors, histories and fields. `plan` says what would run, `run` runs it. A
+module imports its own entry of this list and the entries before it:
+
+1. `results`   what every run hands back, with its notes
+2. `effort`    what a motion costs
+3. `patch`     a static patch: its grids, its pressure, its measures with errors
+4. `bench`     a prescribed slide of a patch or a point
+5. `rig`       a driven structure that rubs
+6. `wear`      a patch worn by a bench or a rig over many cycles
+7. `remedies`  the measures that miss the tolerance, and what cures them
+8. `memory`    what a run takes
+9. `plan`      what would run: engine, sizes, cost
+10. `run`      a plan becomes a result
+11. `many`     many models at once
 """

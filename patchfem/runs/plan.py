@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ..core import Missing, PatchfemError, say
-from ..effects import EFFECTS
+from ..effects import EFFECTS, has
 from ..model.model import Model, build
 from ..model.source import placed
 from . import memory
@@ -83,7 +83,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
         said[2] = of_rig.sum_words(model) if model.kind == "rig" else []
     if model.patch is not None:
         from .patch import plan as of_patch
-        from .patch.foreseen.grids import sizes as of_grids
+        from .patch.grids import sizes as of_grids
 
         tolerance = model.patch.mesh_tolerance or model.accuracy.tolerance
         grids = of_grids(model.patch, tolerance)
@@ -107,11 +107,9 @@ def _planned(model: Model, per_point: bool) -> Plan:
     seconds += START + memory.code(model, engine).seconds
     parts = memory.needs(model, engine, steps, unknowns, numerics, pressed)
     if model.friction is not None:
-        from . import law
-
-        chain |= law.link(model)
-        groups |= law.groups(model)
-        said[2] = [*said[2], *law.words(model)]
+        chain |= _link(model)
+        groups |= _law_groups(model)
+        said[2] = [*said[2], *_groove_words(model)]
     if model.rig is not None:
         said[0] = [*said[0], *of_rig.first_words(model.rig, groups, chain)]
     return Plan(model, model.kind, model.source.effects, model.absent, engine, unknowns, steps, round(seconds, 2),
@@ -144,3 +142,48 @@ def refuse_size(what: Plan) -> None:
         key += "slide.cycles" if what.kind == "bench" else "drive.cycles" if what.model.rig is not None else ""
         raise Missing(f"the run would take about {what.seconds:.2g} s ({what.steps:.2g} steps), more than "
                       f"{LONGEST:.0e} s; lower {key or 'the number of elements'}", "")
+
+
+def _link(model: Model) -> dict:
+    """Last links of the stiffness chain: grooves, and of every interface bonds, or slip."""
+    load = model.nominal_load
+    if not load > 0:
+        return {}
+    valley = {"grooves": model.grooves.stiffness(load)} if model.grooves is not None else {}
+    others = model.rig.interfaces[1:] if model.rig is not None else ()
+    return valley | _of_law(model.friction, load) | {
+        f"bonds_{k}": _of_law(one.numbers, load if one.load is None else one.load)["bonds"]
+        for k, one in enumerate(others, 2)}
+
+
+def _of_law(f, load: float) -> dict:
+    """The link of a law under a load [N]."""
+    rigid = "none: it creeps" if has(f.law, "creeps") else "rigid until it slips"
+    if has(f.law, "bonds"):
+        return {"bonds": f.static * load / f.bond_length}
+    if has(f.law, "averaged"):
+        return {"bonds": rigid}
+    from ..friction.record import law_from
+
+    one = law_from(f, load).element(load)
+    return {"bonds": one.limit / one.length if one.length else rigid}
+
+
+def _law_groups(model: Model) -> dict:
+    """Dimensionless groups of the law by name."""
+    if model.spread is None:
+        return {}
+    from ..friction.bonds.spread import pad_factor
+
+    return {"share_of_the_spread": pad_factor(model.pad, model.spread)}
+
+
+def _groove_words(model: Model) -> list:
+    """The sentence on the grooves that the load climbs; none without them."""
+    load = model.nominal_load
+    if model.grooves is None or not load > 0:
+        return []
+    g, mu = model.grooves, model.friction.static
+    return [f"the grooves hold like a spring N k^2 A = {g.stiffness(load):.4g} N/m about their bottom, and up to "
+            f"{g.capacity(load, mu):.4g} N on their steepest flank, where friction alone holds mu N = {mu * load:.4g} "
+            "N"]

@@ -1,5 +1,6 @@
 """A run from its plan to its result: plan(scene) says what would run, run(plan) runs it."""
 
+import hashlib
 from contextlib import nullcontext
 from dataclasses import replace
 from importlib import import_module
@@ -7,11 +8,13 @@ from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
+import numpy as np
+
 from ..core import Measure, NotConverged, Outcome, PatchfemError
 from ..model.model import Model
 from ..model.source import placed
 from .plan import Plan, plan, refuse_size
-from .results.loose import loose
+from .remedies import loose
 from .results.places import placeless
 from .results.result import Result, worded
 
@@ -76,7 +79,8 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         if model.wear is not None and patch is not None:
             from .wear.keep import evolved_with
 
-            evolved = evolved_with(kept, model, patch, coarse[:2], progress)
+            key = kept and key_of(model, patch, kept.version)
+            evolved = evolved_with(kept, key, model, patch, coarse[:2], progress)
             patch, coarse = evolved.patch, evolved.coarse
             if model.grooves is not None and evolved.state is not None:
                 from .wear.evolve import lowered
@@ -118,7 +122,6 @@ def _keeping(kept: Kept | None, what: Plan, patch):
     if kept is None or not marches(what):
         return nullcontext()
     from ..dynamics.resume import Keeper, keeping
-    from .key import key_of
 
     def path(number: int) -> Path:
         return kept.path.parent / f"march_{number}.npz"
@@ -126,6 +129,15 @@ def _keeping(kept: Kept | None, what: Plan, patch):
     if kept.resume and model.wear is None and not path(1).is_file():
         raise PatchfemError(f"{kept.path.parent.name}: no interrupted run is kept there; run without --resume")
     return keeping(Keeper(path, key_of(model, patch, kept.version), kept.resume))
+
+
+def key_of(model, patch, version: str) -> str:
+    """What a kept state belongs to: the scene in SI, the unworn gap on its nodes, a slide from a file, the version."""
+    corners = () if model.slide is None or model.slide.corners is None else model.slide.corners
+    of_patch = () if patch is None else (patch.x, patch.gap)
+    parts = (f"{version}\n{model.source.resolved}".encode(), *of_patch, *corners)
+    return hashlib.sha256(b"".join(one if isinstance(one, bytes) else np.asarray(one).tobytes()
+                                   for one in parts)).hexdigest()
 
 
 def marches(what: Plan) -> bool:

@@ -13,7 +13,7 @@ from patchfem.core import Measure
 from patchfem.model.model import build
 from patchfem.runs.patch import ladder
 from patchfem.runs.plan import plan
-from patchfem.runs.results.loose import loose
+from patchfem.runs.remedies import loose
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 

@@ -10,6 +10,7 @@ from scene_texts import PIECE
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak, wedge_linear, wedge_opening, wedge_skin
 from patchfem.core import Outcome, PatchfemError
 from patchfem.runs.patch import ladder
+from patchfem.runs.patch.grids import seconds_of
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import SceneError, loads
@@ -283,7 +284,7 @@ def test_always_an_automatic_mesh_is_found_and_stays_small(name, cheap):
     text = BLOCKS + COATING.format(250e9, 0.24, COATED[name]) if name in COATED else BLOCKS
     found = solved(*GRADED.get(name, (TILT,)), "accuracy.tolerance=1e-2", text=text)
     grids = {id(g): g for g in (found.patch.pair.grid, found.patch.pair.upper_grid)}.values()
-    assert ladder.seconds_of(grids) <= 0.15 and np.diff(found.patch.x).min() > 0
+    assert seconds_of(grids) <= 0.15 and np.diff(found.patch.x).min() > 0
     if name in ("corner", "billionth"):  # the contact lies at the corner that the wedge closes
         assert value(found, "pressure_centre") == pytest.approx(-SIZE / 2, rel=5e-3)
 

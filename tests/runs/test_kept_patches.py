@@ -8,9 +8,8 @@ import patchfem as pf
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.runs.many import one_by_one
 from patchfem.runs.many.meshes import meshed
-from patchfem.runs.patch import ladder, press
-from patchfem.runs.patch.shared import kept
-from patchfem.runs.patch.shared.kept import Kept
+from patchfem.runs.patch import kept, ladder, press
+from patchfem.runs.patch.kept import Kept
 from patchfem.runs.rig import interface
 
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'

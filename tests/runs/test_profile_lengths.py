@@ -9,7 +9,7 @@ from scene_texts import COATING, PIECE
 import patchfem as pf
 from patchfem.closed_forms import contact as closed_forms
 from patchfem.model.model import build
-from patchfem.runs.patch.fine import trace
+from patchfem.runs.patch import fine as trace
 from patchfem.scene.scene import loads
 from patchfem.surface.synthetic import self_affine
 

@@ -11,7 +11,7 @@ from ...response.coarser import Rung
 from ...response.errors import GAPS, change
 from ...slip.fields import element_fields, point_fields, shear_of
 from ...slip.grain import spread, stiffer
-from ..patch.shared.kept import elements
+from ..patch.kept import elements
 from .follow import follow
 from .ledger import Slid
 from .rigid import climbing

@@ -24,7 +24,7 @@ class Shared:
         for key, patches in groups.items():
             if len(patches) < 2:
                 continue
-            from ..patch.shared.meshes import shared_meshes
+            from ..patch.meshes import shared_meshes
 
             try:
                 self.meshes[key] = shared_meshes(patches, key[1], all_)
@@ -49,6 +49,6 @@ def _wants(model: Model | PatchfemError) -> bool:
 
 
 def _key(model: Model) -> tuple:
-    from ..patch.shared.meshes import geometry_of
+    from ..patch.meshes import geometry_of
 
     return geometry_of(model.patch), model.accuracy.tolerance

@@ -11,10 +11,10 @@ import numpy as np
 from ...core import Outcome
 from ...model.model import Model
 from ..patch import result as of_patch
+from ..patch import static
+from ..patch.meshes import geometry_of
 from ..patch.notes import slender
-from ..patch.shared import static
-from ..patch.shared.meshes import geometry_of
-from ..results.loose import loose
+from ..remedies import loose
 from ..results.places import placeless
 from . import one_by_one
 from .answers import Answers, joined

@@ -18,7 +18,7 @@ from ...elasticity.grid_fronts import predicted_seconds
 from ...elasticity.lapack import cho_factor, cho_solve, one_thread
 from ...mesh.grading import Layout, columns, rows
 from ...model.pieces import layers_of
-from .grading import loaded
+from .grids import loaded
 from .press import pressure_on
 
 ORDER = 4

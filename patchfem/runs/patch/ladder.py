@@ -3,25 +3,19 @@
 from dataclasses import replace
 from functools import lru_cache, partial
 
-import numpy as np
-
 from ...core import NotConverged, Outcome
-from ...elasticity.grid_fronts import predicted_seconds
 from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import bodies_of
 from . import high_order
 from .condensed import condensed, shared_pairs
-from .grading import base_grids
+from .grids import LEAST_LEVELS, SPENT, base_grids, seconds_of
+from .kept import KEPT, Kept, shares
 from .measures import measures, met, missed
 from .press import pressed, solve
-from .shared.kept import KEPT, Kept, shares
 
-OTHER = 4.0  # time of condensing a grid that is not a tensor grid over that of one that is
-LEAST_LEVELS = 3  # nested meshes that show an order
 FINE = 1e-3  # tolerance that bilinear meshes meet cheaply
 HELPED = 3.0  # times nearer to the tolerance, from which cells of order 4 end the climb even if they miss it
 MOST_DECADES = 6  # below a tolerance, in which another is looked for
-SPENT = {True: 3.0, False: 0.4}  # predicted seconds of the finest mesh: of a static patch, of one that moves
 
 
 def solve_split(asked, level: int, estimate: bool) -> tuple:
@@ -144,14 +138,14 @@ def _finer(asked) -> bool:
     """Whether a trace may be solved on points finer than any cells."""
     if asked.gap.profile is None:
         return False
-    from .fine.trace import serves
+    from .fine import serves
 
     return serves(asked)
 
 
 def _on_points(asked, patches: list, tolerance: float) -> tuple:
     """Sharper measures of patches, fine to coarse, from points as fine as a trace, and the finest patch with them."""
-    from .fine.trace import sharper
+    from .fine import sharper
 
     found, apart = sharper(asked, partial(_enough, patches, tolerance))
     first = patches[0]
@@ -184,14 +178,3 @@ def _grids(patch) -> tuple:
 def _enough(patches: list, tolerance: float, sharp: dict) -> bool:
     """Whether patches, fine to coarse, meet the tolerance with the measures that cells of order 4 add."""
     return met(measures(replace(patches[0], sharper=sharp), *patches[1:], tolerance=tolerance), tolerance)
-
-
-def seconds_of(bodies) -> float:
-    """Predicted time [s] of condensing the grids of a patch; a grid counts as its own mirror image where it is even."""
-    out = 0.0
-    for body in bodies:
-        plan = plan_of(body)
-        columns = plan.x.size if plan is body else len(body.points) // plan.depth.size
-        even = plan is body and bool(np.abs(plan.x + plan.x[::-1]).max() <= 1e-12 * plan.length)
-        out += (1 if plan is body else OTHER) * predicted_seconds(columns, plan.depth.size, even)
-    return out

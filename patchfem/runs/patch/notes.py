@@ -4,7 +4,7 @@ import numpy as np
 
 from ...core import Outcome, say
 from ...mesh.nested import plan_of
-from .shared.kept import band
+from .kept import band
 
 COUPLED = 0.02  # of the tangential compliance; the closing by shear is said from there on
 BENT = 0.02  # of the load under which a tall piece buckles; as much is missing from its sideways motion

@@ -4,7 +4,7 @@ from math import log10, sqrt
 
 from ...model.model import Model
 from ...model.patch import bars, block_shear
-from .foreseen.grids import Sizes, work
+from .grids import Sizes, work
 from .high_order import serves
 
 PRESSED, WORK = 0.15, 3.0  # seconds of a patch with its fields, and per predicted second of condensing it
@@ -61,10 +61,9 @@ def groups(model: Model) -> dict:
     load = asked.nominal_load
     if model.friction is not None:
         out["slip_length"] = model.friction.static * load / block_shear(asked)
-    tilts = [abs(part.angle) for name, part in asked.gap.shapes if name == "tilt"]
-    if tilts and load > 0:
+    if asked.gap.tilt is not None and load > 0:
         approach = load * bars(asked, lambda m: (1 - m.poisson**2) / m.young)
-        out["tilt_over_first_opening"] = tilts[0] * asked.length / (2 * approach)
+        out["tilt_over_first_opening"] = asked.gap.tilt * asked.length / (2 * approach)
     return out
 
 
@@ -76,7 +75,7 @@ def verdict(found: dict, asked) -> list:
     tilt, gap = found.get("tilt_over_first_opening"), asked.gap
     if tilt is None:
         return []
-    if gap.profile is not None or asked.strips is not None or any(name != "tilt" for name, part in gap.shapes):
+    if gap.profile is not None or asked.strips is not None or len(gap.shapes) > 1:
         return [f"tilt is {tilt:.3g} of the first-opening tilt of flat pieces, which these are not"]
     if tilt <= 1:
         part = "full contact" if tilt <= FULL else "full contact, or all but an edge"

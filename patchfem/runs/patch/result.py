@@ -6,11 +6,11 @@ from ...core import Outcome
 from ...model.pieces import bodies_of
 from ...model.source import placed
 from ..results.result import Result, still
+from . import kept
 from .ladder import solve_all
 from .measures import strip_error
 from .notes import left_out
 from .rounding import beyond_gentle
-from .shared import kept
 from .values import values
 
 LOCKS = 0.499  # Poisson's ratio; up to it the bars of locking cells hold

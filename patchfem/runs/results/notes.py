@@ -5,12 +5,13 @@ from math import ceil, log2
 import numpy as np
 
 from ...core import Outcome, say
-from ...friction.bonds.parameters import ripening
-from .loose import FARTHEST, more_harmonics
 
 BOOKS = 1e-3  # relative gap of the two books of energy beyond which a run says so
 RIPE = 0.3  # of their length, over which bonds may ripen before a run says so
 BOUND = 1e-3  # share of mu_s N that friction may exceed before a run says so
+FARTHEST = 8  # halvings of the steps that are named at once where no engine without steps serves
+MORE, LEAST = 4, 31  # times the harmonics of a balance, and harmonics, that are proposed
+MOST_HARMONICS = 500  # that are proposed at once
 
 
 def climbing_as_one(model, patch) -> list:
@@ -39,6 +40,8 @@ def warming(model, patch, response, work: float | None = None) -> list:
 
 def unripe(law, speed: float) -> list:
     """Warning that a printed law's bonds break before they are grown, as a list of sentences."""
+    from ...friction.bonds.parameters import ripening
+
     a = ripening(law, speed) if law.reading == "report" else 0.0
     if a <= RIPE:
         return []
@@ -111,3 +114,11 @@ def two_books(values: dict, steps: int | None, harmonics: int | None = None) -> 
             "compare with accuracy.method = \"march\""
     return [f"work_check is {found.value:.2g} (limit {BOOKS:g}): friction work by the trapezoidal rule on the samples "
             f"differs from that of the energy ledger; {remedy}"]
+
+
+def more_harmonics(found: int, sharp: float = 0.0) -> str:
+    """The harmonics that make a balance of so many better; few of them say little of how it converges.
+
+    sharp: how many the friction itself asks for.
+    """
+    return f"set accuracy.harmonics = {max(MORE * found, LEAST, min(ceil(sharp), MOST_HARMONICS))}"

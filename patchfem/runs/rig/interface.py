@@ -16,7 +16,7 @@ from ...model.model import Model
 from ...slip.fields import shear_of
 from ...structure.drive_sizes import omega_of
 from ..bench.averaged import limit_share
-from ..patch.shared.kept import elements, strip_elements
+from ..patch.kept import elements, strip_elements
 from .numerics import Numerics, quadrature_of
 from .strips import strip_loads
 

@@ -9,18 +9,17 @@ import numpy as np
 from ...core import PatchfemError
 from ...disk.whole import whole
 from ...wear.jumps import Worn
-from ..key import key_of
 from .evolve import Evolved, Moment, evolve
 
 STATE = tuple(Worn.__slots__)
 MOMENT = ("cycle", "depth", "used", "pressure", "gap", "miss")
 
 
-def evolved_with(kept, model, patch, coarse, progress=None) -> Evolved:
-    """`evolve` with its state kept after every jump; kept: where, None keeps nothing."""
+def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved:
+    """`evolve` with its state kept after every jump; kept: where, None keeps nothing; key: what the
+    state belongs to."""
     if kept is None:
         return evolve(model, patch, coarse, progress)
-    key = key_of(model, patch, kept.version)
     begin = load(kept.path, key) if kept.resume else None
     return evolve(model, patch, coarse, progress, begin, lambda state, moments: save(kept.path, key, state, moments))
 

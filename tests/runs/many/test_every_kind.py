@@ -7,8 +7,7 @@ from scene_texts import COATED, MODE, PLASTIC, SHEAR, SLIDE
 import patchfem as pf
 from patchfem.runs.many import many, one_by_one
 from patchfem.runs.many.meshes import meshed
-from patchfem.runs.patch import condensed, ladder
-from patchfem.runs.patch.shared import kept
+from patchfem.runs.patch import condensed, kept, ladder
 
 STORES = (condensed._shared, ladder._kept, kept._measures, kept._band, kept.elements)
 PATCH = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n'

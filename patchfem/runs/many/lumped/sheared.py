@@ -18,7 +18,7 @@ from ....model.source import placed
 from ....response.errors import pieces_error
 from ....response.measures import energy_balance
 from ...patch import result as of_patch
-from ...results.loose import loose
+from ...remedies import loose
 from ...results.places import placeless
 from ...results.travel import ended, travelled
 from ...rig.engines import PIECES, engine_of

@@ -7,7 +7,7 @@ import numpy as np
 from ....core import Measure
 from ....effects import has
 from ....model.model import Model
-from ...results.loose import loose
+from ...remedies import loose
 from ...rig.remarks import said_of_law
 from ..answers import Answers
 

@@ -11,15 +11,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from ....core import PatchfemError
-from ....mesh.grading import Layout
-from ....mesh.nested import finer
-from ....mesh.tensor import TensorGrid
-from ....model.patch import Meshes
-from .. import grading, ladder
-from ..condensed import condensed
-from ..measures import measures, met
-from ..press import pressed
+from ...core import PatchfemError
+from ...mesh.grading import Layout
+from ...mesh.nested import finer
+from ...mesh.tensor import TensorGrid
+from ...model.patch import Meshes
+from . import grids, ladder
+from .condensed import condensed
+from .measures import measures, met
+from .press import pressed
 
 CASES = 48  # cases that a mesh is chosen by; of more, those that lie farthest apart
 ROUNDS = 4  # of the search for the contacts
@@ -49,11 +49,11 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
         return named(ladder.levels_of(asked))
     cases, every = spread(patches)
     swept = [replace(one, load=share * one.load) for one in cases if one.sweeps == "load" and one.load is not None
-             for share in grading.SWING]
+             for share in grids.SWING]
     layout = _layout([*cases, *swept], not (every and all_))
     # a contact that moves on the way has measures that its first state tells nothing of
     for share in () if layout is None else START[-1:] if asked.sweeps else START:
-        levels, good = _climbed(cases, grading.grids_of(asked, layout.times(share)), tolerance, share > 1)
+        levels, good = _climbed(cases, grids.grids_of(asked, layout.times(share)), tolerance, share > 1)
         if good or share == START[-1]:
             return named(levels)
     return None
@@ -104,14 +104,14 @@ def _layout(cases: list, between: bool) -> Layout | None:
 
     between: there are more cases than these, and their contacts end between those of neighbouring ones.
     """
-    first, along = cases[0], grading.EDGE[cases[0].still]
-    layout = grading.search_layout(first)
+    first, along = cases[0], grids.EDGE[cases[0].still]
+    layout = grids.search_layout(first)
     for _ in range(ROUNDS):
-        pair = condensed(first, *grading.grids_of(first, layout))
+        pair = condensed(first, *grids.grids_of(first, layout))
         seen = [(one, found) for one in cases if (found := _loaded(one, pair)) is not None]
         if not seen:
             return None
-        layout = _merged([grading.layout_of(one, [found]) for one, found in seen], between)
+        layout = _merged([grids.layout_of(one, [found]) for one, found in seen], between)
         if max(found.cell / found.wide for _, found in seen) <= 1 / (along - 1):
             break
     return layout
@@ -120,7 +120,7 @@ def _layout(cases: list, between: bool) -> Layout | None:
 def _loaded(asked, pair):
     """The contact of a case, None of one that cannot be pressed: its own run says why."""
     try:
-        return grading.loaded(pressed(asked, pair))
+        return grids.loaded(pressed(asked, pair))
     except PatchfemError:
         return None
 
@@ -153,17 +153,17 @@ def _filled(layouts: list) -> list:
     return out
 
 
-def _climbed(cases: list, grids, tolerance: float, once: bool) -> tuple:
-    """Levels of nested meshes from the coarsest `grids`, fine to coarse, up to one on which every case meets the
+def _climbed(cases: list, bodies, tolerance: float, once: bool) -> tuple:
+    """Levels of nested meshes from the coarsest `bodies`, fine to coarse, up to one on which every case meets the
     tolerance, or the dearest that is worth it; and whether every case does. once: no more than the least levels."""
     pairs, tolerance = [], cases[0].mesh_tolerance or tolerance
     while True:
-        pairs.insert(0, condensed(cases[0], *grids))
-        grids = [finer(grid) for grid in grids]
-        if len(pairs) < ladder.LEAST_LEVELS:
+        pairs.insert(0, condensed(cases[0], *bodies))
+        bodies = [finer(body) for body in bodies]
+        if len(pairs) < grids.LEAST_LEVELS:
             continue
         good = all(_enough(one, pairs, tolerance) for one in cases)  # ends with the first that is not
-        if good or once or grids[0].x.size > MOST_NODES or ladder.seconds_of(grids) > ladder.SPENT[cases[0].still]:
+        if good or once or bodies[0].x.size > MOST_NODES or grids.seconds_of(bodies) > grids.SPENT[cases[0].still]:
             return [(pair.grid, None if pair.upper is pair.piece else pair.upper_grid) for pair in pairs], good
 
 

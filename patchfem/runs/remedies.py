@@ -2,17 +2,15 @@
 
 from math import ceil, log2, log10, pi
 
-from ...core import say
-from ...effects import has
-from .patch_rows import DECISIVE, TABLE
+from ..core import say
+from ..effects import has
+from .results.notes import FARTHEST, more_harmonics
+from .results.patch_rows import DECISIVE, TABLE
 
 MOST = 1e9  # times that an error exceeds what is allowed, beyond which it does not matter
 TIGHTER = 0.1  # times the tolerance: a mesh of at least one halving more
 MOST_HALVINGS = 4  # of the steps, as far ahead as an order seen at two of them is trusted
 LEAST_LEFT = 0.2  # share of an allowed error that steps may be asked to meet, where the mesh takes more than the rest
-FARTHEST = 8  # of the steps, that are named at once where no engine without steps serves
-MORE, LEAST = 4, 31  # times the harmonics of a balance, and harmonics, that are proposed
-MOST_HARMONICS = 500  # that are proposed at once
 MOST_STRIPS = 64  # that are proposed: four times the strips are some twenty times the time
 SIZE = "contact.element_size"  # an even mesh finds the ends of a contact at first order, one that is chosen at second
 OF_PEAK = ("pressure_peak", "loaded_fraction")
@@ -98,7 +96,7 @@ def _finer_mesh(result, wide: dict, coarse) -> str:
 
 def _locks(result, wide: dict) -> bool:
     """Whether the measures that speak for `wide` are known as well as Poisson's ratio allows."""
-    from ..patch.high_order import locked
+    from .patch.high_order import locked
 
     share, known = locked(result.plan.model.patch), result.measures
     return all(known[name].error <= share * abs(known[name].value) for name in _first(result, wide))
@@ -123,7 +121,7 @@ def _climbing(result, coarse) -> float | None:
     asked, tolerance = result.plan.model.patch, result.plan.model.accuracy.tolerance
     if not any(coarse) or asked.meshes is not None:
         return TIGHTER * tolerance
-    from ..patch.ladder import climbs_at
+    from .patch.ladder import climbs_at
 
     return climbs_at(asked, [result.patch, *coarse], asked.mesh_tolerance or tolerance)
 
@@ -192,14 +190,6 @@ def _finer_bonds(accuracy) -> str:
         f"accuracy.tolerance = {TIGHTER * accuracy.tolerance:.3g} refines the sum over bonds"
 
 
-def more_harmonics(found: int, sharp: float = 0.0) -> str:
-    """The harmonics that make a balance of so many better; few of them say little of how it converges.
-
-    sharp: how many the friction itself asks for.
-    """
-    return f"set accuracy.harmonics = {max(MORE * found, LEAST, min(ceil(sharp), MOST_HARMONICS))}"
-
-
 def _sharp(result) -> float:
     """Harmonics that show how fast a friction turns that follows the speed: the largest speed over that of the law."""
     law, slip = result.plan.model.friction, result.measures.get("slip_amplitude")
@@ -213,7 +203,7 @@ def _unproven(model, steps: int, name: str, wide: dict) -> str:
 
     Steps that are left out are doubled until the displacement is met.
     """
-    from ..effort import MOST_STEPS
+    from .effort import MOST_STEPS
 
     seen = f"the change of {name} did not fall from {steps // 4} to {steps} steps per cycle"
     if exact := _stepless(model):
@@ -242,7 +232,7 @@ def _finer_under(result, coarse) -> str:
 def _stepless(model) -> str:
     """The exact engine where it follows a motion that steps do not resolve; "" where none does."""
     if model.kind == "rig":
-        from ..rig.engines import inexact
+        from .rig.engines import inexact
 
         if model.accuracy.method != "exact" and not inexact(model):
             pinned = "leave out accuracy.steps_per_cycle and " * (model.accuracy.steps_per_cycle is not None)

@@ -9,17 +9,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....contact.active_set import Ask
-from ....contact.fine.products import Products, ends_of, smooth_modes, stiffness_of
-from ....contact.fine.strip import end_effect, strip_compliance
-from ....contact.gradients import gradients
-from ....core import NotConverged
-from ....elasticity.elasticity import assemble
-from ....elasticity.lapack import one_thread
-from ....mesh.grading import Layout, columns, rows
-from ....model.pieces import layers_of
-from ..measures import OFFSET, Hidden, combined, least_of
-from ..values import peak_pressure
+from ...contact.active_set import Ask
+from ...contact.fine.products import Products, ends_of, smooth_modes, stiffness_of
+from ...contact.fine.strip import end_effect, strip_compliance
+from ...contact.gradients import gradients
+from ...core import NotConverged
+from ...elasticity.elasticity import assemble
+from ...elasticity.lapack import one_thread
+from ...mesh.grading import Layout, columns, rows
+from ...model.pieces import layers_of
+from .measures import OFFSET, Hidden, combined, least_of
+from .values import peak_pressure
 
 LEAST_LEVELS, MOST_POINTS, MOST_WORK = 3, 60_000, 2.5e7  # of a level; its iterations times its points
 POINTS = 500  # of the first level at least
@@ -69,7 +69,7 @@ def sharper(asked, enough) -> tuple:
 
 
 def _first(asked) -> int:
-    from ....model.profile import spacing_of
+    from ...model.profile import spacing_of
 
     return max(POINTS, min(round(asked.length / spacing_of(asked.gap.profile) / 4), MOST_POINTS // 4))
 

@@ -8,9 +8,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from ....slip.shear_modes import JenkinsSet, jenkins_set, scaled
-from ..measures import measures, plane_band
-from ..press import Patch
+from ...slip.shear_modes import JenkinsSet, jenkins_set, scaled
+from .measures import measures, plane_band
+from .press import Patch
 
 KEPT = 2  # patches with those of their errors
 

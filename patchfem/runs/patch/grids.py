@@ -1,16 +1,22 @@
-"""The mesh that a patch needs: graded to where its own pressure ends, to its corners and its coating.
+"""The grids of a patch: graded to where its own pressure ends, to its corners, its coating and the waves of its gap.
 
-The coarsest grid follows from the patch alone. Every next one splits all its cells in two, so the meshes of a tighter
-tolerance are those of a wider one and more. How far the ladder is climbed is decided in `ladder`.
+The coarsest grid follows from the patch alone: its contact is searched on columns that are graded to what the search
+before found. A plan and a run have the same. Every next grid splits all cells in two, so the grids of a tighter
+tolerance are those of a wider one and more. How far the ladder is climbed a run decides in `ladder`, a plan expects in
+`sizes`. Read `base_grids` first, then `layout_of`.
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from ...core import frozen_array
+from ...core import NotConverged, frozen_array
+from ...elasticity.grid_fronts import predicted_bytes, predicted_seconds
 from ...mesh.grading import Layout, columns, rows
-from ...mesh.tensor import TensorGrid
+from ...mesh.nested import plan_of
+from ...mesh.tensor import TensorGrid, graded_grid
 from ...model.pieces import outlined, rounded_edges
 from .condensed import condensed
 from .press import Patch, pressed
@@ -27,8 +33,14 @@ MOST_PLACES = 12  # beyond it the contact is many islands and the columns stay e
 SWING = (0.5, 1.5)  # of the mean load, between which edges are resolved where the load varies
 WORN = 1 / 48  # of the interface, a column of the coarsest grid where wear may move the edges anywhere
 CLOSER = 64  # cells along a contact of a node or two, in the next search
+WAVE = 16  # cells of the search, and of the third grid, in a wave of the gap
 CREST, CRESTS = 0.3, 4  # of the largest pressure: a crest that cells are graded to; its cells of the coarsest grid
 SEARCHES = 8  # of the contact, each on columns graded to what the one before found
+LEAST_LEVELS = 3  # nested meshes that show an order
+SPENT = {True: 3.0, False: 0.4}  # predicted seconds of the finest mesh: of a static patch, of one that moves
+OTHER = 4.0  # time of condensing a grid that is not a tensor grid over that of one that is
+ONE_MORE = 2e-3  # tolerance below which a contact that ends inside, or over a jump, is expected to take a level more
+ROWS = 33  # of nodes of a mesh in a file, which a plan does not read
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -58,6 +70,12 @@ def base_grids(asked) -> list:
     Where a load that varies moves the edges of the contact, the columns are fine over the bands that they sweep between
     SWING of the load; where wear does, no column is longer than WORN of the interface.
     """
+    return list(_searched(asked)[0])
+
+
+@lru_cache(maxsize=4)  # a plan and its run ask for the same patch
+def _searched(asked) -> tuple:
+    """(the grids of `base_grids`, how often the contact ends inside the interface)."""
     sweep = [replace(asked, load=share * asked.load) for share in SWING
              if asked.sweeps == "load" and asked.load is not None]
     layout = search_layout(asked)
@@ -69,19 +87,24 @@ def base_grids(asked) -> list:
         cells = max(one.cell / one.wide for one in seen)
         if cells <= 1 / (EDGE[asked.still] - 1) and _shows_crests(asked, grids[0].x, layout):
             break
-    return grids_of(asked, layout)
+    return tuple(grids_of(asked, layout)), len(seen[0].places)
 
 
 def _shows_crests(asked, x, layout: Layout) -> bool:
-    """Whether columns x (k,) [m] are no longer than a layout wants them at the crests of a pressure under a profile."""
-    if asked.gap.profile is None or x.size > MOST_COLUMNS:
+    """Whether columns x (k,) [m] are no longer than a layout wants them at the crests of a pressure on waves."""
+    if _longest(asked) == np.inf or x.size > MOST_COLUMNS:
         return True
     return bool((np.diff(x) <= 2 * layout.size((x[1:] + x[:-1]) / 2)).all())
 
 
+def _longest(asked) -> float:
+    """Longest cell [m] that shows the waves of the gap, those of a profile and of its shapes; infinite without any."""
+    return min(asked.gap.wave / WAVE, np.inf if asked.gap.profile is None else asked.size)
+
+
 def search_layout(asked) -> Layout:
     """Even columns on which a contact is looked for."""
-    cell = asked.size if asked.gap.profile is not None else asked.length / SEARCH_CELLS
+    cell = min(asked.length / SEARCH_CELLS, _longest(asked))
     return Layout(-asked.length / 2, asked.length / 2, (), (-asked.length / 2, asked.length / 2), cell, cell, 0.0)
 
 
@@ -89,8 +112,7 @@ def layout_of(asked, seen: list) -> Layout:
     """Layout of the coarsest columns for the contacts `seen`, finest where one ends."""
     half, span = asked.length / 2, (min(one.span[0] for one in seen), max(one.span[1] for one in seen))
     wide, thick = min(one.wide for one in seen), _coating(asked)
-    # the third mesh has cells no longer than what a profile may hold
-    most = asked.length / 12 if asked.gap.profile is None else 4 * asked.size
+    most = min(asked.length / 12, 4 * _longest(asked))  # the third mesh has cells a quarter as long
     if max(len(one.places) for one in seen) > MOST_PLACES:
         return Layout(-half, half, (), span, *(2 * [min(asked.length / 64, most)]), 0.0)
     if asked.sweeps == "wear":
@@ -108,7 +130,7 @@ def layout_of(asked, seen: list) -> Layout:
     near = [place for place in known if span[0] - least <= place <= span[1] + least]
     bands += tuple((place, place, min(least, fall / 4)) for place in near)
     sharp = JUMP if asked.singular_ends else 1
-    if asked.gap.profile is not None:
+    if _longest(asked) < np.inf:
         bands += tuple((place, place, max(wide / CRESTS, least / JUMP)) for one in seen for place, wide in one.crests)
     corner = max(min(thick / 16 if thick else np.inf, wide / EDGE[asked.still] / sharp), LEAST * asked.length)
     ends = {place for one in seen for place in one.corners}
@@ -196,3 +218,94 @@ def grid_on(asked, x, piece) -> TensorGrid:
     layout = Layout(0.0, height, tuple(bands), (0.0, height), cap, cap, SLOPE[asked.still])
     depth, coated = rows(layout, thick)
     return TensorGrid(frozen_array(x), depth, coated)
+
+
+class Sizes(NamedTuple):
+    """Grids of a patch as a plan counts them.
+
+    points: nodes of the interface; finest: (columns, rows) of nodes of the finest grid of each piece, one where they
+    are alike; levels: nested grids that are solved; even: they are their own mirror images; outlined: they reach beyond
+    the interface; ends: how often the contact ends inside the interface.
+    """
+
+    points: int
+    finest: tuple
+    levels: int
+    even: bool
+    outlined: bool
+    ends: int = 0
+
+    @property
+    def nodes(self) -> float:
+        """Nodes of the finest grids."""
+        return float(sum(columns * rows for columns, rows in self.finest))
+
+
+def sizes(asked, tolerance: float) -> Sizes:
+    """The grids that a `PatchModel` is solved on at a tolerance: the first as a run has it, the number of levels as it
+    is expected. A mesh file counts as one that is as fine as the automatic grid: it is not read."""
+    pieces, ends = (asked.lower,) if asked.alike else (asked.lower, asked.upper), 0
+    if asked.mesh is not None:
+        points = round(asked.length / asked.size) + 1
+        return Sizes(points, tuple((points, ROWS) for _ in pieces), LEAST_LEVELS, False, True)
+    if asked.meshes is not None:
+        bodies = [body for body in asked.meshes.levels[0] if body is not None]
+    elif asked.chosen:
+        bodies, ends = _expected(asked)
+    else:
+        bodies = [graded_grid(asked.length, piece.height, asked.size, piece.thickness) for piece in pieces]
+    x = (plan_of(bodies[0]) or bodies[0]).x
+    even, finest = bool(np.abs(x + x[::-1]).max() <= 1e-9 * asked.length), tuple(map(_nodes, bodies))
+    found = Sizes(x.size, finest, LEAST_LEVELS, even and not asked.outlined, asked.outlined, ends)
+    if not asked.chosen or asked.meshes is not None:
+        return found
+    levels = LEAST_LEVELS + (tolerance < ONE_MORE and bool(ends or asked.gap.jumps))
+    found = [_halved(found, times) for times in range(levels)]
+    return next((one for one in reversed(found[LEAST_LEVELS:]) if _seconds(one) <= SPENT[asked.still]),
+                found[LEAST_LEVELS - 1])
+
+
+def _expected(asked) -> tuple:
+    """`_searched`, or even columns where the contact is not found, which the run tells."""
+    try:
+        return _searched(asked)
+    except NotConverged:
+        return grids_of(asked, search_layout(asked)), 0
+
+
+def _nodes(body) -> tuple:
+    """(columns, rows) of nodes of a whole body."""
+    plan = plan_of(body)
+    if plan is None:
+        return body.x.size, max(3, round(len(body.points) / body.x.size))
+    return (plan.x.size if plan is body else len(body.points) // plan.depth.size), plan.depth.size
+
+
+def _halved(found: Sizes, times: int) -> Sizes:
+    """The sizes of grids whose cells are halved so many times; below zero, merged."""
+    def of(nodes: int) -> int:
+        return max(3, round((nodes - 1) * 2**times) + 1)
+
+    finest = tuple((of(columns), of(rows)) for columns, rows in found.finest)
+    return found._replace(points=of(found.points), finest=finest, levels=max(found.levels, times + 1))
+
+
+def _seconds(found: Sizes) -> float:
+    """Predicted seconds of condensing the finest grids."""
+    return sum((OTHER if found.outlined else 1.0) * predicted_seconds(*grid, found.even) for grid in found.finest)
+
+
+def seconds_of(bodies) -> float:
+    """Predicted seconds of condensing the grids of a patch; a grid counts as its own mirror image where it is even."""
+    out = 0.0
+    for body in bodies:
+        whole, x = plan_of(body) is body, body.x
+        even = whole and bool(np.abs(x + x[::-1]).max() <= 1e-12 * body.length)
+        out += (1.0 if whole else OTHER) * predicted_seconds(*_nodes(body), even)
+    return out
+
+
+def work(found: Sizes) -> tuple:
+    """(seconds, bytes) of condensing all levels, predicted."""
+    return sum(_seconds(_halved(found, -below)) for below in range(found.levels)), \
+        sum(predicted_bytes(*grid, found.even) for grid in found.finest)

@@ -9,14 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....contact.many.anchored import Anchored
-from ....elasticity.lapack import one_thread
-from ....mesh.tensor import TensorGrid
-from .. import measures as one_by_one
-from ..condensed import Pair, shared_pairs
-from ..measures import Hidden, combined, least_of
-from ..press import with_linear_skin
-from ..values import peak_pressure, vertex
+from ...contact.many.anchored import Anchored
+from ...elasticity.lapack import one_thread
+from ...mesh.tensor import TensorGrid
+from . import measures as one_by_one
+from .condensed import Pair, shared_pairs
+from .measures import Hidden, combined, least_of
+from .press import with_linear_skin
+from .values import peak_pressure, vertex
 
 SOLVED = 1e-12  # largest residual, as `contact.unilateral` has it
 BORDER = 3  # nodes whose means give the pressure at an end

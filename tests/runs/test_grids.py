@@ -1,0 +1,83 @@
+"""The grids of a patch: a plan counts those that a run makes, and a wave of the gap has cells that show it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scene_texts import SMALL_PATCH
+
+from patchfem.contact import gaps
+from patchfem.model.gap import Gap
+from patchfem.model.model import build
+from patchfem.runs.patch.grids import base_grids, sizes
+from patchfem.runs.patch.ladder import solve_all
+from patchfem.scene.scene import loads
+
+PIECES = """[contact]
+length = "12 mm"
+width = "10 mm"
+height = "5 mm"
+load = "200 N"
+substrate = "Ti-8Al-1Mo-1V"
+"""
+COATED = '[contact.coating]\nmaterial = "WC-Co"\nthickness = "0.15 mm"\n'
+ENDING = '[contact.{}]\n{}\n'
+
+
+def asked(text, *sets):
+    return build(loads(text, "a.toml", sets)).patch
+
+
+def grids_of_run(patch, tolerance) -> tuple:
+    """(columns, rows) of nodes of the finest grid of each piece, as a run solves them; how many levels there are."""
+    patches = solve_all(patch, tolerance)
+    pair = patches[0].pair
+    bodies = [pair.grid] if pair.upper is pair.piece else [pair.grid, pair.upper_grid]
+    return tuple((body.x.size, body.depth.size) for body in bodies), sum(one is not None for one in patches)
+
+
+@pytest.mark.parametrize("text, tolerance, sets", [
+    (PIECES, 1e-2, []), (PIECES + COATED, 1e-3, []), (SMALL_PATCH, 1e-3, []),
+    (PIECES + ENDING.format("step", 'height = "2 um"\nat = "1 mm"'), 3e-3, []),
+    (PIECES + ENDING.format("crown", 'radius = "2 m"'), 1e-2, []),
+    (PIECES + ENDING.format("tilt", 'angle = "0.2 mrad"'), 1e-2, []),
+    (PIECES + ENDING.format("load_line", 'offset = "3 mm"'), 1e-2, []),
+    (PIECES + '[contact.asperities]\nlaw = "exponential"\ndecay_length = "0.2 um"\n' +
+     ENDING.format("tilt", 'angle = "0.5 mrad"'), 1e-2, []),
+    (PIECES + '[contact.upper]\nheight = "4 mm"\n', 1e-3, ["contact.element_size=0.2 mm"])])
+def test_exact_a_plan_counts_the_grids_of_the_run(text, tolerance, sets):
+    patch = asked(text, *sets)
+    found, (finest, levels) = sizes(patch, tolerance), grids_of_run(patch, tolerance)
+    assert found.finest == finest and found.levels == levels and found.points == max(n for n, _ in finest)
+
+
+@pytest.mark.parametrize("shape", [ENDING.format("crown", 'radius = "2 m"'),
+                                   ENDING.format("tilt", 'angle = "1 mrad"')])
+@pytest.mark.parametrize("tolerance", [3e-3, 1e-3])
+def test_always_a_plan_is_at_most_one_level_off_where_a_contact_ends_inside(shape, tolerance):
+    patch = asked(PIECES + shape)
+    assert abs(sizes(patch, tolerance).levels - grids_of_run(patch, tolerance)[1]) <= 1
+
+
+def ripple(x, length, height):
+    return height / 2 * (1 - np.cos(2 * np.pi * x / length))
+
+
+def test_exact_a_new_shape_that_states_its_wave_has_cells_that_show_it(monkeypatch):
+    """Westergaard's pressure in full contact: a cosine of amplitude pi E* h/(2 l) about the mean, on pieces that are
+    deep beside the wave. 13 waves of .92 mm would fall on seven cells each of a plain gap."""
+    patch, wave, high = asked(PIECES), 12e-3 / 13, 10e-9
+    monkeypatch.setattr(gaps, "ripple", ripple, raising=False)
+    monkeypatch.setitem(gaps.STATED, "ripple", gaps.Stated(wave=lambda keys: dict(keys)["length"]))
+    keys = (("length", wave), ("height", high))
+    waved = replace(patch, gap=Gap((("ripple", keys),), None, None, None, False, "upper"))
+    assert waved.gap.wave == wave
+    (plain,), (shown,) = base_grids(patch), base_grids(waved)
+    assert np.diff(plain.x).max() > wave / 8 and np.diff(shown.x).max() <= wave / 4 * 1.2
+    pressed = solve_all(waved, 1e-3)[0]
+    x, sigma = (part[np.abs(pressed.x) < 3e-3] for part in (pressed.x, pressed.pressure.sigma_n))
+    turn = 2 * np.pi * x / wave
+    swing = np.linalg.lstsq(np.stack([x**0, x**2, x**4, np.cos(turn)], 1), sigma, rcond=None)[0][3]
+    face = patch.lower.substrate
+    modulus = face.young / (1 - face.poisson**2) / 2
+    assert swing == pytest.approx(np.pi * modulus * high / 2 / wave, rel=0.01)
