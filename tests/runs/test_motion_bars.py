@@ -1,6 +1,6 @@
 """Do the bars of a motion hold? Random rigs of every law, drive and structure against the truth of `motion_bars`.
 
-`python tests/support/motion_bars.py 9300 300 FILE` is the whole campaign, tests/README.md has its result.
+`python tests/support/motion_bars.py run FILE` is the whole campaign, tests/README.md has what campaigns found.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ FEW = (11, 21, 30, 111)  # exact, in pieces, exact, a march
 @pytest.mark.share(0, 2)
 @pytest.mark.parametrize("seed", FEW)
 def test_always_the_bars_of_a_random_rig_hold_the_independent_program(seed, tmp_path):
-    found = compared(seed, tmp_path)
+    found = compared(spec(seed), tmp_path)
     assert found["rows"] and found["truth"] == "reference"
     assert not [row for row in found["rows"] if not held(row)]
 
@@ -43,7 +43,7 @@ def test_exact_the_independent_program_reads_peaks_between_its_nodes():
 @pytest.mark.slow
 def test_always_most_bars_of_forty_rigs_hold(tmp_path):
     """What 114 other rigs had (tests/README.md), less what the chance of forty allows."""
-    found = score([compared(seed, tmp_path) for seed in range(6000, 6040)])
+    found = score([compared(spec(seed), tmp_path) for seed in range(6000, 6040)])
     assert found["coverage"] >= 0.93 and found["right"] >= 0.7, found["misses"]
 
 

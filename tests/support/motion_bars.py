@@ -1,12 +1,17 @@
 """Bars of the measures of random rigs against what is true: an independent program, or the same one much finer.
 
-`python tests/support/motion_bars.py FIRST COUNT FILE` writes a line for each scene to FILE; `--read FILE` prints the
-coverage and the sharpness of the bars in it.
+    python tests/support/motion_bars.py run FILE [--first SEED --count N] [--every K] [--truth OTHER]
+    python tests/support/motion_bars.py score FILE...
+
+`run` adds a line for each scene to FILE: the seeds from SEED on, or the held-out rigs of `motion_scenes.held_out`, of
+which --every K takes each K-th. A scene that FILE has is not run again. --truth takes the truth from an earlier FILE,
+of the same or another state of the package, where the run is as long and its window the same. `score` prints coverage
+and sharpness of the bars, of all and by engine. Only the public names of the package are used.
 """
 
+import argparse
 import json
 import signal
-import sys
 import tempfile
 from collections import defaultdict
 from pathlib import Path
@@ -15,26 +20,21 @@ from time import process_time
 import numpy as np
 from motion_read import measures, works
 from motion_reference import Motion, TooLong
-from motion_scenes import spec, written
+from motion_scenes import held_out, spec, written
 from motion_steady import periodic
 
-from patchfem.core import Missing, NotConverged, PatchfemError
-from patchfem.model.model import build
-from patchfem.response.errors import change
-from patchfem.response.rows import TABLE, of_first
-from patchfem.runs.rig.engines import PIECES
-from patchfem.runs.rig.numerics import choose
-from patchfem.runs.run import run
-from patchfem.scene.scene import SceneError, load
+import patchfem as pf
 
 FINER = 16  # times the steps of the run that stands for the truth
-LONGEST = 1500  # seconds of a scene, on a machine that others use
+LONGEST = 150  # CPU seconds of a scene
 MOST_STEPS = 12000  # of DOP853, some six seconds
 SURE = 5.0  # times the change at the last halving of the steps, what the finer run may be off
 ROUGH, FINE = (0.04, 1e-10), (0.025, 1e-12)  # longest step over the shortest period and relative error of a step
-SHARPEST = ("exact", "piecewise", "smooth")  # engines whose bars ask for both
 LEFT_OUT = ("energy_balance", "work_check", "normal_load", "energy_created", "jump_level", "level_hysteresis",
-            "relative_displacement_amplitude_steady")
+            "relative_displacement_amplitude_steady",
+            # of the pressed patch, at rest
+            "contact_fraction", "contact_half_width", "pressure_peak", "pressure_centre", "approach", "rotation",
+            "moment", "normal_stiffness", "tangential_stiffness")
 SHARP = 1e-8  # of the value: a bar that is narrower is as sharp as anybody can use
 
 
@@ -45,43 +45,32 @@ def referable(s: dict) -> bool:
     return not ((s["law"] == "convolution" and s["patch"]) or (s["several"] and s["law"] == "iwan"))
 
 
-def truth_of(s: dict, path, result) -> tuple:
-    """(truth by name, what it is itself uncertain by, its kind) of a scene and its Result."""
-    model = build(load(path))
+def truth_of(s: dict, path, run: dict) -> tuple:
+    """(truth by name, what it is itself uncertain by, its kind) of a scene and its run, as `ran` has it."""
     if referable(s):
         try:
-            return _steady(s, model, cycles_kept(model, result)) if s.get("method") == "harmonic" else \
-                _moved(s, model, result.extra["window"])
+            return _steady(s, run["period"], run["kept"]) if s.get("method") == "harmonic" else _moved(s, run)
         except TooLong:
             pass
-    return _finer(s, path, model, result.extra)
+    return _finer(s, path, run)
 
 
-def _moved(s: dict, model, window: int) -> tuple:
-    """Truth by the independent program; what a second, more careful run of it changes is what it does not know.
-
-    window: cycles over which the measures are told.
-    """
-    numerics, period, runs = choose(model), model.rig.drive.period, []
-    for share, rtol in (ROUGH, FINE) if numerics.engine in SHARPEST else (ROUGH,):
+def _moved(s: dict, run: dict) -> tuple:
+    """Truth by the independent program; what a second, more careful run of it changes is what it does not know."""
+    cycles, period, runs = run["cycles"], run["period"], []
+    for share, rtol in (ROUGH,) if run["engine"] == "march" else (ROUGH, FINE):
         motion = Motion(s, share)
-        stretches = motion.run(numerics.cycles * period, rtol, most=MOST_STEPS)
-        runs.append(measures(motion, stretches, period, numerics.cycles, window))
+        stretches = motion.run(cycles * period, rtol, most=MOST_STEPS)
+        runs.append(measures(motion, stretches, period, cycles, run["window"]))
     return runs[-1], doubts(*runs), "reference"
 
 
-def cycles_kept(model, result) -> int:
-    """Cycles that a steady motion keeps, over which its works are told."""
-    time = result.response.time
-    return round(float(time[-1] - time[0]) / model.rig.drive.period)
-
-
-def _steady(s: dict, model, kept: int) -> tuple:
+def _steady(s: dict, period: float, kept: int) -> tuple:
     """Truth of a steady motion by the independent program: its periodic state, or a run that has settled.
 
-    kept: cycles over which the works are told.
+    period [s]; kept: cycles over which the works are told.
     """
-    period, motion = model.rig.drive.period, Motion(s)
+    motion = Motion(s)
     start = periodic(motion, period)
     if start is not None:
         stretches = motion.run(kept * period, 1e-11, start)
@@ -109,19 +98,22 @@ def unsettled(quarter: dict, half: dict, whole: dict) -> dict:
     return out
 
 
-def _finer(s: dict, path, model, extra: dict) -> tuple:
+def _finer(s: dict, path, run: dict) -> tuple:
     """Truth by the program itself: elements from yield to yield where it marched, else many more steps."""
-    sets = [f"accuracy.tolerance={model.accuracy.tolerance / 10:g}"]
-    if extra.get("map") == "yields":  # its density in more cells
-        return _values(load(path, sets)), {}, "cells"
+    tight = {"accuracy.tolerance": f"{s['tolerance'] / 10:g}"}
+    if run["map"] == "yields":  # its density in more cells
+        return _values(path, tight), {}, "cells"
     if s.get("method") == "harmonic":
-        found = run(load(path, [*sets, "accuracy.harmonics=129"])).measures
-        known = {name: m for name, m in found.items() if m.value is not None}
+        found = pf.run(path, **tight, **{"accuracy.harmonics": "129"}).measures
+        known = {name: found[name] for name in found if found[name].value is not None}
         return {k: m.value for k, m in known.items()}, {k: m.error or 0.0 for k, m in known.items()}, "harmonics"
-    if extra["engine"] == "march" and not PIECES.lacks(model):
-        return _values(load(path, [*sets, "accuracy.method=exact"])), {}, "pieces"
-    steps = extra.get("steps_per_cycle") or 400
-    runs = [_values(load(path, [*sets, "accuracy.method=march", f"accuracy.steps_per_cycle={share * steps}"]))
+    if run["engine"] == "march":
+        try:
+            return _values(path, tight | {"accuracy.method": "exact"}), {}, "pieces"
+        except pf.PatchfemError:  # no exact engine has its equations
+            pass
+    steps = run["steps"] or 400
+    runs = [_values(path, tight | {"accuracy.method": "march", "accuracy.steps_per_cycle": f"{share * steps}"})
             for share in (FINER // 2, FINER)]
     doubt = {name: SURE * gap for name, gap in change(*runs[::-1]).items()}
     return runs[-1], doubt, "finer"
@@ -138,33 +130,61 @@ def doubts(rough: dict, fine: dict | None = None) -> dict:
                   + least * rough["relative_displacement_amplitude"]}
 
 
-def _values(scene) -> dict:
-    found = run(scene, estimate=False).measures
-    return {name: m.value for name, m in found.items() if m.value is not None}
+def _values(path, sets: dict) -> dict:
+    found = pf.run(path, **sets).measures
+    return {name: found[name].value for name in found if found[name].value is not None}
 
 
-def compared(seed: int, folder: Path) -> dict:
-    """What a random scene found: law, drive, engine, kind of truth, rows [name, value, error, floor, truth, doubt]."""
-    s = spec(seed)
-    path = written(s, folder)
-    out = {"seed": seed, "law": s["law"], "drive": s["drive"], "rows": []}
+def change(fine: dict, coarse: dict) -> dict:
+    """Size of the difference by name of the measures that both runs have."""
+    return {name: apart(name, fine[name], coarse[name]) for name in fine.keys() & coarse.keys()}
+
+
+def ran(s: dict, path: Path) -> dict:
+    """The run of a scene by the program: outcome, engine, steps, cycles, window and measures [value, error, floor]."""
     begin = process_time()
     try:
-        result = run(load(path))
-    except (PatchfemError, SceneError, Missing, NotConverged) as error:
-        return out | {"refused": str(error)}
-    out |= {"engine": result.extra["engine"], "outcome": str(result.outcome),
-            "steps": result.extra.get("steps_per_cycle"), "seconds": process_time() - begin}
-    if str(result.outcome) in ("grows", "not_converged"):
+        result = pf.run(path)
+    except pf.PatchfemError as error:
+        return {"refused": str(error)}
+    seconds, rig = process_time() - begin, pf.build(path).rig
+    summary = json.loads((result.save(path.with_suffix("")) / "summary.json").read_text("utf-8"))
+    chosen, time = summary["numerics"], result.to_xarray().time
+    found = {name: result.measures[name] for name in result.measures}
+    return {"outcome": summary["outcome"], "engine": chosen["engine"], "map": chosen.get("map"),
+            "steps": chosen.get("steps_per_cycle"), "seconds": seconds, "period": rig.drive.period,
+            "cycles": rig.cycles, "window": chosen["window_cycles"],
+            "kept": round(float(time[-1] - time[0]) / rig.drive.period),  # cycles that a steady motion keeps
+            "measures": {name: [m.value, m.error, m.floor] for name, m in found.items()
+                         if m.value is not None and m.error is not None}}
+
+
+def compared(s: dict, folder: Path, earlier: dict | None = None) -> dict:
+    """What a random scene found: law, drive, engine, kind of truth, rows [name, value, error, floor, truth, doubt].
+
+    earlier: what the same scene found in another run, whose truth is taken where it is of the same cycles.
+    """
+    path = written(s, folder)
+    run = ran(s, path)
+    measured = run.pop("measures", {})
+    out = {"seed": s["seed"], "law": s["law"], "drive": s["drive"], "rows": []} | run
+    if "refused" in out or out["outcome"] in ("grows", "not_converged"):
         return out
-    begin = process_time()
-    truth, doubt, out["truth"] = truth_of(s, path, result)
-    out["truth_seconds"] = process_time() - begin
-    for name, m in result.measures.items():
-        if m.value is None or m.error is None or name not in truth or of_first(name) not in TABLE or name in LEFT_OUT:
-            continue
-        out["rows"].append([name, m.value, m.error, m.floor, truth[name], doubt.get(name, 0.0)])
+    begin, same = process_time(), ("cycles", "window", "kept")
+    if earlier and "true" in earlier and all(earlier[key] == out[key] for key in same):
+        truth, doubt, out["truth"] = (earlier[key] for key in ("true", "doubt", "truth"))
+    else:
+        truth, doubt, out["truth"] = truth_of(s, path, out)
+    out |= {"true": truth, "doubt": doubt, "truth_seconds": process_time() - begin}
+    out["rows"] = [[name, *three, truth[name], doubt.get(name, 0.0)] for name, three in measured.items()
+                   if name in truth and of_first(name) not in LEFT_OUT]
     return out
+
+
+def of_first(name: str) -> str:
+    """Name of a measure without the number of its interface."""
+    head, _, number = name.rpartition("_")
+    return head if number.isdigit() else name
 
 
 def apart(name: str, value: float, truth: float) -> float:
@@ -198,46 +218,83 @@ def score(lines) -> dict:
             continue
         scenes.append(all(map(held, rows)))
         for row in rows:
-            first = row[0].rpartition("_")[0] if row[0][-1].isdigit() else row[0]
-            by[first].append((held(row), sharp(row)))
+            by[of_first(row[0])].append((held(row), sharp(row)))
             if not held(row):
                 misses.append((one["seed"], one["law"], one["drive"], one["engine"], one["truth"], *row))
     bars = [pair for pairs in by.values() for pair in pairs]
-    return {"scenes": len(scenes), "right": float(np.mean(scenes)), "bars": len(bars),
-            "coverage": float(np.mean([ok for ok, _ in bars])),
-            "sharp": float(np.mean([near for _, near in bars if near is not None])),
-            "by": {name: (len(pairs), float(np.mean([ok for ok, _ in pairs])),
-                          float(np.mean([near for _, near in pairs if near is not None] or [np.nan])))
+    return {"scenes": len(scenes), "right": _share(scenes), "bars": len(bars),
+            "coverage": _share([ok for ok, _ in bars]), "sharp": _share([near for _, near in bars]),
+            "by": {name: (len(pairs), _share([ok for ok, _ in pairs]), _share([near for _, near in pairs]))
                    for name, pairs in sorted(by.items())}, "misses": misses}
+
+
+def _share(values: list) -> float:
+    """Share of those that are true, of all but None."""
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else float("nan")
+
+
+def printed(lines: list) -> None:
+    """Print the score of lines: what missed, by measure, by engine."""
+    found = score(lines)
+    for miss in found["misses"]:
+        print("missed", *miss)
+    for name, (count, cover, near) in found["by"].items():
+        print(f"{name:34s} {count:5d} bars, {100 * cover:5.1f} % hold, {100 * near:5.1f} % within five times")
+    for engine in [*sorted({one["engine"] for one in lines if one["rows"]}), "all"]:
+        one = score([line for line in lines if engine in ("all", line.get("engine"))])
+        print(f"{engine:10s} {one['scenes']:4d} scenes, all bars right in {100 * one['right']:5.1f} %; {one['bars']} "
+              f"bars, {100 * one['coverage']:5.1f} % hold, {100 * one['sharp']:5.1f} % within five times")
+    none = [one for one in lines if not one["rows"]]
+    print("nothing compared:", *((one["seed"], one.get("refused", one.get("outcome"))) for one in none))
 
 
 def _late(*_) -> None:
     raise TimeoutError
 
 
-def main(arguments) -> None:
-    signal.signal(signal.SIGALRM, _late)
-    if arguments[0] == "--read":
-        lines = [json.loads(line) for name in arguments[1:] for line in Path(name).read_text("utf-8").splitlines()]
-        found = score(lines)
-        for miss in found.pop("misses"):
-            print("missed", *miss)
-        for name, (count, cover, near) in found.pop("by").items():
-            print(f"{name:34s} {count:5d} bars, {100 * cover:5.1f} % hold, {100 * near:5.1f} % within five times")
-        print(found, "refused:", [one["seed"] for one in lines if "refused" in one])
+def _lines(names) -> list:
+    return [json.loads(line) for name in names for line in Path(name).read_text("utf-8").splitlines()]
+
+
+def campaign(specs: list, name: str, earlier: dict) -> None:
+    """Compare the scenes that the file of this name has not, a line for each; earlier: lines of a truth by seed."""
+    signal.signal(signal.SIGPROF, _late)
+    done = {one["seed"] for one in _lines([name])} if Path(name).exists() else set()
+    for s in specs:
+        if s["seed"] in done:
+            continue
+        signal.setitimer(signal.ITIMER_PROF, LONGEST)
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                line = compared(s, Path(folder), earlier.get(s["seed"]))
+        except (TimeoutError, RuntimeError, AssertionError, ValueError) as error:
+            line = {"seed": s["seed"], "rows": [], "refused": f"failed {error!r}"}
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        with open(name, "a", encoding="utf-8") as file:
+            file.write(json.dumps(line) + "\n")
+
+
+def main() -> None:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    runs, reads = verbs.add_parser("run"), verbs.add_parser("score")
+    runs.add_argument("file")
+    runs.add_argument("--first", type=int)
+    runs.add_argument("--count", type=int, default=300)
+    runs.add_argument("--every", type=int, default=1)
+    runs.add_argument("--truth")
+    reads.add_argument("files", nargs="+")
+    asked = parser.parse_args()
+    if asked.verb == "score":
+        printed(_lines(asked.files))
         return
-    first, count, name = int(arguments[0]), int(arguments[1]), arguments[2]
-    with tempfile.TemporaryDirectory() as folder:
-        for seed in range(first, first + count):
-            signal.alarm(LONGEST)
-            try:
-                line = compared(seed, Path(folder))
-            except (TimeoutError, RuntimeError, AssertionError, ValueError) as error:
-                line = {"seed": seed, "rows": [], "refused": f"failed {error!r}"}
-            signal.alarm(0)
-            with open(name, "a", encoding="utf-8") as file:
-                file.write(json.dumps(line) + "\n")
+    specs = held_out(asked.count) if asked.first is None else \
+        [spec(seed) for seed in range(asked.first, asked.first + asked.count)]
+    earlier = {one["seed"]: one for one in _lines([asked.truth])} if asked.truth else {}
+    campaign(specs[::asked.every], asked.file, earlier)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

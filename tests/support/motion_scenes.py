@@ -1,7 +1,10 @@
 """Random scenes of rigs: every law, drive and structure, as numbers that a scene and an independent program both read.
 
-`spec(seed)` draws the numbers, `text(spec)` writes the scene, `record(spec)` is the table of a drive from a file.
+`spec(seed)` draws the numbers, `text(spec)` writes the scene, `record(spec)` is the table of a drive from a file;
+`held_out(count)` are rigs for each of the methods alike, of seeds that no number of the program was fitted to.
 """
+
+from itertools import count as from_
 
 import numpy as np
 
@@ -39,6 +42,35 @@ def spec(seed: int) -> dict:
             and not (out["several"] or out["patch"] or out.get("cubic") or out.get("load_amplitude")):
         out["method"] = "harmonic"
     return out
+
+
+HELD_OUT = 29_000_000  # the first seed of the held-out rigs
+# laws that each method has: events, yields, high order, and those of which only a march is chosen
+METHODS = {"events": ("coulomb", "weakening"), "yields": ("elastic-plastic", "iwan"),
+           "smooth": ("tanh", "bouc-wen", "lugre", "stretch", "growing"), "march": LAWS, "harmonic": LAWS}
+
+
+def held_out(count: int) -> list:
+    """Specs of `count` rigs of 1 to 4 modes, each method in turn: it is named in the scene where it is a march or
+    harmonic balance, else the program chooses."""
+    seeds, out = from_(HELD_OUT), []
+    for k in range(count):
+        method = tuple(METHODS)[k % len(METHODS)]
+        out.append(next(s for s in map(spec, seeds) if fits(s, method)))
+        out[-1].pop("method", None)
+        out[-1] |= {"method": method} if method in ("march", "harmonic") else {}
+    return out
+
+
+def fits(s: dict, method: str) -> bool:
+    """Whether a method has the equations of a spec and is chosen, or can be named, for it."""
+    if s["law"] not in METHODS[method]:
+        return False
+    if method == "harmonic":
+        return s["drive"] in ("sine", "force") and s["law"] not in ("order", "report", "growing", "weakening") \
+            and not (s["several"] or s["patch"] or s.get("cubic") or s.get("load_amplitude"))
+    sheared = bool(s["patch"]) and s["patch"]["shear"]
+    return method == "march" or not (sheared or "cubic" in s or "load_amplitude" in s) or method == "yields"
 
 
 def _modes(r, own: float) -> list:
