@@ -33,9 +33,12 @@ def stretches(drive, count: int) -> list:
     return [Stretch(start, value(k), drive.largest, drive.rate) for k, start in enumerate(starts)]
 
 
-def choose(faces, mass, pull, active, signs, static, kinetic, tol):
-    """Signs of all faces: those in `active` have no slip velocity. pull (n,) without friction."""
-    options = sorted(product((0, 1, -1), repeat=len(active)), key=lambda c: sum(map(abs, c)))
+def choose(faces, mass, pull, active, signs, static, kinetic, tol, most_sliding=False):
+    """Signs of all faces: those in `active` have no slip velocity. pull (n,) without friction.
+
+    most_sliding: of several choices without a contradiction the one with the most faces that slide, else the fewest.
+    """
+    options = sorted(product((0, 1, -1), repeat=len(active)), key=lambda c: sum(map(abs, c)), reverse=most_sliding)
     for option in options:
         trial = np.array(signs)
         trial[active] = option
@@ -53,7 +56,7 @@ def choose(faces, mass, pull, active, signs, static, kinetic, tol):
     raise AssertionError("no choice")
 
 
-def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12):
+def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_sliding=False):
     """[(time, signs, z, v)] at the start of every stretch and at the end."""
     faces, mass, n = np.asarray(modes.interfaces), modes.mass, modes.omega.size
     static, kinetic = (np.broadcast_to(np.asarray(x, float), (len(faces),)) for x in (static, kinetic))
@@ -85,7 +88,8 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12):
         part = segments[number]
         stop = min(end, segments[number + 1].start if number + 1 < len(segments) else end)
         if active:
-            signs = choose(faces, mass, pull(part, t, y[:n], y[n:]), active, signs, static, kinetic, 1e-9)
+            signs = choose(faces, mass, pull(part, t, y[:n], y[n:]), active, signs, static, kinetic, 1e-9,
+                           most_sliding)
         out.append((t, tuple(signs), y[:n].copy(), y[n:].copy()))
 
         def slope(t, y, signs=signs, part=part):

@@ -1,0 +1,197 @@
+"""Rigs with several faces that stick, or could, at one instant: Coulomb, against DOP853 with events that tries every
+choice of the faces.
+
+    python tests/support/sticks_together.py run FILE [--count N]
+    python tests/support/sticks_together.py score FILE
+
+2 to 4 masses, 2 or 3 interfaces, kinetic over static friction from 1 down to .02. Of four kinds in turn: `mirror`:
+equal masses and couplings, so that all faces stick at once; `twins`: equal interfaces between the same two bodies,
+whose share of the force in stick no equation tells apart; `release` from a displacement at rest and `step` of the base,
+where all faces decide at the start. Several choices can be without a contradiction where kinetic friction is less than
+static: a motion is right where it is that of one of the orders in which the reference tries them. More faces than
+masses stand only where the two frictions are equal: else a motion is one of a continuum. Only the public names of the
+package are used. Seeds are held out: from 29 500 000 on.
+"""
+
+import argparse
+import json
+import signal
+from collections import Counter
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+from event_reference import run_reference
+from scipy.interpolate import CubicHermiteSpline
+from scipy.linalg import eigh
+
+import patchfem as pf
+
+FIRST, CYCLES = 29_500_000, 6
+KINDS, RATIOS = ("mirror", "twins", "release", "step"), (1.0, 0.95, 0.5, 0.2, 0.05, 0.02)
+# which choice the reference takes of several: that of alike faces alike, of the fewest or of the most that slide
+ORDERS = {"mirror": ("together", "fewest", "most"), "twins": ("together",), "release": ("fewest", "most"),
+          "step": ("fewest", "most")}
+SAME, BALANCED = 1e-6, 1e-9  # of the largest slide; of the energy
+LONGEST = 20  # CPU seconds of a reference
+
+
+def spec(seed: int) -> dict:
+    """Numbers of a rig in SI units: `links` are (pair, stiffness [N/m], damping [N s/m]), pairs count from 1, 0 is the
+    base."""
+    r, kind = np.random.default_rng(seed), KINDS[seed % len(KINDS)]
+    faces, ratio = int(r.integers(2, 4)), RATIOS[int(r.integers(len(RATIOS)))]
+    n = int(r.integers(2 if kind == "twins" or (ratio == 1 and kind != "mirror") else faces, 5))
+    alike, omega = kind == "mirror", 2 * np.pi * r.uniform(50, 200)
+    mass = np.full(n, r.uniform(0.3, 2)) if alike else r.uniform(0.3, 2, n)
+    ground, between = (mass * omega**2 * r.uniform(0.5, 1.5, n), r.uniform(0.1, 0.8, (n, n)) * mass[0] * omega**2)
+    if alike:
+        ground[:], between[:] = ground[0], between[0, 0]
+    links = [((k + 1, 0), ground[k]) for k in range(n)]
+    links += [((k + 1, j + 1), between[k, j]) for k in range(n) for j in range(k) if alike or j == k - 1]
+    zeta, size = r.uniform(0.002, 0.05), r.uniform(10, 80)
+    pairs = [[1, 0]] * faces if kind == "twins" else [[k + 1, 0] for k in range(min(faces, n))]
+    if len(pairs) < faces:
+        pairs.append([2, 1])
+    share = np.full(faces, r.uniform(0.15, 0.6)) if alike else r.uniform(0.15, 0.6, faces)
+    if kind == "twins":
+        share[:] = share[0] / faces
+    limit = share * size * (mass[0] if kind in ("mirror", "twins") else mass.mean())
+    start = size / omega**2 * r.uniform(-4, 4, n) if kind == "release" else np.zeros(n)
+    return {"seed": seed, "kind": kind, "mass": mass.tolist(), "pairs": pairs, "size": size, "start": start.tolist(),
+            "links": [(list(pair), float(k), float(2 * zeta * np.sqrt(k * mass[0]))) for pair, k in links],
+            "load": (limit / 0.3).tolist(), "frequency": omega / (2 * np.pi) * r.uniform(0.5, 1.5),
+            "ratio": ratio}
+
+
+def text(s: dict) -> str:
+    """The scene of a spec."""
+    each = ", ".join(f'"{one!r} kg"' for one in s["mass"])
+    out = f"[structure]\nmasses = [{each}]\n"
+    for pair, k, c in s["links"]:
+        out += f'[[structure.spring]]\nbetween = {pair}\nstiffness = "{k!r} N/m"\n'
+        out += f'[[structure.damper]]\nbetween = {pair}\ncoefficient = "{c!r} N s/m"\n'
+    for pair, load in zip(s["pairs"], s["load"]):
+        out += f'[[structure.interface]]\nbetween = {pair}\nlaw = "coulomb"\nload = "{load!r} N"\n'
+        out += f'static = 0.3\nkinetic = {0.3 * s["ratio"]!r}\n'
+    if s["kind"] == "release":
+        places = ", ".join(f'"{x!r} m"' for x in s["start"])
+        return out + f'[structure.start]\ndisplacement = [{places}]\n[drive]\nkind = "free"\ncycles = {CYCLES}\n'
+    wave = 'waveform = "step"\n' if s["kind"] == "step" else f'frequency = "{s["frequency"]!r} Hz"\n'
+    return out + f'[drive]\nkind = "base"\n{wave}acceleration = "{s["size"]!r} m/s^2"\ncycles = {CYCLES}\n'
+
+
+def row(pair, n: int) -> np.ndarray:
+    """x_i - x_j of a pair (i, j)."""
+    out = np.zeros(n + 1)
+    out[pair[0]] += 1
+    out[pair[1]] -= 1
+    return out[1:]
+
+
+def truth(s: dict, end: float, order: str) -> tuple:
+    """(times (t,) [s] of events and the end, slides (t, i) [m], signs (t, i)) by the reference, in modes of unit mass.
+
+    order: as in ORDERS; `together`: the alike faces are one that carries the load of all, bodies that are alike one.
+    """
+    n, mass = len(s["mass"]), np.diag(s["mass"])
+    stiff, damp = (sum(link[which] * np.outer(row(link[0], n), row(link[0], n)) for link in s["links"])
+                   for which in (1, 2))
+    faces, same, bodies = np.array([row(pair, n) for pair in s["pairs"]]), np.arange(len(s["pairs"])), np.eye(n)
+    if order == "together":
+        same[:] = 0
+    if order == "together" and s["kind"] == "mirror":
+        with_face = np.arange(n) < len(faces)
+        bodies = np.array([one for one in (with_face, ~with_face) if one.any()], float).T
+    square, shapes = eigh(bodies.T @ stiff @ bodies, bodies.T @ mass @ bodies)
+    shapes = bodies @ shapes
+    modes = SimpleNamespace(interfaces=(faces @ shapes)[np.unique(same)], mass=1.0, omega=np.sqrt(square),
+                            dampers=shapes.T @ damp @ shapes, base=shapes.T @ mass @ np.ones(n))
+    size, omega = s["size"] if s["kind"] != "release" else 0.0, 2 * np.pi * s["frequency"]
+    constant, amplitude = (size, 0.0) if s["kind"] == "step" else (0.0, size)
+    drive = SimpleNamespace(start=0.0, constant=constant, amplitude=amplitude, phase=0.0,
+                            omega=0.0 if s["kind"] == "step" else omega)
+    static, start = 0.3 * np.bincount(same, s["load"]), shapes.T @ mass @ np.array(s["start"])
+    found = run_reference(modes, [drive], static, s["ratio"] * static, end, start, np.zeros(len(square)),
+                          most_sliding=order == "most")
+    time, signs, z, _ = zip(*found)
+    return np.array(time), np.array(z) @ shapes.T @ faces.T, np.array(signs)[:, same]
+
+
+def compared(s: dict) -> dict:
+    """Largest distance of the slides from the reference at its events, over the largest slide, by the order of its
+    choices until one is the same; energy balance; instants at which several faces stick or
+    turn."""
+    out = {key: s[key] for key in ("seed", "kind", "ratio")} | {"faces": len(s["pairs"]), "masses": len(s["mass"])}
+    try:
+        result = pf.run(text(s), say=lambda _: None)
+    except pf.PatchfemError as error:
+        return out | {"refused": str(error)}
+    data = result.to_xarray()
+    time, slide, speed = (data[name].values for name in ("time", "relative_displacement", "relative_velocity"))
+    last = np.append(np.diff(time) > 0, True)
+    curve = CubicHermiteSpline(time[last], slide[:, last], speed[:, last], axis=1)
+    out |= {"outcome": str(result.outcome), "balance": result.measures["energy_balance"].value, "gaps": {}}
+    for order in ORDERS[s["kind"]]:
+        signal.setitimer(signal.ITIMER_PROF, LONGEST)
+        try:
+            when, where, signs = truth(s, float(time[-1]), order)
+        except (AssertionError, TimeoutError) as error:
+            out["gaps"][order] = repr(error)
+            continue
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0)
+        scale = max(np.abs(where).max(), np.abs(slide).max(), 1e-300)
+        out["gaps"][order] = float(np.abs(curve(when).T - where).max() / scale)
+        turns = (signs[1:] != signs[:-1]) & (signs[:-1] != 0)  # to stick, or to slide the other way
+        out |= {"together": int((turns.sum(axis=1) > 1).sum()), "events": len(when) - 1}
+        if out["gaps"][order] <= SAME:
+            break
+    return out
+
+
+def right(one: dict) -> bool:
+    """Whether a motion is that of the reference and keeps its energy."""
+    gaps = [gap for gap in one.get("gaps", {}).values() if not isinstance(gap, str)]
+    return bool(gaps) and min(gaps) <= SAME and one["balance"] <= BALANCED
+
+
+def printed(lines: list) -> None:
+    """Print what is wrong and how many are right, by kind and by ratio."""
+    for one in lines:
+        if not right(one):
+            print("not right:", json.dumps(one))
+    for key in ("kind", "ratio"):
+        every, good = Counter(one[key] for one in lines), Counter(one[key] for one in lines if right(one))
+        print(f"by {key}:", ", ".join(f"{name}: {good[name]} of {count}" for name, count in sorted(every.items())))
+    sticks = [one.get("together", 0) for one in lines]
+    worst = max((one["balance"] for one in lines if "balance" in one), default=float("nan"))
+    print(f"{sum(map(right, lines))} of {len(lines)} right; {sum(sticks)} sticks or turns of several faces at once in "
+          f"{sum(count > 0 for count in sticks)} of them; largest energy balance {worst:.1e}")
+
+
+def _late(*_) -> None:
+    raise TimeoutError
+
+
+def main() -> None:
+    """The command line."""
+    signal.signal(signal.SIGPROF, _late)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    runs, reads = verbs.add_parser("run"), verbs.add_parser("score")
+    runs.add_argument("--count", type=int, default=200)
+    for verb in (runs, reads):
+        verb.add_argument("file", type=Path)
+    asked = parser.parse_args()
+    if asked.verb == "run":
+        with asked.file.open("w", encoding="utf-8") as file:
+            for seed in range(FIRST, FIRST + asked.count):
+                file.write(json.dumps(compared(spec(seed))) + "\n")
+                file.flush()
+    else:
+        printed([json.loads(line) for line in asked.file.read_text("utf-8").splitlines()])
+
+
+if __name__ == "__main__":
+    main()
