@@ -26,7 +26,7 @@ from motion_steady import periodic
 import patchfem as pf
 
 FINER = 16  # times the steps of the run that stands for the truth
-LONGEST = 150  # CPU seconds of a scene
+LONGEST = 60  # CPU seconds of a scene
 MOST_STEPS = 12000  # of DOP853, some six seconds
 SURE = 5.0  # times the change at the last halving of the steps, what the finer run may be off
 ROUGH, FINE = (0.04, 1e-10), (0.025, 1e-12)  # longest step over the shortest period and relative error of a step

@@ -25,9 +25,7 @@ from torture import grammar
 from torture.toml import text_of
 from torture.trial import Trial
 
-from patchfem.core import Missing, PatchfemError
-from patchfem.runs.plan import plan
-from patchfem.scene.scene import SceneError, loads
+import patchfem as pf
 
 MOST = 60.0  # seconds
 HELD_OUT = 29_700_000
@@ -81,8 +79,8 @@ def plain(seed: int) -> str:
 def planned(seed: int, made=text):
     """The plan of a seed, None where it is refused or long."""
     try:
-        found = plan(loads(made(seed), "a.toml"))
-    except (SceneError, PatchfemError, Missing):
+        found = pf.plan(made(seed))
+    except pf.PatchfemError:
         return None
     return found if found.seconds <= MOST else None
 
