@@ -4,6 +4,20 @@ import numpy as np
 from scipy.linalg import expm
 
 from patchfem.core import ModalBasis
+from patchfem.dynamics.harmonic.laws import Flow, OfSpeed
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.laws.stretch import points_element
+from patchfem.friction.laws.tanh import Rate
+
+
+def of_speed(limit, speed):
+    """limit tanh(v/speed)."""
+    return OfSpeed(Rate(limit, speed).element(1.0))
+
+
+def bonds(limit, length):
+    """The bond recursion u' = sgn - u per length, F = limit u."""
+    return Flow(points_element(Bonds(limit, length), np.ones(1), np.ones(1)))
 
 
 def sdof(xi=0.003, omega=1.0, mass=1.0):

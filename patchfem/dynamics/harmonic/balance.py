@@ -9,12 +9,12 @@ import numpy as np
 from ...core import Response
 from .branch import Backbone, Branch, backbone, branches, levels, response
 from .forces import Group
-from .laws import Interlock, Jenkins, OfSpeed, Spring, Stretch, Track, law_of_model, synthesis
+from .laws import Flow, Interlock, Jenkins, OfSpeed, Spring, Track, law_of_model, synthesis
 from .point import Periodic, point
 from .stability import with_stability
 
-__all__ = ["Backbone", "Branch", "Group", "Interlock", "Jenkins", "OfSpeed", "Periodic", "Spring", "Stretch",
-           "backbone", "branches", "cycle_energy", "law_of_model", "levels", "periodic_response", "point", "regime",
+__all__ = ["Backbone", "Branch", "Flow", "Group", "Interlock", "Jenkins", "OfSpeed", "Periodic", "Spring", "backbone",
+            "branches", "cycle_energy", "law_of_model", "levels", "periodic_response", "point", "regime",
            "response", "with_stability"]
 
 

@@ -1,4 +1,4 @@
-"""Compiled laws along one cycle of a periodic slide: turning points, parallel Jenkins elements, the bond recursion.
+"""Compiled turning points of a periodic slide, and parallel Jenkins elements along one cycle of it.
 
 A rate-free law is followed from turning point to turning point, which are found where the harmonics have them and not
 at the samples, so the memory is that of the continuous motion; the cost of a sample is a few ns whatever the number of
@@ -140,76 +140,3 @@ def _turn(q, g, p, depth, end, sign, base, mark, number):
         end[depth], sign[depth], base[depth], mark[depth] = p, g, q, number
         depth += 1
     return depth, 0
-
-
-@njit(error_model="numpy", cache=True, **LEAN)
-def bond_cycle(q, start, cells, turns, limit, length, room, force, slope, hold):
-    """Steady loop of the bond recursion, u' = sgn - u per length [m], F = limit u, along samples q (N,) of a cycle.
-
-    Between turning points the stretch is exact, u = g + (u_r - g) exp(-|q - q_r|/length), so its value at the turning
-    points obeys an affine condition, solved exactly. room: zeros (R + 1, R) to work in. Out:
-    force (N,), slope (N,) at fixed turning points, hold (R, N): derivative of the force to each turning place.
-    """
-    n, r = q.size, turns.size
-    if r == 0:
-        e = np.exp(-abs(q[0]) / length)
-        for i in range(n):
-            force[i] = limit * (1 - e) * (1.0 if q[0] > 0 else -1.0)
-            slope[i] = limit / length * e
-        return
-    u, jac = room[r], room[:r]  # stretch at the turning points
-    for passed in range(2):
-        g = -start  # direction after the first turning point
-        for k in range(r):
-            j = (k + 1) % r
-            x = abs(turns[j] - turns[k]) / length
-            e = np.exp(-x)
-            new = u[k] * e - g * np.expm1(-x)
-            pull = (u[k] - g) * e * g / length
-            if j == 0:
-                total = 0.0
-                for m in range(r):
-                    total += abs(turns[(m + 1) % r] - turns[m]) / length
-                if passed == 0:
-                    u[0] = new / -np.expm1(-total)
-                else:
-                    for m in range(r):
-                        jac[0, m] = (jac[k, m] * e + pull * ((1.0 if m == k else 0.0) - (1.0 if m == j else 0.0))) \
-                            / -np.expm1(-total)
-            elif passed == 0:
-                u[j] = new
-            else:
-                for m in range(r):
-                    jac[j, m] = jac[k, m] * e + pull * ((1.0 if m == k else 0.0) - (1.0 if m == j else 0.0))
-            g = -g
-        _relax(u, jac, turns, length, start, passed)
-    k, at, g = r - 1, 0, start
-    for i in range(n):
-        e = np.exp(-abs(q[i] - turns[k]) / length)
-        here = g + (u[k] - g) * e
-        force[i] = limit * here
-        slope[i] = limit / length * (1 - g * here)
-        for m in range(r):
-            hold[m, i] += limit * e * jac[k, m]
-        hold[k, i] -= slope[i]
-        while at < r and cells[at] == i:
-            k = at
-            at += 1
-            g = -g
-
-
-@njit(error_model="numpy", **LEAN)
-def _relax(u, jac, turns, length, start, passed):
-    """Carry the value (or slope) found for the first turning point around the cycle."""
-    g, r = -start, turns.size
-    for k in range(r - 1):
-        j = k + 1
-        x = abs(turns[j] - turns[k]) / length
-        e = np.exp(-x)
-        if passed == 0:
-            u[j] = u[k] * e - g * np.expm1(-x)
-        else:
-            pull = (u[k] - g) * e * g / length
-            for m in range(r):
-                jac[j, m] = jac[k, m] * e + pull * ((1.0 if m == k else 0.0) - (1.0 if m == j else 0.0))
-        g = -g

@@ -1,7 +1,10 @@
 """A compiled law whose memory is one number z along the samples of a cycle; the text runs with any such law.
 
-Between two samples the slide moves straight, at the speed of the step; forces are those at the samples, at their speed.
+The samples and the turning points between them are the nodes of the cycle. To the next one the slide moves straight,
+at the speed of the step; forces are those at the nodes, at their speed.
 """
+
+from math import inf
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
@@ -12,23 +15,28 @@ TURNS = 60  # of the cycle until its end meets its start
 
 @njit(error_model="numpy", cache=True, **LEAN)
 def cycle(num, q, speed, dt, z, steps, force, slopes):
-    """Periodic state of the law with the numbers num (1, k) along slides q [m] and speeds (N,) [m/s], steps of dt [s].
+    """Periodic state of the law with numbers num (1, k) along slides q [m] and speeds [m/s] of M nodes, each dt (M,)
+    [s] before the next.
 
-    Out: z (N,), slopes of the step that follows every sample over z, over its slide and over its time, steps (3, N);
-    force (N,) [N] and its slopes over z and the speed (2, N). The first cycle is that of a virgin contact; Newton's
-    steps on the memory at the first sample follow, where a cycle forgets any of it.
+    Out: z (M,), slopes of the step that follows every node over z, over its slide and over its time, steps (3, M);
+    force (M,) [N] and its slopes over z and the speed (2, M). The first cycle is that of a virgin contact; Newton's
+    steps on the memory at the first node follow, where a cycle forgets any of it.
     """
-    n = q.size
-    start = law.flow(num, 0, 0.0, q[0], dt * n)[0]
+    n, whole = q.size, 0.0
+    for i in range(n):
+        whole += dt[i]
+    start, last = law.flow(num, 0, 0.0, q[0], whole)[0], inf
     for turn in range(TURNS):
         now, kept, largest = start, 1.0, abs(start)
         for i in range(n):
             z[i] = now
-            now, steps[0, i], steps[1, i], steps[2, i] = law.flow(num, 0, now, q[(i + 1) % n] - q[i], dt)
+            now, steps[0, i], steps[1, i], steps[2, i] = law.flow(num, 0, now, q[(i + 1) % n] - q[i], dt[i])
             kept *= steps[0, i]
             largest = max(largest, abs(now))
-        if abs(now - start) <= 1e-14 * largest:
+        miss = abs(now - start)
+        if miss <= 1e-14 * largest * min(1 - kept, 1.0) or (turn > 2 and miss > 0.5 * last):  # round-off
             break
+        last = miss
         start += (now - start) / (1 - kept) if turn and kept < 1 - 1e-9 else now - start
     for i in range(n):
         force[i], slopes[0, i], slopes[1, i] = law.pull(num, 0, z[i], speed[i])
@@ -36,8 +44,8 @@ def cycle(num, q, speed, dt, z, steps, force, slopes):
 
 @njit(error_model="numpy", cache=True, **LEAN)
 def tangents(steps, out):
-    """Derivatives (N, p) of z at the samples of the periodic state to p parameters, in place of what every step takes
-    of them: the increment of the slide, in the last column that of the time; steps as of `cycle`."""
+    """Derivatives (M, p) of z at the nodes of the periodic state to p parameters, in place of what every step takes of
+    them: the increment of the slide, in the last column that of the time; steps as of `cycle`."""
     n, p = out.shape
     for k in range(p):
         by, kept, now = 2 if k == p - 1 else 1, 1.0, 0.0

@@ -141,36 +141,6 @@ class Jenkins:
         return Sampled(force, slope, None, hold, float(full[-1]), stretch)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Stretch:
-    """Bond recursion of the stretch reading, p = 1, constant bond length: limit mu_s N [N], length [m]."""
-
-    limit: float
-    length: float
-
-    def __post_init__(self):
-        if not (self.limit >= 0 and self.length > 0 and np.isfinite(self.limit + self.length)):
-            raise PatchfemError("friction.bond_length must be positive and the friction limit not negative")
-
-    @property
-    def total(self) -> float:
-        """Tangent stiffness at rest [N/m]."""
-        return self.limit / self.length
-
-    def sharpness(self, amplitude: float) -> int:
-        """Samples of a cycle that resolve a reversal at a slide amplitude [m]."""
-        return _samples(self.length / max(amplitude, 1e-300))
-
-    def sample(self, track: Track) -> Sampled:
-        """The loop on which the recursion closes, its affine condition solved exactly."""
-        _, places, cells, start = track.turning
-        n = track.samples
-        force, slope, hold = np.empty(n), np.empty(n), np.zeros((places.size, n))
-        kernels().bond_cycle(track.q, start, cells, places, self.limit, self.length,
-                             np.zeros((places.size + 1, places.size)), force, slope, hold)
-        return Sampled(force, slope, None, hold, self.limit, self.length * force)
-
-
 @dataclass(frozen=True, slots=True)
 class Spring:
     """Bonded spring: stiffness [N/m], cubic [N/m3] q^3 besides."""
@@ -257,34 +227,75 @@ class Flow:
         """Samples of a cycle that resolve a reversal at a slide amplitude [m]."""
         return _samples(self.length / max(amplitude, 1e-300))
 
-    def along(self, track: Track) -> tuple:
-        """Stretch z (N,) [m] of the periodic state, its slopes (3, N) over itself, the slide increment and the time of
-        the steps that follow, forces (N,) and their slopes (2, N) over z and the speed."""
-        n = track.samples
-        z, steps, force, slopes = np.empty(n), np.empty((3, n)), np.empty(n), np.empty((2, n))
-        flow_kernels(self.element.kernels).cycle(self.element.numbers[None], track.q, track.omega * track.rate,
-                                                 2 * np.pi / (track.omega * n), z, steps, force, slopes)
-        return z, steps, force, slopes
+    def along(self, track: Track) -> "Nodes":
+        """The periodic state, that of a virgin contact where several are, at samples and turning points."""
+        angles, places, cells, _ = track.turning
+        n, at = track.samples, cells + 1
+        angle = np.insert(np.arange(n) * (2 * np.pi / n), at, angles)
+        q, speed = np.insert(track.q, at, places), np.insert(track.omega * track.rate, at, 0.0)
+        dt = np.maximum(np.diff(angle, append=2 * np.pi) / track.omega, 1e-300)
+        z, steps, force, slopes = np.empty(q.size), np.empty((3, q.size)), np.empty(q.size), np.empty((2, q.size))
+        flow_kernels(self.element.kernels).cycle(self.element.numbers[None], q, speed, dt, z, steps, force, slopes)
+        return Nodes(angle, np.insert(np.ones(n, bool), at, False), dt, z, steps, force, slopes)
 
     def sample(self, track: Track) -> Sampled:
-        """Force at the samples of the periodic state, which is that of a virgin contact where several are."""
-        z, steps, force, slopes = self.along(track)
+        """Force at the samples of the periodic state. Where the law knows no time its slopes are those over the slide
+        and the turning places, else those over the harmonics."""
+        one = self.along(track)
+        own, force, stretch = one.own, one.force[one.own], self.element.limit * one.z[one.own]
+        if one.steps[2].any() or one.slopes[1].any():
+            return Sampled(force, limit=self.element.limit, stretch=stretch, tangent=lambda: self._tangent(track, one))
+        # at the end of a step dz/dq is its slope over the slide; at its start, over what it keeps of z, besides
+        before, after = np.roll(one.steps[1], 1), one.steps[1] / np.maximum(one.steps[0], 1e-300)
+        hold = one.kept_from(np.flatnonzero(~own)) * (before - after)[~own, None]
+        return Sampled(force, (one.slopes[0] * before)[own], None, (one.slopes[0] * hold)[:, own], self.element.limit,
+                       stretch)
 
-        def tangent():
-            h, angle = track.x.size - 1, np.arange(track.samples) * (2 * np.pi / track.samples)
-            phase = np.outer(angle, np.arange(h + 1))
-            wave, k = np.concatenate([np.cos(phase), -np.sin(phase[:, 1:])], axis=1), np.arange(1, h + 1)
-            rate = np.concatenate([0 * wave[:, :1], -k * np.sin(phase[:, 1:]), -k * np.cos(phase[:, 1:])], axis=1)
-            dt = 2 * np.pi / (track.omega * track.samples)
-            out = np.empty((track.samples, 2 * h + 2))
-            out[:, :-1], out[:, -1] = np.roll(wave, -1, axis=0) - wave, -dt / track.omega
-            flow_kernels(self.element.kernels).tangents(steps, out)
-            out *= slopes[0][:, None]
-            out[:, :-1] += slopes[1][:, None] * track.omega * rate
-            out[:, -1] += slopes[1] * track.rate
-            return out[:, :-1], out[:, -1]
+    def _tangent(self, track: Track, one: "Nodes") -> tuple:
+        """Derivatives of the force at the samples as of `Sampled.tangent`."""
+        k, own = np.arange(track.x.size), one.own
+        turned = np.exp(1j * np.outer(one.angle, k))
+        wave, rate = (np.concatenate([x.real, -x.imag[:, 1:]], axis=1) for x in (turned, 1j * k * turned))
+        out = np.empty((one.angle.size, wave.shape[1] + 1))
+        out[:, :-1], out[:, -1] = np.roll(wave, -1, axis=0) - wave, -one.dt / track.omega
+        flow_kernels(self.element.kernels).tangents(one.steps, out)
+        out = out[own] * one.slopes[0, own, None]
+        out[:, :-1] += one.slopes[1, own, None] * track.omega * rate[own]
+        out[:, -1] += one.slopes[1, own] * track.rate
+        return out[:, :-1], out[:, -1]
 
-        return Sampled(force, limit=self.element.limit, stretch=self.element.limit * z, tangent=tangent)
+
+class Nodes(NamedTuple):
+    """A Flow at the M samples and turning points of a cycle: angle (M,), which are samples (M,) bool, the time dt (M,)
+    [s] to the next, stretch z (M,) [m], slopes (3, M) of the steps that follow over the stretch, slide and time,
+    force (M,) [N] and its slopes (2, M) over the stretch and the speed."""
+
+    angle: np.ndarray
+    own: np.ndarray
+    dt: np.ndarray
+    z: np.ndarray
+    steps: np.ndarray
+    force: np.ndarray
+    slopes: np.ndarray
+
+    def kept_from(self, places) -> np.ndarray:
+        """What is left of a disturbance of z at nodes `places` (r,) at every node, (r, M), periodic; 0 of one that
+        nothing forgets."""
+        fall = np.append(0.0, np.cumsum(np.log(np.maximum(self.steps[0], 1e-300))))
+        since = fall[:-1] - fall[places, None] + np.where(np.arange(self.z.size) < places[:, None], fall[-1], 0.0)
+        forgets = -np.expm1(fall[-1])
+        return np.exp(since) / forgets if forgets > 1e-12 else np.zeros_like(since)
+
+    def by_cell(self) -> tuple:
+        """(what a cell from sample to sample keeps of the stretch, its slope over an even slide), both (N,)."""
+        kept, by_slide, _ = self.steps
+        first, turns = np.flatnonzero(self.own), ~self.own
+        share = np.ones(self.z.size)
+        share[turns] = self.dt[turns]
+        share[np.roll(turns, -1)] = self.dt[np.roll(turns, -1)]
+        share[turns | np.roll(turns, -1)] /= self.dt[self.own][0]
+        later = np.where(np.roll(turns, -1), np.roll(kept, -1), 1.0)
+        return np.multiply.reduceat(kept, first), np.add.reduceat(by_slide * share * later, first)
 
 
 def _samples(share: float) -> int:
@@ -302,12 +313,11 @@ def law_of_model(model):
         return Jenkins(one.numbers[2:2 + count], one.numbers[2 + count:])
     if form == "speed":
         return OfSpeed(one)
-    if form == "flow":
+    # points of bonds that do not grow and break at once remember one stretch
+    if form == "flow" or (form == "points" and one.numbers[2] < 0 and not one.numbers[7]):
         return Flow(one)
     if model.set_valued:
         raise PatchfemError("accuracy.method: \"harmonic\" cannot balance set-valued friction; use the event map, or "
                             "law = \"elastic-plastic\" with a short bond_length")
-    if form == "points" and one.numbers[2] < 0 and not one.numbers[7]:
-        return Stretch(model.limit, model.length)
     raise PatchfemError("accuracy.method: \"harmonic\" takes the stretch reading with order = 1, a constant bond "
                         "length, friction.breakaway = 0 and a rigid slide; use method = \"march\"")

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..periodic import is_stable, multipliers
 from .floquet import Fading, Mark, monodromy
-from .laws import Flow, Stretch
+from .laws import Flow, Nodes
 
 
 def with_stability(periodic, modes, cells: int = 0):
@@ -26,13 +26,11 @@ def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
     for i, (track, laws) in enumerate(zip(group.tracks(periodic.coefficients, periodic.omega, n), group.laws)):
         for law in laws:
             if isinstance(law, Flow):
-                fading.append(_flow(i, law, track))
-                by_rate[i] += _mean(law.along(track)[3][1], 0.5)
+                one = law.along(track)
+                fading.append(_flow(i, one))
+                by_rate[i] += _mean(one.slopes[1, one.own], 0.5)
                 continue
             found = law.sample(track)
-            if isinstance(law, Stretch):
-                fading.append(_bonds(i, law, track, found))
-                continue
             share = _weights(track, found)
             slope[i] += _mean(found.slope, share) if found.slope is not None else 0.0
             by_rate[i] += _mean(found.by_rate, 0.5) if found.by_rate is not None else 0.0
@@ -90,19 +88,8 @@ def _marks(row: int, track, hold, share, slope) -> list:
     return out
 
 
-def _flow(row: int, law: Flow, track) -> Fading:
-    _, (kept, by_slide, _), _, (by_memory, _) = law.along(track)
+def _flow(row: int, one: Nodes) -> Fading:
+    kept, by_slide = one.by_cell()
     loss = -np.log(np.maximum(kept, 1e-300))
     gain = by_slide * np.divide(loss, 1 - kept, out=np.ones_like(loss), where=loss > 1e-9)
-    return Fading(row, gain, loss * (track.samples / (2 * np.pi)), _mean(by_memory, 0.5))
-
-
-def _bonds(row: int, law: Stretch, track, found) -> Fading:
-    n, rise = track.samples, np.roll(track.q, -1) - track.q
-    path = np.abs(rise)
-    _, places, cells, _ = track.turning
-    for k in np.unique(cells):
-        stops = [track.q[k], *places[cells == k], track.q[(k + 1) % n]]
-        path[k] = np.abs(np.diff(stops)).sum()
-    gain = _mean(found.slope, _turned(track, np.full(n, 0.5))) / law.limit if law.limit else np.zeros(n)
-    return Fading(row, gain, path / law.length * (n / (2 * np.pi)), law.limit)
+    return Fading(row, gain, loss * (kept.size / (2 * np.pi)), _mean(one.slopes[0, one.own], 0.5))

@@ -69,7 +69,8 @@ def flow(num, e, z, dq, dt):
     length = num[e, GROWTH + 3]
     end = length if dq > 0 else -length
     kept = exp(-abs(dq) / length)
-    return end + (z - end) * kept, kept, (1 - z / end) * kept, 0.0
+    # no difference of lengths: stretches far below them are as exact
+    return z * kept - end * expm1(-abs(dq) / length), kept, (1 - z / end) * kept, 0.0
 
 
 @njit(error_model="numpy", **LEAN)

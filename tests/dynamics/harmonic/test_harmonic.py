@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from harmonic_cases import five, many, march, plain_jenkins, sdof
+from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sdof
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -13,20 +13,14 @@ from patchfem.core import BaseSine, ModalBasis, NotConverged, PatchfemError
 from patchfem.dynamics.harmonic.balance import cycle_energy, periodic_response
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.harmonic import Balance, newton, pack, unpack
-from patchfem.dynamics.harmonic.laws import Interlock, Jenkins, OfSpeed, Spring, Stretch, Track, analysis, synthesis
+from patchfem.dynamics.harmonic.laws import Interlock, Jenkins, Spring, Track, analysis, synthesis
 from patchfem.dynamics.harmonic.point import balance_of, group_of, point
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model, rate_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import advance
-from patchfem.friction.laws.tanh import Rate
 
 DRIVE = BaseSine(1.0, 1.0)
 PEAKS = {10: 0.249538145, 100: 0.285786312, 1000: 0.288449682}  # DOP853 at 1e-12, D = 0.8, xi = 0.003
-
-
-def of_speed(limit, speed):
-    """limit tanh(v/speed)."""
-    return OfSpeed(Rate(limit, speed).element(1.0))
 
 
 def harmonics(seed, count, size=1.0):
@@ -64,18 +58,18 @@ def test_always_bonds_follow_the_recursion(seed, count, size):
     order = np.argsort(np.concatenate([np.arange(32), cells + 0.5 + 1e-9 * np.arange(cells.size)]), kind="stable")
     cycle = np.concatenate([track.q, places])[order]
     law = Bonds(0.3, 0.4)
-    bonds, last = np.array([[1.0], [0.0], [0.0]]), cycle[-1]
+    state, last = np.array([[1.0], [0.0], [0.0]]), cycle[-1]
     for _ in range(int(10 / np.abs(np.diff(cycle)).sum()) + 3):
         forces = []
         for q in cycle:
-            bonds = advance(bonds, np.array([q - last]), np.ones(1), law.length)[0]
+            state = advance(state, np.array([q - last]), np.ones(1), law.length)[0]
             last = q
-            forces.append(law.static / law.length * bonds[1, 0])
-    found = Stretch(0.3, 0.4).sample(track)
+            forces.append(law.static / law.length * state[1, 0])
+    found = bonds(0.3, 0.4).sample(track)
     assert found.force == pytest.approx(np.array(forces)[order < 32], abs=1e-10)
 
 
-@pytest.mark.parametrize("law", [Jenkins([10.0, 3.0], [0.08, 0.2]), Stretch(0.8, 0.1), Spring(2.0, 5.0),
+@pytest.mark.parametrize("law", [Jenkins([10.0, 3.0], [0.08, 0.2]), bonds(0.8, 0.1), Spring(2.0, 5.0),
                                  Interlock(3.0, 0.5), of_speed(0.8, 0.3)], ids=lambda law: type(law).__name__)
 def test_exact_slopes_are_the_derivative_of_the_forces(law):
     group, q = Group(sdof(), law, 4096), harmonics(3, 5)[None]
@@ -95,7 +89,7 @@ def test_exact_areas_of_the_closed_loops():
     for amplitude in (0.5, 1.7, 6.0):
         x = np.array([0.0, amplitude])
         for law, truth in ((Jenkins([2.0], [1.0]), jenkins_loop(amplitude, 1.0, 2.0)),
-                           (Stretch(2.0, 1.0), stretch_loop(amplitude, 1.0, 2.0))):
+                           (bonds(2.0, 1.0), stretch_loop(amplitude, 1.0, 2.0))):
             force = law.sample(Track(x + 0j, 1.0, 8192)).force
             assert np.pi * amplitude * analysis(force, 1)[1].imag == pytest.approx(truth[0], rel=1e-6, abs=1e-6)
             assert force[0] == pytest.approx(truth[1], rel=1e-12)
@@ -149,7 +143,7 @@ def test_exact_the_jacobian_of_the_balance():
     for damping in (None, c):
         modes = ModalBasis(("r", "a", "b"), np.array([0.0, 1.0, 3.0]), 0.02 * one, faces[0], one, one, 1.3, damping,
                            faces)
-        group = Group(modes, [(0, of_speed(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, Stretch(0.5, 0.4))], 1024)
+        group = Group(modes, [(0, of_speed(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, bonds(0.5, 0.4))], 1024)
         balance = Balance(modes, group.rows, group)
         x = np.random.default_rng(4).normal(size=balance.size(1.1, 3)) * 0.5
         here = balance.system(x, 1.1, 0.7, 3)
@@ -280,7 +274,7 @@ def test_exact_both_rows_of_a_group():
     assert receptance == pytest.approx(receptance.transpose(0, 2, 1), abs=1e-14)
 
 
-@pytest.mark.parametrize("law", [Stretch(0.8, 0.05), of_speed(0.4, 0.05), Interlock(1.0, 0.5)],
+@pytest.mark.parametrize("law", [bonds(0.8, 0.05), of_speed(0.4, 0.05), Interlock(1.0, 0.5)],
                          ids=lambda law: type(law).__name__)
 def test_exact_other_laws_obey_the_equation_of_motion(law):
     """The accelerations of the harmonics against those the law's own force gives."""
@@ -321,6 +315,6 @@ def test_refuses_to_call_an_unbalanced_motion_steady():
 def test_exact_models_of_the_march_become_laws():
     modes = sdof()
     law = Group(modes, points_model(Bonds(0.3, 2e-6), [1.0, 2.0], [5.0, 4.0])).laws[0][0]
-    assert (law.limit, law.length) == (pytest.approx(0.3 * 13), 2e-6)
+    assert (law.element.limit, law.length) == (pytest.approx(0.3 * 13), 2e-6)
     law = Group(modes, rate_model(3.0, 0.1)).laws[0][0]
     assert (law.element.limit, law.element.kernels) == (3.0, "friction.laws.tanh_kernels")

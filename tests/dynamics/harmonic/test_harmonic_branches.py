@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from harmonic_cases import five, many, march, plain_jenkins, sdof
+from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sdof
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipk
@@ -15,11 +15,10 @@ from patchfem.dynamics.harmonic.continuation import follow
 from patchfem.dynamics.harmonic.floquet import exponentials, product
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.harmonic import Balance
-from patchfem.dynamics.harmonic.laws import Jenkins, OfSpeed, Spring, Stretch, synthesis
+from patchfem.dynamics.harmonic.laws import Jenkins, OfSpeed, Spring, synthesis
 from patchfem.dynamics.harmonic.point import point
 from patchfem.dynamics.harmonic.stability import monodromy_of, with_stability
 from patchfem.dynamics.periodic import is_stable, multipliers
-from patchfem.friction.laws.tanh import Rate
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -31,11 +30,6 @@ CUBIC = 0.02 * MASS * W**2 / 1e-6  # 2 % of the flexure at 1 mm
 STIFF = [(RIG.output, Spring(0.0, CUBIC))]
 LEVEL = 5 * G_N
 FRICTION = [*STIFF, (0, Jenkins([1e6], [4e-6]))]
-
-
-def of_speed(limit, speed):
-    """limit tanh(v/speed)."""
-    return OfSpeed(Rate(limit, speed).element(1.0))
 
 
 # ---- following a curve
@@ -262,7 +256,7 @@ def test_order_of_the_map_in_its_cells():
 def test_exact_bonds_forget_as_a_march_does():
     """One mode and the recursion: the whole map (z, v, u) by DOP853 on z'' and u' = (q' - |q'| u)/length."""
     modes, drive, limit, length = sdof(0.05), BaseSine(1.0, 1.2), 0.4, 0.3
-    p = point(modes, drive, Stretch(limit, length), tolerance=1e-6)
+    p = point(modes, drive, bonds(limit, length), tolerance=1e-6)
     r = periodic_response(p, modes, drive, 4096)
 
     def rhs(t, y):
@@ -275,7 +269,7 @@ def test_exact_bonds_forget_as_a_march_does():
     start = np.array([r.modal[0, 0], r.modal_rate[0, 0], r.force[0] / limit])
     assert end(start) == pytest.approx(start, abs=2e-5)
     columns = np.stack([(end(start + d) - end(start - d)) / 2e-4 for d in 1e-4 * np.eye(3)], axis=1)
-    unit = np.array([1.0, 1.2, 1.0])
+    unit = np.array([1.0, 1.2, 1 / length])  # rates over the angle, the stretch u length
     found = monodromy_of(p, modes, 4096) * unit[:, None] / unit
     assert found == pytest.approx(columns, abs=2e-5)
 
@@ -295,7 +289,7 @@ def test_exact_small_matrices():
 def test_exact_the_jacobian_of_the_free_balance():
     """Against central differences, with a law of the rate and coupled modes."""
     modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
-    group = Group(modes, [of_speed(0.4, 0.3), Spring(0.3, 0.8), Stretch(0.5, 0.4)], 1024)
+    group = Group(modes, [of_speed(0.4, 0.3), Spring(0.3, 0.8), bonds(0.5, 0.4)], 1024)
     equations = FreeBalance(Balance(modes, group.rows, group), 1, 3, 2.0)
     x = np.append(np.random.default_rng(4).normal(size=7) * 0.5, [1.1, 0.07])
     found = np.stack([(equations.system(x + d, 0.6)[0] - equations.system(x - d, 0.6)[0]) / 2e-6
@@ -343,7 +337,7 @@ steps_per_cycle = 600
 
 @pytest.mark.parametrize("text, law", [
     ('law = "elastic-plastic"\nstatic = 0.3\nbond_length = "2 um"', Jenkins([30 / 2e-6], [2e-6])),
-    ('law = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"', Stretch(30.0, 2e-6))], ids=["elastic-plastic", "bonds"])
+    ('law = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"', bonds(30.0, 2e-6))], ids=["elastic-plastic", "bonds"])
 def test_exact_backbone_is_that_of_the_loops_of_a_bench(text, law):
     """A scene's bench measures stiffness and area of the loop; with one harmonic they are the backbone's."""
     omega, amplitudes = W, np.array([4.0])

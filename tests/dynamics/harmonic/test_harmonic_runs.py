@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from harmonic_cases import five, many, march, plain_jenkins, sdof
+from harmonic_cases import bonds, five, many, march, plain_jenkins, sdof
 from scene_texts import NONLOCAL, POINT, STRUCTURE
 
 from patchfem.core import BaseSine, ModalBasis, NotConverged
 from patchfem.dynamics.harmonic.balance import periodic_response, regime
 from patchfem.dynamics.harmonic.branch import response
-from patchfem.dynamics.harmonic.laws import Jenkins, Spring, Stretch, synthesis
+from patchfem.dynamics.harmonic.laws import Jenkins, Spring, synthesis
 from patchfem.dynamics.harmonic.point import group_of, point
 from patchfem.response.loops import interface_loop
 from patchfem.response.measures import acceleration_peak, harmonic, slip_measures
@@ -29,7 +29,7 @@ def test_exact_measures_of_a_run_of_a_scene(law):
     result = run(plan(scene), estimate=False)
     found, modes, drive = result.measures, result.plan.model.rig.modes, result.plan.model.rig.drive
     limit = 0.3 * LOAD
-    p = point(modes, drive, Jenkins([limit / 20e-6], [20e-6]) if law == "elastic-plastic" else Stretch(limit, 20e-6),
+    p = point(modes, drive, Jenkins([limit / 20e-6], [20e-6]) if law == "elastic-plastic" else bonds(limit, 20e-6),
               tolerance=1e-5)
     r = periodic_response(p, modes, drive, 1000)
     dt = np.full(1001, drive.period / 1000)
@@ -129,8 +129,8 @@ def test_exact_regimes():
         name, share = regime(p)
         assert (name, share) == (want[0], pytest.approx(want[1]))
     assert regime(point(modes, DRIVE, Spring(3.0), harmonics=1)) == ("no friction", 0.0)
-    assert regime(point(modes, BaseSine(1e-4, 0.5), Stretch(1.0, 1.0), harmonics=3))[0] == "stuck"
-    assert regime(point(modes, BaseSine(1.0, 0.5), Stretch(0.1, 0.1), harmonics=7))[0] == "slides"
+    assert regime(point(modes, BaseSine(1e-4, 0.5), bonds(1.0, 1.0), harmonics=3))[0] == "stuck"
+    assert regime(point(modes, BaseSine(1.0, 0.5), bonds(0.1, 0.1), harmonics=7))[0] == "slides"
 
 
 @pytest.mark.parametrize("limit, bounded", [(0.9, True), (0.7, False)])
