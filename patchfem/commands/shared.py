@@ -114,18 +114,22 @@ class progress_bar:
 
 
 class Lines:
-    """Progress as lines: the done share and what is left at the pace so far, at most one in SECONDS."""
+    """Progress as lines: the share of the main pass that is done and what is left of it, at most one in SECONDS.
+
+    The pace is that since the first call: what is compiled before it says nothing of the work.
+    """
 
     SECONDS = 10.0
 
     def __init__(self, clock=monotonic):
-        self.clock, self.begin = clock, clock()
-        self.next = self.begin + self.SECONDS
+        self.clock, self.first, self.next = clock, None, clock() + self.SECONDS
 
     def __call__(self, share: float) -> None:
         now = self.clock()
+        self.first = self.first or (now, share)
         if now < self.next:
             return
         self.next = now + self.SECONDS
-        left = f", about {(now - self.begin) * (1 - share) / share:.0f} s left" if share > 0 else ""
-        say(f"{share:.0%} done{left}")
+        begin, before = self.first
+        left = f", about {(now - begin) * (1 - share) / (share - before):.0f} s left of it" if share > before else ""
+        say(f"{share:.0%} of the main pass done{left}")

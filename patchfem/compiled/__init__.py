@@ -294,6 +294,17 @@ def written(module: str, text: str, say=None, parts=()):
     return Kernels(name, path if kept else text, bring)
 
 
+def ran(kind: str) -> None:
+    """Note that a run of this kind came to its end: its compiled code is kept."""
+    if not PLAIN:
+        own.put(_folder() / "kinds" / digest(kind), kind.encode())
+
+
+def has_run(kind: str) -> bool:
+    """Whether a run of this kind has come to its end with the kernels as they are, so that nothing of it compiles."""
+    return PLAIN or (_placed()[0] / "kinds" / digest(kind)).is_file()
+
+
 def _bytes_of(path: Path) -> bytes | None:
     try:
         return path.read_bytes()

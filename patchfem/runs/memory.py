@@ -23,17 +23,18 @@ COMPARED = ("duhamel", "newmark", "euler")
 
 
 class Code(NamedTuple):
-    """What the code of an engine takes besides the program: bytes, seconds of CPU until it runs, and whether a compiler
-    is loaded with it."""
+    """What the code of an engine takes besides the program: bytes, seconds of CPU until it runs, and those of the first
+    run of its kind, in which it compiles; 0 of code that is not compiled."""
 
     bytes: float
     seconds: float
-    compiled: bool = True
+    compile: float = 0.0
 
 
-NONE = Code(0.0, 0.0, False)
-FEW, EVENTS = Code(6e6, 0.05, False), Code(28e6, 0.25, False)  # exact: of one mode under sines or no friction; of any
-STEPS, SMOOTH, PIECES, BALANCE = Code(58e6, 0.4), Code(74e6, 0.4), Code(82e6, 0.4), Code(1e8, 0.55)
+NONE = Code(0.0, 0.0)
+FEW, EVENTS = Code(6e6, 0.05), Code(28e6, 0.25)  # exact: of one mode under sines or no friction; of any
+STEPS, SMOOTH = Code(58e6, 0.4, 8.0), Code(74e6, 0.4, 20.0)
+PIECES, BALANCE = Code(82e6, 0.4, 15.0), Code(1e8, 0.55, 12.0)
 CODES = {"static": NONE, "bench, closed form": NONE, "bench, law step by step": NONE, "bench, two directions": NONE,
          "smooth": SMOOTH, "piecewise": PIECES, "harmonic": BALANCE}
 
@@ -49,6 +50,28 @@ def code(model: Model, engine: str) -> Code:
         rig = model.rig
         return FEW if not rig.interfaces or (len(rig.frequencies) == 1 and rig.drive.segments) else EVENTS
     return CODES.get(by, STEPS)
+
+
+def kind_of(model: Model, engine: str, unknowns: dict) -> str:
+    """What the compiled code of a run hangs on, in words: two runs of one kind run by the same code."""
+    rig, f = model.rig, model.friction
+    laws = [one.numbers for one in rig.interfaces] if rig is not None else [f] if f is not None else []
+    words = [engine, *sorted({f"{one.law} {one.reading} {one.order not in (None, 0, 1)}" for one in laws})]
+    if rig is not None:
+        words += [f"{min(2, len(rig.frequencies))} {min(2, len(rig.interfaces))}", "sines" * bool(rig.drive.segments)]
+    flags = {"soft": bool(model.soft), "grooves": model.grooves is not None, "varies": model.load_varies,
+             "list": "bond_list_about" in unknowns}
+    return ", ".join([*words, *(name for name, holds in flags.items() if holds)])
+
+
+def compile_seconds(model: Model, engine: str, unknowns: dict) -> float:
+    """CPU seconds in which the first run of this kind compiles; 0 where one has run, or nothing of it is compiled."""
+    seconds = code(model, engine).compile
+    if seconds:
+        from ..compiled import has_run
+
+        return 0.0 if has_run(kind_of(model, engine, unknowns)) else seconds
+    return 0.0
 
 
 class Need(NamedTuple):
@@ -69,7 +92,7 @@ def needs(model: Model, engine: str, steps: int, unknowns: dict, numerics=None, 
     """
     points = unknowns.get("interface_points", 0)
     runs = code(model, engine)
-    parts = [Need(PACKAGES, "packages", ""), Need(runs.bytes, CODE_PART if runs.compiled else "code", "")]
+    parts = [Need(PACKAGES, "packages", ""), Need(runs.bytes, CODE_PART if runs.compile else "code", "")]
     if points:
         key = "contact.mesh" if model.patch.mesh else "contact.element_size"
         parts.append(Need(pressed, f"{points} nodes of the interface", key))

@@ -16,7 +16,8 @@ class Plan:
     """A model with the engine that will run it, its sizes and its cost.
 
     effects: names in the scene; steps: of the time loop, all passes; seconds, bytes: estimates; chain: link ->
-    stiffness [N/m] or "rigid"; groups: name -> value; verdict: sentences; parts: of the memory, as `memory.needs`.
+    stiffness [N/m] or "rigid"; groups: name -> value; verdict: sentences; parts: of the memory, as `memory.needs`;
+    compile_seconds: besides `seconds`, where no run of this kind has left its compiled code.
     """
 
     model: Model
@@ -32,12 +33,14 @@ class Plan:
     groups: dict
     verdict: tuple
     parts: tuple = ()
+    compile_seconds: float = 0.0
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{count} {name.removesuffix('_about').replace('_', ' ')}"
                           for name, count in self.unknowns.items())
         lines = [f"Plan of {self.model.source.path.name}: {self.kind}, engine {self.engine}, {sizes or 'one point'}, "
-                 f"{self.steps} steps, about {self.seconds:.1f} s and {self.bytes / 1e6:.0f} MB"]
+                 f"{self.steps} steps, about {self.seconds:.1f} s{once(self.compile_seconds)} and "
+                 f"{self.bytes / 1e6:.0f} MB"]
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
 
     def as_json(self) -> dict:
@@ -46,7 +49,13 @@ class Plan:
                 "not_in_scene": list(self.not_in_scene), "engine": self.engine, "unknowns": self.unknowns,
                 "steps": self.steps, "seconds": self.seconds, "bytes": self.bytes, "stiffness_chain": self.chain,
                 "groups": self.groups, "verdict": list(self.verdict),
-                "memory": {part.what: int(part.bytes) for part in self.parts}}
+                "memory": {part.what: int(part.bytes) for part in self.parts},
+                "compile_seconds": self.compile_seconds}
+
+
+def once(seconds: float) -> str:
+    """The words on what compiles, "" where nothing does."""
+    return f" (+ {seconds:.0f} s once, to compile)" if seconds else ""
 
 
 def plan(asked, per_point: bool = False) -> Plan:
@@ -114,7 +123,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
         said[0] = [*said[0], *of_rig.first_words(model.rig, groups, chain)]
     return Plan(model, model.kind, model.source.effects, model.absent, engine, unknowns, steps, round(seconds, 2),
                 int(sum(part.bytes for part in parts)), chain, groups, tuple(_verdict(model, groups, parts, said)),
-                parts)
+                parts, memory.compile_seconds(model, engine, unknowns))
 
 
 def _verdict(model: Model, groups: dict, parts: tuple, said: list) -> list:

@@ -13,6 +13,7 @@ import numpy as np
 from ..core import Measure, NotConverged, Outcome, PatchfemError
 from ..model.model import Model
 from ..model.source import placed
+from . import memory
 from .plan import Plan, plan, refuse_size
 from .remedies import loose
 from .results.places import placeless
@@ -81,6 +82,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
 
             key = kept and key_of(model, patch, kept.version)
             evolved = evolved_with(kept, key, model, patch, coarse[:2], progress)
+            progress = None  # it has told of all cycles
             patch, coarse = evolved.patch, evolved.coarse
             if model.grooves is not None and evolved.state is not None:
                 from .wear.evolve import lowered
@@ -103,6 +105,10 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             from .wear.measures import worn
 
             result = replace(worn(result, evolved, estimate), plan=what)
+    if what.compile_seconds and estimate:
+        from ..compiled import ran
+
+        ran(memory.kind_of(model, what.engine, what.unknowns))
     return _whole(result, notes, begin, coarse)
 
 

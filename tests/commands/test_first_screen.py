@@ -86,12 +86,22 @@ def test_exact_a_quiet_run_says_nothing(tmp_path, words, out):
 
 
 def test_exact_progress_as_lines(capsys):
-    """One line in ten seconds at most, with what is left at the pace so far."""
-    times = iter([0.0, 4.0, 11.0, 15.0, 40.0])
+    """One line in ten seconds at most, with what is left at the pace since the first share: 15 % in 3 s. The 8 s
+    before it, in which something compiles, would make 33 s of the 15 that are left."""
+    times = iter([0.0, 8.0, 11.0, 15.0, 40.0])
     lines = shared.Lines(lambda: next(times))
     for share in (0.1, 0.25, 0.3, 1.0):
         lines(share)
-    assert capsys.readouterr().err == "25% done, about 33 s left\n100% done, about 0 s left\n"
+    assert capsys.readouterr().err == "25% of the main pass done, about 15 s left of it\n" \
+                                      "100% of the main pass done, about 0 s left of it\n"
+
+
+def test_exact_a_run_that_compiles_tells_no_pace_at_its_first_share(capsys):
+    times = iter([0.0, 14.0, 25.0])
+    lines = shared.Lines(lambda: next(times))
+    for share in (0.003, 0.5):
+        lines(share)
+    assert capsys.readouterr().err == "0% of the main pass done\n50% of the main pass done, about 11 s left of it\n"
 
 
 @pytest.mark.parametrize("cycles, text", [

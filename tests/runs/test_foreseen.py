@@ -9,6 +9,7 @@ import plan_trial
 import pytest
 from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
 
+from patchfem import compiled
 from patchfem.core import Missing
 from patchfem.runs import memory
 from patchfem.runs.plan import plan, refuse_size
@@ -99,6 +100,21 @@ def test_refuses_in_one_line_what_the_process_may_not_take(tmp_path, law, least)
                           preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (least << 20, least << 20)))
     assert done.returncode == 4 and done.stderr.count("\n") == 1, done.stderr
     assert "GB are free; give the process more memory" in done.stderr or "out of memory" in done.stderr
+
+
+def test_exact_a_plan_tells_what_compiles_until_a_run_of_its_kind_has_come_to_its_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(compiled, "_placed", lambda: (tmp_path, ""))
+    monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(compiled, "PLAIN", False)
+    before, other = planned(RIG, MARCH), planned(RIG.replace("tanh", "elastic-plastic").replace(
+        'reference_speed = "1 mm/s"', 'bond_length = "1 um"'), MARCH)
+    seconds = before.compile_seconds
+    assert seconds > 0 and f"(+ {seconds:.0f} s once, to compile)" in repr(before)
+    assert before.as_json()["compile_seconds"] == seconds and before.seconds == planned(RIG, MARCH).seconds
+    compiled.ran(memory.kind_of(before.model, before.engine, before.unknowns))
+    assert planned(RIG, MARCH, "drive.cycles=7").compile_seconds == 0 and "compile" not in repr(planned(RIG, MARCH))
+    assert planned(PATCH).compile_seconds == 0 and other.compile_seconds == seconds
+    assert memory.compile_seconds(other.model, other.engine, other.unknowns) == seconds
 
 
 @pytest.mark.slow

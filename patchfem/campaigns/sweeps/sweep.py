@@ -159,13 +159,16 @@ class Clock:
     """How far a sweep is, and how long it will still take."""
 
     def __init__(self, total: int, there: int):
-        self.total, self.done, self.new, self.begin = total, there, 0, perf_counter()
+        self.total, self.done, self.begin, self.new = total, there, None, 0
 
     def __call__(self, count: int) -> str:
         """The line after `count` more cases: "12/144 cases, 3 min left"."""
-        self.done, self.new = self.done + count, self.new + count
-        text = f"{self.done}/{self.total} cases"
-        if not self.new:  # nothing was done yet that tells how long it takes
+        self.done, text = self.done + count, f"{self.done + count}/{self.total} cases"
+        if self.begin is None:  # the first cases bring or compile what all of them run by
+            self.begin = perf_counter() if count else None
+            return text
+        self.new += count
+        if not self.new:
             return text
         return f"{text}, {lasting((self.total - self.done) * (perf_counter() - self.begin) / self.new)} left"
 

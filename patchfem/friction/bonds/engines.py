@@ -18,7 +18,7 @@ ENGINES = (*LISTS, "recursion")
 MERGING = (0.25, 1.0, 6.0, 1.0)
 YOUNG = 3e-4  # error of merging growing bonds of order < 0 besides, at any width: of bonds that form at a reversal
 STRIP = {MOMENTS: 3e-10, POWER: 3e-9, SHARES: 2e-9, AGED: 3e-9}  # seconds per strip and pass, measured on one core
-SHARES_ANY = 4e-8  # the same for the printed law at constant length with an order other than 0, 1, 2
+ANY_ORDER = 2.5e-8  # the same of an order that takes a power, other than 0, 1, 2
 PASS, STEP = 1.5e-7, 5e-7  # seconds per pass over the list and per step besides
 PASSES = 9  # over the list in a step of the rig: three for each of the two or three trial increments
 RECURSION = 3e-8  # seconds per step
@@ -100,8 +100,8 @@ def _priced(law: Bonds, name: str, tail: float, merge: float, stroke: float, ste
     if merge > 0:
         strips = min(strips, 5 / merge + 20 + 2 * min(reach / stroke, 50) + (180 if form == AGED else 0))
     cost = STRIP[form]
-    if form == SHARES and law.order not in (0, 1, 2):
-        cost = SHARES_ANY
+    if form in (POWER, SHARES) and law.order not in (0, 1, 2):
+        cost = ANY_ORDER
     panels = 1 if each <= 1 else 2 + ceil(each).bit_length()
     seconds = STEP + PASSES * (PASS + cost * strips) * (1 if each <= 0.1 else 5 / 2 * panels)
     error = tail

@@ -25,6 +25,7 @@ HELD_ANY = 2e-6  # the same of constant length with an order other than 0, 1, 2
 # and of a released block that stalls: 10 to 50 trial increments where it turns back in every step (measured: 14 s of
 # 2784 steps, 14 s more of four runs with a half and a quarter of them)
 STALLED_STEP = 4e-6
+LIMP_STEP = 2.7e-6  # and of bonds of order 0 that hold a block: 50 trial increments (measured: 2.75e-6 of 2880 steps)
 # and of growing bonds that hold the block, but not fast: it turns back with its drive alone, in 2 or 3 trial increments
 LEANING_STEP = 2e-7
 FAST = 2.0  # D from which a block is held fast: 0.6 and more strips per step, against 0.06 at 1.06 and 0.28 at 1.4
@@ -213,9 +214,19 @@ def stalls(model: Model) -> bool:
                                                               rig.modes.interfaces @ rig.start.z)
 
 
+def limp(model: Model) -> bool:
+    """Whether bonds of order 0 hold the block: they pull alike at any stretch, which is no stiffness, so that it turns
+    back in almost every step and leaves a strip with each."""
+    f, rig = model.friction, model.rig
+    if f is None or not has(f.law, "bonds") or f.reading == "report" or model.bonds.order != 0 or rig.kind == "free":
+        return False
+    return f.static * model.nominal_load >= holding(rig, gentlest(rig))
+
+
 def lists_grow(model: Model) -> bool:
-    """Whether the printed law holds the block at some time of the run, so that its list grows with every step."""
-    return chatters(model) or stalls(model) or _held_level(model) > 0
+    """Whether a law without stiffness holds the block at some time of the run, so that its list grows with every
+    step."""
+    return chatters(model) or stalls(model) or limp(model) or _held_level(model) > 0
 
 
 def _held_level(model: Model) -> float:
@@ -293,8 +304,10 @@ def _held_seconds(model: Model, push: float, first: float, last: float, moving: 
     strips that those before it have left; moving: seconds of a step of a block that moves, which leaves none."""
     needed = holding(model.rig, push)
     ratio = model.friction.static * model.nominal_load / needed if needed else inf
-    if ratio < (1.0 if form_of(model.bonds) == AGED else FAST):
+    if ratio < (1.0 if form_of(model.bonds) == AGED or limp(model) else FAST):
         return moving * (last - first)
+    if limp(model):
+        return LIMP_STEP * (last**2 - first**2) / 2
     return (_held_step(model.bonds) if ratio >= FAST else LEANING_STEP) * (last**2 - first**2) / 2
 
 

@@ -10,7 +10,7 @@ from ...model.model import Model
 from ...structure.drive_sizes import largest, omega_of
 from ..effort import exact_effort, refuse_endless
 from .engines import ENGINES, PIECES, steady_by
-from .numerics import bonds_cost, chatters, choose, halvings, lists_grow, quadrature_of, stalls
+from .numerics import bonds_cost, chatters, choose, halvings, limp, lists_grow, quadrature_of, stalls
 from .pieces.costs import pieces, seconds_of_pieces, words
 from .smooth import choice
 
@@ -169,7 +169,10 @@ def summed_words(model: Model, numerics) -> list:
         out.append("the printed law holds the block from its release on: it swings on its bonds, or turns back in "
                    "almost every step, which takes longest and is counted here; reading = \"stretch\" gives it a "
                    "stiffness")
-    if found.engine != "recursion" and lists_grow(model) and not chatters(model) and not stalls(model):
+    if found.engine != "recursion" and limp(model):
+        out.append("bonds of order 0 hold the block, but give it no stiffness: it turns back in almost every step, and "
+                   "the list grows by a strip with each; an order above 0 gives it one")
+    elif found.engine != "recursion" and lists_grow(model) and not chatters(model) and not stalls(model):
         out.append("the printed law holds the block at some level, or just: the list grows with every step; "
                    "reading = \"stretch\" gives it a stiffness")
     if found.engine != "recursion" and chatters(model):

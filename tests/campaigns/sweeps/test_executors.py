@@ -114,7 +114,8 @@ def test_exact_what_died_is_tried_alone_after_all_others_and_given_up():
 def test_exact_the_time_left_is_told_when_something_was_done():
     """0/4000 cases, 0 s left."""
     clock = Clock(4000, 0)
-    assert clock(0) == "0/4000 cases" and clock(1).startswith("1/4000 cases, ") and clock(0).endswith(" left")
+    assert clock(0) == "0/4000 cases" and clock(1) == "1/4000 cases"  # it compiled, perhaps
+    assert clock(2).startswith("3/4000 cases, ") and clock(0).endswith(" left")
 
 
 class Prompt:
