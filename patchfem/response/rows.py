@@ -11,10 +11,14 @@ from functools import cached_property
 import numpy as np
 
 from ..core import Response, Row
-from ..structure.drive_sizes import whole
+from ..dynamics.integrated import Integrated
+from ..dynamics.second_book import gap
+from ..structure.drive_sizes import largest, whole
 from .loops import drift, half_range, interface_loop, secant_stiffness, turns_of
-from .measures import REST, acceleration_peak, energy_balance, ledger_measures, slip_measures
+from .measures import REST, acceleration_peak, circular_mean, energy_balance, ledger_measures, slip_measures
 from .spectrum import FLOOR, odd_harmonics, wave_measures
+
+SAMPLED = Integrated()  # of an engine that knows no more than its samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,11 +27,12 @@ class Seen:
 
     window: histories; steps: samples per cycle; extremes (c, 2): of the output in every cycle of the window [m]; book:
     energies of the whole run; load [N], None where nothing rubs; stiffness K [N/m] of the first mode as the contact
-    meets it, 0 where no damping ratio refers to it; sine: the drive ends as a sine. loop: (slide (k,), first harmonics
-    of slide and force, work per cycle [J]), None where the window holds no whole cycle (its slide is not read);
-    ledger (4, k) [J] or None; known: name -> value that the engine has itself, None where it has none. by: how
-    the force is read where the slide turns, as `loops.turns_of` takes it; still: half range of the slide [m] up to
-    which it is round-off.
+    meets it, 0 where no damping ratio refers to it; sine: the drive ends as a sine. own: what the engine integrated
+    itself; loop: (first harmonics of slide and force, work per cycle [J]), where it is known otherwise, None where the
+    window holds no whole cycle; ledger (4, k) [J] or None; known: name -> value that the engine has itself, None where
+    it has none. by: how the force is read where the slide turns, as `loops.turns_of` takes it; still: half range of the
+    slide [m] up to which it is round-off; even: equally spaced samples of the window, None where they are its own;
+    together: the interfaces are parts of one, which has no others beside it.
     """
 
     window: Response
@@ -38,16 +43,38 @@ class Seen:
     load: float | None
     stiffness: float
     sine: bool
+    own: Integrated = SAMPLED
     loop: tuple | None = None
     ledger: np.ndarray | None = None
     known: dict = field(default_factory=dict)
     by: str = "rate"
     still: float = 0.0
+    even: Response | None = None
+    together: bool = False
+
+    @cached_property
+    def span(self) -> float:
+        """Time [s] of the window."""
+        return self.window.time[-1] - self.window.time[0]
+
+    @cached_property
+    def whole(self) -> bool:
+        """Whether the window holds whole cycles of the drive."""
+        return whole(self.span, self.drive)
 
     @cached_property
     def slip(self) -> dict:
         """slip_amplitude [m], stick_fraction [1] and slip_start_phase [rad] by name, as far as the run has them."""
-        found = {} if self.load is None else slip_measures(self.window, self.drive, self.steps)
+        if self.load is None:
+            return {}
+        first = self.own.loops[0] if self.own.loops else None
+        if first is None or first.stuck is None:
+            found = slip_measures(self.even or self.window, self.drive, self.steps)
+        else:
+            starts = self.own.starts
+            found = {"stick_fraction": stuck_share(first.stuck, self.span)} | (
+                {"slip_start_phase": circular_mean(starts)} if starts is not None and len(starts) else {})
+        found |= {} if first is None else {"slip_amplitude": first.slip / 2}
         return found if self.sine else {k: v for k, v in found.items() if k != "slip_start_phase"}
 
     @cached_property
@@ -57,30 +84,62 @@ class Seen:
         return turns_of(w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.by)
 
     @cached_property
+    def harmonics(self) -> tuple | None:
+        """(first harmonics of slide and force, work per cycle [J]) of the interface; None where no whole cycle shows
+        them."""
+        if self.loop is not None or not self.own.loops or not self.whole:
+            return self.loop
+        first = self.own.loops[0]
+        return first.first, first.pull, first.work * self.drive.period / self.span
+
+    @cached_property
     def cycle(self) -> dict:
         """loop_area [J], and under a sine equivalent_stiffness, secant_stiffness [N/m] and equivalent_damping [1].
 
         By name, as far as the run has them.
         """
-        if self.loop is None or self.load is None:
+        if self.harmonics is None or self.load is None:
             return {}
         moves = self.sine and np.ptp(self.window.slide) > max(2 * self.still, REST)
-        found = interface_loop(half_range(self.turns) if moves else 0.0, *self.loop[1:], self.stiffness)
+        found = interface_loop(half_range(self.turns) if moves else 0.0, *self.harmonics, self.stiffness)
         return found | {"secant_stiffness": secant_stiffness(self.turns)} if moves else found
 
     @cached_property
     def waves(self) -> dict:
         """absolute_acceleration_fundamental [m s-2] and acceleration_distortion [1] by name, as far as the run has
         them: a drive that ends as a sine, whole cycles, and of the latter an acceleration."""
-        time = self.window.time
-        if not (self.sine and whole(time[-1] - time[0], self.drive)):
+        if not (self.sine and self.whole):
             return {}
-        return wave_measures(*odd_harmonics(self.window, self.drive))
+        if self.own.waves is None:
+            return wave_measures(*odd_harmonics(self.window, self.drive))
+        return wave_measures(*self.own.waves, largest(self.drive))
 
     @cached_property
     def energies(self) -> dict:
         """The measures of the ledger at its end [J] by name, empty without a ledger."""
         return {} if self.ledger is None else ledger_measures(self.ledger)
+
+    @property
+    def work_check(self) -> float | None:
+        """Gap [1] of the two books of friction work; None where the engine has no second one."""
+        if self.load is None or self.own.books is None:
+            return None
+        return gap(*self.own.books, self.book["power"] + self.book["peak_stored"])
+
+    def others(self) -> list:
+        """The interfaces after the first as last cycles of their own; of the work of each the samples tell."""
+        extra = self.window.extra
+        if self.load is None or self.together or "slides" not in extra:
+            return []
+        slips, count, out = extra.get("slips", extra["slides"]), extra["slides"].shape[1], []
+        for k in range(1, count):
+            window = replace(self.window, slide=extra["slides"][:, k], slide_rate=extra["slide_rates"][:, k],
+                             force=extra["forces"][:, k], slip=slips[:, k])
+            loops = self.own.loops[k:k + 1]
+            work = loops[0].work if loops else float(np.trapezoid(window.force, window.slide))
+            out.append(replace(self, window=window, own=Integrated(loops=loops), sine=False, known={},
+                               loop=(0j, 0j, work * self.drive.period / max(self.span, 1e-300))))
+        return out
 
     def of_load(self, value: Callable) -> float | None:
         """A number of the load history (k,) [N] in the window; None where the load does not change with the motion.
@@ -108,11 +167,12 @@ def _moved(values: dict):
 
 ROWS = (
     Row("relative_displacement_amplitude", "m", 1e-10, "half peak-to-peak motion at the output, relative to the base",
-        lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2),
+        lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2 if s.own.swing is None else s.own.swing),
     Row("absolute_acceleration_peak", "m s-2", 1e-4, "largest acceleration at the output, base motion included",
-        lambda s: acceleration_peak(s.window)),
+        lambda s: acceleration_peak(s.window) if s.own.acceleration is None else s.own.acceleration),
     Row("friction_force_peak", "N", 1e-6, "largest resultant friction force of the interface",
-        lambda s: float(np.abs(s.window.force).max()) if s.load is not None else None, group="friction"),
+        lambda s: None if s.load is None else s.own.loops[0].force if s.own.loops else
+        float(np.abs(s.window.force).max()), group="friction"),
     Row("energy_balance", "1", 1e-8,
         "work in that is neither stored nor dissipated over the run, over the power that passed and the peak stored",
         lambda s: energy_balance(s.book), group="energy", term=("1", lambda _: 1.0)),
@@ -125,7 +185,8 @@ ROWS = (
         lambda s: s.waves.get("acceleration_distortion")),
     Row("drift_per_cycle", "m", 1e-11,
         "time mean of the slide in the last cycle less that in the first of the last cycles, per cycle between them",
-        lambda s: drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period),
+        lambda s: drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period) if s.own.drift is None
+        else s.own.drift,
         term=("slip, or motion", _moved)),
     Row("slip_amplitude", "m", 1e-10,
         "half peak-to-peak of the irreversible part of the slide, its parts weighted by their "
@@ -180,7 +241,7 @@ ROWS = (
     Row("friction_ratio_peak", "1", 1e-9, "largest ratio of friction to normal load over the run", group="friction"),
     Row("work_check", "1", 1e-2,
         "friction work by the trapezoidal rule on the run's own samples against that of its ledger, relative",
-        group="energy"),
+        lambda s: s.work_check, group="energy"),
     Row("ring_frequency", "Hz", 1e-3, "frequency at which the rig rings while it sticks"),
     Row("ring_damping", "1", 1e-6, "damping ratio of that ringing"),
     Row("onset_level", "m s-2", 0.0,
@@ -193,22 +254,28 @@ ROWS = (
         "hysteresis: largest difference of the amplitude between rising and falling levels, at one level"),
 )
 TABLE = {row.name: row for row in ROWS}
+OF_EACH = ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area")  # of every interface
 MOVED = ("relative_displacement_amplitude", "relative_displacement_amplitude_steady", "slip_amplitude",
          "drift_per_cycle")
 LEAST_MOVED = 1e-5  # of the displacement of a drive, above which no error of a displacement is let pass unsaid
 
 
 def measures_of(seen: Seen) -> dict:
-    """Value by name of every row that the run has, in SI units.
+    """Value by name of every row that the run has, in SI units, and of OF_EACH for every interface after the first with
+    its number behind the name.
 
     The engine's own value comes before the one that is read off the samples.
     """
-    out = {}
-    for row in ROWS:
-        value = seen.known[row.name] if row.name in seen.known else row.of(seen) if row.of is not None else None
-        if value is not None:
-            out[row.name] = value
-    return out
+    out = {row.name: seen.known[row.name] if row.name in seen.known else row.of(seen) if row.of is not None else None
+           for row in ROWS}
+    for number, other in enumerate(seen.others(), 2):
+        out |= {f"{name}_{number}": TABLE[name].of(other) for name in OF_EACH}
+    return {name: value for name, value in (out | seen.known).items() if value is not None}
+
+
+def stuck_share(stuck, span):
+    """Share of a time span [s] that is stuck [s], 1 but for round-off of the sum of its pieces; numbers or (n,)."""
+    return np.where(stuck >= span * (1 - 1e-12), 1.0, stuck / span)[()]
 
 
 def of_first(name: str) -> str:

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 from math import ceil, factorial
-from typing import NamedTuple
 
 import numpy as np
 
 from ...compiled import load
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
 from ..events.event_list import RELEASE, ROOM, STOP, EventLog
+from ..integrated import Loop
 from ..piecewise_one import room as one
 from .elements import stretches, table_of, virgin
 from .plant import books_of, clock_of, place, plant_of, room_of
@@ -25,20 +25,6 @@ GAUSS = np.array([0.0] + [0.5 * (1e-14 * (2 * g + 1) * factorial(2 * g)**3 / fac
 PLACE, WEIGHT = np.zeros((2, GAUSS.size, GAUSS.size))  # of g Gauss points on [-1, 1], in row g
 for _g in range(1, GAUSS.size):
     PLACE[_g, :_g], WEIGHT[_g, :_g] = np.polynomial.legendre.leggauss(_g)
-
-
-class Loop(NamedTuple):
-    """An interface in the window: least and largest slide [m], first harmonics of slide [m] and force [N], friction
-    work [J], range of the slip [m], time stuck [s], largest force [N]."""
-
-    low: float
-    high: float
-    first: complex
-    pull: complex
-    work: float
-    slip: float
-    stuck: float
-    force: float
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -312,7 +298,7 @@ class _Run:
             stuck = rows[rows[:, self._at(f, 2)] < SLIPS, 1].sum()
             middle = slide.mean()
             q, pull = (2 / span * np.sum(turn * part) for part in (out[:, at] - middle, out[:, at + 2]))
-            found.append(Loop(float(slide.min()), float(slide.max()), complex(q), complex(pull),
+            found.append(Loop(complex(q), complex(pull),
                               float(self.memory.worked[f] - work[0]), float(np.ptp(slip)), float(stuck),
                               float(np.abs(force).max())))
         output, felt = ends[:, :n] @ self.modes.output, self._as_response(out, time).acceleration

@@ -137,7 +137,7 @@ class Watcher:
         contact, done, *_ = marched(model, few, self.patch, 0, self.say)
         if done.outcome in UNBOUNDED:
             return None
-        values = Read(model, few, self.patch, contact).values(done, done.amplitudes[-few.window:], None)
+        values = Read(model, few, self.patch, contact).values(done)
         return _measured(done.window, values)
 
 

@@ -9,18 +9,13 @@ import numpy as np
 from ...core import Outcome
 from ...dynamics.comparison import point_laws
 from ...dynamics.cycles import hermite_extremes
+from ...dynamics.integrated import Integrated, Run
 from ...dynamics.march.models import load_kernels
-from ...dynamics.second_book import gap, sampled_work
 from ...effects import has, module_of
 from ...friction.record import law_from
-from ...response import run_events
-from ...response.loops import at_turns
-from ...response.measures import window_amplitudes, window_ends
-from ...response.outcome import steady_of
-from ...response.rows import measures_of
 from ...structure.drive_sizes import omega_of, peak_speed
-from .solution import Solution, borne, sampled_loop, seen
-from .strips import other_measures
+from .reading import Reader, books_of
+from .solution import borne, sampled_loop
 
 TOLERANCE = 1e-6  # of a converged step, relative, where the scene does not say
 
@@ -52,43 +47,26 @@ def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=N
         cut = replace(numerics, cycles=response.time[beyond[0]] / drive.period)
         done = _integrated(model, cut, laws)
         response = _with_slip(_with_interfaces(done.response(modes, drive.moving), modes), laws)
-    n, window = numerics.steps, numerics.window
-    first = max(0, response.time.size - 1 - window * n)
-    kept = _cut(response, slice(first, None))
-    extremes, phasors = _cycles(response, n)
-    last = min(window, len(extremes))
-    book = _book(done)
-    span = kept.time[-1] - kept.time[0]
-    work = float(np.trapezoid(kept.force, kept.slide)) * drive.period / span if span > 0 else 0.0
-    spent, known, by = book["friction"], {}, "rate"
-    if model.friction is not None:
-        known["work_check"] = _work_check(response, book)
-        by = at_turns(model)
-    values = measures_of(seen(model, patch, kept, extremes[-last:], book, n, loop=sampled_loop(kept, drive, work),
-                              ledger=np.array([[spent], [0.0], [spent], [0.0]]), known=known, by=by))
-    stuck, own = False, {}
-    if model.friction is not None:
-        values |= other_measures(kept, drive, n)
-        stuck = run_events.all_stick(kept, 0.0) and not has(model.friction.law, "creeps")
-        rings, own = run_events.rings(kept, modes, drive)
-        values |= rings
-    outcome = _outcome(model, done, response)
-    ends = window_ends(extremes, phasors, window)
-    return Solution(values, response, kept, window_amplitudes(extremes, window),
-               steady_of(drive, *ends), outcome or (Outcome.STUCK if stuck else None), [], book,
-               perf_counter() - begin, None, {"reduce": 0.0, "compiled_code": 0.0}, notes=done.warnings, own=own,
-               extremes=extremes)
+    n = numerics.steps
+    kept = _cut(response, slice(max(0, response.time.size - 1 - numerics.window * n), None))
+    run = Run(response, kept, *_cycles(response, n), _book(done), _outcome(model, done, response))
+    return Compared(model, numerics, patch).solution(run, perf_counter() - begin, notes=done.warnings,
+                                                     prepare={"reduce": 0.0, "compiled_code": 0.0})
 
 
-def _work_check(response, book: dict) -> float:
-    """Gap [1] between the friction work along the slides of all samples and that of the ledger, which is summed in
-    time."""
-    extra, sampled, passed = response.extra, 0.0, 0.0
-    slides = extra.get("slides", response.slide[:, None])
-    for slide, force in zip(slides.T, extra.get("forces", response.force[:, None]).T):
-        parts = sampled_work(slide, force)
-        sampled, passed = sampled + float(parts.sum()), passed + float(np.abs(parts).sum())
-    return gap(sampled, book["friction"], passed, book["power"] + book["peak_stored"])
+class Compared(Reader):
+    """What a finished comparison run shows: all of it by its samples."""
+
+    def integrated(self, run, drive) -> Integrated:
+        """Friction work along the slides of all samples, and that of the ledger, which is summed in time."""
+        return Integrated(books=books_of(run.response, run.ledger["friction"]))
+
+    def more(self, run, drive, stuck: bool) -> dict:
+        """The loop by the trapezoidal rule, and the ledger."""
+        w, spent = run.window, run.ledger["friction"]
+        span = w.time[-1] - w.time[0]
+        work = float(np.trapezoid(w.force, w.slide)) * drive.period / span if span > 0 else 0.0
+        return {"loop": sampled_loop(w, drive, work), "ledger": np.array([[spent], [0.0], [spent], [0.0]])}
 
 
 def _integrated(model, numerics, laws):

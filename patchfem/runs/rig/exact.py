@@ -11,16 +11,16 @@ from ...dynamics.one_mode import sdof
 from ...dynamics.second_book import gap, sampled_work
 from ...effects import has
 from ...response import run_events
-from ...response.levels import Level
+from ...response.events import stuck_time
+from ...response.levels import KEPT, Level
 from ...response.measures import circular_mean, harmonic, swing, window_amplitudes, window_ends
 from ...response.outcome import steady_of
 from ...response.rows import measures_of
 from ...response.spectrum import wave_measures
 from ...structure.drive_sizes import largest, omega_of, sinusoidal, whole
 from ..bench.averaged import limit_share
-from . import levels as rig_levels
 from .solution import Solution, borne, seen
-from .strips import as_one, other_measures, strip_loads
+from .strips import as_one, strip_loads
 
 
 def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -115,15 +115,25 @@ def _values(model, numerics, patch, drive, done) -> tuple:
         loop = _loop(done, drive, span, apart)
         if not apart:  # the loop of strips is that of their samples
             known["work_check"] = _work_check(done)
+    if model.friction is not None and not apart:
+        known |= _of_others(window, done)
     values = measures_of(seen(model, patch, window, extremes, done.ledger, 400, drive=drive, loop=loop, ledger=ledger,
-                              known=known, by="jumps"))
+                              known=known, by="jumps", together=apart))
     if model.friction is None:
         return values, False
-    if not apart:
-        values |= other_measures(window, drive, 400, done.log)
-        values |= {f"friction_force_peak{f'_{k + 1}' * (k > 0)}": float(f) for k, f in enumerate(done.force_peaks)}
     others = any(run_events.moving(window, drive, done.log)[1:])
     return values, holds and not others
+
+
+def _of_others(window, done) -> dict:
+    """What the events tell of all interfaces: largest forces, and of those after the first the share of the time for
+    which they stick."""
+    out = {f"friction_force_peak{f'_{k + 1}' * (k > 0)}": float(f) for k, f in enumerate(done.force_peaks)}
+    begin, end, events = window.time[0], window.time[-1], run_events.of_log(done.log)
+    for k, slip in enumerate(run_events.slips_of(window)[0].T[1:], 2):
+        held = stuck_time(events, k, begin, end, bool(np.ptp(slip)))
+        out[f"stick_fraction_{k}"] = min(held / (end - begin), 1.0)
+    return out
 
 
 def _work_check(done) -> float:
@@ -153,7 +163,7 @@ def _of_means(done, modes, drive, apart: bool) -> dict:
 
 
 def _loop(done, drive, span: float, apart: bool) -> tuple | None:
-    """Loop of a run by its own quadrature: (slide, first harmonics of slide and force, work per cycle [J]).
+    """Loop of a run by its own quadrature: (first harmonics of slide and force, work per cycle [J]).
 
     None where the window holds no whole cycle. apart: loops of every strip, because a yaw works besides the mean slide.
     """
@@ -165,7 +175,7 @@ def _loop(done, drive, span: float, apart: bool) -> tuple | None:
         power = (done.window.extra["forces"] * done.window.extra["slide_rates"]).sum(axis=1)
     omega, work = omega_of(drive), float(weight @ power) * drive.period / span
     q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
-    return slide, q, part, work
+    return q, part, work
 
 
 def whole_cycles(done):
@@ -203,7 +213,7 @@ def _levels(model, numerics, patch, forces, progress, say) -> tuple:
 def _level(model, numerics, patch, level: float, drive, done) -> Level:
     """The Level of a run at one level [m s-2] of the drive."""
     values, stuck = _values(model, numerics, patch, drive, done)
-    kept = {name: values[name] for name in rig_levels.KEPT if name in values}
+    kept = {name: values[name] for name in KEPT if name in values}
     read = _of_means(done, model.rig.modes, drive, model.rig.strips_slide_apart)
     return Level(level, stuck, kept, {name: 1e-9 * abs(value) + read.get(name, 0.0) for name, value in kept.items()})
 

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from ...core import Measure
-from ...response.levels import JUMP, KEPT, Level, bracket, hysteresis, jump, no_onset, past_onset
+from ...response.levels import JUMP, Level, bracket, hysteresis, jump, no_onset, past_onset
 from ...response.rows import TABLE
 
 MOST = 40  # halvings of the bracket of an onset
@@ -12,20 +12,6 @@ MOST = 40  # halvings of the bracket of an onset
 def ends(rig) -> tuple:
     """Cycles (l,) after which the levels of a drive end; () without levels."""
     return tuple(rig.level_cycles * (k + 1) for k in range(len(rig.levels)))
-
-
-def rows(sizes, marks, values, held: float | None) -> tuple:
-    """A Level for each size [m s-2] and Mark of a march.
-
-    values(mark) -> its measures; held [m]: slip amplitude below which a level sticks, None where nothing rubs.
-    """
-    return tuple(row(size, values(mark), held) for size, mark in zip(sizes, marks))
-
-
-def row(size: float, found: dict, held: float | None) -> Level:
-    """The Level of a size [m s-2] from its measures; held as in `rows`."""
-    kept = {name: found[name] for name in KEPT if name in found}
-    return Level(size, held is not None and found["slip_amplitude"] < held, kept, {})
 
 
 def with_errors(levels, rungs, made: dict) -> tuple:

@@ -7,7 +7,7 @@ import numpy as np
 from ...core import Measure, Outcome, Response
 from ...response.measures import half_swing, harmonic
 from ...response.reasons import SHARED
-from ...response.rows import Seen, measures_of
+from ...response.rows import Seen
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
 
 
@@ -94,7 +94,7 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
     """Loop of equally spaced samples by the trapezoidal rule, as `Seen` takes it; None where the window holds no whole
     cycle.
 
-    force: its first harmonic where it is known better.
+    work: per cycle [J]; force: its first harmonic where it is known better.
     """
     if not whole(window.time[-1] - window.time[0], drive):
         return None
@@ -102,7 +102,7 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
     weight[[0, -1]] = 0.5
     slide = harmonic(window.time, weight, window.slide - window.slide.mean(), omega)
     pull = harmonic(window.time, weight, window.force, omega) if force is None else force
-    return window.slide, slide, pull, work
+    return slide, pull, work
 
 
 def curve_measures(extra: dict) -> dict:
@@ -117,6 +117,3 @@ def curve_measures(extra: dict) -> dict:
     k = int(np.argmin(np.abs(places - at)))
     spacing = float(np.abs(np.diff(places[max(k - 1, 0):k + 2])).max(initial=0.0))
     return {"peak_frequency": Measure(at, "Hz", spacing, spacing)}
-
-
-__all__ = ["Solution", "borne", "curve_measures", "measures_of", "sampled_loop", "seen"]

@@ -20,10 +20,11 @@ from ....response.errors import cells_error
 from ....response.loops import interface_loops
 from ....response.measures import ROUND, energy_balance
 from ....response.ringing import FAINT
+from ....response.rows import stuck_share
 from ....response.spectrum import distorted
 from ...rig.engines import PIECES, engine_of
 from ...rig.pieces.costs import REACH, pairs_of
-from ...rig.pieces.run import group_of, settled_of, stuck_share
+from ...rig.pieces.run import group_of, settled_of
 from .columns import ENDS, MAIN, Runs
 from .threads import in_threads
 

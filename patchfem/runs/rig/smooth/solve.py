@@ -50,9 +50,10 @@ class _Smooth(Read):
     def summed(self):
         """None: no list of bonds."""
 
-    def values(self, part, extremes, ledger, stuck: bool = False, drive=None) -> dict:
+    def values(self, run, drive=None, stuck: bool = False, ledger=None) -> dict:
         """Measures of a SmoothResult; ledger (4, k) [J] or None."""
-        return self._measured(part, part.turned, part.window, extremes, ledger)
+        last = run.amplitudes[-min(self.numerics.window, len(run.amplitudes)):]
+        return self._measured(run, run.turned, run.window, last, ledger)
 
     def _measured(self, part, turned, even, extremes, ledger) -> dict:
         """Measures off the samples `turned`, and off evenly spaced ones where the spacing counts."""
@@ -72,7 +73,7 @@ class _Smooth(Read):
             known |= {"drift_per_cycle": fine.drift}
         if whole(span, drive):
             known |= self._waves(fine)
-            loop = turned.slide, fine.slide, fine.pull, fine.work * drive.period / span
+            loop = fine.slide, fine.pull, fine.work * drive.period / span
         return measures_of(seen(self.model, self.patch, turned, extremes, book, self.numerics.steps, loop=loop,
                                 ledger=ledger, known=known))
 

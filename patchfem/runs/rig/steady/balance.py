@@ -16,14 +16,13 @@ from ....dynamics.harmonic.laws import Interlock, Spring, analysis
 from ....dynamics.harmonic.point import balance_of
 from ....dynamics.harmonic.point import point as periodic_point
 from ....dynamics.harmonic.stability import with_stability
+from ....dynamics.integrated import Integrated, Run
 from ....dynamics.march.march import march
-from ....dynamics.second_book import gap, sampled_work
 from ....response.measures import acceleration_peak
-from ....response.rows import measures_of
 from ....response.spectrum import odd_harmonics, wave_measures
 from ..interface import contact_model, flank_of, model_of
-from ..solution import Solution, sampled_loop, seen
-from ..strips import other_measures
+from ..reading import Reader, books_of
+from ..solution import Solution, sampled_loop
 from .curves import LAST, SHOWN, Shown, unlasting
 from .marched import disturbed, lasts, left_grooves
 
@@ -34,6 +33,18 @@ SAMPLES = 4096  # of the cycle that measures are read off
 BESIDE = 2  # points on either side of one of a curve, whose changes count for it
 OF_HALF = 0.7  # of the change by half the harmonics and samples: seen at 350 points of elastic-plastic elements, whose
 # motion is known exactly, 0.1 of it is left on the mean and 0.55 at most
+
+
+class Balanced(Reader):
+    """What one cycle of a balance shows."""
+
+    def integrated(self, run, drive) -> Integrated:
+        """The two books of friction work; the middle of a motion that repeats stays."""
+        return Integrated(drift=0.0, books=books_of(run.response, run.ledger["friction"]))
+
+    def more(self, run, drive, stuck: bool) -> dict:
+        """The loop of a cycle by the trapezoidal rule."""
+        return {"loop": sampled_loop(run.window, drive, run.ledger["friction"])}
 
 
 class Balance:
@@ -179,16 +190,8 @@ class Balance:
         top = found.amplitude(self.modes.output)
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
-        known = {"drift_per_cycle": 0.0}
-        if self.model.friction is not None:
-            parts = sampled_work(response.slide, response.force)
-            energy = book["power"] + book["peak_stored"]
-            known["work_check"] = gap(float(parts.sum()), book["friction"], float(np.abs(parts).sum()), energy)
-        values = measures_of(seen(self.model, self.patch, response, extremes, book, SAMPLES, drive=drive, known=known,
-                                  loop=sampled_loop(response, drive, book["friction"])))
-        if self.model.friction is not None:
-            values |= other_measures(response, drive, SAMPLES)
-        return values, response, book
+        run = Run(response, response, extremes, np.zeros(1), book)
+        return Balanced(self.model, self.numerics, self.patch, steps=SAMPLES).values(run, drive), response, book
 
     def curve(self, drive) -> tuple:
         """(points of the curve over the frequency through its folds, the frequencies [Hz] of these)."""

@@ -81,7 +81,7 @@ class Marched:
         mark, snapshots = orbits.shown(run, frames)
         read = Read(self.model, replace(self.numerics, steps=steps), self.patch, self.contact)
         stuck = bool(np.ptp(mark.window.slip) <= read.held) and not read.creeps
-        values = read.values(mark, mark.amplitudes, None, stuck, drive=run.drive)
+        values = read.values(mark, run.drive, stuck)
         return values | {"drift_per_cycle": 0.0}, mark, snapshots, stuck
 
     def point(self, drive, near=None) -> tuple:

@@ -16,7 +16,7 @@ from ....dynamics.piecewise.elements import books_begin
 from ....dynamics.piecewise.steady import steady
 from ....response.measures import half_swing
 from ....response.spectrum import wave_measures
-from ..pieces.run import Interfaces, solution_of
+from ..pieces.run import Interfaces, Pieces
 from .curves import SHOWN, Shown, exact_errors, traced, unlasting
 
 
@@ -37,7 +37,7 @@ class Yields:
         done = histories.simulate(self.modes, drive, self.found.groups, 2.0, 1, np.inf, self.frames, None, one.start,
                                   books_begin(one.memory))
         few = replace(self.numerics, cycles=2.0, window=1)
-        raw = solution_of(self.model, few, self.patch, drive, self.found, done, perf_counter() - begin)
+        raw = Pieces(self.model, few, self.patch, self.found).solution(done, perf_counter() - begin, drive)
         extra = {"regime": _regime(one), "multipliers": one.multipliers, "residual": one.residual, "map": "yields"}
         if not _stable(one):
             raw = replace(raw, outcome=Outcome.NOT_CONVERGED, message=unlasting(one.multipliers))
@@ -55,7 +55,8 @@ class Yields:
         values = {SHOWN["amplitude"]: amplitude, SHOWN["acceleration_peak"]: done.acceleration,
                   **wave_measures(*np.abs(done.waves))}
         values = {name: value for name, value in values.items() if value is not None}
-        outcome = Outcome.STUCK if self.found.holds(done) else Outcome.STEADY
+        holds = Pieces(self.model, self.numerics, self.patch, self.found).sticks(done)
+        outcome = Outcome.STUCK if holds else Outcome.STEADY
         return Shown(drive, values, exact_errors(values, one.error), _regime(one), _largest(one), _stable(one), outcome,
                      one.point)
 

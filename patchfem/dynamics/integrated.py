@@ -1,0 +1,58 @@
+"""What an engine hands over of a run: its histories, and what it integrated over the last cycles itself.
+
+An engine that has its motion in closed form, or as polynomials, knows peaks, times of sticking and work better than
+samples of it show. What it does not know it leaves out, and samples have to tell (`response.rows`).
+"""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core import Outcome, Response
+
+
+class Loop(NamedTuple):
+    """An interface in the last cycles: first harmonics of slide [m] and force [N], friction work [J], range of the slip
+    [m], time stuck [s], None where samples have to tell, largest force [N]."""
+
+    first: complex
+    pull: complex
+    work: float
+    slip: float
+    stuck: float | None
+    force: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Integrated:
+    """What an engine integrated over the last cycles; None, or no loops, where samples have to tell.
+
+    swing: half the range [m] of the output; acceleration: largest at the output [m s-2]; drift: time mean of the slide
+    in the last cycle less that in the first, per cycle between them [m]; waves: sizes of the first and third harmonic
+    of the absolute acceleration [m s-2]; loops: a Loop of every interface; starts: phases of the drive modulo pi at
+    which slips of the first begin; books: friction work [J] by samples, by the ledger, and to and fro.
+    """
+
+    swing: float | None = None
+    acceleration: float | None = None
+    drift: float | None = None
+    waves: tuple | None = None
+    loops: tuple = ()
+    starts: np.ndarray | None = None
+    books: tuple | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Run:
+    """A run of an engine: histories, and those of the last cycles; extremes of the output (c, 2) [m] and its part at
+    the drive's frequency (c,) [m] per cycle; energies [J] by name; how it ended, None where its amplitudes tell."""
+
+    response: Response
+    window: Response
+    amplitudes: np.ndarray
+    phasors: np.ndarray
+    ledger: dict
+    outcome: Outcome | None = None
+    message: str = ""
+    snapshots: list = field(default_factory=list)

@@ -1,0 +1,94 @@
+"""From a run of any engine to its Solution: measures, sticking, ringing, outcome and levels in one text."""
+
+from ...core import Outcome
+from ...dynamics.integrated import Integrated
+from ...dynamics.second_book import sampled_work
+from ...effects import has
+from ...response import run_events
+from ...response.levels import KEPT, Level
+from ...response.loops import at_turns
+from ...response.measures import slip_noise, window_amplitudes, window_ends
+from ...response.outcome import steady_of
+from ...response.rows import measures_of
+from .solution import Solution, seen
+
+
+class Reader:
+    """What the runs of a model by one engine show; an engine says what it knows better in `integrated` and `more`.
+
+    contact: what it moves; held: slip [m] below which a cycle sticks; steps: samples per cycle.
+    """
+
+    def __init__(self, model, numerics, patch, contact=None, held: float = 0.0, steps: int | None = None):
+        self.model, self.numerics, self.patch, self.contact = model, numerics, patch, contact
+        self.steps, self.rubs = steps or numerics.steps, model.friction is not None
+        self.creeps = self.rubs and has(model.friction.law, "creeps")  # it never holds, nor sticks
+        self.held = 0.0 if self.creeps else held
+
+    def integrated(self, run, drive) -> Integrated:
+        """What the engine integrated over the last cycles of a run."""
+        return Integrated()
+
+    def more(self, run, drive, stuck: bool) -> dict:
+        """Other fields of `response.rows.Seen`."""
+        return {}
+
+    def values(self, run, drive=None, stuck: bool = False, ledger=None) -> dict:
+        """Measures of the last cycles of a run, or of a mark of it; drive: where it is not the model's; ledger: as
+        `Seen` has it."""
+        drive = drive or self.model.rig.drive
+        given = {"own": self.integrated(run, drive)} | self.more(run, drive, stuck)
+        if self.rubs:
+            given = {"by": at_turns(self.model), "ledger": ledger} | given
+        window, book = given.pop("window", run.window), given.pop("book", run.ledger)
+        last = run.amplitudes[-min(self.numerics.window, len(run.amplitudes)):]
+        return measures_of(seen(self.model, self.patch, window, last, book, self.steps, drive=drive, **given))
+
+    def sticks(self, run) -> bool:
+        """Whether no interface slips in the last cycles of a run by more than `held`, or the last digit."""
+        loops = self.integrated(run, self.model.rig.drive).loops
+        if not self.rubs or self.creeps:
+            return False
+        if loops:
+            return all(one.slip / 2 <= max(self.held, slip_noise(run.window)) for one in loops)
+        return run_events.all_stick(run.window, self.held)
+
+    def rings(self, run, drive) -> tuple:
+        """Measures by name of what rings while the interface sticks, and their errors."""
+        if not self.rubs or self.creeps:
+            return {}, {}
+        return run_events.rings(run.window, self.model.rig.modes, drive, getattr(run, "log", None), self.held)
+
+    def own(self, run) -> dict:
+        """What the run itself leaves open, by name, beside its rings."""
+        return {}
+
+    def solution(self, run, seconds: float, drive=None, **more) -> Solution:
+        """The Solution of a run; drive: where it is not the model's; more: other fields of it."""
+        drive, window = drive or self.model.rig.drive, self.numerics.window
+        stuck, (rings, own) = self.sticks(run), self.rings(run, drive)
+        values = self.values(run, drive, stuck, run.response.extra.get("ledger")) | rings
+        more = {"steady": steady_of(drive, *window_ends(run.amplitudes, run.phasors, window)), "message":
+                getattr(run, "message", ""), "log": getattr(run, "log", None), "snapshots": run.snapshots} | more
+        return Solution(values=values, response=run.response, window=run.window,
+                        amplitudes=window_amplitudes(run.amplitudes, window),
+                        outcome=run.outcome or (Outcome.STUCK if stuck else None), book=run.ledger, seconds=seconds,
+                        contact=self.contact, held=self.held, own=own | self.own(run), extremes=run.amplitudes, **more)
+
+    def level(self, size: float, run, drive=None, left: float = 0.0) -> Level:
+        """The Level of a run, or of a mark of it, at one size [m s-2] of the drive; left: relative error of its
+        measures."""
+        found = self.values(run, drive)
+        kept = {name: found[name] for name in KEPT if name in found}
+        return Level(size, self.sticks(run), kept, {name: left * abs(v) for name, v in kept.items()} if left else {})
+
+
+def books_of(response, work: float, passed: float | None = None) -> tuple:
+    """(friction work [J] by the trapezoidal rule on the samples of all interfaces, that of a ledger, what went to and
+    fro); passed: the last where it is known better."""
+    extra = response.extra
+    slides, forces = (extra.get(name, one[:, None]) for name, one in (("slides", response.slide),
+                                                                      ("forces", response.force)))
+    parts = [sampled_work(slide, force) for slide, force in zip(slides.T, forces.T)]
+    to_and_fro = sum(float(abs(one).sum()) for one in parts)
+    return sum(float(one.sum()) for one in parts), work, to_and_fro if passed is None else passed
