@@ -9,8 +9,10 @@ equal masses and couplings, so that all faces stick at once; `twins`: equal inte
 whose share of the force in stick no equation tells apart; `release` from a displacement at rest and `step` of the base,
 where all faces decide at the start. Several choices can be without a contradiction where kinetic friction is less than
 static: a motion is right where it is that of one of the orders in which the reference tries them. More faces than
-masses stand only where the two frictions are equal: else a motion is one of a continuum. Only the public names of the
-package are used. Seeds are held out: from 29 500 000 on.
+masses stand only where the two frictions are equal: else a motion is one of a continuum. Then it is unique, for its
+acceleration takes the least of a convex function, but the faces' shares of the force are not, and the reference, which
+asks the shares, may choose another motion: a march of impulses (Moreau) decides, to the error of its steps. Only the
+public names of the package are used. Seeds are held out: from 29 500 000 on.
 """
 
 import argparse
@@ -21,7 +23,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-from event_reference import run_reference
+from event_reference import march_reference, run_reference
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import eigh
 
@@ -33,6 +35,7 @@ KINDS, RATIOS = ("mirror", "twins", "release", "step"), (1.0, 0.95, 0.5, 0.2, 0.
 ORDERS = {"mirror": ("together", "fewest", "most"), "twins": ("together",), "release": ("fewest", "most"),
           "step": ("fewest", "most")}
 SAME, BALANCED = 1e-6, 1e-9  # of the largest slide; of the energy
+STEPS, NEAR = 3000, 2e-3  # of the march that decides over dependent faces; its own error
 LONGEST = 20  # CPU seconds of a reference
 
 
@@ -89,15 +92,37 @@ def row(pair, n: int) -> np.ndarray:
     return out[1:]
 
 
+def matrices(s: dict) -> tuple:
+    """Mass, stiffness and damping (n, n), rows of the faces (i, n) of a rig."""
+    n = len(s["mass"])
+    stiff, damp = (sum(link[which] * np.outer(row(link[0], n), row(link[0], n)) for link in s["links"])
+                   for which in (1, 2))
+    return np.diag(s["mass"]), stiff, damp, np.array([row(pair, n) for pair in s["pairs"]])
+
+
+def marched(s: dict, time, slide) -> float:
+    """Largest distance of slides (i, t) [m] at times (t,) [s], its end the last, from a march of impulses, over the
+    largest slide."""
+    mass, stiff, damp, faces = matrices(s)
+    square, shapes = eigh(stiff, mass)
+    modes = SimpleNamespace(interfaces=faces @ shapes, mass=1.0, omega=np.sqrt(square),
+                            dampers=shapes.T @ damp @ shapes, base=shapes.T @ mass @ np.ones(len(mass)))
+    size, omega = s["size"] if s["kind"] != "release" else 0.0, 2 * np.pi * s["frequency"]
+    drive = SimpleNamespace(values=lambda t: np.full_like(t, size) if s["kind"] == "step" else size * np.sin(omega * t))
+    when, z = march_reference(modes, drive, 0.3 * np.array(s["load"]), time[-1], shapes.T @ mass @ np.array(s["start"]),
+                              np.zeros(len(mass)), STEPS)
+    found = z @ shapes.T @ faces.T
+    gap = max(np.abs(np.interp(time, when, one) - own).max() for one, own in zip(found.T, slide))
+    return float(gap / np.abs(found).max())
+
+
 def truth(s: dict, end: float, order: str) -> tuple:
     """(times (t,) [s] of events and the end, slides (t, i) [m], signs (t, i)) by the reference, in modes of unit mass.
 
     order: as in ORDERS; `together`: the alike faces are one that carries the load of all, bodies that are alike one.
     """
-    n, mass = len(s["mass"]), np.diag(s["mass"])
-    stiff, damp = (sum(link[which] * np.outer(row(link[0], n), row(link[0], n)) for link in s["links"])
-                   for which in (1, 2))
-    faces, same, bodies = np.array([row(pair, n) for pair in s["pairs"]]), np.arange(len(s["pairs"])), np.eye(n)
+    (mass, stiff, damp, faces), n = matrices(s), len(s["mass"])
+    same, bodies = np.arange(len(faces)), np.eye(n)
     if order == "together":
         same[:] = 0
     if order == "together" and s["kind"] == "mirror":
@@ -147,13 +172,16 @@ def compared(s: dict) -> dict:
         out |= {"together": int((turns.sum(axis=1) > 1).sum()), "events": len(when) - 1}
         if out["gaps"][order] <= SAME:
             break
+    if len(s["pairs"]) > len(s["mass"]) and not right(out):
+        out["march"] = marched(s, time, slide)
     return out
 
 
 def right(one: dict) -> bool:
     """Whether a motion is that of the reference and keeps its energy."""
     gaps = [gap for gap in one.get("gaps", {}).values() if not isinstance(gap, str)]
-    return bool(gaps) and min(gaps) <= SAME and one["balance"] <= BALANCED
+    same = (bool(gaps) and min(gaps) <= SAME) or one.get("march", np.inf) <= NEAR
+    return same and one["balance"] <= BALANCED
 
 
 def printed(lines: list) -> None:
