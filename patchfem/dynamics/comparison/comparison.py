@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from ...core import ModalBasis, PatchfemError, Response, Start
+from .point_laws import loops, rows
 
 MOST_NUMBERS = 2e8  # kept by a run: 1.6 GB
 
@@ -59,31 +61,26 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Grid:
-    """Arrays of a run before it is run.
-
-    time, drive: (k,); z, v: (k, n); force, residual: (i, k); iterations: (k,).
-    """
+    """A run before it is run: step h [s]; rows of the laws and their compiled loops; rig, drive (k,), `filled` and
+    `room`, as the loops take them."""
 
     h: float
-    time: np.ndarray
+    laws: np.ndarray
+    loops: Any
+    rig: tuple
     drive: np.ndarray
-    z: np.ndarray
-    v: np.ndarray
-    force: np.ndarray
-    residual: np.ndarray
-    iterations: np.ndarray
+    filled: tuple
+    room: tuple
 
 
-def grid(modes: ModalBasis, drive, law: tuple, duration: float, steps_per_cycle: int, start: Start | None) -> Grid:
-    """Equal steps of drive.period/steps_per_cycle over `duration` [s], the forces of the start in place.
-
-    law: (rows, compiled loops) of the laws.
+def grid(modes: ModalBasis, drive, laws, over: tuple, start: Start | None, stick_speed: float | None = None) -> Grid:
+    """Equal steps over `over`: (duration [s], steps per cycle of the drive), the forces of the start in place.
 
     PatchfemError for fewer than 4 steps per cycle, no step at all, more than memory holds, a start that does not fit or
     an interface that slides in no mode.
     """
-    laws, kernels = law
-    n, i = modes.omega.size, len(laws)
+    (duration, steps_per_cycle), n, i = over, modes.omega.size, len(modes.interfaces)
+    table, compiled = rows(laws, i, stick_speed), loops(laws)
     if steps_per_cycle < 4:
         raise PatchfemError(f"accuracy.steps_per_cycle = {steps_per_cycle}: at least 4 steps per cycle are wanted")
     h = drive.period / steps_per_cycle
@@ -94,27 +91,20 @@ def grid(modes: ModalBasis, drive, law: tuple, duration: float, steps_per_cycle:
     idle = np.flatnonzero(~np.any(modes.interfaces, axis=1))
     if idle.size:
         raise PatchfemError(f"interface {idle[0] + 1} slides in no mode: give it a mode with slide, or leave it out")
-    steps = round(duration / h)
-    time = np.arange(steps + 1) * h
-    z, v = np.zeros((steps + 1, n)), np.zeros((steps + 1, n))
+    count = round(duration / h) + 1
+    filled = *(np.zeros((count, size)) for size in (n, n, i, i)), np.zeros(count, np.int64)
     if start is not None:
         if np.shape(start.z) != (n,) or np.shape(start.v) != (n,):
             raise PatchfemError(f"a start needs {n} coordinates and {n} rates, one of each per mode")
         if not np.all(np.isfinite([start.z, start.v])):
             raise PatchfemError("a start needs finite coordinates and rates")
-        z[0], v[0] = start.z, start.v
-    values = np.array(drive.values(time), float, order="C")
-    found = Grid(h, time, values, z, v, np.zeros((i, steps + 1)), np.zeros((i, steps + 1)),
-                 np.zeros(steps + 1, np.int64))
-    found.force[:, 0] = first_forces(modes, laws, kernels, values[0], z[0], v[0])
-    return found
-
-
-def taken(modes: ModalBasis) -> tuple:
-    """(omega, dampers, interfaces, base, mass) of modes as the compiled loops take them: arrays of their own, for numba
-    compiles a loop anew for one that is read-only or lies otherwise in memory."""
-    return *(np.array(one, float, order="C") for one in (modes.omega, modes.dampers, modes.interfaces, modes.base)), \
+        filled[0][0], filled[1][0] = start.z, start.v
+    values = np.array(drive.values(np.arange(count) * h), float, order="C")
+    # arrays of their own: numba compiles a loop anew for one that is read-only or lies otherwise in memory
+    rig = *(np.array(one, float, order="C") for one in (modes.omega, modes.dampers, modes.interfaces, modes.base)), \
         float(modes.mass)
+    filled[2][0] = first_forces(modes, table, compiled, values[0], filled[0][0], filled[1][0])
+    return Grid(h, table, compiled, rig, values, filled, (np.zeros((5, i)), np.zeros((5, n))))
 
 
 def first_forces(modes: ModalBasis, laws: np.ndarray, kernels, drive: float, z, v) -> np.ndarray:
@@ -136,32 +126,28 @@ def first_forces(modes: ModalBasis, laws: np.ndarray, kernels, drive: float, z, 
     return force
 
 
-def ledger(modes: ModalBasis, found: Grid) -> MappingProxyType:
-    """Energies [J] of a finished run by the trapezoidal rule, by the names of `Comparison.ledger`."""
-    m, v = modes.mass, found.v
-    energy = 0.5 * m * np.sum(v[[0, -1]]**2 + (modes.omega * found.z[[0, -1]])**2, axis=1)
-    work = np.trapezoid(-m * found.drive * (v @ modes.base), dx=found.h)
-    viscous = np.trapezoid(m * np.einsum("ki,ij,kj->k", v, modes.dampers, v), dx=found.h)
-    friction = np.trapezoid(np.einsum("ik,ij,kj->k", found.force, modes.interfaces, v), dx=found.h)
-    book = {"work_in": work, "viscous": viscous, "friction": friction, "stored": energy[1] - energy[0]}
-    book["error"] = work - viscous - friction - book["stored"]
-    return MappingProxyType({name: float(value) for name, value in book.items()})
-
-
-def finish(modes: ModalBasis, found: Grid, failures: int, warnings: list) -> Comparison:
+def finish(modes: ModalBasis, run: Grid, failures: int, warnings: list) -> Comparison:
     """The result of a filled grid, with its ledger.
 
     A warning is added where the motion is not finite or more than 1e-3 of the energy that passed through is missing.
     """
-    book = ledger(modes, found)
-    flow = max(abs(book["work_in"]), book["viscous"] + abs(book["friction"]), abs(book["stored"]), 1e-300)
-    if not np.isfinite(book["error"]):
-        step = int(np.argmax(~np.isfinite(found.v).all(axis=1)))
+    (z, v, force, residual, iterations), m = run.filled, modes.mass
+    energy = 0.5 * m * np.sum(v[[0, -1]]**2 + (modes.omega * z[[0, -1]])**2, axis=1)
+    work = np.trapezoid(-m * run.drive * (v @ modes.base), dx=run.h)
+    viscous = np.trapezoid(m * np.einsum("ki,ij,kj->k", v, modes.dampers, v), dx=run.h)
+    friction = np.trapezoid(np.einsum("ki,ij,kj->k", force, modes.interfaces, v), dx=run.h)
+    stored = energy[1] - energy[0]
+    error = work - viscous - friction - stored
+    flow = max(abs(work), viscous + abs(friction), abs(stored), 1e-300)
+    if not np.isfinite(error):
+        step = int(np.argmax(~np.isfinite(v).all(axis=1)))
         warnings = [*warnings, f"the motion is not finite from step {step} on; raise accuracy.steps_per_cycle"]
-    elif abs(book["error"]) > 1e-3 * flow:
-        warnings = [*warnings, f"the energy does not balance: {abs(book['error']) / flow:.1%} of what passed "
-                               f"through is {'missing' if book['error'] > 0 else 'made by the method'}"]
-    for array in (found.time, found.z, found.v, found.force, found.residual, found.iterations, found.drive):
+    elif abs(error) > 1e-3 * flow:
+        warnings = [*warnings, f"the energy does not balance: {abs(error) / flow:.1%} of what passed through is "
+                               f"{'missing' if error > 0 else 'made by the method'}"]
+    kept = np.arange(len(z)) * run.h, z, v, force.T, residual.T, iterations
+    for array in (*kept, run.drive):
         array.setflags(write=False)
-    return Comparison(found.time, found.z, found.v, found.force, found.residual, found.iterations, int(failures),
-                      found.drive, book, tuple(warnings))
+    book = {"work_in": work, "viscous": viscous, "friction": friction, "stored": stored, "error": error}
+    return Comparison(*kept, int(failures), run.drive, MappingProxyType({k: float(b) for k, b in book.items()}),
+                      tuple(warnings))

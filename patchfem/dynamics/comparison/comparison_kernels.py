@@ -1,7 +1,9 @@
 """Compiled loops of the comparison methods: Duhamel's integral by fixed point, Newmark with a stick speed, Euler.
 
-laws (i, k): a row per interface as `point_laws.rows` writes it: 0 for set-valued friction, limit, kinetic force, stick
-speed; or 1, limit, 0, whether as printed, and the numbers of its law. The text runs with any laws.
+rig: (omega (n,), dampers (n, n), faces (i, n), base (n,), mass) of the modes. laws (i, k): a row per interface as
+`point_laws.rows` writes it: 0 for set-valued friction, limit, kinetic force, stick speed; or 1, limit, 0, whether as
+printed, and the numbers of its law. filled: (z, v (k, n), force, residual (k, i) [N], iterations (k,)), which the loops
+fill from their first entries on under the drive (k,) [m s-2]. The text runs with any laws.
 """
 
 import numpy as np
@@ -38,44 +40,27 @@ def first_forces(laws, speed, force):
 
 
 @njit(error_model="numpy", **LEAN)
-def pull(row, z, v, omega, dampers, base, drive, out):
-    """Modal accelerations (n,) [m s-2] without friction into `out`; returns their part along an interface `row`
-    (n,)."""
-    along = 0.0
-    for i in range(omega.size):
-        a = -base[i] * drive - omega[i] ** 2 * z[i]
-        for j in range(omega.size):
-            a -= dampers[i, j] * v[j]
-        out[i] = a
-        along += row[i] * a
-    return along
-
-
-@njit(error_model="numpy", **LEAN)
-def holding(c, along, faces, force, mass):
-    """Force [N] at interface c that leaves it no acceleration, the forces (i,) [N] of the others given.
-
-    along [m s-2]: acceleration of the slide without friction; faces: (i, n); mass [kg].
-    """
-    own = 0.0
-    for d in range(force.size):
-        share = 0.0
-        for i in range(faces.shape[1]):
-            share += faces[c, i] * faces[d, i]
-        if d == c:
-            own = share
-        else:
-            along -= share * force[d] / mass
-    return along * mass / own
-
-
-@njit(error_model="numpy", **LEAN)
 def dot(row, x):
     """Scalar product of two rows."""
     out = 0.0
     for i in range(row.size):
         out += row[i] * x[i]
     return out
+
+
+@njit(error_model="numpy", **LEAN)
+def accelerate(rig, drive, z, v, force, out):
+    """Modal accelerations (n,) [m s-2] under friction forces (i,) [N] into `out`."""
+    omega, dampers, faces, base, mass = rig
+    for i in range(omega.size):
+        out[i] = -base[i] * drive - omega[i]**2 * z[i] - dot(dampers[i], v) - dot(faces[:, i], force) / mass
+
+
+@njit(error_model="numpy", **LEAN)
+def holding(rig, c, accel, force):
+    """Force [N] at interface c that leaves it no acceleration, from the accelerations (n,) under all forces (i,)."""
+    face = rig[2][c]
+    return force[c] + dot(face, accel) * rig[4] / dot(face, face)
 
 
 @njit(error_model="numpy", **LEAN)
@@ -92,57 +77,46 @@ def copied(values, out):
 
 
 @njit(error_model="numpy", cache=True, **LEAN)
-def duhamel_loop(maps, coupling, solve, omega, dampers, faces, base, mass, drive, laws, criterion, tolerance, relax,
-                 most, room, z, v, force, residual, iterations):
-    """Fill z, v (k, n), force (i, k), residual (i, k) [N] and iterations (k,) from their first entries on.
+def duhamel_loop(rig, maps, stop, drive, laws, filled, room):
+    """Fill z, v, force, residual and iterations; returns the number of steps that did not converge.
 
-    maps (n, 2, 4): (z, z', f at the start, f at the end) to (z, z') at the end of a step; coupling (n, n): dampers that
-    are no part of the maps, solve (n, n): inverse of 1 + their effect on z' by f at the end; criterion 0 displacement,
-    1 velocity, 2 force; room: (numbers (3, i), numbers (3, n)) to work in. Returns the number of steps that did not
-    converge.
+    maps: ((n, 2, 4) from z, z', f at the start and f at the end to z and z' after a step, coupling (n, n): dampers that
+    are no part of these, inverse (n, n) of 1 + their effect on z' by f at the end); stop: (criterion 0 displacement, 1
+    velocity, 2 force, tolerance, relaxation, most iterations of a step); room: numbers (3, i) and (3, n) to work in.
     """
-    n, m = omega.size, laws.shape[0]
-    trial, slide, speed = room[0][0], room[0][1], room[0][2]
-    scratch, starts, ends = room[1][0], room[1][1], room[1][2]
-    failed = 0
+    (whole, coupling, solve), (criterion, tolerance, relax, most), (few, many) = maps, stop, room
+    (z, v, force, residual, iterations), (_, _, faces, base, mass) = filled, rig
+    slide, speed, first, last, free, failed = few[0], few[1], many[0], many[1], many[2], 0
     for k in range(drive.size - 1):
-        copied(force[:, k], trial)
+        trial = force[k + 1]
+        copied(force[k], trial)
+        for i in range(base.size):
+            first[i] = -base[i] * drive[k] - dot(coupling[i], v[k]) - dot(faces[:, i], trial) / mass
         for count in range(1, most + 1):
-            for i in range(n):
-                first, last = -base[i] * drive[k] - dot(coupling[i], v[k]), -base[i] * drive[k + 1]
-                for c in range(m):
-                    first -= faces[c, i] * force[c, k] / mass
-                    last -= faces[c, i] * trial[c] / mass
-                starts[i], ends[i] = first, last
-                scratch[i] = step_of(maps[i, 1], z[k, i], v[k, i], first, last)
-            for i in range(n):
-                v[k + 1, i] = dot(solve[i], scratch)
-            for i in range(n):
-                z[k + 1, i] = step_of(maps[i, 0], z[k, i], v[k, i], starts[i], ends[i] - dot(coupling[i], v[k + 1]))
-            change, good = 0.0, count > 1 or criterion == 2
-            for c in range(m):
+            for i in range(base.size):
+                last[i] = -base[i] * drive[k + 1] - dot(faces[:, i], trial) / mass
+                free[i] = step_of(whole[i, 1], z[k, i], v[k, i], first[i], last[i])
+            for i in range(base.size):
+                v[k + 1, i] = dot(solve[i], free)
+            for i in range(base.size):
+                z[k + 1, i] = step_of(whole[i, 0], z[k, i], v[k, i], first[i], last[i] - dot(coupling[i], v[k + 1]))
+            accelerate(rig, drive[k + 1], z[k + 1], v[k + 1], trial, free)
+            good = count > 1 or criterion == 2
+            for c in range(trial.size):
                 q, w = dot(faces[c], z[k + 1]), dot(faces[c], v[k + 1])
-                along = pull(faces[c], z[k + 1], v[k + 1], omega, dampers, base, drive[k + 1], scratch)
-                wanted = law_force(laws, c, w, q - dot(faces[c], z[k]), force[c, k],
-                                   holding(c, along, faces, trial, mass))
-                residual[c, k + 1] = wanted - trial[c]
-                if criterion == 0:
-                    change = abs(q - slide[c])
-                elif criterion == 1:
-                    change = abs(w - speed[c])
-                else:
-                    change = abs(residual[c, k + 1])
-                good = good and change <= tolerance
+                wanted = law_force(laws, c, w, q - dot(faces[c], z[k]), force[k, c], holding(rig, c, free, trial))
+                residual[k + 1, c] = wanted - trial[c]
+                change = q - slide[c] if criterion == 0 else w - speed[c] if criterion == 1 else residual[k + 1, c]
+                good = good and abs(change) <= tolerance
                 slide[c], speed[c] = q, w
             iterations[k + 1] = count
             if good:
                 break
             if count < most:
-                for c in range(m):
-                    trial[c] += relax * residual[c, k + 1]
+                for c in range(trial.size):
+                    trial[c] += relax * residual[k + 1, c]
         else:
             failed += 1
-        copied(trial, force[:, k + 1])
     return failed
 
 
@@ -169,40 +143,26 @@ def implicit_force(laws, c, speed, travel, back_speed, back_travel, before):
 
 
 @njit(error_model="numpy", **LEAN)
-def sweeps(laws, stuck, direction, speed, travel, soft_speed, soft_travel, before, force):
-    """Forces (i,) [N] of all interfaces at the end of a step, the stuck ones given, by sweeps over them; their number.
-
-    Arguments as in `settle`.
-    """
-    count, change = 0, 1.0
-    while count < 500 and change > 1e-15:  # of the limit: round-off
-        count += 1
-        change = 0.0
-        for c in range(force.size):
-            w, q = speed[c], travel[c]
-            for d in range(force.size):
-                if d != c:
-                    w -= soft_speed[c, d] * force[d]
-                    q -= soft_travel[c, d] * force[d]
-            if laws[c, 0] != COULOMB:
-                new = implicit_force(laws, c, w, q, soft_speed[c, c], soft_travel[c, c], before[c])
-            else:
-                new = w / soft_speed[c, c] if stuck[c] else laws[c, 2] * direction[c]
-            change = max(change, abs(new - force[c]) / laws[c, 1])
-            force[c] = new
-        if force.size == 1:
-            break
-    return count
-
-
-@njit(error_model="numpy", **LEAN)
-def settle(laws, stuck, direction, speed, travel, soft_speed, soft_travel, before, force):
-    """Forces (i,) at the end of a step; stuck interfaces that need more than their static limit are released.
-    soft_speed [m/s/N], soft_travel [m/N]: (i, i) what each force takes off each slide. Returns the sweeps it took."""
-    count, again = 0, True
+def settle(laws, stuck, direction, free, soft, before, force):
+    """Forces (i,) at the end of a step by sweeps over the interfaces; stuck ones that need more than their static limit
+    are released. free: (speed, travel) (i,) without friction; soft: ([m/s/N], [m/N]), (i, i) what each force takes off
+    each of them. Returns the number of sweeps."""
+    (speed, travel), (by_speed, by_travel), count, again = free, soft, 0, True
     while again:
-        count += sweeps(laws, stuck, direction, speed, travel, soft_speed, soft_travel, before, force)
-        again = False
+        change, again, last = 1.0, False, count + 500
+        while count < last and change > 1e-15:  # of the limit: round-off
+            count, change = count + 1, 0.0
+            for c in range(force.size):
+                own = force[c]
+                force[c] = 0.0
+                w, q = speed[c] - dot(by_speed[c], force), travel[c] - dot(by_travel[c], force)
+                if laws[c, 0] != COULOMB:
+                    force[c] = implicit_force(laws, c, w, q, by_speed[c, c], by_travel[c, c], before[c])
+                else:
+                    force[c] = w / by_speed[c, c] if stuck[c] else laws[c, 2] * direction[c]
+                change = max(change, abs(force[c] - own) / laws[c, 1])
+            if force.size == 1:
+                break
         for c in range(force.size):
             if stuck[c] and abs(force[c]) > laws[c, 1]:
                 stuck[c], direction[c], again = False, np.sign(force[c]), True
@@ -210,129 +170,93 @@ def settle(laws, stuck, direction, speed, travel, soft_speed, soft_travel, befor
 
 
 @njit(error_model="numpy", **LEAN)
-def arrest(stuck, faces, mass, crossed, v, accel, force):
+def arrest(rig, stuck, v, accel, force):
     """Stop all stuck interfaces: take their slide speed and slide acceleration away, by sweeps.
 
-    force [N] keeps what the second one needs. crossed: (i, i) faces_c . faces_d.
+    force [N] keeps what the second one needs.
     """
     for _ in range(500):
         change = 0.0
         for c in range(force.size):
-            if not stuck[c]:
-                continue
-            w, a = dot(faces[c], v), dot(faces[c], accel)
-            change = max(change, abs(w), abs(a))
-            force[c] += a * mass / crossed[c, c]
-            for i in range(v.size):
-                v[i] -= faces[c, i] * w / crossed[c, c]
-                accel[i] -= faces[c, i] * a / crossed[c, c]
+            if stuck[c]:
+                face = rig[2][c]
+                own, w, a = dot(face, face), dot(face, v), dot(face, accel)
+                change = max(change, abs(w), abs(a))
+                force[c] += a * rig[4] / own
+                for i in range(v.size):
+                    v[i] -= face[i] * w / own
+                    accel[i] -= face[i] * a / own
         if change == 0.0 or force.size == 1:
             return
 
 
 @njit(error_model="numpy", cache=True, **LEAN)
-def newmark_loop(inverse, omega, dampers, faces, base, mass, drive, laws, h, by_force, room, z, v, force, residual,
-                 iterations):
-    """Fill z, v (k, n), force (i, k), residual (i, k) [N] and iterations (k,) from their first entries on.
+def newmark_loop(rig, maps, drive, laws, by_force, filled, room):
+    """Fill z, v, force, residual and iterations by average acceleration; returns the number of stops.
 
-    Average acceleration; inverse (n, n): of 1 + h D/2 + h^2 omega^2/4. A Coulomb interface below its stick speed after
-    a step is stopped, with by_force only where its static force suffices. room: (zeros (3, i, i), flags (i,), numbers
-    (4, i), numbers (4, n)) to work in. Returns the number of such stops.
+    maps: (step h [s], inverse (n, n) of 1 + h D/2 + h^2 omega^2/4, softness as in `settle`). A Coulomb interface below
+    its stick speed after a step is stopped, with by_force only where its static force suffices. room: numbers (5, i)
+    and (5, n), flags (i,) to work in.
     """
-    n, m = omega.size, laws.shape[0]
-    crossed, soft_speed, soft_travel, stuck = room[0][0], room[0][1], room[0][2], room[1]
-    direction, now, speed, travel = room[2][0], room[2][1], room[2][2], room[2][3]
-    accel, new, scratch, half = room[3][0], room[3][1], room[3][2], room[3][3]
-    copied(force[:, 0], now)
-    for c in range(m):
-        for d in range(m):
-            for i in range(n):
-                crossed[c, d] += faces[c, i] * faces[d, i]
-                for j in range(n):
-                    soft_speed[c, d] += faces[c, i] * inverse[i, j] * faces[d, j] / mass
-            soft_travel[c, d] = soft_speed[c, d] * (h * h / 4)
-            soft_speed[c, d] *= h / 2
+    (h, inverse, soft), (z, v, force, residual, iterations), (few, many, stuck) = maps, filled, room
+    faces, accel, half, ahead, scratch, new = rig[2], many[0], many[1], many[2], many[3], many[4]
+    now, none, direction, speed, travel = few[0], few[1], few[2], few[3], few[4]
     stops = 0
-    accelerate(z[0], v[0], omega, dampers, faces, base, mass, drive[0], now, accel)
-    for c in range(m):
-        stuck[c] = laws[c, 0] == COULOMB and abs(dot(faces[c], v[0])) < laws[c, 3]
-        direction[c] = np.sign(dot(faces[c], v[0]))
-        hold = now[c] + dot(faces[c], accel) * mass / crossed[c, c]
-        if stuck[c] and by_force and abs(hold) > laws[c, 1]:
-            stuck[c], direction[c] = False, np.sign(hold)
-            force[c, 0] = laws[c, 2] * direction[c]
-    copied(force[:, 0], now)
-    accelerate(z[0], v[0], omega, dampers, faces, base, mass, drive[0], now, accel)
+    for turn in range(2):  # by the second one those that the first releases slide
+        copied(force[0], now)
+        accelerate(rig, drive[0], z[0], v[0], now, accel)
+        for c in range(now.size if turn == 0 else 0):
+            w, hold = dot(faces[c], v[0]), holding(rig, c, accel, now)
+            stuck[c], direction[c] = laws[c, 0] == COULOMB and abs(w) < laws[c, 3], np.sign(w)
+            if stuck[c] and by_force and abs(hold) > laws[c, 1]:
+                stuck[c], direction[c] = False, np.sign(hold)
+                force[0, c] = laws[c, 2] * direction[c]
     copied(v[0], scratch)
-    arrest(stuck, faces, mass, crossed, scratch, accel, now)
+    arrest(rig, stuck, scratch, accel, now)
     for k in range(drive.size - 1):
-        for i in range(n):
-            half[i] = v[k, i] + h / 2 * accel[i]
-        for i in range(n):
-            scratch[i] = -base[i] * drive[k + 1] - omega[i] ** 2 * (z[k, i] + h * (v[k, i] + h / 4 * accel[i])) \
-                - dot(dampers[i], half)
-        for i in range(n):
+        for i in range(accel.size):
+            half[i], ahead[i] = v[k, i] + h / 2 * accel[i], z[k, i] + h * (v[k, i] + h / 4 * accel[i])
+        accelerate(rig, drive[k + 1], ahead, half, none, scratch)
+        for i in range(accel.size):
             new[i] = dot(inverse[i], scratch)
-        for c in range(m):
+        for c in range(now.size):
             w = dot(faces[c], new)
-            speed[c], travel[c] = dot(faces[c], half) + h / 2 * w, h * dot(faces[c], v[k]) \
-                + h * h / 4 * (dot(faces[c], accel) + w)
+            speed[c] = dot(faces[c], half) + h / 2 * w
+            travel[c] = dot(faces[c], ahead) - dot(faces[c], z[k]) + h * h / 4 * w
             if not stuck[c] and k > 0:
                 direction[c] = np.sign(dot(faces[c], v[k]))
-            now[c] = force[c, k]
-        iterations[k + 1] = settle(laws, stuck, direction, speed, travel, soft_speed, soft_travel, force[:, k], now)
-        for i in range(n):
-            scratch[i] = -base[i] * drive[k + 1] - omega[i] ** 2 * (z[k, i] + h * (v[k, i] + h / 4 * accel[i])) \
-                - dot(dampers[i], half)
-            for c in range(m):
-                scratch[i] -= faces[c, i] * now[c] / mass
-        for i in range(n):
-            new[i] = dot(inverse[i], scratch)
-        for i in range(n):
-            z[k + 1, i] = z[k, i] + h * (v[k, i] + h / 4 * (accel[i] + new[i]))
-            v[k + 1, i] = half[i] + h / 2 * new[i]
-        copied(new, accel)
-        for c in range(m):
-            w = dot(faces[c], v[k + 1])
-            hold = now[c] + dot(faces[c], accel) * mass / crossed[c, c]
-            if laws[c, 0] == COULOMB:
-                wanted = now[c] if stuck[c] else laws[c, 2] * np.sign(w)
-                residual[c, k + 1] = wanted - now[c]
-                if not stuck[c] and abs(w) < laws[c, 3] and (not by_force or abs(hold) <= laws[c, 1]):
+            now[c] = force[k, c]
+        iterations[k + 1] = settle(laws, stuck, direction, (speed, travel), soft, force[k], now)
+        accelerate(rig, drive[k + 1], ahead, half, now, scratch)
+        for i in range(accel.size):
+            accel[i] = dot(inverse[i], scratch)
+            z[k + 1, i], v[k + 1, i] = ahead[i] + h * h / 4 * accel[i], half[i] + h / 2 * accel[i]
+        for c in range(now.size):
+            w, hold = dot(faces[c], v[k + 1]), holding(rig, c, accel, now)
+            if laws[c, 0] == COULOMB and not stuck[c]:
+                residual[k + 1, c] = laws[c, 2] * np.sign(w) - now[c]
+                if abs(w) < laws[c, 3] and (not by_force or abs(hold) <= laws[c, 1]):
                     stuck[c] = True
                     stops += 1
-        arrest(stuck, faces, mass, crossed, v[k + 1], accel, now)
-        for c in range(m):
-            force[c, k + 1] = min(max(now[c], -laws[c, 1]), laws[c, 1])
+        arrest(rig, stuck, v[k + 1], accel, now)
+        for c in range(now.size):
+            force[k + 1, c] = min(max(now[c], -laws[c, 1]), laws[c, 1])
     return stops
 
 
-@njit(error_model="numpy", **LEAN)
-def accelerate(z, v, omega, dampers, faces, base, mass, drive, force, out):
-    """Modal accelerations (n,) into `out`."""
-    for i in range(omega.size):
-        out[i] = -base[i] * drive - omega[i] ** 2 * z[i] - dot(dampers[i], v)
-        for c in range(force.size):
-            out[i] -= faces[c, i] * force[c] / mass
-
-
 @njit(error_model="numpy", cache=True, **LEAN)
-def euler_loop(omega, dampers, faces, base, mass, drive, laws, h, room, z, v, force):
-    """Fill z, v (k, n) and force (i, k) from their first entries on: z += h z', z' += h z'', all from the step's start.
-    room: (numbers (i,), numbers (n,)) to work in.
-    """
-    n, m = omega.size, laws.shape[0]
-    now, accel = room
-    copied(force[:, 0], now)
+def euler_loop(rig, drive, laws, h, filled, room):
+    """Fill z, v and force: z += h z', z' += h z'', all from the start of the step. room: as of `duhamel_loop`."""
+    z, v, force, faces, (few, many) = filled[0], filled[1], filled[2], rig[2], room
+    now, accel = few[0], many[0]
+    copied(force[0], now)
     for k in range(drive.size):
-        for c in range(m):
-            along = pull(faces[c], z[k], v[k], omega, dampers, base, drive[k], accel)
+        for c in range(now.size):
+            accelerate(rig, drive[k], z[k], v[k], now, accel)
             travel = dot(faces[c], z[k]) - dot(faces[c], z[k - 1]) if k > 0 else 0.0
-            now[c] = law_force(laws, c, dot(faces[c], v[k]), travel, now[c], holding(c, along, faces, now, mass))
-            force[c, k] = now[c]
+            now[c] = law_force(laws, c, dot(faces[c], v[k]), travel, now[c], holding(rig, c, accel, now))
+        copied(now, force[k])
         if k + 1 < drive.size:
-            accelerate(z[k], v[k], omega, dampers, faces, base, mass, drive[k], now, accel)
-            for i in range(n):
-                z[k + 1, i] = z[k, i] + h * v[k, i]
-                v[k + 1, i] = v[k, i] + h * accel[i]
-    return 0
+            accelerate(rig, drive[k], z[k], v[k], now, accel)
+            for i in range(accel.size):
+                z[k + 1, i], v[k + 1, i] = z[k, i] + h * v[k, i], v[k, i] + h * accel[i]

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from ...core import ModalBasis, PatchfemError, Start
-from .comparison import Comparison, finish, grid, taken
-from .point_laws import Smooth, loops, rows, sticking_warnings
+from .comparison import Comparison, Grid, finish, grid
+from .point_laws import elastic_rates, sticking_warnings
 
 CRITERIA = ("displacement", "velocity", "force")
 ADMITTED = 1e-2  # share of the friction limit that a step may leave open before a run says so
@@ -51,20 +51,15 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     if not 0 < tolerance < np.inf or not 0 < relax <= 1 or most < 2:
         raise PatchfemError(f"accuracy.convergence_tolerance = {tolerance:g}, relax = {relax:g}, most = {most}: wanted "
                             "are a finite tolerance > 0, 0 < relax <= 1 and at least 2 iterations")
-
-    law = rows(laws, len(modes.interfaces))
-    compiled = loops(laws)
-    found = grid(modes, drive, (law, compiled), duration, steps_per_cycle, start)
-    omega, dampers, *others = taken(modes)
-    maps, coupling = kernels(modes, found.h), dampers - np.diag(np.diag(dampers))
+    found = grid(modes, drive, laws, (duration, steps_per_cycle), start)
+    maps, coupling = kernels(modes, found.h), modes.dampers - np.diag(np.diag(modes.dampers))
     solve = np.linalg.inv(np.eye(modes.omega.size) + maps[:, 1, 3:] * coupling)
-    room = np.empty((3, len(law))), np.empty((3, modes.omega.size))
-    failures = compiled.duhamel_loop(
-        maps, coupling, solve, omega, dampers, *others, found.drive, law, CRITERIA.index(convergence), float(tolerance),
-        float(relax), int(most), room, found.z, found.v, found.force, found.residual, found.iterations)
-    share = admitted(modes, found.h, convergence, tolerance, relax) / law[:, 1]
+    stop = CRITERIA.index(convergence), float(tolerance), float(relax), int(most)
+    failures = found.loops.duhamel_loop(found.rig, (maps, coupling, solve), stop, found.drive, found.laws, found.filled,
+                                        found.room)
+    share = admitted(modes, found.h, convergence, tolerance, relax) / found.laws[:, 1]
     said = [*sticking_warnings(modes, laws, found.h), *_admitting(convergence, tolerance, float(share.max(initial=0))),
-            *_warnings(modes, laws, law, found, failures, steps_per_cycle)]
+            *_warnings(modes, laws, found, failures, steps_per_cycle)]
     return finish(modes, found, failures, said)
 
 
@@ -78,18 +73,16 @@ def _admitting(convergence: str, tolerance: float, share: float) -> list:
             f"limit; {cure}"]
 
 
-def _warnings(modes, laws, law, found, failures, steps: int) -> list:
-    out = []
-    left = np.abs(found.residual) / law[:, 1:2]
+def _warnings(modes, laws, found: Grid, failures, steps: int) -> list:
+    out, (*_, residual, iterations) = [], found.filled
+    left = np.abs(residual) / found.laws[:, 1]
     if left.max(initial=0.0) > ADMITTED:
-        out.append(f"the steps accepted left up to {left.max():.3g} and on the average {left[:, 1:].mean():.3g} of the "
+        out.append(f"the steps accepted left up to {left.max():.3g} and on the average {left[1:].mean():.3g} of the "
                    "friction limit between the law and the force used")
     if failures:
-        out.append(f"{failures} of {found.time.size - 1} steps ended without convergence after the last iteration")
-    for one, face in zip(laws, modes.interfaces):
-        if isinstance(one, Smooth) and one.compliance:
-            turn = found.h * np.sqrt(np.sum(face**2) / modes.mass / one.compliance)
-            if turn > TURN:
-                out.append(f"the elastic part of the friction turns by {turn:.2g} rad in a step (limit {TURN:g}); set "
-                           f"accuracy.steps_per_cycle = {steps * int(np.ceil(turn / TURN))}")
+        out.append(f"{failures} of {iterations.size - 1} steps ended without convergence after the last iteration")
+    turn = found.h * max(elastic_rates(modes, laws), default=0.0)
+    if turn > TURN:
+        out.append(f"the elastic part of the friction turns by {turn:.2g} rad in a step (limit {TURN:g}); set "
+                   f"accuracy.steps_per_cycle = {steps * int(np.ceil(turn / TURN))}")
     return out

@@ -7,8 +7,8 @@ and friction limit tanh(v/v_0) shakes at rest for h > 2 v_0 m/limit.
 import numpy as np
 
 from ...core import ModalBasis, Start
-from .comparison import Comparison, finish, grid, taken
-from .point_laws import Smooth, loops, rows, sticking_warnings
+from .comparison import Comparison, finish, grid
+from .point_laws import elastic_rates, sticking_warnings
 
 
 def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 400,
@@ -18,14 +18,11 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     laws: one of point_laws per interface. PatchfemError as in `comparison.grid`. Warnings say what the step takes off
     the damping.
     """
-
-    law = rows(laws, len(modes.interfaces))
-    kernels = loops(laws)
-    found = grid(modes, drive, (law, kernels), duration, steps_per_cycle, start)
-    room = np.empty(len(law)), np.empty(modes.omega.size)
+    found = grid(modes, drive, laws, (duration, steps_per_cycle), start)
     with np.errstate(over="ignore", invalid="ignore"):
-        kernels.euler_loop(*taken(modes), found.drive, law, found.h, room, found.z, found.v, found.force)
-        return finish(modes, found, 0, _warnings(modes, laws, found.h, steps_per_cycle))
+        found.loops.euler_loop(found.rig, found.drive, found.laws, found.h, found.filled, found.room)
+        return finish(modes, found, 0, [*sticking_warnings(modes, laws, found.h),
+                                        *_warnings(modes, laws, found.h, steps_per_cycle)])
 
 
 def damping_left(modes: ModalBasis, h: float) -> np.ndarray:
@@ -36,8 +33,7 @@ def damping_left(modes: ModalBasis, h: float) -> np.ndarray:
 
 
 def _warnings(modes, laws, h, steps: int) -> list:
-    out = sticking_warnings(modes, laws, h)
-    left = damping_left(modes, h)
+    out, left = [], damping_left(modes, h)
     if np.any(np.isfinite(left)):
         i = int(np.nanargmin(left))
         lost = modes.omega * h / 2
@@ -50,14 +46,9 @@ def _warnings(modes, laws, h, steps: int) -> list:
         out.append(f"explicit Euler takes {lost[i]:.3g} off the damping ratio of mode "
                    f"'{modes.names[i]}' and leaves {left[i]:.3g} of {own[i]:.3g}{grows}")
     for one, face in zip(laws, modes.interfaces):
-        share = np.sum(face**2) / modes.mass
-        if not isinstance(one, Smooth):
-            continue
-        if h * one.steepness * share > 2:
-            out.append(f"a step of {h:.3g} s is above 2 v_0 m/limit = {2 / (one.steepness * share):.3g} s: the "
-                       "friction changes its sign from step to step while the interface hardly moves")
-        if one.compliance:
-            turn = h * np.sqrt(share / one.compliance)
-            out.append(f"explicit Euler takes {turn / 2:.3g} off the damping ratio of the elastic contact, which has "
-                       "none of its own")
-    return out
+        pace = np.sum(face**2) / modes.mass * one.steepness
+        if h * pace > 2:
+            out.append(f"a step of {h:.3g} s is above 2 v_0 m/limit = {2 / pace:.3g} s: the friction changes its sign "
+                       "from step to step while the interface hardly moves")
+    return out + [f"explicit Euler takes {h * rate / 2:.3g} off the damping ratio of the elastic contact, which has "
+                  "none of its own" for rate in elastic_rates(modes, laws)]

@@ -10,8 +10,8 @@ friction is that of the speed at the start of the step, so a reversal without st
 import numpy as np
 
 from ...core import ModalBasis, PatchfemError, Start
-from .comparison import Comparison, finish, grid, taken
-from .point_laws import Coulomb, added_static, loops, low_speed, rows, sticking_warnings
+from .comparison import Comparison, Grid, finish, grid
+from .point_laws import Coulomb, added_static, low_speed, sticking_warnings
 
 
 def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 400, stick_speed: float | None = None,
@@ -23,30 +23,26 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     """
     if stick_speed is not None and not (np.isfinite(stick_speed) and stick_speed >= 0):
         raise PatchfemError(f"accuracy.stick_speed = {stick_speed:g} m/s: a finite speed >= 0 is wanted")
-
-    law = rows(laws, len(modes.interfaces), stick_speed)
-    kernels = loops(laws)
-    found = grid(modes, drive, (law, kernels), duration, steps_per_cycle, start)
-    h, (omega, dampers, *others) = found.h, taken(modes)
-    inverse = np.linalg.inv(np.eye(omega.size) + h / 2 * dampers + h * h / 4 * np.diag(omega**2))
-    count, n = len(law), omega.size
-    room = np.zeros((3, count, count)), np.zeros(count, bool), np.zeros((4, count)), np.zeros((4, n))
-    stops = kernels.newmark_loop(
-        inverse, omega, dampers, *others, found.drive, law, h, int(by_force), room, found.z, found.v, found.force,
-        found.residual, found.iterations)
-    return finish(modes, found, stops, _warnings(modes, laws, law, found, stick_speed, by_force, stops))
+    found = grid(modes, drive, laws, (duration, steps_per_cycle), start, stick_speed)
+    h, faces = found.h, modes.interfaces
+    inverse = np.linalg.inv(np.eye(modes.omega.size) + h / 2 * modes.dampers + h * h / 4 * np.diag(modes.omega**2))
+    soft = faces @ inverse @ faces.T * (h / 2 / modes.mass)
+    maps, room = (h, inverse, (soft, soft * (h / 2))), (*found.room, np.zeros(len(faces), bool))
+    stops = found.loops.newmark_loop(found.rig, maps, found.drive, found.laws, int(by_force), found.filled, room)
+    return finish(modes, found, stops, [*sticking_warnings(modes, laws, h, stick_speed),
+                                        *_warnings(modes, laws, found, by_force, stops)])
 
 
-def _warnings(modes, laws, law, found, stick_speed, by_force, stops) -> list:
-    out = sticking_warnings(modes, laws, found.h, stick_speed)
-    for one, row, face in zip(laws, law, modes.interfaces):
+def _warnings(modes, laws, found: Grid, by_force, stops) -> list:
+    out, h = [], found.h
+    for one, row, face in zip(laws, found.laws, modes.interfaces):
         if not isinstance(one, Coulomb) or not row[3]:
             continue
-        static = row[2] + added_static(modes, face, row[3], found.h)
+        static = row[2] + added_static(modes, face, row[3], h)
         if not by_force and static > 1.01 * row[1]:
-            out.append(f"the stick speed {row[3]:g} m/s at a step of {found.h:.3g} s holds the interface up to "
+            out.append(f"the stick speed {row[3]:g} m/s at a step of {h:.3g} s holds the interface up to "
                        f"{static:.3g} N instead of {row[1]:.3g} N, and the more the smaller the step; set "
-                       f'accuracy.stick_speed = "{low_speed(modes, face, row[1], found.h):.2g} m/s"')
+                       f'accuracy.stick_speed = "{low_speed(modes, face, row[1], h):.2g} m/s"')
         drop = 0.5 * stops * modes.mass * row[3]**2 / np.sum(face**2)
         out.append(f"below {row[3]:g} m/s the interface is stopped at once ({stops} times, up to {drop:.3g} J in all): "
                    "the speed drops from a finite value, which no rigid friction does")

@@ -24,6 +24,7 @@ class Coulomb:
     static: float
     kinetic: float
     stick_speed: float = 0.0
+    compliance = steepness = 0.0  # it neither stretches nor feels the speed
 
     @property
     def limit(self) -> float:
@@ -122,6 +123,12 @@ def added_static(modes: ModalBasis, face, stick_speed: float, h: float) -> float
 def low_speed(modes: ModalBasis, face, static: float, h: float) -> float:
     """Stick speed [m/s] that raises a static friction [N] by RAISED of it, in steps of h [s] (`added_static`)."""
     return RAISED * static / added_static(modes, face, 1.0, h)
+
+
+def elastic_rates(modes: ModalBasis, laws) -> list:
+    """Circular frequencies [rad/s] at which the interfaces that stretch would vibrate on their springs alone."""
+    return [float(np.sqrt(np.sum(face**2) / modes.mass / one.compliance)) for one, face in zip(laws, modes.interfaces)
+            if one.compliance]
 
 
 def sticking_warnings(modes: ModalBasis, laws, h: float, stick_speed: float | None = None) -> list:
