@@ -218,3 +218,20 @@ def tell(count, work, ledger):
     ledger[6] = max(ledger[6], abs(count))
     ledger[7] += 1.0 if count < 0 else 0.0
     ledger[8] += work
+
+
+@njit(error_model="numpy", **LEAN)
+def ended(state, free, push, dense, table, at, accel, out):
+    """Coordinates and rates at the end of a step under `accel` (n,), into out (2, n); nothing is moved or booked."""
+    n = state.shape[1]
+    for i in range(n):
+        z, v = table[at, i], table[at, n + i]
+        if dense.size == 0:
+            z += free[0, i] * state[0, i] + free[1, i] * state[1, i] + push[0, i] * accel[i]
+            v += free[2, i] * state[0, i] + free[3, i] * state[1, i] + push[1, i] * accel[i]
+        else:
+            for k in range(n):
+                z += dense[i, k] * state[0, k] + dense[i, n + k] * state[1, k] + dense[i, 2 * n + k] * accel[k]
+                v += dense[n + i, k] * state[0, k] + dense[n + i, n + k] * state[1, k] \
+                    + dense[n + i, 2 * n + k] * accel[k]
+        out[0, i], out[1, i] = z, v

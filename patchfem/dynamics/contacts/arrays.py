@@ -1,5 +1,5 @@
 """Arrays of the contacts that a march can meet: one law on one slide, points behind shear modes, points under
-a changing load or on flanks, a list of bonds."""
+a changing load or on flanks, a list of bonds; of faces beside each other and of a load that changes."""
 
 from collections import namedtuple
 from typing import NamedTuple
@@ -62,13 +62,13 @@ def sheared(weight, length: float, growth, psi, kappa, lanes: int = 1) -> dict:
 
 
 class Rub(namedtuple("Rub", ("force", "memory", "before", "now", "modes", "under", *Sheared._fields))):
-    """The law of `march.varying_friction_kernels` under a load that changes.
+    """Points of a law under a load that changes, `pressed_points_kernels`.
 
-    force (4,): mu_s, mu_k (v_0 of a rate law), bond length [m], initial density m_0; memory (3, m): elastic-plastic
-    traction/mu and springs [N]; bonds m, z, s2 [N, N m, N m2]; before, now (m,): nodal forces at the ends of the step
-    [N]; modes (r, m): shear modes at all points, none of pieces that are rigid in shear; under (m,): numbers of the
-    points under load, in the order in which they come in the rest, which is as of `Sheared`; there they have the memory
-    after half of the change of load, and the mean load.
+    force (6,): mu_s, mu_k, bond length [m], initial density m_0, kind of the law as in `shear_points_kernels`, goal of
+    the solve [N]; memory (3, m): elastic-plastic traction/mu and springs [N]; bonds m, z, s2 [N, N m, N m2]; before,
+    now (m,): nodal forces at the ends of the step [N]; modes (r, m): shear modes at all points, none of pieces that are
+    rigid in shear; under (m,): numbers of the points under load, in the order in which they come in the rest, which is
+    as of `Sheared`; there they have the memory after half of the change of load, and the mean load.
     """
 
     __slots__ = ()
@@ -78,7 +78,7 @@ class Climbing(namedtuple("Climbing", ("flank", "now_at", "share", *Rub._fields)
     """A law with memory along flanks, `grooves.contact_kernels`.
 
     flank (9,): load [N], wave number [rad/m], amplitude [m], phase [rad], lifted mass [kg], kind of the law as in
-    `march.varying_friction_kernels`, amplitude [N], pace [rad/s] and phase [rad] of the load's
+    `shear_points_kernels`, amplitude [N], pace [rad/s] and phase [rad] of the load's
     swing; now_at (16,): speed of what rises [m/s], vertical force of the step before [N],
     the last two slides of a step [m], 1 once the vertical force has fallen to zero, then of the step that was tried
     last: mean force U [N], its slope [N/m], force f along the flank [N], dz/dq, ds/dq, vertical force [N], and the
@@ -103,67 +103,6 @@ class Flanked(NamedTuple):
     bound: np.ndarray
 
 
-class Stops(NamedTuple):
-    """The m elements of set-valued friction among joints, `march.joints_stops_kernels`.
-
-    element, names (m,): their numbers, room for numbers; limit (2, m): static and kinetic friction [N]; gives (3, m,
-    m): what their forces take from their slides [m/N] and rates [m/(s N)] over a step, and from their accelerations
-    [1/kg]; rows (m, n): their slides per coordinate; system (m, m), field (18, m) as `march.joints_shares_kernels` has
-    it.
-    """
-
-    element: np.ndarray
-    names: np.ndarray
-    limit: np.ndarray
-    gives: np.ndarray
-    rows: np.ndarray
-    system: np.ndarray
-    field: np.ndarray
-
-
-def copied(parts):
-    """A tuple of arrays, or of such tuples, with arrays of its own."""
-    return type(parts)(*(copied(part) if isinstance(part, tuple) else part.copy() for part in parts))
-
-
-class Joints(NamedTuple):
-    """Elements (e,) on ports (p,) beside a patch on port 0 where `there` (1,) is 1.
-
-    beta (p, p) [m/N]; rows (p, n): slide of every port per coordinate; ports (e,); rubs (e,): 1 for friction, 0 for
-    springs; num, mem (e, ...) as the laws have them, num[e, 0] which law; bound (e,) [N], infinite where nothing
-    bounds it; goal (1 + e,) [N] of the patch and the elements; give (n,) [m/N] of the coordinates. State: last (e, 2)
-    slide increments, forces (e,), own (2,): force of the patch and its last increment. Scratch: free (p,); q, v, eps,
-    dq, miss (e,); system (e, e); room (3, n); hess (n, n). Of the set-valued elements: gamma (p, p) [m/(s N)], what
-    port forces take from the rates of ports by the end of a step; rate (p,) [m/s] of the free motion there; stops.
-    """
-
-    there: np.ndarray
-    beta: np.ndarray
-    rows: np.ndarray
-    ports: np.ndarray
-    rubs: np.ndarray
-    num: np.ndarray
-    mem: np.ndarray
-    bound: np.ndarray
-    goal: np.ndarray
-    give: np.ndarray
-    last: np.ndarray
-    forces: np.ndarray
-    own: np.ndarray
-    free: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    eps: np.ndarray
-    dq: np.ndarray
-    miss: np.ndarray
-    system: np.ndarray
-    room: np.ndarray
-    hess: np.ndarray
-    gamma: np.ndarray
-    rate: np.ndarray
-    stops: Stops
-
-
 class BondList(NamedTuple):
     """One list of bonds for a slide that all share: force = mu_s N [N]; bondlist (10, capacity), now (6,), tally (12,),
     law (24,), table (k,) as in friction.bonds.list_kernels; growth (6,) of eq. 2.10; last (2,) slide increments [m];
@@ -178,3 +117,102 @@ class BondList(NamedTuple):
     growth: np.ndarray
     last: np.ndarray
     bound: np.ndarray
+
+
+class Alone(NamedTuple):
+    """A contact on port 0 with nothing beside it: goal (1,) [N] of its residual."""
+
+    goal: np.ndarray
+
+
+class Stops(NamedTuple):
+    """The m set-valued faces of a march, `march.stops_kernels`.
+
+    element, names (m,): their numbers, room for numbers; limit (4, m): static and kinetic friction [N] at the start of
+    the step, then at its end; gives (3, m, m): what their forces take from their slides [m/N] and rates [m/(s N)] over
+    a step, and from their accelerations [1/kg]; rows (m, n): their slides per coordinate; system (m, m), field (18, m)
+    as `march.stops_kernels` has it.
+    """
+
+    element: np.ndarray
+    names: np.ndarray
+    limit: np.ndarray
+    gives: np.ndarray
+    rows: np.ndarray
+    system: np.ndarray
+    field: np.ndarray
+
+
+class Faces(NamedTuple):
+    """Elements (e,) on ports (p,) beside a contact on port 0 where `there` (1,) is 1.
+
+    beta (p, p) [m/N]; rows (p, n): slide of every port per coordinate; ports (e,); rubs (e,): 1 for friction, 0 for
+    springs; num, mem (e, ...) as the laws have them, num[e, 0] which law; bound (e,) [N], infinite where nothing
+    bounds it; goal (1 + e,) [N] of the contact and the elements; give (n,) [m/N] of the coordinates; beside (n,)
+    [m/s2]: accelerations by what pushes the modes besides. State: last (e, 2) slide increments, forces (e,), own (2,):
+    force of the contact and its last increment; found (1,): 1 where the stops of the step are known. Scratch: free
+    (p,); q, v, eps, dq, miss (e,); system (e, e); room (3, n); hess (n, n). Of the set-valued elements: gamma (p, p)
+    [m/(s N)], what port forces take from the rates of ports by the end of a step; rate (p,) [m/s] of the free motion
+    there; stops.
+    """
+
+    there: np.ndarray
+    beta: np.ndarray
+    rows: np.ndarray
+    ports: np.ndarray
+    rubs: np.ndarray
+    num: np.ndarray
+    mem: np.ndarray
+    bound: np.ndarray
+    goal: np.ndarray
+    give: np.ndarray
+    beside: np.ndarray
+    last: np.ndarray
+    forces: np.ndarray
+    own: np.ndarray
+    found: np.ndarray
+    free: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    eps: np.ndarray
+    dq: np.ndarray
+    miss: np.ndarray
+    system: np.ndarray
+    room: np.ndarray
+    hess: np.ndarray
+    gamma: np.ndarray
+    rate: np.ndarray
+    stops: Stops
+
+
+class Pressing(NamedTuple):
+    """A load that changes, `march.pressing_kernels`.
+
+    sets: `contact.press_kernels.SetArrays`; rows (3, n): slide, heave and pitch per coordinate; beta (3, 3): what
+    constant forces in a step take from them; arm (1,) [m]: half the length of the patch; force (2,): mu_s, mu_k of a
+    law on the resultant load; now (m,): nodal forces [N]; loads (steps + 1,) [N]: prescribed load at the steps, empty
+    where the contact says it; slot (1,): of the present contact set, below 0 where none fits; mean (1,): friction
+    force of the step before [N]; few (22,): room.
+    """
+
+    sets: tuple
+    rows: np.ndarray
+    beta: np.ndarray
+    arm: np.ndarray
+    force: np.ndarray
+    now: np.ndarray
+    loads: np.ndarray
+    slot: np.ndarray
+    mean: np.ndarray
+    few: np.ndarray
+
+
+class Steady(NamedTuple):
+    """A load that stays: loads (0,), none."""
+
+    loads: np.ndarray
+
+
+def copied(parts):
+    """A tuple of arrays, or of such tuples, with arrays of its own."""
+    return type(parts)(*(copied(part) if isinstance(part, tuple) else part.copy() for part in parts))

@@ -9,8 +9,6 @@ from ...friction.flags_kernels import LEAN
 from ...friction.laws import elastic_plastic_kernels as law
 from . import element_solve_kernels as solver
 
-SET_VALUED = False
-
 
 @njit(error_model="numpy", **LEAN)
 def solve(free, beta, q, v, dt, c, goal):
@@ -46,14 +44,3 @@ def commit(dq, force, q, v0, v1, dt, c):
 def state(c, q, v):
     """(force [N], stored energy [J], irreversible slip [m]) at the slide q [m] and the speed v [m/s]."""
     return law.state(c.num, c.mem, 0, q, v)
-
-
-@njit(error_model="numpy", **LEAN)
-def passed(free, rate, beta, gamma, share, v, dt, c, top):
-    """Nothing: only a set-valued contact is asked for the speed at the end of a step."""
-    return 0.0, 0.0
-
-
-@njit(error_model="numpy", **LEAN)
-def hold(c, force):
-    """Nothing to do: what holds an element is in its law."""

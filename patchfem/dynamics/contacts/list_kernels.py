@@ -11,7 +11,6 @@ from ...friction.bonds.list_sum_kernels import MOMENTS, POWER
 from ...friction.flags_kernels import LEAN
 from ..modal_kernels import narrowed
 
-SET_VALUED = False
 OWED = 1e-4  # bond lengths at the friction limit: the most that a list of stretched bonds may owe
 
 
@@ -80,14 +79,3 @@ def state(c, q, v):
     """(force [N], stored energy [J], irreversible slip [m]) of the list as it stands at the slide q [m]."""
     force = c.force[0] * c.tally[5]
     return force, c.force[0] * (c.tally[4] - c.tally[11]), q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q
-
-
-@njit(error_model="numpy", **LEAN)
-def passed(free, rate, beta, gamma, share, v, dt, c, top):
-    """Nothing: only a set-valued contact is asked for the speed at the end of a step."""
-    return 0.0, 0.0
-
-
-@njit(error_model="numpy", **LEAN)
-def hold(c, force):
-    """Nothing to do: what holds is in the list of bonds."""

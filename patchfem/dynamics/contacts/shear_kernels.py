@@ -9,8 +9,6 @@ from ...friction.flags_kernels import FAST, LEAN
 from .shear_points_kernels import DENSITY, LOAD, MOVED, PLAY, POINTS, SLIDE, SQUARE, STRETCH, short
 from .shear_solve_kernels import descend, halfway, went_on
 
-SET_VALUED = False
-
 
 @njit(error_model="numpy", forceinline=True, **LEAN)
 def solve(free, beta, q, v, dt, c, goal):
@@ -86,14 +84,3 @@ def state(c, q, v):
     for k in range(c.b.size):
         energy += 0.5 * c.kappa[k] * c.b[k] ** 2
     return force, energy, slip / total if total > 0 else q
-
-
-@njit(error_model="numpy", forceinline=True, **LEAN)
-def passed(free, rate, beta, gamma, share, v, dt, c, top):
-    """Nothing: only a set-valued contact is asked for the speed at the end of a step."""
-    return 0.0, 0.0
-
-
-@njit(error_model="numpy", forceinline=True, **LEAN)
-def hold(c, force):
-    """Nothing: what holds is in the points."""

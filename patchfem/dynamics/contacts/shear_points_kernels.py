@@ -5,45 +5,12 @@ the load in the row LOAD; at its `ending` they are those after the slide.
 """
 
 from ...compiled.inner import njit
-from ...friction.bonds.point_kernels import SHORT, bond_mean, loose_mean, shape, short_mean
+from ...friction.bonds.point_kernels import SHORT, bond_end, bond_mean, loose_mean, short_mean
 from ...friction.flags_kernels import FAST, LEAN
+from ...friction.laws.elastic_plastic_kernels import spring_end, spring_mean
 
 PLASTIC, POINTS = 1, 2
 DENSITY, STRETCH, SQUARE, MOVED, PLAY, LOAD, SLIDE, FORCE, SLOPE = range(9)  # elastic-plastic: traction/mu, springs
-
-
-@njit(error_model="numpy", **LEAN)
-def spring_mean(y, springs, sigma, dq, length):
-    """(path-mean traction/mu [N], its slope [N/m]) of one point."""
-    rate = springs / length
-    y1 = y + rate * dq
-    bound = min(max(y1, -sigma), sigma)
-    if bound == y1:
-        return 0.5 * (y + y1), 0.5 * rate
-    part = (bound - y) / (rate * dq)
-    return part * 0.5 * (y + bound) + (1 - part) * bound, 0.5 * rate * part * part
-
-
-@njit(error_model="numpy", **LEAN)
-def spring_end(y, springs, sigma, dq, length):
-    """(traction/mu [N], slope [N/m]) of one point at the end of the slide dq."""
-    y1 = y + springs / length * dq
-    if y1 > sigma:
-        return sigma, 0.0
-    if y1 < -sigma:
-        return -sigma, 0.0
-    return y1, springs / length
-
-
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def bond_end(m, z, dq, sigma, eps):
-    """(stretch sum, slope) of one point at the end of the slide dq (z of `bond_step`)."""
-    g = 1.0 if dq > 0 else -1.0
-    x = abs(dq) / eps
-    f1, _, e = shape(x)
-    young = sigma - m
-    z1 = z * e + g * eps * (sigma * x * f1 - young * x * e)
-    return z1, sigma - young * e - g * z1 / eps
 
 
 @njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)

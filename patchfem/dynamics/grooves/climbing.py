@@ -7,9 +7,9 @@ import numpy as np
 from ...core import Outcome, Response
 from ...friction.grooves import STEADY, Grooves, Swing
 from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes, tangential_stiffness
-from ..contacts.arrays import Climbing, sheared
+from ..contacts.arrays import Climbing
 from ..march.march import Run
-from ..march.varying_load import PLASTIC, POINTS, Rubbing, bonds, plastic
+from ..march.varying_load import PLASTIC, Rubbing, bonds, plastic, rub_of
 from .run import lifts, refuse_heavy
 
 HERE = "dynamics.grooves.contact_kernels"
@@ -54,6 +54,7 @@ class FlankModel:
     coefficient `static` [1]."""
 
     __slots__ = ()
+    joints, laws, loading = (), (), ""  # nothing beside it, and the loop knows of a load that stays
 
     @property
     def limit(self) -> float:
@@ -115,19 +116,12 @@ class ClimbingModel(FlankModel):
     def build(self, hub=None) -> tuple:
         """(Climbing, None) with arrays of their own, at rest at the slide 0."""
         g, law, share = self.grooves, self.law, np.array(self.share, float)
-        begin, size = float(self.swing.about(self.load, 0.0)), share.size
-        whole = begin * np.hypot(1.0, float(g.slope(0.0)))
-        normal, memory = whole * share, np.zeros((3, size))
-        memory[1 if law.kind == PLASTIC else 0] = normal * (1.0 if law.kind == PLASTIC else law.force[3])
-        weight = np.full(size, law.static / (law.length if law.kind == POINTS else 1.0))
-        psi, kappa = (np.zeros((size, 0)), ()) if self.shear is None else (self.shear.shape, self.shear.stiffness)
-        at = np.zeros(16)
+        begin = float(self.swing.about(self.load, 0.0))
+        whole, at = begin * np.hypot(1.0, float(g.slope(0.0))), np.zeros(16)
         at[[VERTICAL, BEFORE, NORMAL, RAISED]] = begin, whole, whole, begin * g.height(0.0)
         swing = self.swing.amplitude, self.swing.omega, self.swing.phase
         flank = np.array([self.load, g.wave, g.amplitude, g.phase, g.lifted_mass, law.kind, *swing])
-        return Climbing(flank, at, share, np.array(law.force, float), memory, normal.copy(), normal,
-                        np.array(psi.T, order="C"), np.arange(size),
-                        **sheared(weight, law.length, law.growth, psi, kappa)), None
+        return Climbing(flank, at, share, *rub_of(law, whole * share, self.shear, self.limit)), None
 
     def shown(self, contact) -> dict:
         """Of pieces that give way the points' friction along the flank [N], what is elastic there [m] and their share

@@ -15,15 +15,14 @@ import numpy as np
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
+from ..contacts.pressed_points_kernels import press_all, rub_commit, rub_force, rub_state, spring_back
 from ..contacts.shear_points_kernels import SLOPE
 from ..contacts.shear_solve_kernels import GRADIENT, STEP, descend, halfway, hessian
 from ..contacts.shear_solve_kernels import pulled as drawn
 from ..dense_kernels import factor
 from ..dense_kernels import solve as solve_factored
-from ..march.varying_friction_kernels import press_all, rub_commit, rub_force, rub_state, spring_back
 from ..modal_kernels import narrowed
 
-SET_VALUED = False
 LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, KIND, SWING, PACE, LAG = range(9)  # of contacts.arrays.Climbing.flank
 RISE, VERTICAL, LAST, LAST_BUT_ONE, LIFTS, PULL, PULL_SLOPE, ALONG, MEAN_SLOPE, PATH, HELD, PLACE, BEFORE, NORMAL, \
     CLOCK, RAISED = range(16)  # of now_at
@@ -89,7 +88,7 @@ def drag(ds, flat, end, dt, c):
             c.y[0, 0] = ds
             pulled = descend(ds, 0.0, kind, False, c, TINY * c.force[0] * c.flank[LOAD])[0]
         else:
-            pulled, gain = rub_force(ds, kind, c, 0.5 * (at[BEFORE] + before), dt)
+            pulled, gain = rub_force(ds, kind, c)
         bound = c.force[0] * before
         after = min(max(2 * pulled - at[PLACE], -bound), bound)
         now = max(flat + after * end, 0.0)
@@ -213,7 +212,7 @@ def commit(dq, force, q, v0, v1, dt, c):
     raised(dq, dt, c.flank, at)
     for j in range(c.now.size):
         c.before[j] = c.now[j]
-    at[BEFORE], at[PLACE] = at[NORMAL], rub_state(kind, c, 0.0, 0.0)[0]
+    at[BEFORE], at[PLACE] = at[NORMAL], rub_state(kind, c, 0.0)[0]
     return lost, fine
 
 
@@ -222,18 +221,7 @@ def state(c, q, v):
     """(force against the slide [N], energy stored in height, lifted mass and law [J], irreversible slip [m]) at the
     slide q [m] and the speed v [m/s]."""
     flank, at, t = c.flank, c.now_at, steep(c.flank, q)
-    along, energy, kept = rub_state(int(flank[KIND]), c, q, 0.0)
+    along, energy, kept = rub_state(int(flank[KIND]), c, q)
     energy += of_height(c, q) + 0.5 * flank[LIFTED] * at[RISE] * at[RISE]
     length = sqrt(1 + t * t)
     return at[VERTICAL] * t + along * length, energy, q - (q - kept) / length
-
-
-@njit(error_model="numpy", **LEAN)
-def passed(free, rate, beta, gamma, share, v, dt, c, top):
-    """Nothing: only a set-valued contact is asked for the speed at the end of a step."""
-    return 0.0, 0.0
-
-
-@njit(error_model="numpy", **LEAN)
-def hold(c, force):
-    """Nothing to do: what holds is in the law."""

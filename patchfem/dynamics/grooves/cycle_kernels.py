@@ -2,8 +2,8 @@
 
 y is the force along the flank over mu, R the normal force, s the load of the springs that stand, P = sqrt(1 + t^2). A
 step over the path ds takes y to y + ds/eps max(s, mean of R), or to the limit +-R; R = P V + mu t y at its end makes
-either a closed form. The law is that of `march.varying_friction_kernels`, kind PLASTIC. Derivatives of a step are taken
-by an imaginary part of 1e-30, which leaves no difference to lose digits.
+either a closed form. The law is that of `contacts.pressed_points_kernels`, kind PLASTIC. Derivatives of a step are
+taken by an imaginary part of 1e-30, which leaves no difference to lose digits.
 """
 
 import numpy as np

@@ -32,17 +32,13 @@ from .contact_kernels import (
     RISE,
     VERTICAL,
     climb,
-    hold,
     of_height,
-    passed,
     raised,
     resist,
     steep,
 )
 
-__all__ = ["SET_VALUED", "commit", "given", "hold", "passed", "solve", "state"]
-
-SET_VALUED = False
+__all__ = ["commit", "given", "solve", "state"]
 
 
 @njit(error_model="numpy", **LEAN)

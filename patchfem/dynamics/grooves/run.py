@@ -32,6 +32,7 @@ class GroovesModel:
     kinetic: float
     speed: float | None = None
     swing: Swing = STEADY
+    joints, laws, loading = (), (), ""
 
     @property
     def limit(self) -> float:

@@ -1,7 +1,7 @@
-"""The march in time: modes move exactly under the path-mean friction force of each step.
+"""The march in time: modes move exactly under the path-mean friction forces of each step.
 
-In: modes, a drive, a law under its load. Out: histories, extremes, energy ledger. Three loops: `loop_kernels` of one
-interface, `joints_kernels` of several elements, `varying_load_kernels` of a load that changes. Each is one text that
-runs with any contact or law: `hub` and `joints` make an instance of it per law. Read `march` first, then `hub` and
-`loop_kernels`.
+In: modes, a drive, laws under their load. Out: histories, extremes, energy ledger. One loop, `loop_kernels`, over the
+faces of a rig: one contact under a load that stays or changes (`pressing_kernels`), or elements beside it or in its
+place (`faces_kernels`), of which the set-valued ones stop and go inside a step (`stops_kernels`). `hub` makes an
+instance of it per contact, set of laws and load. Read `march` first, then `hub` and `loop_kernels`.
 """

@@ -1,4 +1,4 @@
-"""The compiled loops by the contact that they meet: an instance of one text per contact and law.
+"""The compiled loops by the faces that they meet: an instance of one text per contact, laws and load.
 
 `loop_kernels` runs with any contact, `contacts.element_kernels` and its solver with any law. A law passed to a compiled
 function as an argument is never found on disk again, so `compiled.instance` writes the loop once per law instead.
@@ -7,10 +7,11 @@ function as an argument is never found on disk again, so `compiled.instance` wri
 from functools import cache
 
 from ... import compiled
-from ..plant import Plant
+from ..contacts.dispatch import COULOMB, law_of
 
 HERE = "dynamics.march"
 SOLVES = "dynamics.grooves.element_kernels",  # contacts of any law that solve their step themselves
+STEADY, WHOLE, POINTS = "", "whole", "points"  # loads: that stays; that changes, borne as a whole or point by point
 
 
 @cache
@@ -27,19 +28,32 @@ def contact_of(kind: tuple):
 
 
 @cache
-def loop_of(kind: tuple):
-    """The loop of one interface with the contact of this kind: its `march` and `follow`."""
-    return compiled.instance(f"{HERE}.loop_kernels", {"contact": contact_of(kind)})
+def loop_of(kind: tuple, laws: tuple = (), load: str = STEADY):
+    """The loop of a rig: its `march` and `follow`. kind: of the contact; laws: modules of the elements beside it or in
+    its place; load: STEADY, WHOLE or POINTS."""
+    contact, named = contact_of(kind), {}
+    flags = {"MANY": bool(laws), "STOPS": COULOMB in laws, "PRESSED": load != STEADY, "POINTED": load == POINTS}
+    text = '"""Parts of a loop, written by patchfem.dynamics.march.hub."""\n\n' + "".join(
+        f"{name} = {value}\n" for name, value in flags.items())
+    parts = compiled.written(f"{HERE}.parts_{compiled.digest(text)}_kernels", text)
+    if laws:
+        law = law_of(laws)
+        named["faces"] = compiled.instance(f"{HERE}.faces_kernels", {
+            "law": law, "contact": contact, "parts": parts,
+            "solver": compiled.instance("dynamics.contacts.element_solve_kernels", {"law": law}),
+            "together": compiled.instance(f"{HERE}.together_kernels", {"law": law})})
+    if load != STEADY:
+        named["pressing"] = compiled.instance(f"{HERE}.pressing_kernels",
+                                              {"contact": contact, "parts": parts} | named)
+    return compiled.instance(f"{HERE}.loop_kernels", {"contact": contact, "parts": parts} | named)
 
 
-def march(kind: tuple, *arguments) -> tuple:
-    """`loop_kernels.march` with the contact of this kind: (steps done, status)."""
-    return loop_of(kind).march(*arguments)
+def march(model, *arguments) -> tuple:
+    """`loop_kernels.march` with the faces of a model: (steps done, status)."""
+    return loop_of(model.kind, model.laws, model.loading).march(*arguments)
 
 
 def follow_path(path, dt, kind, contact, work, goal, energies, forces) -> int:
     """`loop_kernels.follow` with the contact of this kind; work: nothing. The steps that failed."""
     return loop_of(kind).follow(path, float(dt), contact, float(goal), energies, forces)
 
-
-__all__ = ["Plant", "contact_of", "follow_path", "loop_of", "march"]

@@ -1,135 +1,108 @@
-"""The compiled loop where one interface and the modes meet, and its twin for a slide that is given.
+"""The compiled loop where faces and modes meet, and its twin for a slide that is given.
 
-Over a step the modes move exactly under the path mean of the friction force along the straight increment of slide,
-which does exactly the work of the law: the sum of all energies never rises by itself. A set-valued contact says too at
-what speed the step ends, and what it takes for it is friction work as well. The text runs with any contact: `hub` makes
-an instance per contact, of a module with solve, passed, given, commit, state and hold as those named here.
+Over a step the modes move exactly under the path means of the friction forces along the straight increments of slide,
+which do exactly the work of the laws: the sum of all energies never rises by itself. The faces are one contact, or
+elements beside it or in its place (`faces_kernels`), of which the set-valued ones say too at what speed the step ends
+(`stops_kernels`); the load stays, or changes (`pressing_kernels`). The text runs with any of them: `hub` makes an
+instance of it per contact, of a module with solve, given, commit and state as those named here, and per set of parts,
+and what a rig does not have is not compiled.
 """
-
-from math import inf
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ..contacts import element_kernels as contact
-from ..modal_kernels import (
-    accelerations,
-    free_rate,
-    free_slide,
-    move,
-    note,
-    push_back,
-    rate_given,
-    sample,
-    stored,
-    struck,
-    tell,
-)
+from ..modal_kernels import free_slide, move, note, push_back, sample, stored, tell
+from . import alone_kernels as parts
+from . import faces_kernels as faces
+from . import pressing_kernels as pressing
 
-SET_VALUED = contact.SET_VALUED  # a name of this module, which numba leaves branches out by
+MANY, STOPS, PRESSED = parts.MANY, parts.STOPS, parts.PRESSED  # names by which numba leaves branches out
+UNFIT = 4  # status where no contact set fits
 
 
 @njit(error_model="numpy", cache=True, **LEAN)
-def march(first, steps, motion, plant, table, c, goal, travel, ledger, rows):
+def march(first, steps, motion, plant, table, c, j, n, travel, ledger, rows):
     """March `steps` steps, the first by row `first` of the table (in turns); 0.1-0.3 us per step, a few ns per point.
 
-    motion (2, n): coordinates and rates; table: of `propagator.Propagator`; c: Contact of the contact; goal [N];
+    motion (2, n): coordinates and rates; table: of `propagator.Propagator`; c: the contact on port 0; j: Faces, or
+    Alone; n: Pressing, or Steady (all of `contacts.arrays`);
     ledger (9,): work in, viscous loss, |work in| per step, friction loss, peak stored, iterations, worst iterations,
     steps without convergence, friction work;
-    rows (steps + 1, 2 n + 7): z, z', q, q', F, slip, mean force of the step that follows, energy in the interface,
-    friction work of the step that follows [J].
-    Returns (steps done, status): 0 finished, 1 travel exceeded, 2 memory of the contact full, 3 not finite.
+    rows (steps + 1, 2 n + 7 + ...): z, z', q, q', F, slip, mean force of the step that follows, energy in the
+    interface, friction work of the step that follows [J], of the contact or else the first element; then slide, speed,
+    force, slip and mean force of the step that follows of every element, of which the springs' energy does not count;
+    under a load that changes then load, moment, energy of the preloaded contact, heave and pitch.
+    Returns (steps done, status): 0 finished, 1 travel exceeded, 2 memory of the contact full, 3 not finite, 4 no
+    contact set fits.
     """
-    slide, output, dt, beta = plant.slide, plant.output, plant.dt, plant.beta
-    n, around = slide.size, table.shape[0]
-    accel, spare = plant.room[0], plant.room[1:]
-    gamma, share, speed, count = rate_given(slide, slide, plant.push, plant.dense, plant.mass), 0.0, 0.0, 1
-    for k in range(n):
-        share += slide[k] * slide[k] / plant.mass
+    slide, dt, around, size = plant.slide, plant.dt, table.shape[0], 2 * plant.slide.size
+    accel, spare, beta = plant.room[0], plant.room[1:], plant.beta
+    if PRESSED:
+        n.few[:] = 0.0
+        n.few[0] = n.sets.base[0]
     for i in range(steps + 1):
-        q, v, out = sample(rows[i], motion, slide, output)
-        force, energy, slip = contact.state(c, q, v)
-        status = note(rows[i, :2 * n + 6], force, energy, slip, out, travel,
-                      energy + stored(motion, plant.omega, plant.mass), ledger)
+        q, v, out = sample(rows[i], motion, slide, plant.output)
+        beside = 0.0
+        if PRESSED:
+            beside = pressing.pressed(i, i == steps, motion, plant.mass, c, j, n, rows[i])
+            if n.slot[0] < 0:
+                return i, UNFIT
+        if MANY:
+            force, energy, slip, springs = faces.sampled(q, v, motion, rows[i], c, j)
+            beside += springs
+            if STOPS:
+                if i > 0:
+                    drive = table[(first + i - 1) % around, 4 * size + 2]
+                    force = faces.held(motion, plant, drive, force, rows[i], j)
+        else:
+            force, energy, slip = contact.state(c, q, v)
+        status = note(rows[i, :size + 6], force, energy, slip, out, travel,
+                      energy + (beside + stored(motion, plant.omega, plant.mass)), ledger)
         if status:
             return i, status
         if i == steps:
             break
         at = (first + i) % around
-        free = free_slide(motion, plant.reach, 0, table, at)
-        if SET_VALUED:
-            rate = free_rate(motion, slide, plant.free, plant.dense, table, at)
-            top = held_force(motion, plant, table, at, free / beta, accel) if abs(v) * dt <= 1e-6 * abs(free) else inf
-            dq, speed = contact.passed(free, rate, beta, gamma, share, v, dt, c, top)
+        if PRESSED:
+            dq, used, count = pressing.agreed(i, q, v, motion, plant, table, at, c, j, n, j.goal[0])
+            if n.slot[0] < 0:
+                return i, UNFIT
+        elif MANY:
+            faces.begun(motion, plant, table, at, dt, j)
+            dq, count = faces.solved(q, v, motion, plant, table, at, c, j)
         else:
-            dq, _, count = contact.solve(free, beta, q, v, dt, c, goal)
-        used = (free - dq) / beta
-        push_back(used, slide, plant.mass, accel)
+            free = free_slide(motion, plant.reach, 0, table, at)
+            dq, _, count = contact.solve(free, beta, q, v, dt, c, j.goal[0])
+            used = (free - dq) / beta
+        if MANY:
+            faces.pushed(plant, j, accel)
+            work = faces.worked(dq, rows[i], j)
+        else:
+            push_back(used, slide, plant.mass, accel)
+            rows[i, size + 4], work = used, used * dq
+            if PRESSED:
+                pressing.pushed(n, plant.mass, accel)
         move(motion, plant.free, plant.push, plant.loss, plant.dense, plant.dense_loss, table, at, accel, spare, ledger)
-        rows[i, 2 * n + 4] = used
-        after = 0.0
-        for k in range(n):
-            after += slide[k] * motion[1, k]
-        lost, ok = contact.commit(dq, used, q, v, after, dt, c)
-        work = used * dq
-        if SET_VALUED:
-            if speed != after:
-                blow = struck(motion, slide, speed, after, plant.mass)
-                work += blow
-                lost += blow
-            contact.hold(c, holding(motion, plant, table[at, 8 * n + 2], accel, spare) if speed == 0.0 else 0.0)
+        if STOPS:
+            blow = faces.blown(motion, plant.mass, j)
+            work += blow
+            ledger[3] += blow
         tell(count, work, ledger)
-        rows[i, 2 * n + 6] = work
+        rows[i, size + 6] = work
+        if MANY:
+            lost, ok = faces.committed(q, v, dq, motion, plant, c, j)
+        else:
+            after = 0.0
+            for k in range(slide.size):
+                after += slide[k] * motion[1, k]
+            lost, ok = contact.commit(dq, used, q, v, after, dt, c)
         ledger[3] += lost
         if not ok:
-            return i, 2
+            if PRESSED:
+                ledger[7] += 1.0
+            else:
+                return i, 2
     return steps, 0
-
-
-@njit(error_model="numpy", **LEAN)
-def holding(motion, plant, drive, accel, spare):
-    """Friction force [N] that keeps the slide from accelerating at an instant under the drive [m s-2].
-
-    motion: (2, n); accel, spare: room.
-    """
-    for k in range(accel.size):
-        accel[k] = 0.0
-    accelerations(motion, plant.omega, plant.damp, plant.damping, plant.base, drive, accel, spare)
-    need, gain = 0.0, 0.0
-    for k in range(accel.size):
-        need += plant.slide[k] * spare[0, k]
-        gain += plant.slide[k] * plant.slide[k] / plant.mass
-    return need / gain
-
-
-@njit(error_model="numpy", **LEAN)
-def held_force(motion, plant, table, at, used, rates):
-    """As `holding` at the end of a step through which the force `used` [N] has held the slide; rates (n,): room."""
-    slide, n, need, across, size = plant.slide, plant.slide.size, 0.0, 0.0, 0.0
-    for i in range(n):
-        z, v = table[at, i], table[at, n + i]
-        if plant.dense.size == 0:
-            push = -slide[i] * used / plant.mass
-            z += plant.free[0, i] * motion[0, i] + plant.free[1, i] * motion[1, i] + plant.push[0, i] * push
-            v += plant.free[2, i] * motion[0, i] + plant.free[3, i] * motion[1, i] + plant.push[1, i] * push
-        else:
-            for k in range(n):
-                push = -slide[k] * used / plant.mass
-                z += plant.dense[i, k] * motion[0, k] + plant.dense[i, n + k] * motion[1, k] \
-                    + plant.dense[i, 2 * n + k] * push
-                v += plant.dense[n + i, k] * motion[0, k] + plant.dense[n + i, n + k] * motion[1, k] \
-                    + plant.dense[n + i, 2 * n + k] * push
-        rates[i] = v
-        across += slide[i] * v
-        size += slide[i] * slide[i]
-        need -= slide[i] * (plant.base[i] * table[at, 8 * n + 2] + plant.omega[i] * plant.omega[i] * z)
-    for i in range(n):
-        v = rates[i] - slide[i] * across / size
-        if plant.damping.size == 0:
-            need -= slide[i] * plant.damp[i] * v
-        else:
-            for k in range(n):
-                need -= slide[k] * plant.damping[k, i] * v
-    return need * plant.mass / size
 
 
 @njit(error_model="numpy", cache=True, **LEAN)

@@ -2,21 +2,23 @@
 
 from collections import deque
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...core import BaseSine, ModalBasis, Outcome, Response
+from ..contacts import arrays
 from ..cycles import extremes_of, phasor, thinned
 from ..plant import Plant
 from ..propagator import propagator
 from ..resume import Samples, slot_of
 from ..second_book import sampled_work
+from .faces import GOAL, faces_of
 from .models import ContactModel, load_kernels
 from .room import keep, lengthened
 
-FULL = 2  # status of a loop whose list of bonds is full
-GOAL = 1e-11  # residual of the step solve over the friction limit
+FULL, UNFIT = 2, 4  # status of a loop whose list of bonds is full, and where no contact set fits the motion
+EACH = 5  # columns of an element in a row, as of `faces_kernels`
 MOST_KEPT = 400_000  # samples kept outside the last cycles
 AT_ONCE, PIECES = 8000, 16  # steps and cycles of a piece of a run of which nothing is kept
 
@@ -77,7 +79,7 @@ def plant_of(modes: ModalBasis, prop):
 
 
 def _runner(model):
-    """The class that marches a model: Run, or that of a model of several elements."""
+    """The class that marches a model: Run, or its own."""
     return getattr(model, "runner", None) or Run
 
 
@@ -175,10 +177,14 @@ class Run:
         if start is not None:
             self.state[:] = start.z, start.v
         self.ledger, self.done, self.outcome, self.message = np.zeros(9), 0, None, ""
-        self.totals, self.width = np.zeros(3), 2 * modes.omega.size + 7
+        self.totals = np.zeros(3)
         self.second = np.zeros(2)  # friction work off the samples, and what went to and fro [J]
         self.ledger[0] = self.motion()  # what is released at the start counts as work in
         self.plant = plant_of(modes, self.prop)
+        self.faces, self.load = faces_of(model, self.prop, self.plant, modes.mass), self._pressing()
+        self.width = 2 * modes.omega.size + 7 + EACH * len(model.joints) + 5 * bool(model.loading)
+        if model.joints or model.loading:
+            self.ledger[0] += self.strained()
         self.periodic = self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, BaseSine) else None
 
     def fork(self, drive):
@@ -188,7 +194,7 @@ class Run:
         for name, value in vars(self).items():
             if isinstance(value, np.ndarray):
                 setattr(twin, name, value.copy())
-        twin.contact = type(self.contact)(*(array.copy() for array in self.contact))
+        twin.contact, twin.faces, twin.load = map(arrays.copied, (self.contact, self.faces, self.load))
         return twin
 
     def placed(self, place, rate) -> None:
@@ -226,7 +232,28 @@ class Run:
 
     def response(self, rows, number) -> Response:
         """Histories of the samples with step numbers `number` (k,)."""
-        return _response(rows, number, self.prop.dt, self.modes, self.drive)
+        out = _response(rows, number, self.prop.dt, self.modes, self.drive)
+        return self._beside(out, rows) if hasattr(self.model, "patch") else out
+
+    def _beside(self, out, rows) -> Response:
+        """Histories with the elements beside the first: `extra` has slides, slide_rates, forces, slips (k, i) of the
+        interfaces and spring_forces (k, s)."""
+        modes, faces = self.modes, self.faces
+        parts, rubs = self._elements(rows), faces.rubs == 1
+        push = -np.einsum("ke,en->kn", parts[:, :, 2], faces.rows[faces.ports]) / modes.mass
+        if self.model.patch is None:
+            push += np.outer(out.force, modes.slide) / modes.mass  # of the first element, counted already
+        extra = out.extra | {"spring_forces": parts[:, ~rubs, 2]}
+        if rubs.any():
+            names = ("slides", "slide_rates", "forces", "slips")
+            extra |= {name: parts[:, rubs, k] for k, name in enumerate(names)}
+        return replace(out, acceleration=out.acceleration + push @ modes.output, extra=extra)
+
+    def _elements(self, rows) -> np.ndarray:
+        """The columns of the elements (k, e, EACH) in booked rows, or in those of the loop (`_moved`)."""
+        count = len(self.model.joints)
+        begin = 2 * self.modes.omega.size + 7 + rows.shape[1] - self.width
+        return rows[:, begin:begin + EACH * count].reshape(len(rows), count, EACH)
 
     def passed(self, steps: int, tell=None) -> bool:
         """March to the step of this number in long pieces, of which nothing is kept; whether the run went on so far.
@@ -272,8 +299,16 @@ class Run:
     def _steps(self, count: int, rows) -> tuple:
         """March `count` steps into rows (count + 1, width): (steps done, status)."""
         table, row = self.table(count)
-        return self.hub.march(self.model.kind, row, count, self.state, self.plant, table, self.contact,
-                              float(GOAL * self.model.limit), float(self.travel), self.ledger, rows)
+        return self.hub.march(self.model, row, count, self.state, self.plant, table, self.contact, self.faces,
+                              self._load(count), float(self.travel), self.ledger, rows)
+
+    def _pressing(self):
+        """The load at the start: one that stays."""
+        return arrays.Steady(np.zeros(0))
+
+    def _load(self, count: int):
+        """What the loop is told of the load in the next steps."""
+        return self.load
 
     def _sums(self, rows) -> np.ndarray:
         """Friction work, the energy dissipated and that created since the start (3, steps + 1) [J] at the rows; `cycle`
@@ -306,17 +341,26 @@ class Run:
     def _sampled(self, rows) -> np.ndarray:
         """Friction work [J] of the steps between the rows, off their slides and forces alone.
 
-        What blows take at the end of a step, from a slide that stops or holds, has no slide to be read off: it counts.
+        What blows take at the end of a step, from slides that stop or hold, has no slide to be read off: where all that
+        rubs is set-valued it counts.
         """
-        n = 2 * self.modes.omega.size
-        if not getattr(self.model, "set_valued", False):
-            return sampled_work(rows[:, n], rows[:, n + 2])
-        blows = rows[:-1, n + 6] - rows[:-1, n + 4] * np.diff(rows[:, n])
-        return sampled_work(rows[:, n], rows[:, n + 2], rows[:-1, n + 4]) + blows
+        n, model = 2 * self.modes.omega.size, self.model
+        smooth = not model.joints or getattr(model, "patch", None) is not None
+        out = sampled_work(rows[:, n], rows[:, n + 2]) if smooth else np.zeros(len(rows) - 1)
+        blows = rows[:-1, n + 6].copy()
+        for one, part in zip(model.joints, self._elements(rows).transpose(1, 2, 0)):
+            if one.potential is None:
+                slide, _, force, _, mean = part
+                steady = bool(one.element.kernels)
+                out += sampled_work(slide, force, None if steady else mean[:-1])
+                blows -= mean[:-1] * np.diff(slide)
+                smooth |= steady
+        return out if smooth else out + blows
 
     def _moving(self) -> tuple:
         """The arrays that a step changes besides those of the contact."""
-        return self.state, self.ledger
+        faces = self.faces
+        return self.state, self.ledger, *faces[:-1], *(faces.stops if self.model.joints else ())
 
     def _judge(self, status: int) -> None:
         if status == 1:
@@ -324,6 +368,9 @@ class Run:
         if status == 3:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = f"the motion is not finite at step {self.done}; raise accuracy.steps_per_cycle"
+        if status == UNFIT:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = f"no contact set fits the motion at step {self.done}; raise accuracy.steps_per_cycle"
 
     def _snapshot(self, row) -> dict:
         n = 2 * self.modes.omega.size
@@ -339,20 +386,22 @@ class Run:
 
     def watched(self, rows) -> tuple:
         """Slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in booked rows."""
-        n = 2 * self.modes.omega.size
-        return rows[:, n + 1:n + 2], rows[:, n + 3:n + 4]
+        n, parts = 2 * self.modes.omega.size, self._elements(rows)
+        return np.column_stack([rows[:, n + 1], parts[:, :, 1]]), np.column_stack([rows[:, n + 3], parts[:, :, 3]])
 
     def motion(self) -> float:
         """Kinetic and elastic energy of the modes [J]."""
         return 0.5 * self.modes.mass * float(np.sum(self.state[1]**2 + (self.modes.omega * self.state[0])**2))
 
     def strained(self) -> float:
-        """Energy stored in the interface [J]."""
-        n = 2 * self.modes.omega.size
-        rows = np.empty((1, n + 7))
-        self.hub.march(self.model.kind, 0, 0, self.state, self.plant, np.zeros((1, 1)), self.contact, 1.0, np.inf,
-                       np.zeros(9), rows)
-        return float(rows[0, n + 5])
+        """Energy stored in what rubs, in springs and in the contact that presses [J]."""
+        n, rows = 2 * self.modes.omega.size, np.zeros((1, self.width))
+        self.hub.march(self.model, 0, 0, self.state, self.plant, np.zeros((1, 1)), self.contact, self.faces,
+                       self._load(0), np.inf, np.zeros(9), rows)
+        springs = [one.potential(part[0]) for one, part in zip(self.model.joints, self._elements(rows)[0])
+                   if one.potential is not None]
+        normal = rows[0, -3] if self.model.loading else 0.0  # of the preloaded contact
+        return float(rows[0, n + 5] + normal + sum(springs))
 
     def book(self) -> dict:
         """The energy ledger [J]."""

@@ -1,5 +1,6 @@
 """From a law under its load to the arrays of a contact in the compiled loops."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,15 +12,30 @@ from ...friction.laws.stretch import bonds_of, growth_numbers, points_element
 from ...friction.laws.tanh import Rate
 from ...friction.protocol import Element
 from ..contacts import arrays
+from ..contacts.dispatch import COULOMB
 
 HERE = "dynamics.contacts"
+ELEMENTS = f"{HERE}.element_kernels"
 LANES = 16  # points that compiled loops take at once: fewer left over are one after the other
-SET_VALUED = f"{HERE}.coulomb_kernels"  # the contact without a slope
+IDLE = ELEMENTS, "friction.laws.elastic_plastic_kernels"  # kind of a contact that nothing asks
 
 
 def load_kernels(say=None):
     """The hub of the march, `hub`; `say` is told when its loops have to be compiled first."""
     return load("dynamics.march.hub", say)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Joint:
+    """A law on one port.
+
+    port: row of slides; element: the law under its load; potential: energy [J] of a slide [m] of a spring, None for
+    friction.
+    """
+
+    port: int
+    element: Element
+    potential: Callable | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -41,6 +57,8 @@ class ContactModel:
     element: Element | None = None
     tuple_of: type = arrays.Element
 
+    loading = ""  # the load stays
+
     @property
     def kind(self) -> tuple:
         """(contact, law): what the hub takes an instance of its loop for."""
@@ -49,7 +67,17 @@ class ContactModel:
     @property
     def set_valued(self) -> bool:
         """Whether the contact holds without any stretch."""
-        return self.contact == SET_VALUED
+        return self.law == COULOMB
+
+    @property
+    def laws(self) -> tuple:
+        """Modules of the compiled laws of `joints`."""
+        return (COULOMB,) if self.set_valued else ()
+
+    @property
+    def joints(self) -> tuple:
+        """Elements in place of the contact: a set-valued one, as all that hold are solved together."""
+        return (Joint(0, self.element),) if self.set_valued else ()
 
     def shown(self, contact) -> dict:
         """What a picture of the interface needs of the memory: "stretch" (t,) of elements, or "bonds" (4 or 5, m)."""
@@ -73,8 +101,12 @@ def element_model(element: Element, reduction=None) -> ContactModel:
     bound = element.limit if element.bounded else np.inf
     fields = {"num": element.numbers[None], "mem": element.memory[None], "last": np.zeros(2), "eps": np.zeros(1),
               "bound": [bound]}
-    contact = f"{HERE}.element_kernels" if element.kernels else SET_VALUED
-    return ContactModel(contact, element.limit, fields, element.length, element.kernels, reduction, element)
+    return ContactModel(ELEMENTS, element.limit, fields, element.length, element.kernels or COULOMB, reduction, element)
+
+
+def free_model() -> ContactModel:
+    """A contact that rubs nothing."""
+    return jenkins_model([0.0], [1.0])
 
 
 def coulomb_model(static: float, kinetic: float) -> ContactModel:

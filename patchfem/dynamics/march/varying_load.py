@@ -12,14 +12,18 @@ import numpy as np
 
 from ...compiled import load as compiled
 from ...contact.contact_sets import ContactSets, sides
-from ...core import ModalBasis, Outcome, PatchfemError, Response
+from ...core import ModalBasis, PatchfemError, Response
 from ...effects import unbuilt
+from ...friction.laws.coulomb import Coulomb
 from ...friction.laws.stretch import growth_numbers
+from ...friction.laws.tanh import Rate
 from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
-from ..contacts.arrays import Rub, sheared
-from .march import GOAL, Run
+from ..contacts import arrays
+from ..contacts.dispatch import COULOMB as COULOMB_LAW
+from .faces import GOAL
+from .march import Run
 from .march import march as run
-from .models import coulomb_model
+from .models import IDLE, Joint, element_model
 
 COULOMB, PLASTIC, POINTS, RATE = 0, 1, 2, 4
 FLOOR = 1.0  # least pressure of a node in the weights of the shear modes, over the mean of the preload
@@ -28,8 +32,8 @@ PRESS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Rubbing:
-    """A law of friction under a load that changes: kind and numbers as in `varying_friction_kernels`; static: mu_s,
-    which times the preload is the scale of the residuals."""
+    """A law of friction under a load that changes: its kind and the first numbers of `contacts.arrays.Rub`, v_0 of a
+    rate law in place of mu_k; static: mu_s, which times the preload is the scale of the residuals."""
 
     kind: int
     static: float
@@ -94,6 +98,20 @@ def contact_frequencies(modes: ModalBasis, sets: ContactSets) -> np.ndarray:
     return np.sqrt(np.maximum(np.linalg.eigvalsh(np.diag(modes.omega**2) + rows.T @ hessian @ rows / modes.mass), 0))
 
 
+def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
+    """The fields of a fresh `contacts.arrays.Rub`, as a tuple: points under the nodal forces normal (m,) [N].
+
+    shear: ShearModes on the points, None of pieces that are rigid in shear; limit [N]: scale of the residuals.
+    """
+    memory, size, plastic = np.zeros((3, normal.size)), normal.size, law.kind == PLASTIC
+    memory[1 if plastic else 0] = normal if plastic else normal * law.force[3]
+    psi, kappa = (np.zeros((size, 0)), ()) if shear is None else (shear.shape, shear.stiffness)
+    weight = np.full(size, law.static / (1.0 if plastic else law.length))
+    return (np.array([*law.force, law.kind, GOAL * limit]), memory, normal.copy(), normal.copy(),
+            np.array(psi.T, order="C"), np.arange(size),
+            *arrays.sheared(weight, law.length, law.growth, psi, kappa).values())
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class VaryingLoadModel:
     """What `march.march` needs to know: law, contact sets, rows (3, n) of slide, heave and pitch.
@@ -138,9 +156,41 @@ class VaryingLoadModel:
         """The class that marches it."""
         return VaryingLoadRun
 
-    def build(self, hub):
-        """(contact, None) that nothing uses."""
-        return coulomb_model(0.0, 0.0).build()
+    @property
+    def pointed(self) -> bool:
+        """Whether points bear their own share of the load."""
+        return self.law.kind in (PLASTIC, POINTS)
+
+    @property
+    def loading(self) -> str:
+        """How the load is borne, as `hub` names it."""
+        return "points" if self.pointed else "whole"
+
+    @property
+    def laws(self) -> tuple:
+        """Modules of the compiled laws of `joints`."""
+        return (COULOMB_LAW,) if self.set_valued else ()
+
+    @property
+    def joints(self) -> tuple:
+        """The set-valued element, under the preload."""
+        law, load = self.law, self.preload
+        return (Joint(0, Coulomb(law.force[1], law.static).element(load)),) if self.set_valued else ()
+
+    @property
+    def kind(self) -> tuple:
+        """(contact, law) of what rubs beside the joints: what the hub takes an instance of its loop for."""
+        if self.pointed:
+            return "dynamics.contacts.pressed_points_kernels", ""
+        return IDLE if self.set_valued else (IDLE[0], "friction.laws.tanh_kernels")
+
+    def build(self, hub=None) -> tuple:
+        """(contact, None) with arrays of their own, under the preload."""
+        law = self.law
+        if self.pointed:
+            now = np.full(1 if self.load is not None else self.sets.x.size, self.preload)
+            return arrays.Rub(*rub_of(law, now, self.shear, self.limit)), None
+        return element_model(Rate(law.static, law.force[1] if law.kind == RATE else 1.0).element(self.preload)).build()
 
     def shown(self, contact) -> dict:
         """Nothing: its memory is that of the run."""
@@ -179,45 +229,27 @@ def model_of(modes: ModalBasis, law: Rubbing, sets: ContactSets | None, load=Non
 class VaryingLoadRun(Run):
     """The arrays of a march under a load that varies, and its clock."""
 
-    def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
-        self.loop, self.press = compiled("dynamics.march.varying_load_kernels"), compiled("contact.press_kernels")
-        super().__init__(modes, drive, model, steps_per_cycle, travel, hub, start)
-        law, sets = model.law, model.sets
-        arrays = sets.arrays() if model.load is None else _one_point(model.preload)
-        x = arrays["x"]
-        self.sets = self.press.SetArrays(**arrays)
-        self.ports = self.loop.Ports(np.ascontiguousarray(model.rows, float), self.prop.beta.copy(),
-                                     float(np.ptp(x) / 2) or 1.0)
-        now, slot = np.full(x.size, model.preload), 0
+    def _pressing(self) -> arrays.Pressing:
+        """The load at the start, and what rubs under it; the contact sets stand apart, for any run may ask them."""
+        model, press = self.model, compiled("contact.press_kernels")
+        parts = model.sets.arrays() if model.load is None else _one_point(model.preload)
+        x, slot = parts["x"], 0
+        self.sets, now = press.SetArrays(**parts), np.full(x.size, model.preload)
         if model.load is None:
             heave, turn = model.rows[1:] @ self.state[0]
-            slot = self.press.locate(self.sets, self.press.begin(self.sets, sets.name(arrays)), -heave, turn)
-            self.press.press_state(self.sets, slot, -heave, turn, now)
-        self.slot, memory = np.array([slot]), np.zeros((3, x.size))
-        memory[1 if law.kind == PLASTIC else 0] = now * (1.0 if law.kind == PLASTIC else law.force[3])
-        psi, kappa = (np.zeros((x.size, 0)), ()) if model.shear is None else (model.shear.shape, model.shear.stiffness)
-        weight = np.full(x.size, law.static / (law.length if law.kind == POINTS else 1.0))
-        self.rub = Rub(
-            np.array(law.force, float), memory, now.copy(), now, np.array(psi.T, order="C"), np.arange(x.size),
-            **sheared(weight, law.length, law.growth, psi, kappa))
-        self.held, self.room = np.zeros(3), (np.empty(30), np.empty((3, modes.omega.size)))
-        self.width += 5
-        self.ledger[0] += self.strained()
+            slot = press.locate(self.sets, press.begin(self.sets, model.sets.name(parts)), -heave, turn)
+            press.press_state(self.sets, slot, -heave, turn, now)
+        if model.pointed:
+            self.contact = arrays.Rub(*rub_of(model.law, now, model.shear, model.limit))
+        return arrays.Pressing((), np.ascontiguousarray(model.rows, float), self.prop.beta.copy(),
+                               np.array([float(np.ptp(x) / 2) or 1.0]), np.array(model.law.force[:2]), now, np.zeros(0),
+                               np.array([slot]), np.zeros(1), np.zeros(22))
 
-    def fork(self, drive):
-        """As of a Run; the contact sets are shared, which any run may ask."""
-        twin = super().fork(drive)
-        twin.rub = type(self.rub)(*(array.copy() for array in self.rub))
-        return twin
-
-    def _steps(self, count: int, rows) -> tuple:
-        table, row = self.table(count)
-        model, loads = self.model, np.zeros(0)
-        if model.load is not None:
-            loads = np.array(model.load((self.done + np.arange(count + 1)) * self.prop.dt), float)
-        return self.loop.march(row, count, self.state, self.held, self.slot, self.plant, self.ports, table,
-                               model.law.kind, self.rub, self.sets, loads, GOAL * model.limit, float(self.travel),
-                               self.room, self.ledger, rows)
+    def _load(self, count: int) -> arrays.Pressing:
+        loads = self.load.loads
+        if self.model.load is not None:
+            loads = np.array(self.model.load((self.done + np.arange(count + 1)) * self.prop.dt), float)
+        return self.load._replace(sets=self.sets, loads=loads)
 
     def _parts(self, rows) -> np.ndarray:
         """As of a Run; the noise is that of the largest force, of the slide's last digit (a sum over the modes) and of
@@ -232,30 +264,13 @@ class VaryingLoadRun(Run):
             + 1e-14 * np.maximum(rows[:-1, n + 5], rows[1:, n + 5])
         return np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])
 
-    def _judge(self, status: int) -> None:
-        super()._judge(status)
-        if status == 4:
-            self.outcome = Outcome.NOT_CONVERGED
-            self.message = f"no contact set fits the motion at step {self.done}; raise accuracy.steps_per_cycle"
-
     def _snapshot(self, row) -> dict:
-        rub = self.rub
-        return super()._snapshot(row) | {"heave": row[-2], "turn": row[-1], "nodal": rub.now.copy(), "b": rub.b.copy(),
-                                         "memory": rub.memory.copy(), "bend": rub.b @ rub.modes}
-
-    def strained(self) -> float:
-        """Energy of the preloaded contact and of what stretches in it [J]."""
-        law, (top, bottom, square), out = self.model.law, self.rub.memory, 0.0
-        if self.model.load is None:
-            heave, turn = self.model.rows[1:] @ self.state[0]
-            slot = self.press.locate(self.sets, int(self.slot[0]), -heave, turn)
-            out = self.press.press_state(self.sets, slot, -heave, turn, np.zeros(top.size))[2]
-        if law.kind == PLASTIC:
-            on = bottom > 0
-            out += law.static * law.length / 2 * float(np.sum(top[on]**2 / bottom[on]))
-        elif law.kind == POINTS:
-            out += law.static / law.length / 2 * float(square.sum())
-        return float(out) + float(self.rub.kappa @ self.rub.b**2) / 2
+        nodal = self.load.now.copy()
+        found = {"b": np.zeros(0), "memory": np.zeros((3, nodal.size)), "bend": 0.0}
+        if self.model.pointed:
+            c = self.contact
+            found = {"b": c.b.copy(), "memory": c.memory.copy(), "bend": c.b @ c.modes}
+        return super()._snapshot(row) | {"heave": row[-2], "turn": row[-1], "nodal": nodal} | found
 
     def book(self) -> dict:
         """The energy ledger [J], contact sets made, pivots, tableaus made anew."""

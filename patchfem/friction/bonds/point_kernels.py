@@ -200,3 +200,28 @@ def _primitive(v, floor):
     if abs(v) < floor:
         return v / floor
     return (1 + log(abs(v) / floor)) * (1.0 if v > 0 else -1.0)
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def bond_end(m, z, dq, sigma, eps):
+    """(stretch sum, slope) of one point at the end of the slide dq (z of `bond_step`)."""
+    g = 1.0 if dq > 0 else -1.0
+    x = abs(dq) / eps
+    f1, _, e = shape(x)
+    young = sigma - m
+    z1 = z * e + g * eps * (sigma * x * f1 - young * x * e)
+    return z1, sigma - young * e - g * z1 / eps
+
+
+@njit(error_model="numpy", **LEAN)
+def press_point(m, z, s2, s0, s1, initial, length):
+    """Bonds of one point after a change of its load at rest (twin: `recursion.pressed`)."""
+    if s1 >= s0:
+        return m + initial * (s1 - s0), z, s2
+    left = m * s1 / s0
+    least = z * z / s2 if s2 > 0 else 0.0
+    keep = left / least if least > left else 1.0
+    bound = length * s1
+    if keep * abs(z) > bound:
+        keep = bound / abs(z)
+    return left, z * keep, s2 * keep

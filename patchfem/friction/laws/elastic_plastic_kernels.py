@@ -1,15 +1,19 @@
 """Compiled elastic-plastic elements side by side (3.12 with its reversal). Twin: `elastic_plastic.ElasticPlastic`.
 
+A point under a load that changes has a traction over mu and springs of that density (twin: `ElasticPlastic.press` and
+`step`); it stretches and slips as one of the elements does.
+
 num: number t of elements, their stiffness (t,) [N/m], their yield slide (t,) [m]; mem: force [N], stored energy [J] and
 stretch [m] averaged with stiffness * yield slide, then the stretch (t,) of every element [m].
 """
 
-from math import sqrt
+from math import exp, sqrt
 
 from ...compiled.inner import njit
 from ..flags_kernels import FAST, LEAN, middle
 
-__all__ = ["at_end", "closed", "commit", "mean", "middle", "state"]
+__all__ = ["at_end", "closed", "commit", "mean", "middle", "press_springs", "pulled", "spring_end", "spring_mean",
+           "spring_step", "state"]
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
@@ -102,3 +106,37 @@ def state(num, mem, e, q, v):
     """(force [N], stored energy [J], irreversible part of the slide [m]) of a contact as it stands at the slide q
     [m]."""
     return mem[e, 0], mem[e, 1], q - mem[e, 2]
+
+
+@njit(error_model="numpy", **LEAN)
+def press_springs(y, springs, sigma):
+    """(traction/mu, springs) of one point under another load (twin: `ElasticPlastic.press`)."""
+    return min(max(y, -sigma), sigma), max(springs, sigma) if sigma > 0 else 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def spring_mean(y, springs, sigma, dq, length):
+    """(path-mean traction/mu [N], its slope [N/m]) of one point under the load `sigma` over a slide dq [m]."""
+    rate = springs / length
+    if abs(rate * dq) < 1e-290:
+        return y, 0.5 * rate
+    _, area, elastic = pulled(y, rate * dq, sigma)
+    part = elastic / (rate * dq)
+    return area / (rate * dq), 0.5 * rate * part * part
+
+
+@njit(error_model="numpy", **LEAN)
+def spring_end(y, springs, sigma, dq, length):
+    """(traction/mu [N], slope [N/m]) of one point at the end of the slide dq [m]."""
+    end, _, elastic = pulled(y, springs / length * dq, sigma)
+    return end, springs / length if elastic == springs / length * dq else 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def spring_step(y, springs, sigma, dq, length):
+    """(traction/mu, springs) of one point after the slide dq [m] under the load `sigma`: those beyond it break."""
+    move = springs * dq / length
+    end, _, elastic = pulled(y, move, sigma)
+    part = elastic / move if move != 0 else 1.0
+    left = min(sigma, springs)
+    return end, left + (springs - left) * exp(-(1 - part) * abs(dq) / length)

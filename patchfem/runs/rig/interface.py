@@ -96,7 +96,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
     """
     f, soft = model.friction, model.soft
     if f is None:
-        return models.coulomb_model(0.0, 0.0)
+        return models.free_model()
     if model.rig.load_varies:
         from .varying_load import model_of
 

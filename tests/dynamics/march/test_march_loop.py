@@ -7,6 +7,7 @@ from march_paths import OMEGA, follow, one_mode
 from scipy.integrate import solve_ivp
 
 from patchfem.core import BaseSine, ModalBasis, Outcome
+from patchfem.dynamics.contacts.arrays import Alone, Steady
 from patchfem.dynamics.march.march import GOAL, march, plant_of
 from patchfem.dynamics.march.models import jenkins_model, list_model, load_kernels, points_model
 from patchfem.dynamics.propagator import propagator
@@ -284,7 +285,7 @@ def release(basis, model, start, steps_per_cycle, count):
     contact, _ = model.build(hub)
     state = np.zeros((2, basis.omega.size))
     state[0] = start
-    plant, table = plant_of(basis, prop), prop.tables(drive, 0, 1)
+    plant, table, alone = plant_of(basis, prop), prop.tables(drive, 0, 1), Alone(np.array([GOAL * model.limit]))
     ledger, rows = np.zeros(9), np.zeros((2, 2 * basis.omega.size + 7))
 
     def energy():
@@ -299,7 +300,7 @@ def release(basis, model, start, steps_per_cycle, count):
 
     history = [energy()]
     for _ in range(count):
-        done, status = hub.march(model.kind, 0, 1, state, plant, table, contact, GOAL * model.limit, np.inf, ledger,
+        done, status = hub.march(model, 0, 1, state, plant, table, contact, alone, Steady(np.zeros(0)), np.inf, ledger,
                                  rows)
         assert (done, status) == (1, 0)
         history.append(energy())

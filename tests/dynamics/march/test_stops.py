@@ -5,11 +5,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from patchfem.core import BaseSine, ModalBasis
-from patchfem.dynamics.contacts.stop_kernels import inside, through
+from patchfem.dynamics.contacts.arrays import Stops
 from patchfem.dynamics.events.histories import simulate
-from patchfem.dynamics.march import loop_kernels, varying_load
+from patchfem.dynamics.march import stops_kernels as stops
+from patchfem.dynamics.march import varying_load
 from patchfem.dynamics.march.march import march, plant_of
 from patchfem.dynamics.march.models import coulomb_model
+from patchfem.dynamics.modal_kernels import ended
 from patchfem.dynamics.propagator import propagator
 
 
@@ -75,10 +77,20 @@ def test_exact_a_slide_that_holds_has_no_speed():
     assert np.abs(r.force).max() <= 0.1 * (1 + 1e-12) and closes(done)[0] < 1e-11
 
 
+def face(free, rate, start, give, static, kinetic, rest):
+    """A set-valued face at the start of a step: free slide and speed, speed at the start, what a newton takes from
+    slide, speed and acceleration, limits (2,) at the ends of the step, whether it rests."""
+    limit = np.array([[static[0]], [kinetic[0]], [static[1]], [kinetic[1]]])
+    s = Stops(np.zeros(1, np.int64), np.zeros(1, np.int64), limit, np.array(give).reshape(3, 1, 1),
+              np.ones((1, 1)), np.zeros((1, 1)), np.zeros((18, 1)))
+    s.field[[stops.FREE, stops.RATE, stops.START, stops.REST], 0] = free, rate, start, rest
+    return s
+
+
 def test_always_a_step_takes_energy_and_no_more_than_static_friction():
-    """Slides, speeds and friction at random, stiff or soft beside the step: work plus blow >= 0, |mean force| <= mu_s
-    N."""
-    rng = np.random.default_rng(8)
+    """Slides, speeds and friction at random, stiff or soft beside the step: where stops are found and their work is not
+    below 0, work plus blow is that work, the face moves as its forces say, |mean force| <= mu_s N."""
+    rng, found = np.random.default_rng(8), 0
     for _ in range(4000):
         dt, share = 10 ** rng.uniform(-3, 0), 10 ** rng.uniform(-2, 2)
         beta, gamma = share * dt * dt / 2 * rng.uniform(0.1, 1.1), share * dt * rng.uniform(0.1, 1.1)
@@ -88,14 +100,22 @@ def test_always_a_step_takes_energy_and_no_more_than_static_friction():
         rest = bool(rng.integers(2))
         free = (0.0 if rest else v * dt) + beta * rng.normal() * 2
         rate = (0.0 if rest else v) + gamma * rng.normal() * 2
-        top = rng.choice([np.inf, rng.normal()])
-        dq, speed, held = through(free, rate, beta, gamma, share, v, dt, s0, s1, k0, k1, rest, top)
-        used = (free - dq) / beta
-        end = rate - gamma * used
+        one = face(free, rate, v, (beta, gamma, share), (s0, s1), (k0, k1), rest)
+        if not (stops.stays(one) or stops.watched(dt, one)) or not stops.met(one):
+            continue
+        work = stops.blows(one)
+        dq, used, speed = one.field[[stops.DQ, stops.MEAN, stops.SPEED], 0]
+        motion = np.array([[0.0], [rate - gamma * used]])
+        end = motion[1, 0]
+        lost = stops.struck(motion, 1 / share, one)
         noise = 1e-13 * (abs(used * free) + end * end / share)
         assert abs(used) <= max(s0, s1) * (1 + 1e-9) + 1e-13 * abs(free) / beta
-        assert used * dq + (end * end - speed * speed) / (2 * share) >= -noise
-        assert not held or speed == 0.0
+        assert dq == pytest.approx(free - beta * used, abs=1e-13 * abs(free))
+        assert work == pytest.approx(used * dq + lost, abs=1e-9 * abs(work) + noise)
+        assert motion[1, 0] == pytest.approx(speed, abs=1e-12 * (abs(end) + abs(speed)))
+        assert one.field[stops.WAY, 0] != 0.0 or speed == 0.0
+        found += work >= 0
+    assert found > 1500
 
 
 def by_small_steps(v, h, s, k, gain, rest, count=5_000):
@@ -115,18 +135,21 @@ def by_small_steps(v, h, s, k, gain, rest, count=5_000):
 
 
 def test_exact_slide_inside_a_step_is_that_of_small_steps():
-    rng = np.random.default_rng(5)
-    events = 0
+    rng, turned = np.random.default_rng(5), 0
     for _ in range(30):
         v, gain, rest = rng.normal(), rng.uniform(0.5, 5.0), bool(rng.integers(2))
         h, s = rng.normal(size=2) * 2, rng.uniform(0.2, 1.5, 2)
         k = s * rng.uniform(0, 1)
-        slide, speed, held, count = inside(v, *h, *s, *k, gain, rest)
+        one = face(0.0, 0.0, v, (0.5, 1.0, gain), s, k, rest)
+        v = 0.0 if rest else v
+        way = np.sign(v)
+        one.field[[stops.FIRST, stops.LAST, stops.SPEED, stops.WAY, stops.SLIDES], 0] = *h, v, way, abs(way)
+        assert stops.followed(1.0, one)
         want = by_small_steps(v, h, s, k, gain, rest)
-        assert (slide, speed) == pytest.approx(want[:2], abs=4e-3 * gain)
-        assert held == want[2]
-        events += count
-    assert events > 30
+        assert one.field[[stops.SLIDE, stops.SPEED], 0] == pytest.approx(want[:2], abs=4e-3 * gain)
+        assert (one.field[stops.WAY, 0] == 0.0) == want[2]
+        turned += one.field[stops.WAY, 0] != way
+    assert turned > 10
 
 
 def by_events(drive, load, static, kinetic, at):
@@ -202,10 +225,16 @@ def test_exact_force_that_holds_at_the_end_of_a_step(coupled):
 
     end = (at + 1) * prop.dt
     done = solve_ivp(rates, (at * prop.dt, end), motion.ravel(), "DOP853", rtol=1e-12, atol=1e-16)
-    z, v = done.y[:, -1].reshape(2, n)
+    z, v = done.y[:, -1].reshape(2, n).copy()
     v -= slide * (slide @ v) / (slide @ slide)
     need = slide @ pull(end, z, v) * mass / (slide @ slide)
-    plant, room = plant_of(modes, prop), np.zeros((3, n))
-    assert loop_kernels.held_force(motion, plant, table, at, used, room[0]) == pytest.approx(need, rel=1e-9)
+    plant, room, out = plant_of(modes, prop), np.zeros((3, n)), np.zeros((2, n))
+    ended(motion, plant.free, plant.push, plant.dense, table, at, -slide * used / mass, out)
+    assert out == pytest.approx(done.y[:, -1].reshape(2, n), rel=1e-9)
+    one = face(0.0, 0.0, 0.0, (1.0, 1.0, slide @ slide / mass), (1e9, 1e9), (1.0, 1.0), True)._replace(rows=slide[None])
     there = float(drive.values(np.array([end]))[0])
-    assert loop_kernels.holding(np.array([z, v]), plant, there, room[0], room[1:]) == pytest.approx(need, rel=1e-12)
+    for rate in (out[1].copy(), v):  # as it moves, and brought to rest
+        moved, accel = np.array([z, rate]), np.zeros(n)
+        assert stops.stays_to_the_end(moved, plant, there, accel, room[1:], one)
+        assert one.field[stops.FOUND, 0] == pytest.approx(need, rel=1e-9)
+        assert slide @ moved[1] == pytest.approx(0.0, abs=1e-12)

@@ -162,8 +162,8 @@ def test_always_nothing_creates_energy(name, seed, steps):
 
 def test_exact_twins_of_the_points():
     """Compiled points under a changing load against the laws of a bench."""
-    kernels, rng = load("dynamics.march.varying_friction_kernels"), np.random.default_rng(3)
-    points = load("dynamics.contacts.shear_points_kernels")
+    points, rng = load("friction.laws.elastic_plastic_kernels"), np.random.default_rng(3)
+    press_point = load("friction.bonds.point_kernels").press_point
     law, other = Bonds(0.3, 1e-6, initial=0.4), ElasticPlastic(0.3, 1e-6)
     bonds, springs = Recursion(law), other.start(np.array([2.0]))
     state = bonds.start(np.array([2.0]))
@@ -172,10 +172,10 @@ def test_exact_twins_of_the_points():
     for _ in range(200):
         after = max(rng.normal() + 1.5, 0.0)
         dq = rng.normal() * 1e-6
-        one = np.array(kernels.press_point(*one, at, after, 0.4, 1e-6))
+        one = np.array(press_point(*one, at, after, 0.4, 1e-6))
         assert one == pytest.approx(pressed(law, state.bonds, np.array([at]), np.array([after]))[:, 0], rel=1e-13)
         state = bonds.press(state, np.array([at]), np.array([after])).state
-        two = kernels.press_springs(*two, after)
+        two = points.press_springs(*two, after)
         springs = other.press(springs, np.array([at]), np.array([after])).state
         assert two == pytest.approx(springs[:, 0], rel=1e-13)
         if after > 0:
@@ -185,7 +185,7 @@ def test_exact_twins_of_the_points():
             assert 0.3 * mean[0] == pytest.approx(moved.mean[0], rel=1e-12, abs=1e-15)
             assert mean[1] == pytest.approx((near[0] - mean[0]) / (dq * 1e-6), rel=1e-3, abs=1e-3)
             end = points.spring_end(*two, after, dq, 1e-6)[0]
-            two = kernels.spring_step(*two, after, dq, 1e-6)
+            two = points.spring_step(*two, after, dq, 1e-6)
             assert end == pytest.approx(two[0], rel=1e-14)
             springs = moved.state
             assert two == pytest.approx(springs[:, 0], rel=1e-12)

@@ -12,7 +12,7 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import elastic_plastic_kernels as law
 from ..dense_kernels import eliminate, factor, solve
-from .joints_shares_kernels import HOLDS, SLIDE, SLIDES
+from .stops_kernels import HOLDS, SLIDE, SLIDES
 
 
 @njit(error_model="numpy", **LEAN)
@@ -104,7 +104,7 @@ def equations(j, dt, known):
 
     An element that holds asks for no slide, with a trace of give where elements that depend on each other share their
     force in more ways than one; one that slips keeps its force. known: the slides of those that do not slip all the way
-    stand in j.stops instead (`joints_stops_kernels`).
+    stand in j.stops instead (`stops_kernels`).
     """
     count, beta, face = j.forces.size, j.beta, 0
     for e in range(count):

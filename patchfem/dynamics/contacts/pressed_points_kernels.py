@@ -1,54 +1,21 @@
-"""Friction of a rigid slide under a load that changes in time, compiled: its force in a step, its memory.
+"""A contact, `arrays.Rub`, of points under a load that changes in time: elastic-plastic or bonds, each under its own.
 
-Kinds: 0 Coulomb, 4 a force that follows the speed, on the resultant load; 1 elastic-plastic and 2 bonds of the stretch
-reading with p = 1, point by point under the nodal force. As on a bench: half of the change of load, the slide under
-the mean load, the other half. A changing load alone never gives energy, and no point keeps more than mu times its load.
-It leaves the points out of balance with pieces that give way in shear, which a mean alone would keep and turn about in
-every step; so a step ends with the pieces springing back while the holder stands.
+As on a bench: half of the change of load, the slide under the mean load, the other half. A changing load alone never
+gives energy, and no point keeps more than mu times its load. It leaves the points out of balance with pieces that give
+way in shear, which a mean alone would keep and turn about in every step; so a step ends with the pieces springing back
+while the holder stands. Whoever presses the points writes the nodal forces at both ends of the step, `before` and
+`now`. The functions without `rub` in front are those that `march.loop_kernels` asks of every contact.
 """
 
-import numpy as np
-
 from ...compiled.inner import njit
-from ...friction.bonds.point_kernels import bond_step, grow
+from ...friction.bonds.point_kernels import bond_step, grow, press_point
 from ...friction.flags_kernels import LEAN
-from ..contacts.shear_points_kernels import DENSITY, LOAD, PLASTIC, POINTS, SLIDE, SLOPE, SQUARE, STRETCH, respond
-from ..contacts.shear_solve_kernels import descend, halfway, slid, went_on
-from ..modal_kernels import safe_point
+from ...friction.laws.elastic_plastic_kernels import press_springs, spring_step
+from .shear_points_kernels import DENSITY, LOAD, PLASTIC, POINTS, SLIDE, SLOPE, SQUARE, STRETCH, respond
+from .shear_solve_kernels import descend, halfway, slid, went_on
 
-COULOMB, RATE = 0, 4
+MU, MU_KINETIC, LENGTH, INITIAL, KIND, GOAL = range(6)  # of `force`
 TIGHT = 0.01  # share of the goal down to which pieces that give way are solved: their loss is a small difference
-
-
-@njit(error_model="numpy", **LEAN)
-def press_point(m, z, s2, s0, s1, initial, length):
-    """Bonds of one point after a change of its load at rest (twin: `recursion.pressed`)."""
-    if s1 >= s0:
-        return m + initial * (s1 - s0), z, s2
-    left = m * s1 / s0
-    least = z * z / s2 if s2 > 0 else 0.0
-    keep = left / least if least > left else 1.0
-    bound = length * s1
-    if keep * abs(z) > bound:
-        keep = bound / abs(z)
-    return left, z * keep, s2 * keep
-
-
-@njit(error_model="numpy", **LEAN)
-def press_springs(y, springs, sigma):
-    """(traction/mu, springs) of one point under another load (twin: `local.ElasticPlastic`)."""
-    return min(max(y, -sigma), sigma), max(springs, sigma) if sigma > 0 else 0.0
-
-
-@njit(error_model="numpy", **LEAN)
-def spring_step(y, springs, sigma, dq, length):
-    """(traction/mu, springs) of one point after the slide dq under `sigma`."""
-    move = springs * dq / length
-    y1 = y + move
-    bound = min(max(y1, -sigma), sigma)
-    part = 1.0 if bound == y1 else (bound - y) / move
-    left = min(sigma, springs)
-    return bound, left + (springs - left) * np.exp(-(1 - part) * abs(dq) / length)
 
 
 @njit(error_model="numpy", **LEAN)
@@ -72,8 +39,6 @@ def load_points(part, rub):
 @njit(error_model="numpy", **LEAN)
 def press_all(kind, rub):
     """The memory after half of the change of load, and the mean load, in the points."""
-    if kind == COULOMB or kind == RATE:
-        return
     load_points(0.5, rub)
     memory, points = rub.memory, rub.points
     for i in range(rub.count[0]):
@@ -82,15 +47,13 @@ def press_all(kind, rub):
             points[DENSITY, i], points[STRETCH, i] = press_springs(memory[0, j], memory[1, j], points[LOAD, i])
         else:
             points[DENSITY, i], points[STRETCH, i], points[SQUARE, i] = press_point(
-                memory[0, j], memory[1, j], memory[2, j], rub.before[j], points[LOAD, i], rub.force[3], rub.force[2])
+                memory[0, j], memory[1, j], memory[2, j], rub.before[j], points[LOAD, i], rub.force[INITIAL],
+                rub.force[LENGTH])
 
 
 @njit(error_model="numpy", **LEAN)
-def rub_force(dq, kind, rub, mean, dt):
+def rub_force(dq, kind, rub):
     """Path-mean friction force [N] and slope [N/m] of a rigid slide increment."""
-    if kind == RATE:
-        mu, part = rub.force[0], np.tanh(dq / (dt * rub.force[1]))
-        return mu * mean * part, mu * mean * (1 - part * part) / (dt * rub.force[1])
     slid(dq, rub.b, rub)
     force, slope = respond(kind, False, rub), 0.0
     for i in range(rub.count[0]):
@@ -99,51 +62,48 @@ def rub_force(dq, kind, rub, mean, dt):
 
 
 @njit(error_model="numpy", **LEAN)
-def rub_solve(free, beta, v0, dt, kind, rub, mean, goal, guess):
-    """Slide increment with dq = free - beta F(dq) under the mean load. Returns (dq, F, iterations), < 0: failed."""
+def solve(free, beta, q, v, dt, c, goal):
+    """(dq, path-mean force, iterations) of a step with dq = free - beta force under the mean load, dq = free for beta =
+    0; iterations < 0 when it failed."""
+    kind = int(c.force[KIND])
     if kind == POINTS:
-        halfway(v0, dt, rub)
-    if rub.b.size:
-        if beta == 0.0:
-            rub.y[0, 0] = free
-        force, count = descend(free, beta, kind, False, rub, TIGHT * goal)
-        return rub.y[0, 0], (free - rub.y[0, 0]) / beta if beta > 0.0 else force, count
+        halfway(v, dt, c)
+    press_all(kind, c)
     if beta == 0.0:
-        return free, rub_force(free, kind, rub, mean, dt)[0] if kind != COULOMB else 0.0, 1
-    if kind == COULOMB:
-        if abs(free) <= beta * rub.force[0] * mean:
-            return 0.0, free / beta, 1
-        force = rub.force[1] * mean * (1.0 if free > 0 else -1.0)
-        return free - beta * force, force, 1
-    dq = free - beta * guess
-    force, slope = rub_force(dq, kind, rub, mean, dt)
-    low, high = -np.inf, np.inf
-    for count in range(1, 200):
-        miss = dq - free + beta * force
-        if abs(miss) <= 1e-3 * goal * beta or abs(miss) <= 4e-16 * (abs(free) + beta * abs(force)):
-            return dq, (free - dq) / beta, count
-        if miss > 0:
-            high = dq
-        else:
-            low = dq
-        dq -= miss / (1 + beta * max(slope, 0.0))
-        if count > 8:
-            bound = beta * (1.5 * rub.force[0] * mean + abs(force))
-            dq = safe_point(max(low, free - bound), min(high, free + bound), dq)
-            if count > 40 and count % 2:
-                dq = 0.5 * (max(low, free - bound) + min(high, free + bound))
-            if high - low <= 4e-16 * (abs(free) + bound):
-                return dq, (free - dq) / beta, count if abs(miss) <= goal * beta else -count
-        force, slope = rub_force(dq, kind, rub, mean, dt)
-    return dq, (free - dq) / beta, -200
+        c.y[0, 0] = free
+    force, count = descend(free, beta, kind, False, c, TIGHT * goal)
+    return c.y[0, 0], (free - c.y[0, 0]) / beta if beta > 0.0 else force, count
+
+
+@njit(error_model="numpy", **LEAN)
+def given(dq, q, v, dt, c, goal):
+    """(path-mean force [N], whether it was found) over a slide increment dq [m] that is prescribed."""
+    _, force, count = solve(dq, 0.0, q, v, dt, c, goal)
+    return force, count >= 0
+
+
+@njit(error_model="numpy", **LEAN)
+def commit(dq, force, q, v0, v1, dt, c):
+    """Move points and pieces by the solved step; (energy dissipated [J], that of the changing load and of what springs
+    back included, whether the pieces came to balance)."""
+    kind = int(c.force[KIND])
+    lost = rub_commit(dq, force, v0, v1, dt, kind, c)
+    if c.b.size == 0:
+        return lost, True
+    more, count = spring_back(kind, c, c.force[GOAL])
+    return lost + more, count >= 0
+
+
+@njit(error_model="numpy", **LEAN)
+def state(c, q, v):
+    """(friction force [N], stored energy [J], irreversible slip [m]) as they stand at the slide q [m]."""
+    return rub_state(int(c.force[KIND]), c, q)
 
 
 @njit(error_model="numpy", **LEAN)
 def rub_commit(dq, used, v0, v1, dt, kind, rub):
     """Move the memory by the solved step; returns the energy dissipated [J], that of the changing load included."""
-    if kind == COULOMB or kind == RATE:
-        return used * dq
-    length, memory, points = rub.force[2], rub.memory, rub.points
+    length, memory, points = rub.force[LENGTH], rub.memory, rub.points
     lost = used * dq + held_energy(kind, rub) if kind == PLASTIC else 0.0
     for i in range(rub.count[0]):
         j, load, xi = rub.under[i], points[LOAD, i], points[SLIDE, i]
@@ -153,7 +113,8 @@ def rub_commit(dq, used, v0, v1, dt, kind, rub):
         else:
             lost += 0.5 * rub.weight[i] * (memory[2, j] - points[SQUARE, i])
             m, z, s2, part = bond_step(points[DENSITY, i], points[STRETCH, i], points[SQUARE, i], xi, load, rub.eps[1])
-            memory[0, j], memory[1, j], memory[2, j] = press_point(m, z, s2, load, rub.now[j], rub.force[3], length)
+            memory[0, j], memory[1, j], memory[2, j] = press_point(m, z, s2, load, rub.now[j], rub.force[INITIAL],
+                                                                   length)
             lost += 0.5 * rub.weight[i] * (part + s2 - memory[2, j])
     went_on(rub)
     if kind == PLASTIC:
@@ -176,7 +137,7 @@ def spring_back(kind, rub, goal):
     for i in range(rub.count[0]):
         j, load, xi = rub.under[i], points[LOAD, i], points[SLIDE, i]
         if kind == PLASTIC:
-            a, b = spring_step(memory[0, j], memory[1, j], load, xi, rub.force[2])
+            a, b = spring_step(memory[0, j], memory[1, j], load, xi, rub.force[LENGTH])
             memory[0, j], memory[1, j] = press_springs(a, b, load)
         else:
             memory[0, j], memory[1, j], memory[2, j], _ = bond_step(memory[0, j], memory[1, j], memory[2, j], xi, load,
@@ -189,7 +150,7 @@ def spring_back(kind, rub, goal):
 @njit(error_model="numpy", **LEAN)
 def held_energy(kind, rub):
     """Elastic energy of the memory and of the pieces [J]."""
-    out, mu, length, memory = 0.0, rub.force[0], rub.force[2], rub.memory
+    out, mu, length, memory = 0.0, rub.force[MU], rub.force[LENGTH], rub.memory
     for k in range(rub.b.size):
         out += 0.5 * rub.kappa[k] * rub.b[k] * rub.b[k]
     for i in range(rub.count[0]):
@@ -203,11 +164,9 @@ def held_energy(kind, rub):
 
 
 @njit(error_model="numpy", **LEAN)
-def rub_state(kind, rub, q, held):
+def rub_state(kind, rub, q):
     """(friction force [N], stored energy [J], irreversible slip [m]) as they stand."""
-    if kind == COULOMB or kind == RATE:
-        return held, 0.0, q
-    mu, length, memory, points = rub.force[0], rub.force[2], rub.memory, rub.points
+    mu, length, memory, points = rub.force[MU], rub.force[LENGTH], rub.memory, rub.points
     force, slip, total = 0.0, 0.0, 0.0
     load_points(1.0, rub)
     slid(q, rub.b, rub)

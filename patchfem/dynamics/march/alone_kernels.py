@@ -1,0 +1,9 @@
+"""What a loop of `loop_kernels` holds: here one contact under a load that stays. `hub` writes one for other rigs.
+
+Numba leaves out the branches behind what is False, so nothing is compiled that a rig does not have.
+"""
+
+MANY = False  # elements beside the contact, or in place of it
+STOPS = False  # elements that are set-valued
+PRESSED = False  # a load that changes
+POINTED = False  # points that bear their own share of it

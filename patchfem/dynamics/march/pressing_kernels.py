@@ -1,0 +1,211 @@
+"""A load that changes: the normal force and the moment of the contact on the modes, or a load prescribed in time.
+
+Heave h (> 0 away) and pitch t (> 0 opens +x) move the upper holder, so d = -h closes it. Over a step the modes move
+exactly under constant forces. Those of the normal contact are the path mean of its slopes along the straight increment,
+through every contact set on the way, so they do exactly the work E(end) - E(start) (a discrete gradient; McLachlan,
+Quispel, Robidoux, Phil. Trans. R. Soc. A 357, 1999). Friction acts with the path mean of its law under the mean load of
+the step; Coulomb's stops and goes inside it, under a load that changes linearly (`stops_kernels`). So the sum of all
+energies never rises by itself. n: `contacts.arrays.Pressing`, c: the contact that rubs, j: Faces of the set-valued one.
+"""
+
+import numpy as np
+
+from ...compiled.inner import njit
+from ...contact.press_kernels import locate, press_state, pull
+from ...contact.press_path_kernels import path_mean
+from ...friction.flags_kernels import LEAN
+from ..contacts import element_kernels as contact
+from ..modal_kernels import free_rate, free_slide
+from . import alone_kernels as parts
+from . import faces_kernels as faces
+
+STOPS, POINTED = parts.STOPS, parts.POINTED
+TIGHT = 0.01  # of the goal, to which friction and normal contact agree
+
+
+@njit(error_model="numpy", **LEAN)
+def place_of(motion, rows, r):
+    """Slide, heave or pitch of the modes."""
+    out = 0.0
+    for i in range(motion.shape[1]):
+        out += rows[r, i] * motion[0, i]
+    return out
+
+
+@njit(error_model="numpy", **LEAN)
+def press_step(n, k0, begin, f1, f2, turn, out):
+    """Heave and pitch of a step: (dh, dt) = (f1, f2) - beta mean slope, by Newton's method with step halving from the
+    guess in `turn` (2,). Returns (set at the end, iterations, residual as a force [N]); `out` as in `path_mean`.
+
+    The slopes have a convex potential, so the answer is unique; inside one set one step finds it.
+    """
+    sets, beta, arm = n.sets, n.beta, n.arm[0]
+    b11, b12, b21, b22 = beta[1, 1], beta[1, 2], beta[2, 1], beta[2, 2]
+    dh, dt = turn[0], turn[1]
+    old_h, old_t, step_h, step_t, part, best = dh, dt, 0.0, 0.0, 1.0, np.inf
+    k = k0
+    for count in range(1, 100):
+        k = path_mean(sets, k0, begin[0], begin[1], dh, dt, out)
+        if k < 0:
+            return k, count, np.inf
+        p1, p2 = b11 * out[0] + b12 * out[1], b21 * out[0] + b22 * out[1]
+        r1, r2 = dh - f1 + p1, dt - f2 + p2
+        size = abs(r1) + arm * abs(r2)
+        noise = 4e-16 * (abs(dh) + abs(f1) + abs(p1) + arm * (abs(dt) + abs(f2) + abs(p2)))
+        turn[0], turn[1] = dh, dt
+        if size <= noise:
+            return k, count, 0.0
+        if size < best * (1 - 0.1 * part) or best == np.inf:
+            best, part, old_h, old_t = size, 1.0, dh, dt
+            j11, j12 = 1 + b11 * out[5] + b12 * out[7], b11 * out[6] + b12 * out[8]
+            j21, j22 = b21 * out[5] + b22 * out[7], 1 + b21 * out[6] + b22 * out[8]
+            det = j11 * j22 - j12 * j21
+            step_h, step_t = (j22 * r1 - j12 * r2) / det, (j11 * r2 - j21 * r1) / det
+        else:
+            part *= 0.5
+            if part < 1e-9 or size <= 64 * noise or (part < 0.2 and best <= 1e3 * noise):
+                turn[0], turn[1] = old_h, old_t
+                k = path_mean(sets, k0, begin[0], begin[1], old_h, old_t, out)
+                return k, count, best / (b11 + b22 / (arm * arm) + 2 / sets.base[4])
+        dh, dt = old_h - part * step_h, old_t - part * step_t
+    return k, 100, best / (b11 + b22 / (arm * arm) + 2 / sets.base[4])
+
+
+@njit(error_model="numpy", **LEAN)
+def pressed(i, last, motion, mass, c, j, n, row):
+    """Load [N], moment [N m], energy [J] of the preloaded contact, heave and pitch at sample i into the last columns of
+    its row; what rubs knows its load. The energy [J]; n.slot < 0 where no contact set fits."""
+    begin, load, moment, m = n.few[17:22], n.few[0], n.sets.base[1], row.size - 5
+    begin[0], begin[1] = place_of(motion, n.rows, 1), place_of(motion, n.rows, 2)
+    begin[2], begin[3], begin[4] = 0.0, 0.0, 0.0
+    if n.loads.size > 0:
+        load = n.loads[i]
+        n.now[0] = load
+    else:
+        n.slot[0] = locate(n.sets, n.slot[0], -begin[0], begin[1])
+        if n.slot[0] < 0:
+            return 0.0
+        begin[2], begin[3], begin[4] = pull(n.sets, n.slot[0], begin[0], begin[1])
+        load, moment = max(n.sets.base[0] - begin[3], 0.0), moment - begin[4]
+        if POINTED or last:
+            press_state(n.sets, n.slot[0], -begin[0], begin[1], n.now)
+    n.few[0] = load
+    row[m], row[m + 1], row[m + 2], row[m + 3], row[m + 4] = load, moment, begin[2], begin[0], begin[1]
+    weigh(load, load, c, j, n)
+    if STOPS:
+        faces.capped(j)
+        pushes(begin[3], begin[4], mass, n, j.beside)
+    return begin[2]
+
+
+@njit(error_model="numpy", **LEAN)
+def weigh(before, after, c, j, n):
+    """Tell what rubs its load at both ends of a step [N]; the nodal forces of points at the later one stand in n.now.
+    """
+    if POINTED:
+        for i in range(n.now.size):
+            c.now[i] = n.now[i]
+    elif STOPS:
+        faces.limited(before, after, n.force, j)
+    else:
+        c.num[0, 1] = n.force[0] * 0.5 * (before + after)
+        c.bound[0] = c.num[0, 1]
+
+
+@njit(error_model="numpy", **LEAN)
+def pushes(heave, pitch, mass, n, accel):
+    """Modal accelerations (n,) under forces that resist heave [N] and pitch [N m]."""
+    for i in range(accel.size):
+        accel[i] = -(n.rows[1, i] * heave + n.rows[2, i] * pitch) / mass
+
+
+@njit(error_model="numpy", **LEAN)
+def pushed(n, mass, accel):
+    """Add the modal accelerations of the mean forces of a step on heave and pitch, n.few[3:5], to accel (n,)."""
+    for i in range(accel.size):
+        accel[i] -= (n.rows[1, i] * n.few[3] + n.rows[2, i] * n.few[4]) / mass
+
+
+@njit(error_model="numpy", **LEAN)
+def rubbed(q, v, force, motion, plant, table, at, c, j, n, goal):
+    """(slide dq [m], mean friction force [N], iterations) of a step under the mean forces force (2,) on heave and
+    pitch; iterations < 0 where it failed."""
+    free = free_slide(motion, plant.reach, 0, table, at) - n.beta[0, 1] * force[0] - n.beta[0, 2] * force[1]
+    if STOPS:
+        pushes(force[0], force[1], plant.mass, n, j.beside)
+        j.free[0] = free
+        if n.beta[0, 0] == 0.0:  # nothing slides
+            return faces.slid(0.0, j), 0.0, 1
+        j.rate[0] = free_rate(motion, plant.slide, plant.free, plant.dense, table, at) \
+            - j.gamma[0, 1] * force[0] - j.gamma[0, 2] * force[1]
+        _, count = faces.solved(q, v, motion, plant, table, at, c, j)
+        return j.dq[0], j.forces[0], count
+    else:
+        return contact.solve(free, n.beta[0, 0], q, v, plant.dt, c, TIGHT * goal)
+
+
+@njit(error_model="numpy", **LEAN)
+def agreed(i, q, v, motion, plant, table, at, c, j, n, goal):
+    """Friction and normal contact over a step from sample i, each under the mean force of the other: (dq [m], mean
+    friction force [N], iterations, < 0 where they disagree); n.slot < 0 where no contact set fits. The mean forces on
+    heave and pitch stand in n.few[3:5].
+
+    Where friction moves heave and pitch too the secant, kept inside its bracket, finds the force that both agree on.
+    """
+    few, beta, load = n.few, n.beta, n.few[0]
+    force, turn, out, begin = few[3:5], few[6:8], few[8:17], few[17:22]
+    given, coupled = n.loads.size > 0, beta[0, 1] != 0 or beta[0, 2] != 0
+    moves = not given and (beta[1, 1] != 0 or beta[2, 2] != 0)
+    heave, pitch = free_slide(motion, plant.reach, 1, table, at), free_slide(motion, plant.reach, 2, table, at)
+    guess, count, wrong, end, bad = n.mean[0], 0, 0.0, n.slot[0], False
+    low, high, last_f, last_r = -np.inf, np.inf, 0.0, np.inf
+    dq, used, after = 0.0, 0.0, load
+    if given:
+        after = n.loads[i + 1]
+        n.now[0] = after
+    if POINTED:
+        for k in range(n.now.size):
+            c.before[k] = c.now[k]
+    for outer in range(1, 81):
+        if moves:
+            end, its, wrong = press_step(n, n.slot[0], begin, heave - beta[1, 0] * guess, pitch - beta[2, 0] * guess,
+                                         turn, out)
+            if end < 0:
+                n.slot[0] = end
+                return dq, used, count
+            force[0], force[1] = out[0], out[1]
+            count += its
+            after = 2 * max(n.sets.base[0] - out[0], 0.0) - load
+            if POINTED:
+                press_state(n.sets, end, -(begin[0] + turn[0]), begin[1] + turn[1], n.now)
+        weigh(load, after, c, j, n)
+        dq, used, its = rubbed(q, v, force, motion, plant, table, at, c, j, n, goal)
+        count += abs(its)
+        bad = its < 0 or wrong > goal
+        miss = used - guess
+        if not (moves and coupled) or abs(miss) <= TIGHT * goal:
+            break
+        if outer == 80 or (high < np.inf and low > -np.inf and high - low <= 4e-16 * (abs(low) + abs(high))):
+            if STOPS:
+                mean = 0.5 * (load + after)
+                if n.force[1] * mean <= abs(guess) <= n.force[0] * mean:
+                    used = guess  # between kinetic and static friction the step starts to slip
+                    dq = faces.slid(used, j)
+                    break
+            bad = bad or abs(miss) > goal
+            break
+        if miss > 0:
+            low = guess
+        else:
+            high = guess
+        following = used
+        if last_r < np.inf and miss != last_r:
+            following = guess - miss * (guess - last_f) / (miss - last_r)
+        last_f, last_r = guess, miss
+        if not (low < following < high) or outer % 8 == 0:
+            following = 0.5 * (low + high) if low > -np.inf and high < np.inf else used
+        guess = following
+    n.mean[0], n.slot[0] = used, end
+    if moves:
+        few[0] = max(n.sets.base[0] - out[3], 0.0)
+    return dq, used, -count if bad else count
