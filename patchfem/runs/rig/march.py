@@ -60,7 +60,7 @@ class Read(Reader):
         return super().solution(run, seconds, drive, prepare=prepare, levels=levels, probe=probe, summed=self.summed(),
                                 extra={"late": self.late(run.window)}, **more)
 
-    def own(self, run) -> dict:
+    def own(self, run, drive, values: dict) -> dict:
         """What the peaks and the end of a run leave open, by name."""
         late, between = self.late(run.window), self.between(run.window)
         return {name: late.get(name, 0.0) + between.get(name, 0.0) for name in late | between}

@@ -1,15 +1,20 @@
 """From a run of any engine to its Solution: measures, sticking, ringing, outcome and levels in one text."""
 
+from dataclasses import replace
+
+import numpy as np
+
 from ...core import Outcome
 from ...dynamics.integrated import Integrated
 from ...dynamics.second_book import sampled_work
 from ...effects import has
 from ...response import run_events
+from ...response.errors import GAPS, change
 from ...response.levels import KEPT, Level
 from ...response.loops import at_turns
 from ...response.measures import slip_noise, window_amplitudes, window_ends
 from ...response.outcome import steady_of
-from ...response.rows import measures_of
+from ...response.rows import measures_of, row_of
 from .solution import Solution, seen
 
 
@@ -59,9 +64,19 @@ class Reader:
             return {}, {}
         return run_events.rings(run.window, self.model.rig.modes, drive, getattr(run, "log", None), self.held)
 
-    def own(self, run) -> dict:
-        """What the run itself leaves open, by name, beside its rings."""
+    def own(self, run, drive, values: dict) -> dict:
+        """What the run itself leaves open of its values by name, beside its rings."""
         return {}
+
+    def sampled(self, run, drive, values: dict) -> dict:
+        """What samples leave open of the values by name of a motion that is exact, by every second of them: nothing of
+        those that the engine integrated."""
+        fewer = self.values(replace(run, window=thinned(run.window)), drive,
+                            ledger=run.response.extra.get("ledger"))
+        own = self.integrated(run, drive)
+        apart = {name: gap for name, gap in change(values, fewer).items() if gap > 0 and name not in GAPS}
+        return {name: row_of(name).halves[0] * gap + row_of(name).halves[1] / self.steps
+                for name, gap in apart.items()} if own.loops else {}
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """The Solution of a run; drive: where it is not the model's; more: other fields of it."""
@@ -73,7 +88,8 @@ class Reader:
         return Solution(values=values, response=run.response, window=run.window,
                         amplitudes=window_amplitudes(run.amplitudes, window),
                         outcome=run.outcome or (Outcome.STUCK if stuck else None), book=run.ledger, seconds=seconds,
-                        contact=self.contact, held=self.held, own=own | self.own(run), extremes=run.amplitudes, **more)
+                        contact=self.contact, held=self.held, own=own | self.own(run, drive, values),
+                        extremes=run.amplitudes, **more)
 
     def level(self, size: float, run, drive=None, left: float = 0.0) -> Level:
         """The Level of a run, or of a mark of it, at one size [m s-2] of the drive; left: relative error of its
@@ -81,6 +97,19 @@ class Reader:
         found = self.values(run, drive)
         kept = {name: found[name] for name in KEPT if name in found}
         return Level(size, self.sticks(run), kept, {name: left * abs(v) for name, v in kept.items()} if left else {})
+
+
+def thinned(window):
+    """A window without every second of its equally spaced samples; its last, and those of events between the others,
+    stay."""
+    place = (window.time - window.time[0]) / np.diff(window.time).max()
+    number = np.round(place).astype(int)
+    kept = (np.abs(place - number) > 1e-6) | (number % 2 == 0)
+    kept[-1] = True
+    columns = {name: getattr(window, name)[kept] for name in window.__dataclass_fields__
+               if name != "extra" and getattr(window, name) is not None}
+    extra = {name: column[..., kept] if name == "ledger" else column[kept] for name, column in window.extra.items()}
+    return replace(window, extra=extra, **columns)
 
 
 def books_of(response, work: float, passed: float | None = None) -> tuple:

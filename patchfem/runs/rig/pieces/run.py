@@ -63,6 +63,10 @@ class Pieces(Reader):
             return held_ring(*run.ring, run.acceleration), {}
         return run_events.rings(run.window, self.model.rig.modes, drive, run.log, repeats=run.repeats)
 
+    def own(self, run, drive, values: dict) -> dict:
+        """What samples leave open of the measures that no sum over the pieces has."""
+        return self.sampled(run, drive, values)
+
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """The Solution of a PieceRun; where its windows still change, with the motion that it settles to."""
         drive, numerics = drive or self.model.rig.drive, self.numerics
