@@ -15,7 +15,7 @@ import numpy as np
 from ...core import NotConverged, frozen_array
 from ...elasticity.grid_fronts import predicted_bytes, predicted_seconds
 from ...mesh.grading import Layout, columns, rows
-from ...mesh.nested import plan_of
+from ...mesh.nested import coarser, finer, plan_of
 from ...mesh.tensor import TensorGrid, graded_grid
 from ...model.pieces import outlined, rounded_edges
 from .condensed import condensed
@@ -40,7 +40,6 @@ LEAST_LEVELS = 3  # nested meshes that show an order
 SPENT = {True: 3.0, False: 0.4}  # predicted seconds of the finest mesh: of a static patch, of one that moves
 OTHER = 4.0  # time of condensing a grid that is not a tensor grid over that of one that is
 ONE_MORE = 2e-3  # tolerance below which a contact that ends inside, or over a jump, is expected to take a level more
-ROWS = 33  # of nodes of a mesh in a file, which a plan does not read
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -224,14 +223,15 @@ class Sizes(NamedTuple):
     """Grids of a patch as a plan counts them.
 
     points: nodes of the interface; finest: (columns, rows) of nodes of the finest grid of each piece, one where they
-    are alike; levels: nested grids that are solved; even: they are their own mirror images; outlined: they reach beyond
-    the interface; ends: how often the contact ends inside the interface.
+    are alike; levels: nested grids that are solved; seconds, bytes: of condensing all of them, predicted; outlined:
+    they reach beyond the interface; ends: how often the contact ends inside the interface.
     """
 
     points: int
     finest: tuple
     levels: int
-    even: bool
+    seconds: float
+    bytes: float
     outlined: bool
     ends: int = 0
 
@@ -244,25 +244,28 @@ class Sizes(NamedTuple):
 def sizes(asked, tolerance: float) -> Sizes:
     """The grids that a `PatchModel` is solved on at a tolerance: the first as a run has it, the number of levels as it
     is expected. A mesh file counts as one that is as fine as the automatic grid: it is not read."""
-    pieces, ends = (asked.lower,) if asked.alike else (asked.lower, asked.upper), 0
-    if asked.mesh is not None:
-        points = round(asked.length / asked.size) + 1
-        return Sizes(points, tuple((points, ROWS) for _ in pieces), LEAST_LEVELS, False, True)
+    ends, plain = 0, asked.mesh is None
     if asked.meshes is not None:
-        bodies = [body for body in asked.meshes.levels[0] if body is not None]
+        ladder = [[body for body in level if body is not None] for level in asked.meshes.levels]
     elif asked.chosen:
         bodies, ends = _expected(asked)
+        more = tolerance < ONE_MORE and bool(ends or asked.gap.jumps)
+        ladder = [bodies]
+        while len(ladder) < LEAST_LEVELS + more:
+            bodies = [finer(body) for body in bodies]
+            if len(ladder) >= LEAST_LEVELS and seconds_of(bodies) > SPENT[asked.still]:
+                break
+            ladder.insert(0, bodies)
     else:
-        bodies = [graded_grid(asked.length, piece.height, asked.size, piece.thickness) for piece in pieces]
-    x = (plan_of(bodies[0]) or bodies[0]).x
-    even, finest = bool(np.abs(x + x[::-1]).max() <= 1e-9 * asked.length), tuple(map(_nodes, bodies))
-    found = Sizes(x.size, finest, LEAST_LEVELS, even and not asked.outlined, asked.outlined, ends)
-    if not asked.chosen or asked.meshes is not None:
-        return found
-    levels = LEAST_LEVELS + (tolerance < ONE_MORE and bool(ends or asked.gap.jumps))
-    found = [_halved(found, times) for times in range(levels)]
-    return next((one for one in reversed(found[LEAST_LEVELS:]) if _seconds(one) <= SPENT[asked.still]),
-                found[LEAST_LEVELS - 1])
+        pieces = (asked.lower,) if asked.alike else (asked.lower, asked.upper)
+        ladder = [[graded_grid(asked.length, piece.height, asked.size, piece.thickness) for piece in pieces]]
+        while len(ladder) < LEAST_LEVELS and ladder[-1][0].x.size > 8:
+            ladder.append([coarser(body) for body in ladder[-1]])
+    finest = tuple(map(_nodes, ladder[0]))
+    return Sizes((plan_of(ladder[0][0]) or ladder[0][0]).x.size, finest, len(ladder),
+                 sum(map(seconds_of, ladder)) * (1.0 if plain else OTHER),
+                 sum(predicted_bytes(*nodes, _mirrored(body)) for nodes, body in zip(finest, ladder[0])),
+                 asked.outlined or not plain, ends)
 
 
 def _expected(asked) -> tuple:
@@ -281,31 +284,12 @@ def _nodes(body) -> tuple:
     return (plan.x.size if plan is body else len(body.points) // plan.depth.size), plan.depth.size
 
 
-def _halved(found: Sizes, times: int) -> Sizes:
-    """The sizes of grids whose cells are halved so many times; below zero, merged."""
-    def of(nodes: int) -> int:
-        return max(3, round((nodes - 1) * 2**times) + 1)
-
-    finest = tuple((of(columns), of(rows)) for columns, rows in found.finest)
-    return found._replace(points=of(found.points), finest=finest, levels=max(found.levels, times + 1))
-
-
-def _seconds(found: Sizes) -> float:
-    """Predicted seconds of condensing the finest grids."""
-    return sum((OTHER if found.outlined else 1.0) * predicted_seconds(*grid, found.even) for grid in found.finest)
+def _mirrored(body) -> bool:
+    """Whether a body is a plain grid that is its own mirror image."""
+    return plan_of(body) is body and bool(np.abs(body.x + body.x[::-1]).max() <= 1e-12 * body.length)
 
 
 def seconds_of(bodies) -> float:
-    """Predicted seconds of condensing the grids of a patch; a grid counts as its own mirror image where it is even."""
-    out = 0.0
-    for body in bodies:
-        whole, x = plan_of(body) is body, body.x
-        even = whole and bool(np.abs(x + x[::-1]).max() <= 1e-12 * body.length)
-        out += (1.0 if whole else OTHER) * predicted_seconds(*_nodes(body), even)
-    return out
-
-
-def work(found: Sizes) -> tuple:
-    """(seconds, bytes) of condensing all levels, predicted."""
-    return sum(_seconds(_halved(found, -below)) for below in range(found.levels)), \
-        sum(predicted_bytes(*grid, found.even) for grid in found.finest)
+    """Predicted seconds of condensing the grids of a patch."""
+    return sum((1.0 if plan_of(body) is body else OTHER) * predicted_seconds(*_nodes(body), _mirrored(body))
+               for body in bodies)

@@ -4,7 +4,7 @@ from math import log10, sqrt
 
 from ...model.model import Model
 from ...model.patch import bars, block_shear
-from .grids import Sizes, work
+from .grids import Sizes
 from .high_order import serves
 
 PRESSED, WORK = 0.15, 3.0  # seconds of a patch with its fields, and per predicted second of condensing it
@@ -29,9 +29,8 @@ def effort(asked, found: Sizes, tolerance: float) -> tuple:
     Both follow from the work of condensing the grids, which is known from their sizes; what a unit of it takes, with
     the fields and files of the finest grid, was measured over random patches.
     """
-    seconds, size = work(found)
-    seconds = PRESSED + (OUTLINED if found.outlined else WORK) * seconds
-    size = PACKAGES + (OUTLINED_NODE * found.nodes if found.outlined else CONDENSED * size)
+    seconds = PRESSED + (OUTLINED if found.outlined else WORK) * found.seconds
+    size = PACKAGES + (OUTLINED_NODE * found.nodes if found.outlined else CONDENSED * found.bytes)
     if tolerance < SHARP_FROM and serves(asked):
         decades = log10(1e-3 / tolerance) * (1 if found.ends == 0 and not asked.lower.thickness else sqrt(EDGED))
         seconds, size = seconds + SHARPER * decades**2, size + SHARPER_BYTES * decades**2
