@@ -12,7 +12,7 @@ from ..model.model import Model, build
 from ..model.source import placed
 from ..runs.bench import bench as law_bench
 from ..runs.bench.engine import smooth_sum_of
-from ..runs.bench.watch import Watch
+from ..runs.bench.ledger import Watch
 from ..scene.changed import Base
 from ..scene.scene import Scene, SceneError
 from .fit_path import lead_in, whole_cycles

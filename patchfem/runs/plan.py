@@ -104,7 +104,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
         engine, steps, more = of_rig.cost(model, per_point, unknowns)
         seconds, numerics = seconds + more, choose(model, per_point)
     elif model.kind == "bench":
-        from .bench import plan as of_bench
+        from .bench import engine as of_bench
 
         engine, steps, more = of_bench.cost(model, unknowns)
         seconds, groups = seconds + more, of_bench.groups(model) | groups

@@ -12,8 +12,8 @@ from patchfem.model.model import build
 from patchfem.response.measures import work_check
 from patchfem.runs.bench import bench
 from patchfem.runs.bench.engine import engine_of, strokes
+from patchfem.runs.bench.ledger import BLOCK, UNWATCHED, Watch
 from patchfem.runs.bench.stepped import stepped
-from patchfem.runs.bench.watch import BLOCK, UNWATCHED, Watch
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run

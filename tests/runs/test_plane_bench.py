@@ -13,8 +13,8 @@ from patchfem.friction.bonds.recursion import Recursion
 from patchfem.inputs.paths import read_path
 from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
+from patchfem.runs.bench.ledger import UNWATCHED
 from patchfem.runs.bench.stepped import stepped
-from patchfem.runs.bench.watch import UNWATCHED
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run

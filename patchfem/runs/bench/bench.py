@@ -9,8 +9,8 @@ from ...response.loops import at_turns, half_range, interface_loop, secant_stiff
 from ...response.measures import harmonic, ledger_measures, step_harmonic, work_check
 from .closed import closed
 from .engine import CLOSED, STEPPED, Engine, engine_of
+from .ledger import UNWATCHED, Watch
 from .stepped import stepped
-from .watch import UNWATCHED, Watch
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -61,7 +61,7 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
 def _slid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) -> tuple:
     """(Slid, histories of the other direction by name) of a pass along path = (time, slide)."""
     if model.slide.across is not None:
-        from .two_directions import run_plane
+        from .stepped import run_plane
 
         return run_plane(model, patch, *path, frames, watch)
     if model.soft:

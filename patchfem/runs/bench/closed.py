@@ -7,8 +7,7 @@ In every step such a law carries a share of its limit, and the limit is that of 
 import numpy as np
 
 from .law import ends_of_rest, law_for, pressed
-from .ledger import Slid, elastic_slip, frame_numbers, ledger_of, local_slip
-from .watch import Watch
+from .ledger import Slid, Watch, elastic_slip, frame_numbers, ledger_of, local_slip
 
 GAUSS = 8  # points in a step over a flank
 

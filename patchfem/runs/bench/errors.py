@@ -12,7 +12,7 @@ from ...response.errors import change, step_error
 from . import bench
 from .engine import LIST, PLANE, STEPPED, slips_by_elements
 from .law import tail_of
-from .watch import Watch
+from .ledger import Watch
 
 FINER = 0.5  # merge width of the run that shows what merging does
 MERGED = 2.0  # times its change: where merging is of second order 4/3 would do

@@ -8,8 +8,7 @@ import numpy as np
 from ...dynamics.march.march import GOAL
 from ...dynamics.march.models import load_kernels
 from ...dynamics.march.room import keep, lengthened
-from .ledger import frame_numbers, ledger_of
-from .watch import BLOCK, Watch
+from .ledger import BLOCK, Watch, frame_numbers, ledger_of
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -1,11 +1,13 @@
-"""What one pass of a bench leaves behind: its histories, its energy book and its frames."""
+"""One pass of a bench: what it is told from outside, and its histories, its energy book and its frames."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ...effects import has
 
+BLOCK = 4096  # samples between two words of progress; what it costs to enter compiled code is lost in it
 ROUND = 1e-13  # of what a law dissipates: created energy below it is round-off
 
 
@@ -60,3 +62,23 @@ def _length(model) -> float:
     """Bond length [m], 0 of a law that does not stretch."""
     f = model.friction
     return (f.bond_length or 0.0) if not has(f.law, "averaged") else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """What a pass is told from outside. choice: how bonds are summed, None to choose; say: called with one line when
+    something compiles; progress: called with the done share; springs: function of the (stiffness, yield slide) of the
+    elements of partial slip -> those that move, None: they do."""
+
+    choice: object = None
+    say: object = None
+    progress: object = None
+    springs: object = None
+
+    def tell(self, share: float) -> None:
+        """Pass the done share (0 to 1) on to `progress`, if there is one."""
+        if self.progress is not None:
+            self.progress(share)
+
+
+UNWATCHED = Watch()

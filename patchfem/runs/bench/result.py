@@ -12,7 +12,7 @@ from ..results.travel import FAR, ended, reach, travelled
 from . import bench
 from .engine import steps_of
 from .errors import errors_of
-from .watch import Watch
+from .ledger import Watch
 
 
 def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:

@@ -14,8 +14,7 @@ from ...friction.record import law_from
 from .engine import ELEMENTS, Engine
 from .follow import follow
 from .law import pressed
-from .ledger import Slid, elastic_slip, local_slip
-from .watch import Watch
+from .ledger import Slid, Watch, elastic_slip, local_slip
 
 
 def rigid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) -> Slid:

@@ -13,9 +13,8 @@ from ...slip.fields import element_fields, point_fields, shear_of
 from ...slip.grain import spread, stiffer
 from ..patch.kept import elements
 from .follow import follow
-from .ledger import Slid
+from .ledger import Slid, Watch
 from .rigid import climbing
-from .watch import Watch
 
 GRAIN, STIFF = 1.5, 0.5  # times the change by the grain of the nodes and by that of the stiffness (tests/README.md)
 

@@ -1,14 +1,16 @@
-"""A rigid slide with the NumPy laws, sample by sample: where the pressure of a point changes on the way.
+"""A rigid slide with the NumPy laws, sample by sample: where the pressure of a point changes on the way, or in two
+directions.
 
 The twin of the compiled engines: it takes every law and every bench with a rigid slide.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ...core import Missing
 from .law import ends_of_rest, law_for, pressed
-from .ledger import Slid, elastic_slip, frame_numbers, ledger_of, local_slip, split
-from .watch import BLOCK, Watch
+from .ledger import BLOCK, Slid, Watch, elastic_slip, frame_numbers, ledger_of, local_slip, split
 
 MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a bench is refused
 
@@ -18,27 +20,72 @@ def stepped(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
     the lower one, or the load changes in time. Missing where the sum over bonds would take too long."""
     law, (weight, pressure) = law_for(model, patch), _pressures(model, patch, time, slide)
     refuse_costly(model, law, time.size, weight.size, slide)
-    move = _under_load if model.load_varies else _along
-    s0 = pressure(0)
-    state, at = law.start(s0), frame_numbers(time.size, frames)
-    force, load, work, stored = (np.zeros(time.size) for _ in range(4))
-    losses, pick, tau, under = np.zeros((time.size, 2)), set(at.tolist()), [], []
-    peaks = ends_of_rest(model, slide)
-    for k in range(time.size):
+    peaks, at = ends_of_rest(model, slide), frame_numbers(time.size, frames)
+    found = _walked((law, _under_load if model.load_varies else _along), (time, slide[:, None]), (weight, pressure), at,
+                    peaks, watch)
+    force, tau = found.force[:, 0], found.tau[:, 0]
+    return Slid(force, found.load, elastic_slip(model, slide, force, found.load), found.ledger, at, tau,
+                local_slip(model, slide[at], tau, np.array([pressure(k) for k in at]).reshape(tau.shape)))
+
+
+def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:
+    """(Slid along x, histories of the other direction by name; `pairs` are the (slide, force) of that direction) of a
+    slide in two directions: the `lateral` column of slide.file beside its displacement.
+
+    Pressure that rides on a rigid mover is constant at every point and the law is linear in it, so every point has the
+    traction of one point under unit pressure times its own. yaw_moment [N m]: sum of y f_x - x f_y, about +z of the
+    friction on the upper piece, f positive against its slip; strips have their places y over the width.
+    """
+    law = law_for(model)
+    refuse_costly(model, law, time.size, 1, slide)
+    across, one = np.interp(time, model.slide.corners[0], model.slide.across), np.ones(1)
+    at = frame_numbers(time.size, frames)
+    found = _walked((law, _along), (time, np.stack([slide, across], axis=1)), (one, lambda k: one), at, {}, watch)
+    load, moment, roll = _moments(model, patch)
+    sigma = patch.pressure.sigma_n if patch is not None else np.array([load])
+    unit, give = found.force, law.law.length / law.law.static if law.law.static > 0 else 0.0
+    slip = slide - give * unit[:, 0]
+    local = np.where(sigma > 0, slip[at, None], slide[at, None])
+    more = {"lateral": across, "lateral_force": load * unit[:, 1], "pairs": [(across, load * unit[:, 1])]}
+    if patch is not None:
+        more["yaw_moment"] = roll * unit[:, 0] - moment * unit[:, 1]
+    return Slid(load * unit[:, 0], np.full(time.size, load), slip, load * found.ledger, at,
+                np.outer(unit[at, 0], sigma), local), more
+
+
+class _Walked(NamedTuple):
+    """Histories of k samples in d directions: force (k, d) and load (k,) [N], ledger of `ledger_of` [J], tau (f, d, m)
+    [Pa] of the frames."""
+
+    force: np.ndarray
+    load: np.ndarray
+    ledger: np.ndarray
+    tau: np.ndarray
+
+
+def _walked(laws: tuple, path: tuple, points: tuple, at, peaks: dict, watch: Watch) -> _Walked:
+    """Step a law along a path. laws: (the law, how it takes a step); path: (time (k,) [s], slide (k, d) [m]); points:
+    (weights (m,) [m2], function from the number of a sample to the pressure (m,) [Pa] there); at: numbers of the
+    frames; peaks: sample -> sign of the motion that a rest ends with."""
+    (law, move), (time, slide), (weight, pressure) = laws, path, points
+    size, width = slide.shape
+    s0, pick = pressure(0), set(at.tolist())
+    state = law.start(s0) if width == 1 else law.start(s0, width)
+    force, load, work, stored = np.zeros((size, width)), np.zeros(size), np.zeros(size), np.zeros(size)
+    losses, tau = np.zeros((size, 2)), []
+    for k in range(size):
         if k:
             dq, s1 = slide[k] - slide[k - 1], pressure(k)
-            mean, lost, state = move(law, state, dq, s0, s1, time[k] - time[k - 1])
+            mean, lost, state = move(law, state, dq if width > 1 else dq[0], s0, s1, time[k] - time[k - 1])
             s0, losses[k] = s1, split(weight * lost)
-            work[k] = work[k - 1] + weight @ mean * dq
-        here = law.breaking(s0, peaks[k]) if k in peaks else law.traction(state)
-        force[k], load[k], stored[k] = weight @ here, weight @ s0, weight @ law.stored(state)
+            work[k] = work[k - 1] + dq @ np.atleast_2d(mean) @ weight
+        here = np.atleast_2d(law.breaking(s0, peaks[k]) if k in peaks else law.traction(state))
+        force[k], load[k], stored[k] = here @ weight, weight @ s0, weight @ law.stored(state)
         if k in pick:
             tau.append(here)
-            under.append(s0)
-        if k % BLOCK == 0 or k == time.size - 1:
-            watch.tell(k / (time.size - 1))
-    return Slid(force, load, elastic_slip(model, slide, force, load), ledger_of(work, stored, losses), at,
-                np.array(tau), local_slip(model, slide[at], np.array(tau), np.array(under)))
+        if k % BLOCK == 0 or k == size - 1:
+            watch.tell(k / (size - 1))
+    return _Walked(force, load, ledger_of(work, stored, losses), np.array(tau).reshape(len(tau), width, weight.size))
 
 
 def refuse_costly(model, law, samples: int, points: int, slide) -> None:
@@ -82,3 +129,11 @@ def _under_load(law, state, dq: float, s0, s1, dt: float) -> tuple:
     after = law.press(step.state, half, s1)
     return step.mean, before.dissipated + step.dissipated + after.dissipated, after.state
 
+
+def _moments(model, patch) -> tuple:
+    """(load [N], sum f x, sum f y [N m]) of the pressure; y from the strips, 0 without them."""
+    if patch is None:
+        return model.point.load, 0.0, 0.0
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    roll = patch.strips.roll_moment if patch.strips is not None else 0.0
+    return float(force.sum()), float(force @ patch.x), roll
