@@ -278,6 +278,14 @@ class Response:
     slip: np.ndarray
     extra: dict = field(default_factory=dict)
 
+    def at(self, pick) -> "Response":
+        """Some of its samples: a slice, numbers or bools (k,); what `extra` has of other lengths is left out."""
+        count = self.time.size
+        columns = {name: getattr(self, name)[pick] for name in self.__dataclass_fields__ if name != "extra"}
+        extra = {name: part[:, pick] if name == "ledger" else part[pick] for name, part in self.extra.items()
+                 if (part.shape[-1] if name == "ledger" else len(part)) == count}
+        return Response(**columns, extra=extra)
+
 
 def say(length: float, digits: int = 4) -> str:
     """A length [m] as words for a message, such as "200 um" or "12.7 mm", to so many digits."""

@@ -19,7 +19,6 @@ CODE_PART = "compiled code"
 CURES = {"contact.element_size": "make contact.element_size larger", "contact.mesh": "give contact.mesh fewer nodes on "
          "its interface", "accuracy.tail": "loosen accuracy.tail or accuracy.merge", "structure": "give fewer modes",
          "slide.file": "keep every few rows of slide.file", "drive.file": "keep every few rows of drive.file"}
-COMPARED = ("duhamel", "newmark", "euler")
 
 
 class Code(NamedTuple):
@@ -41,13 +40,13 @@ CODES = {"static": NONE, "bench, closed form": NONE, "bench, law step by step": 
 
 def code(model: Model, engine: str) -> Code:
     """The code of the engine that will run a model."""
-    by = engine
-    if engine == "harmonic":
-        from .rig.engines import steady_by
+    rig = model.rig
+    if rig is None:
+        return CODES.get(engine, STEPS)
+    from .rig.engines import ENGINES, EXACT, steady_by
 
-        by = steady_by(model).like
-    if by == "exact":
-        rig = model.rig
+    by = steady_by(model).like if ENGINES[engine].steady else engine
+    if by == EXACT.name:
         return FEW if not rig.interfaces or (len(rig.frequencies) == 1 and rig.drive.segments) else EVENTS
     return CODES.get(by, STEPS)
 
@@ -118,12 +117,14 @@ def _samples_key(model: Model) -> str:
 
 
 def _of_rig(model: Model, engine: str, steps: int, numerics) -> list:
+    from .rig.engines import ENGINES
+
     rig, n = model.rig, len(model.rig.frequencies)
     width = 2.0 * n + 12 + 6 * len(rig.interfaces)
     parts = [Need(FULL * n**2, f"{n} modes", "structure")]
-    if engine in COMPARED:
+    if ENGINES[engine].keeps:
         parts.append(Need(GRID * width * steps / 1.75, f"{steps} steps, all of them kept", "drive.cycles"))
-    elif engine == "harmonic":
+    elif ENGINES[engine].steady:
         if model.accuracy.harmonics:
             size = 2.0 * model.accuracy.harmonics * max(1, len(rig.interfaces))
             parts.append(Need(WAVE * size**2, f"{model.accuracy.harmonics} harmonics", "accuracy.harmonics"))

@@ -48,7 +48,7 @@ def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=N
         done = _integrated(model, cut, laws)
         response = _with_slip(_with_interfaces(done.response(modes, drive.moving), modes), laws)
     n = numerics.steps
-    kept = _cut(response, slice(max(0, response.time.size - 1 - numerics.window * n), None))
+    kept = response.at(slice(max(0, response.time.size - 1 - numerics.window * n), None))
     run = Run(response, kept, *_cycles(response, n), _book(done), _outcome(model, done, response))
     return Compared(model, numerics, patch).solution(run, perf_counter() - begin, notes=done.warnings,
                                                      prepare={"reduce": 0.0, "compiled_code": 0.0})
@@ -105,14 +105,6 @@ def _with_slip(response, laws):
     if "slides" in extra:
         extra = extra | {"slips": extra["slides"] - extra["forces"] * give}
     return replace(response, slip=response.slide - response.force * give[0], extra=extra)
-
-
-def _cut(response, part):
-    from dataclasses import fields
-
-    kept = {f.name: getattr(response, f.name)[part] for f in fields(response) if f.name != "extra"}
-    extra = {name: values[part] for name, values in response.extra.items() if len(values) == response.time.size}
-    return type(response)(**kept, extra=extra)
 
 
 def _cycles(response, n: int) -> tuple:

@@ -59,7 +59,8 @@ class Engine(NamedTuple):
     numerics, patch) and in_space(model, numerics, patch, coarse, solution) -> Rungs of its error; least: relative error
     that stays; closes: gap of the energy balance beyond which a run has not converged, None where the engine's own
     error of the balance says it, infinite of methods that are shown with what they lose. tells: numbers of a run that
-    its summary has; resumes: it keeps its state on the way; steady: it finds motions that repeat.
+    its summary has; resumes: it keeps its state on the way; keeps: every step of it is kept; steady: it finds
+    motions that repeat.
     """
 
     name: str
@@ -77,6 +78,7 @@ class Engine(NamedTuple):
     closes: float | None = CLOSED
     tells: tuple = ()
     resumes: bool = False
+    keeps: bool = False
     steady: bool = False
 
     @property
@@ -297,11 +299,10 @@ MARCH = Engine("march", "march", "march run_march", _march_in_time, _march_in_sp
                notes="remarks marched_elements", tells=("steps_per_cycle", "iterations"), resumes=True)
 HARMONIC = Engine("harmonic", "harmonic", "steady.steady run_steady", _no_rungs, _steady_in_space, "plan steady_cost",
                   words="plan steady_words", notes="remarks unmoved_elements", least=0.0, closes=None, steady=True)
-COMPARED = ("duhamel", "newmark", "euler")
 ENGINES = {one.name: one for one in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC, *(
     Engine(name, name, "comparison run_comparison", _halves_in_time, _march_in_space, "plan march_cost",
-           chosen="numerics by_named_steps", closes=inf, tells=("steps_per_cycle", "iterations"))
-    for name in COMPARED))}
+           chosen="numerics by_named_steps", closes=inf, tells=("steps_per_cycle", "iterations"), keeps=True)
+    for name in ("duhamel", "newmark", "euler")))}
 AUTOMATIC = (EXACT, PIECES, SMOOTH, MARCH)  # in the order in which they are tried
 
 

@@ -106,10 +106,7 @@ def thinned(window):
     number = np.round(place).astype(int)
     kept = (np.abs(place - number) > 1e-6) | (number % 2 == 0)
     kept[-1] = True
-    columns = {name: getattr(window, name)[kept] for name in window.__dataclass_fields__
-               if name != "extra" and getattr(window, name) is not None}
-    extra = {name: column[..., kept] if name == "ledger" else column[kept] for name, column in window.extra.items()}
-    return replace(window, extra=extra, **columns)
+    return window.at(kept)
 
 
 def books_of(response, work: float, passed: float | None = None) -> tuple:
