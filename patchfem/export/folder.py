@@ -9,8 +9,7 @@ from typing import NamedTuple
 from .. import __version__
 from ..core import Missing, NotConverged
 from ..disk.whole import write_text
-from ..runs.results.places import placeless
-from ..runs.results.result import Result
+from ..runs.results.result import Result, placeless
 from ..runs.run import Kept, marches, run
 from . import netcdf
 from .histories import contents

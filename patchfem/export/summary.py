@@ -11,8 +11,7 @@ from .. import __version__
 from ..disk.installed import installed
 from ..disk.whole import write_text
 from ..effects import EFFECTS
-from ..runs.results.chosen import chosen
-from ..runs.results.result import Result
+from ..runs.results.result import Result, chosen
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 

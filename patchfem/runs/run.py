@@ -16,8 +16,7 @@ from ..model.source import placed
 from . import memory
 from .plan import Plan, plan, refuse_size
 from .remedies import loose
-from .results.places import placeless
-from .results.result import Result, worded
+from .results.result import Result, placeless, worded
 
 __all__ = ["Kept", "Plan", "Result", "plan", "run"]
 KINDS = {"patch": "patch.result static", "bench": "bench.result prescribed", "rig": "rig.rig coupled",
@@ -78,7 +77,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
     else:
         evolved, here = None, what
         if model.wear is not None and patch is not None:
-            from .wear.keep import evolved_with
+            from .wear.evolve import evolved_with
 
             key = kept and key_of(model, patch, kept.version)
             evolved = evolved_with(kept, key, model, patch, coarse[:2], progress)

@@ -9,7 +9,7 @@ from command_line import cli
 from scene_texts import COULOMB, PIECE, POINT, STRUCTURE
 
 from patchfem.commands.streams import plain
-from patchfem.runs.results.places import placeless
+from patchfem.runs.results.result import placeless
 
 PATCH = PIECE + 'load = "26 lbf"\nelement_size = "0.1 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
 SCENE = 'title = "ü ± µ"\n' + POINT + COULOMB + STRUCTURE

@@ -9,7 +9,7 @@ from patchfem.friction.bonds.parameters import Bonds
 from patchfem.runs.many import one_by_one
 from patchfem.runs.many.meshes import meshed
 from patchfem.runs.patch import kept, ladder, press
-from patchfem.runs.patch.kept import Kept
+from patchfem.runs.patch.kept import by_content
 from patchfem.runs.rig import interface
 
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
@@ -64,8 +64,8 @@ def test_exact_a_patch_of_many_levels_is_pressed_once(monkeypatch):
     {"contact.holder.tangential_stiffness": 1e7}, {"contact.holder.rotational_stiffness": 1e3}])
 def test_always_other_patches_are_not_the_same(changed):
     first, second, third = (pf.build(TEXT, **more).patch for more in ({}, {"drive.acceleration": 1.0}, changed))
-    assert Kept(first) == Kept(second) and hash(Kept(first)) == hash(Kept(second))
-    assert Kept(first) != Kept(third)
+    assert by_content(first) == by_content(second) and hash(by_content(first)) == hash(by_content(second))
+    assert by_content(first) != by_content(third)
 
 
 def test_always_a_file_that_may_change_is_read_again(tmp_path):

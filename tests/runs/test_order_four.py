@@ -13,7 +13,7 @@ from patchfem.model.model import build
 from patchfem.runs.patch import high_order
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures, met
-from patchfem.runs.patch.notes import left_out
+from patchfem.runs.patch.result import left_out
 from patchfem.scene.scene import loads
 
 RIG = PIECE + 'load = "26 lbf"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING

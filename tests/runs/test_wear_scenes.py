@@ -18,7 +18,7 @@ from patchfem.core import Compliance, Interface
 from patchfem.elasticity.elasticity import assemble, interface_compliance
 from patchfem.model.model import build
 from patchfem.runs.patch.result import solve_all
-from patchfem.runs.wear import evolve, keep
+from patchfem.runs.wear import evolve
 from patchfem.scene.scene import loads
 from patchfem.slip.partial_slip import Step, advance, operators_of, start
 from patchfem.wear.jumps import Wearing, after
@@ -285,14 +285,14 @@ def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(tmp_path, m
     scene.write_text(text)
     _refusing(monkeypatch, until)
 
-    save = keep.save
+    save = evolve.save
 
     def noted(path, *more):
         save(path, *more)
         states.append(path.read_bytes())
 
     with monkeypatch.context() as patched:
-        patched.setattr(keep, "save", noted)
+        patched.setattr(evolve, "save", noted)
         assert cli("run", scene, "-o", tmp_path / "whole", "-q", "--no-page").code == 0
     assert len(states) >= 2
     for state in states:
@@ -307,7 +307,7 @@ def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(tmp_path, m
 
 
 def test_refuses_an_interrupted_run_of_another_scene_and_names_the_way_on(tmp_path, monkeypatch):
-    scene, save = tmp_path / "worn.toml", keep.save
+    scene, save = tmp_path / "worn.toml", evolve.save
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
 
     def interrupted(*asked):
@@ -315,7 +315,7 @@ def test_refuses_an_interrupted_run_of_another_scene_and_names_the_way_on(tmp_pa
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(keep, "save", interrupted)
+        patched.setattr(evolve, "save", interrupted)
         answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 130 and "--resume" in answer.err
     assert [path.name for path in (tmp_path / "out.partial").iterdir()] == ["wear.npz"]

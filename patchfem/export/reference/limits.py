@@ -3,8 +3,7 @@
 import re
 from importlib import import_module
 
-from ...runs.patch.notes import COUPLED
-from ...runs.patch.result import SMALL
+from ...runs.patch.result import COUPLED, SMALL
 from ...scene.keys.types import DIVIDED_BY, LARGEST
 from .keys import FOLDER, bounds, grid
 from .tried import BENCHES, METHODS, MORE, POINT, RIG, RIGS, Beside, across, laws, refused

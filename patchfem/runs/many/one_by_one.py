@@ -8,7 +8,7 @@ from time import perf_counter
 from ...core import PatchfemError
 from ...model.model import Model
 from ..plan import plan
-from ..results.chosen import chosen
+from ..results.result import chosen
 from ..run import run
 from .answers import Answers
 

@@ -13,9 +13,8 @@ from ...model.model import Model
 from ..patch import result as of_patch
 from ..patch import static
 from ..patch.meshes import geometry_of
-from ..patch.notes import slender
 from ..remedies import loose
-from ..results.places import placeless
+from ..results.result import placeless
 from . import one_by_one
 from .answers import Answers, joined
 
@@ -68,7 +67,7 @@ def solve(models: Sequence[Model], say: Callable | None = None) -> Answers:
                 *loose(seen)]
         if said:
             out.warnings[case] = placeless(said, model.source.path)
-        notes = [*slender(model.patch, measures["normal_load"].value / area), *one.band]
+        notes = [*of_patch.slender(model.patch, measures["normal_load"].value / area), *one.band]
         if notes:
             out.notes[case] = placeless(notes, model.source.path)
     out.seconds[:] = (perf_counter() - begin) / len(models)

@@ -117,7 +117,7 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
 def shared_pairs(asked) -> tuple:
     """The condensed pieces of every level of a `PatchModel` that has `meshes`; those of the last patches are kept."""
     pieces = asked.lower, asked.upper, asked.plane, asked.width * asked.pairs
-    return _shared(asked.meshes.name, pieces, _Content(asked))
+    return _shared(Keyed(asked, (asked.meshes.name, *pieces)))
 
 
 def pair_beside(asked, pair: Pair) -> Pair:
@@ -128,23 +128,23 @@ def pair_beside(asked, pair: Pair) -> Pair:
     return condensed(asked, pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
 
 
-class _Content:
-    """A PatchModel that is any other one to a cache: what tells them apart stands beside it."""
+class Keyed:
+    """A `PatchModel` that is to a cache what its key is: it equals any other one with the same."""
 
-    def __init__(self, asked):
-        self.asked = asked
+    def __init__(self, asked, key: tuple):
+        self.asked, self.key = asked, key
 
     def __eq__(self, other) -> bool:
-        return True
+        return self.key == other.key
 
     def __hash__(self) -> int:
-        return 0
+        return hash(self.key)
 
 
 @lru_cache(maxsize=SHARED)
-def _shared(name: str, pieces: tuple, content: _Content) -> tuple:
-    out = tuple(condensed(content.asked, *level) for level in content.asked.meshes.levels)
-    for piece in {id(one): one for pair in out for one in (pair.piece, pair.upper)}.values():
+def _shared(one: Keyed) -> tuple:
+    out = tuple(condensed(one.asked, *level) for level in one.asked.meshes.levels)
+    for piece in {id(part): part for pair in out for part in (pair.piece, pair.upper)}.values():
         if isinstance(piece, Piece) and not piece.rounding:
             piece.made.clear()  # factors are far larger than the compliance, and made again where fields are wanted
     return out

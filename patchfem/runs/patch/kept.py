@@ -9,27 +9,20 @@ from functools import lru_cache
 import numpy as np
 
 from ...slip.shear_modes import JenkinsSet, jenkins_set, scaled
+from .condensed import Keyed
 from .measures import measures, plane_band
 from .press import Patch
 
 KEPT = 2  # patches with those of their errors
 
 
-class Kept:
+def by_content(asked) -> Keyed:
     """A `PatchModel` that equals any other one with the same content."""
-
-    def __init__(self, asked):
-        self.asked, gap = asked, asked.gap
-        own = [getattr(asked, one.name) for one in fields(asked) if one.name not in ("gap", "meshes", "skin")]
-        shapes = tuple((name, tuple(part)) for name, part in gap.shapes)
-        self.content = (*own, asked.skin and tuple(asked.skin), asked.meshes and asked.meshes.name, shapes,
-                        gap.average, gap.limit, gap.rough, gap.side, gap.material)
-
-    def __eq__(self, other) -> bool:
-        return self.content == other.content
-
-    def __hash__(self) -> int:
-        return hash(self.content)
+    gap = asked.gap
+    own = [getattr(asked, one.name) for one in fields(asked) if one.name not in ("gap", "meshes", "skin")]
+    shapes = tuple((name, tuple(part)) for name, part in gap.shapes)
+    return Keyed(asked, (*own, asked.skin and tuple(asked.skin), asked.meshes and asked.meshes.name, shapes,
+                         gap.average, gap.limit, gap.rough, gap.side, gap.material))
 
 
 def shares(asked) -> bool:
@@ -50,11 +43,11 @@ def _measures(patch: Patch, coarse: tuple, tolerance: float | None) -> dict:
 
 def band(asked, patch: Patch) -> list:
     """`plane_band` of a patch."""
-    return _band(Kept(asked), patch) if shares(asked) else plane_band(asked, patch)
+    return _band(by_content(asked), patch) if shares(asked) else plane_band(asked, patch)
 
 
 @lru_cache(maxsize=KEPT)
-def _band(kept: Kept, patch: Patch) -> list:
+def _band(kept: Keyed, patch: Patch) -> list:
     return plane_band(kept.asked, patch)
 
 

@@ -7,9 +7,9 @@ from ...core import NotConverged, Outcome
 from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import bodies_of
 from . import high_order
-from .condensed import condensed, shared_pairs
+from .condensed import Keyed, condensed, shared_pairs
 from .grids import LEAST_LEVELS, SPENT, base_grids, seconds_of
-from .kept import KEPT, Kept, shares
+from .kept import KEPT, by_content, shares
 from .measures import measures, met, missed
 from .press import pressed, solve
 
@@ -44,14 +44,14 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
     if asked.meshes is not None:
         if fresh:
             return on_pairs(asked, [condensed(asked, *level, fresh=True) for level in asked.meshes.levels], estimate)
-        return _kept(Kept(asked), estimate) if shares(asked) else on_pairs(asked, shared_pairs(asked), estimate)
+        return _kept(by_content(asked), estimate) if shares(asked) else on_pairs(asked, shared_pairs(asked), estimate)
     if asked.chosen:
         return climbed(asked, asked.mesh_tolerance or tolerance, estimate, fresh)
     return _with_coarser(asked, *bodies_of(asked), estimate, fresh)
 
 
 @lru_cache(maxsize=KEPT)
-def _kept(kept: Kept, estimate: bool) -> tuple:
+def _kept(kept: Keyed, estimate: bool) -> tuple:
     return on_pairs(kept.asked, shared_pairs(kept.asked), estimate)
 
 

@@ -15,8 +15,7 @@ from ..results.patch_rows import DECISIVE, TABLE
 from .condensed import pair_beside
 from .limits import edge_limit, limit
 from .press import Patch, pressed
-from .rounding import open_ends, unresolved_rounding
-from .values import edge_cells, values
+from .values import edge_cells, open_ends, unresolved_rounding, values
 
 CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)
 FEW = 12  # nodes of a contact below which their number is felt

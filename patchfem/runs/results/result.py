@@ -1,13 +1,18 @@
 """The result of a run, with the parts that every kind of run shares."""
 
+import re
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from ...core import Outcome
+from ...scales import tidied
 from .patch_rows import TABLE as STATIC
 
 FRAMES = 16  # of the interface, in the last cycle
+COUNTS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
+_BEFORE = re.compile(r"/[^:]*/(?=[^/:]+: )")  # of an absolute path at the start of a remark
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -91,3 +96,46 @@ def on_a_mesh_of_known_error(model, patch, coarse) -> bool:
 def without_errors(found: dict, estimate: bool) -> dict:
     """The measures as they are, or without their errors where none were estimated."""
     return found if estimate else {k: replace(m, error=None) for k, m in found.items()}
+
+
+def chosen(result) -> dict:
+    """Engine, steps per cycle or those that a tolerance chose, cycles and window of a run, shear modes or elements
+    behind the pieces' shear, how bonds are summed, and interface nodes and strips of its patch,
+    and the length [m] that its profile is averaged over.
+
+    map: "events" or "yields" that a steady motion was found by. A choice that the run did not make is left out.
+    """
+    extra, patch, out = result.extra, result.patch, {}
+    if (engine := extra.get("engine")) is not None:
+        out["engine"] = engine
+    if (found := extra.get("map")) is not None:
+        out["map"] = found
+    steps = extra.get("steps")
+    if steps is not None:
+        out["steps_per_cycle"] = int(steps)
+    out |= {name: int(extra[name]) for name in COUNTS if extra.get(name) is not None}
+    if (local := extra.get("step_tolerance")) is not None:
+        out |= {"step_tolerance": float(local), "steps": int(extra["steps_taken"])}
+    if (summed := extra.get("quadrature")) is not None:
+        out["quadrature"] = summed
+    if (window := extra.get("window")) is not None:
+        out["window_cycles"] = int(window)
+    if patch is not None:
+        out["interface_nodes"] = int(patch.x.size)
+        if patch.averaging is not None:
+            out["profile_averaging"] = float(patch.averaging)
+        if result.plan.model.patch.strips is not None:
+            out["strips"] = int(result.plan.model.patch.strips[0])
+    return out
+
+
+def placeless(texts, path: Path) -> list:
+    """Remarks in which a file is named without its folder where that is absolute, and numbers are written for people;
+    path: of the scene, beside which files lie."""
+    folders = [f"{folder}/" for folder in (path.parent, path.parent.absolute()) if folder.is_absolute()]
+    out = []
+    for text in texts:
+        for folder in folders:
+            text = text.replace(folder, "")
+        out.append(tidied(_BEFORE.sub("", text, count=1) if text.startswith("/") else text))
+    return out

@@ -1,12 +1,17 @@
-"""The patch over many cycles of wear: contact, motion and worn depth advance together, jump by jump."""
+"""The patch over many cycles of wear: contact, motion and worn depth advance together, jump by jump; the state on disk,
+from which an interrupted run goes on to the same bits."""
 
+import json
+import os
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
+from ...disk.whole import whole
 from ...effects import unbuilt
 from ...wear.depth import critical_jump, rates, refuse_explicit
 from ...wear.jumps import Wearing, Worn, after, replayed, start
@@ -14,6 +19,9 @@ from ..patch.press import pressed, presser
 from ..patch.values import values
 from ..rig.numerics import choose
 from .slip import Rubbed, even, frames_for, rubbed
+
+STATE = tuple(Worn.__slots__)
+MOMENT = ("cycle", "depth", "used", "pressure", "gap", "miss")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -152,3 +160,46 @@ def _critical(model, patch, state: Worn) -> float:
     asked, rate = model.patch, rates(model.wear.coefficient, state.path, patch.pieces.interface.weight)
     held = "approach" if asked.approach is not None else "moment" if asked.rotates else "load"
     return critical_jump(patch.pieces.normal, rate, patch.active, held, patch.x)
+
+
+def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved:
+    """`evolve` with its state kept after every jump; kept: where, None keeps nothing; key: what the
+    state belongs to."""
+    if kept is None:
+        return evolve(model, patch, coarse, progress)
+    begin = load(kept.path, key) if kept.resume else None
+    return evolve(model, patch, coarse, progress, begin, lambda state, moments: save(kept.path, key, state, moments))
+
+
+def save(path: Path, key: str, state: Worn, moments: tuple) -> None:
+    """Write a state and the moments so far; an earlier file is replaced only when the new one is whole."""
+    arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE}
+    arrays |= {f"moment_{name}": np.array([getattr(one, name) for one in moments]) for name in MOMENT}
+    values = json.dumps([one.values for one in moments], default=float)
+    with whole(path) as partial, open(partial, "wb") as file:
+        np.savez(file, key=np.array(key), values=np.array(values), **arrays)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def load(path: Path, key: str) -> tuple:
+    """(state, moments) of a kept file. PatchfemError where it belongs to another scene or cannot be read."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            found = {name: file[name] for name in file.files}
+        if str(found["key"]) != key:
+            raise PatchfemError(f"{path.parent.name}: what is kept there belongs to another scene or version; run "
+                                "without --resume")
+        whole = {name: found[f"state_{name}"] for name in STATE}
+        state = Worn(**{name: float(value) if value.ndim == 0 else value for name, value in whole.items()})
+        columns = [found[f"moment_{name}"] for name in MOMENT]
+        moments = tuple(Moment(float(row[0]), *row[1:-1], float(row[-1]), values)
+                        for *row, values in zip(*columns, json.loads(str(found["values"])), strict=True))
+    except FileNotFoundError:
+        raise PatchfemError(f"{path.parent.name}: no interrupted run is kept there; run without --resume") from None
+    except PatchfemError:
+        raise
+    except Exception as error:  # a damaged archive has many ways to fail
+        raise PatchfemError(f"{path.parent.name}: the kept state cannot be read ({error}); run without "
+                            "--resume") from None
+    return state, moments

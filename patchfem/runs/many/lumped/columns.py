@@ -15,7 +15,7 @@ from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
 from ....structure.drive_sizes import largest, omega_of, slowest
 from ...results.notes import BOOKS
-from ...results.places import placeless
+from ...results.result import placeless
 from ...rig.engines import knobs_idle
 from ..answers import Answers
 from .warned import said
@@ -64,7 +64,7 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
     """(Answers of the models, (n,) whether a case must be run by itself, (n,) whether all its errors but that of the
     steady estimate are within its tolerance).
 
-    numerics: as `results.chosen` has it.
+    numerics: as `results.result.chosen` has it.
     """
     n, values = len(models), dict(runs.values)
     values[MAIN] = runs.values.get(MAIN, runs.amplitudes)

@@ -19,7 +19,7 @@ from ....response.errors import pieces_error
 from ....response.measures import energy_balance
 from ...patch import result as of_patch
 from ...remedies import loose
-from ...results.places import placeless
+from ...results.result import placeless
 from ...results.travel import ended, travelled
 from ...rig.engines import PIECES, engine_of
 from ...rig.numerics import choose
