@@ -4,13 +4,18 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from .drive_kernels import RATE, drive_series
 from .march_kernels import EACH, HEAD
+from .memory_kernels import RIGID
 from .search_kernels import moved, speed_series
 from .series_kernels import fastest, largest, motion_series, powers, value
+from .stick_kernels import constrain
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def unfold(row, h, plant, clock, room):
-    """Fill the room with the series of the piece of a row over h [s]; the highest power."""
+    """Fill the room with the series of the piece of a row over h [s]; the highest power.
+
+    What holds is found again where it is not what room.mask has; room.held[0] < 0 before the first row.
+    """
     n, faces = len(plant.square), len(plant.reach)
     segment = clock.segments[int(row[3])]
     start = HEAD + 2 * n
@@ -18,10 +23,16 @@ def unfold(row, h, plant, clock, room):
         room.nodes[i, 0], room.nodes[i, 1] = row[HEAD + i], row[HEAD + n + i]
     for f in range(faces):
         room.polys[faces, f], room.springs[f] = row[start + EACH * f], row[start + EACH * f + 1]
-    top = powers(max(fastest(plant, room.springs), segment[RATE]) * h)
+        holds = 1.0 if room.springs[f] == RIGID else 0.0
+        if room.mask[f] != holds:
+            room.mask[f], room.held[0] = holds, -1.0
+    if room.held[0] < 0.0:
+        constrain(plant, room)
+    own = fastest(plant, room.springs) if room.held[1] == 0.0 else 0.0
+    top = powers(max(own, segment[RATE]) * h)
     drive_series(segment, row[5], row[6], clock.period[0], h, top, room.waves)
     motion_series(room.nodes[:n, :2].T, room.polys[faces], room.springs, plant, room.waves[0], h, top, room.coefs,
-                  room.pull)
+                  room)
     for f in range(faces):
         speed_series(plant.faces[f], len(plant.square), room.coefs, top, room.polys[f])
     return top
@@ -35,6 +46,7 @@ def evaluate(rows, owner, tau, plant, clock, room, out):
     work and loss [J].
     """
     n, faces, last, top, h = len(plant.square), len(plant.reach), -1, 0, 1.0
+    room.held[0] = -1.0
     for j in range(owner.size):
         row = rows[owner[j]]
         if owner[j] != last:
@@ -50,6 +62,11 @@ def evaluate(rows, owner, tau, plant, clock, room, out):
         out[j, 2 * n] = value(room.waves[0], 0, top, u)
         for f in range(faces):
             at, to = HEAD + 2 * n + EACH * f, 2 * n + 1 + 6 * f
+            if room.springs[f] == RIGID:
+                out[j, to], out[j, to + 1] = row[at + 8], 0.0
+                out[j, to + 2] = value(room.reactions[f], 0, top - 2, u)
+                out[j, to + 3], out[j, to + 4], out[j, to + 5] = row[at + 4], row[at + 5], row[at + 6]
+                continue
             step, place = moved(room.polys[f], top, u), 0.0
             for i in range(n):
                 place += plant.faces[f, i] * out[j, i]
@@ -61,9 +78,13 @@ def evaluate(rows, owner, tau, plant, clock, room, out):
 
 
 @njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
-def peak(rows, plant, clock, moving, room):
-    """Largest |acceleration| [m s-2] of the output over the pieces of rows, that of a moving base included."""
-    best, poly = 0.0, room.polys[len(plant.reach)]
+def peak(rows, plant, clock, moving, room, reactions):
+    """Largest |acceleration| [m s-2] of the output over the pieces of rows, that of a moving base included; reactions
+    (i,) [N] becomes the largest of every interface while a rigid element holds it."""
+    best, poly, faces = 0.0, room.polys[len(plant.reach)], len(plant.reach)
+    room.held[0] = -1.0
+    for f in range(faces):
+        reactions[f] = 0.0
     for j in range(rows.shape[0]):
         h = rows[j, 1]
         if h <= 0:
@@ -75,4 +96,7 @@ def peak(rows, plant, clock, moving, room):
                 part += plant.output[i] * room.coefs[k + 2, i]
             poly[k] = part * (k + 1) * (k + 2) / (h * h) + moving * room.waves[0, k]
         best = largest(poly, top - 2, best, room.hulls)
+        for f in range(faces):
+            if room.springs[f] == RIGID:
+                reactions[f] = largest(room.reactions[f], top - 2, reactions[f], room.hulls)
     return best

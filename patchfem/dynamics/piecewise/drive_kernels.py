@@ -1,8 +1,9 @@
 """Compiled series of a drive over a short piece: sines and constants, straight lines, sweeps of either kind.
 
 A segment of the drive is a row: cycle and offset [s] of its start, kind, constant [m s-2], amplitude, omega [rad/s],
-phase [rad] at the start of every cycle (of a sweep at its own start), slope, whether the amplitude is a displacement,
-fastest rate [1/s].
+phase [rad] at the start of its first cycle (of a sweep at its own start), slope, whether the amplitude is a
+displacement, fastest rate [1/s], and what its turns per cycle have beyond a whole number, in two parts: 24 bits, whose
+product with a number of cycles is exact, and the rest. So the phase keeps its digits over a million cycles.
 """
 
 from math import cos, exp, expm1, floor, pi, sin
@@ -12,7 +13,7 @@ from ...friction.flags_kernels import FAST, LEAN
 from .series_kernels import TWICE
 
 SINE, LINE, CHIRP, LOG_CHIRP = 0.0, 1.0, 2.0, 3.0  # kinds of a segment
-CYCLE, OFFSET, KIND, CONSTANT, AMPLITUDE, OMEGA, PHASE, SLOPE, DISPLACED, RATE = range(10)
+CYCLE, OFFSET, KIND, CONSTANT, AMPLITUDE, OMEGA, PHASE, SLOPE, DISPLACED, RATE, TURNS, TURNS_LEFT = range(12)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -25,7 +26,10 @@ def since(segment, cycle, offset, period):
 def phase_of(segment, cycle, offset, period):
     """Phase of the drive [rad], modulo 2 pi; along a straight line that of the cycle."""
     if segment[KIND] == SINE:
-        theta = segment[PHASE] + segment[OMEGA] * offset
+        theta, gone = segment[PHASE] + segment[OMEGA] * offset, cycle - segment[CYCLE]
+        if segment[TURNS] != 0.0:
+            extra = gone * segment[TURNS]
+            theta += 2 * pi * (extra - floor(extra) + gone * segment[TURNS_LEFT])
         return theta - 2 * pi * floor(theta / (2 * pi))  # a tenth of the time of %
     if segment[KIND] == LINE:
         return 2 * pi * offset / period
@@ -35,7 +39,20 @@ def phase_of(segment, cycle, offset, period):
     return (segment[PHASE] + segment[OMEGA] * expm1(segment[SLOPE] * time) / segment[SLOPE]) % (2 * pi)
 
 
-@njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def value_now(segment, cycle, offset, period):
+    """Drive [m s-2] of a segment at a time (cycle, offset)."""
+    kind, theta, time = segment[KIND], phase_of(segment, cycle, offset, period), since(segment, cycle, offset, period)
+    if kind == LINE:
+        return segment[CONSTANT] + segment[SLOPE] * time
+    size = segment[AMPLITUDE]
+    if segment[DISPLACED] == 1.0:
+        omega = segment[OMEGA] + segment[SLOPE] * time if kind == CHIRP else segment[OMEGA] * exp(segment[SLOPE] * time)
+        size *= omega * omega
+    return segment[CONSTANT] + size * sin(theta)
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def drive_series(segment, cycle, offset, period, h, top, waves):
     """Fill waves[0] (>= top + 1,) with the series over u = t/h of a drive [m s-2] from the time (cycle, offset) on.
 

@@ -1,4 +1,5 @@
-"""Elastic-plastic elements side by side under one slide, sorted by the slide at which they yield."""
+"""Elements side by side under one slide: a rigid one (Coulomb), elastic-plastic ones sorted by the slide at which they
+yield."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,15 +13,20 @@ SAME = 1e-14  # relative difference of two yield slides that are one
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Elements:
-    """Elements of one interface: springs k_j that slip at a stretch y_j, F = sum k_j e_j with |e_j| <= y_j.
+    """Elements of one interface: springs k_j that slip at a stretch y_j, F = sum k_j e_j with |e_j| <= y_j, and a rigid
+    element before them.
 
     stiffness: (t,) [N/m]; yield_slide: (t,) [m], rising; rank: (a,) the element that each given one became part of, -1
-    for one without stiffness or yield slide, which carries nothing.
+    for one without stiffness or yield slide, which carries nothing. static, kinetic [N]: limits of the rigid element,
+    which holds the slide until its reaction reaches static and then slips under kinetic; static = 0 where there is
+    none.
     """
 
     stiffness: np.ndarray
     yield_slide: np.ndarray
     rank: np.ndarray
+    static: float = 0.0
+    kinetic: float = 0.0
 
     @property
     def limit(self) -> float:
@@ -49,6 +55,18 @@ def elements_of(stiffness, yield_slide) -> Elements:
     return Elements(frozen_array(stiff), frozen_array(y[order][first]), frozen_array(rank, np.int64))
 
 
+def coulomb(static: float, kinetic: float | None = None) -> Elements:
+    """The rigid element of Coulomb friction alone: limits static and kinetic [N], kinetic as static without it.
+
+    PatchfemError unless 0 <= kinetic <= static.
+    """
+    kinetic = static if kinetic is None else kinetic
+    if not 0 <= kinetic <= static:
+        raise PatchfemError("friction.kinetic: it must lie between 0 and static")
+    none = frozen_array([])
+    return Elements(none, none, frozen_array([], np.int64), float(static), float(kinetic))
+
+
 def paired(parts: Elements) -> Elements:
     """Half as many elements: each two that yield one after the other as one of their stiffness and limit together; an
     odd last one stays."""
@@ -66,7 +84,8 @@ class Table(NamedTuple):
     """Elements of all interfaces (i) as the compiled loop takes them, t of the longest list.
 
     count: (i,); reach: (i, t) yield slides [m], infinite behind the last; and sums over the first j elements, j = 0 to
-    t: stiff (i, t + 1) of k [N/m], limit of k y [N], twice of k y^2 [J].
+    t: stiff (i, t + 1) of k [N/m], limit of k y [N], twice of k y^2 [J]. static, kinetic: (i,) [N] limits of the rigid
+    elements, 0 where there is none.
     """
 
     count: np.ndarray
@@ -74,6 +93,8 @@ class Table(NamedTuple):
     stiff: np.ndarray
     limit: np.ndarray
     twice: np.ndarray
+    static: np.ndarray
+    kinetic: np.ndarray
 
 
 def table_of(groups) -> Table:
@@ -87,7 +108,8 @@ def table_of(groups) -> Table:
         for j, part in enumerate((k, k * y, k * y * y)):
             sums[j, i, 1:y.size + 1] = np.cumsum(part)
             sums[j, i, y.size + 1:] = sums[j, i, y.size]
-    return Table(np.array([one.stiffness.size for one in groups], np.int64), reach, *sums)
+    limits = np.array([(one.static, one.kinetic) for one in groups], float).reshape(-1, 2).T
+    return Table(np.array([one.stiffness.size for one in groups], np.int64), reach, *sums, *limits.copy())
 
 
 class Memory(NamedTuple):
@@ -97,7 +119,9 @@ class Memory(NamedTuple):
     slip; the others keep their stretch since a turning point, in groups: depth (i,) groups, the innermost last; upto
     (i, t + 1) the elements before this number, from where the inner group ends; at (i, t + 1) [m] the slide at which a
     group stopped slipping; side (i, t + 1) the sign of that slip, 0 for elements that never slipped, unstretched at
-    `at`. force [N], slip [m] (mean irreversible slide, weighted with k y), worked, lost [J]: (i,).
+    `at`. force [N], slip [m] (mean irreversible slide, weighted with k y), worked, lost [J]: (i,). head: (i,) of the
+    rigid element the sign of its slip, 0 while it holds, twice the sign where it is at its limit while others hold the
+    slide.
     """
 
     place: np.ndarray
@@ -111,6 +135,7 @@ class Memory(NamedTuple):
     slip: np.ndarray
     worked: np.ndarray
     lost: np.ndarray
+    head: np.ndarray
 
 
 def virgin(table: Table, slide) -> Memory:
@@ -120,7 +145,7 @@ def virgin(table: Table, slide) -> Memory:
     upto[:, 0] = table.count
     at = np.zeros((faces, wide + 1))
     at[:, 0] = slide
-    zero = [np.zeros(faces) for _ in range(5)]
+    zero = [np.zeros(faces) for _ in range(6)]
     return Memory(np.array(slide, float), np.zeros(faces, np.int64), zero[0], np.ones(faces, np.int64), upto, at,
                   np.zeros((faces, wide + 1)), *zero[1:])
 

@@ -1,4 +1,4 @@
-"""Samples, extremes, energies and events of a run of piecewise-linear elements."""
+"""Samples, extremes, energies and events of a run of rigid and piecewise-linear elements."""
 
 from dataclasses import dataclass
 from math import ceil, factorial
@@ -7,7 +7,7 @@ import numpy as np
 
 from ...compiled import load
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
-from ..events.event_list import RELEASE, ROOM, STOP, EventLog
+from ..events.event_list import BORDER, RELEASE, REVERSAL, ROOM, STOP, EventLog
 from ..integrated import Loop
 from ..piecewise_one import room as one
 from .elements import stretches, table_of, virgin
@@ -18,6 +18,7 @@ SAMPLES = 400  # per drive cycle in the kept window
 LEAST = 101  # of a run that has no cycles
 CHUNK = 4096  # rows held at once
 CORNERS = 400_000  # turning points kept from before the window
+NOISE = 64 * 2.0**-52  # of what a speed is added from, below which it rests
 SLIPS = 0.5  # share of the slide that is irreversible from which an interface slips
 # largest piece times rate for which g Gauss points, g = 0 to 12, integrate a product of two motions to 1e-14
 GAUSS = np.array([0.0] + [0.5 * (1e-14 * (2 * g + 1) * factorial(2 * g)**3 / factorial(g)**4)**(1 / (2 * g))
@@ -95,7 +96,10 @@ class _Run:
         self.modes, self.drive, self.groups, self.window = modes, drive, tuple(groups), window
         self.kernels, self.dense = warm_up()
         self.table, self.plant = table_of(self.groups), plant_of(modes)
+        if np.any(~self.plant.faces.any(axis=1) & (self.table.static > 0)):
+            raise PatchfemError("structure.mode.slide: no mode moves the interface, so friction cannot act")
         self.clock, self.room = clock_of(drive, len(self.groups)), room_of(self.plant)
+        self.reading, self.rigid = room_of(self.plant), bool(self.table.static.any())
         n, count = modes.omega.size, max(1, ceil(cycles - 1e-9))
         self.motion = np.zeros((2, n))
         if start is not None:
@@ -105,12 +109,14 @@ class _Run:
         wanted = np.zeros(count)
         wanted[max(0, int(cycles + 1e-9)) - 1::-window] = 1.0  # the last whole cycle of every window
         self.books, self.cycles, self.period = books_of(count, wanted, travel), cycles, drive.period
-        self.alone = one.rig_of(self.plant) if one.serves(self.plant, self.clock, travel) else None
+        alone = not self.rigid and one.serves(self.plant, self.clock, travel)
+        self.alone = one.rig_of(self.plant) if alone else None
         self.lines = one.room_of() if self.alone is not None else None
         self.last = one.last_of(self.table.reach.shape[1])
         self.width = self.kernels.HEAD + 2 * n + self.kernels.EACH * len(self.groups)
         self.early, self.kept, self.events, self.count = [], 0, [], 0
-        self.before, self.outcome, self.snapshots = np.zeros(len(self.groups)), None, []
+        self.outcome, self.snapshots = None, []
+        self.before = self._ways(self.plant.faces @ self.motion[1], np.abs(self.plant.faces) @ np.abs(self.motion[1]))
         self.passed, self.repeats = False, False
         self.begun = self.kernels.stored(self.motion, self.plant, self.table, self.memory)
         still = self.kernels.stored(np.zeros_like(self.motion), self.plant, self.table, self.memory)
@@ -125,11 +131,15 @@ class _Run:
             code, used = self._march(stop, rows)
             if code == self.kernels.PILED:
                 raise NotConverged(f"dynamics: events pile up at t = {rows[max(used - 1, 0), 0]:.9g} s")
+            if code == self.kernels.OPEN:
+                raise NotConverged("dynamics: no state of stick and slip that satisfies the law of friction was found "
+                                   "after an event; bring friction.kinetic nearer to static, or use method = "
+                                   "\"march\"")
             if code == self.kernels.TRAVEL:
                 self.passed = True
                 break
             done = rows[:used]
-            marked = self._note(done) | (done[:, 4] == 2)
+            marked = self._note(done) | (done[:, 4] == self.kernels.TURNED)
             if whole:
                 out.append(done.copy())
             elif self.kept < CORNERS:
@@ -138,6 +148,10 @@ class _Run:
             if progress is not None:
                 progress(min(self.now / (self.cycles * self.period), 1.0))
         return out
+
+    def _ways(self, speeds, sizes) -> np.ndarray:
+        """Signs (i,) of the slip of rigid elements at speeds (i,) [m/s] that are added from sizes (i,)."""
+        return np.where((self.table.static > 0) & (np.abs(speeds) > NOISE * sizes), np.sign(speeds), 0.0)
 
     def _march(self, stop, rows) -> tuple:
         """(code, rows used) of the compiled loop, of one mode its own."""
@@ -148,7 +162,8 @@ class _Run:
                                                   self.books, self.last, self.lines, rows)
 
     def _note(self, rows) -> np.ndarray:
-        """Note stops and releases of all interfaces; which rows (k,) begin with one."""
+        """Note stops, releases and reversals of all interfaces and borders of the drive; which rows (k,) begin with a
+        change of the first."""
         marked = np.zeros(len(rows), bool)
         if not len(rows):
             return marked
@@ -158,12 +173,20 @@ class _Run:
             old = np.concatenate([self.before[f:f + 1], way[:-1]])
             self.before[f] = way[-1]
             turned = np.flatnonzero(old != way)
-            what = np.where(way[turned] == 0, STOP, RELEASE * way[turned])
-            place = rows[turned][:, self.kernels.HEAD:self.kernels.HEAD + self.modes.omega.size] @ self.plant.faces[f]
+            what = np.where(way[turned] == 0, STOP, np.where(old[turned] == 0, RELEASE, REVERSAL) * way[turned])
+            z = rows[turned, self.kernels.HEAD:self.kernels.HEAD + self.modes.omega.size]
+            place = rows[turned, self._at(f, 8)] if self.rigid else z @ self.plant.faces[f]
             self.events.append(np.stack([rows[turned, 0], rows[turned, 2] % (2 * np.pi), 0 * place + f, what, place],
                                         axis=1))
             self.count += turned.size
             marked[turned] = True
+        borders = np.flatnonzero(rows[:, 4] == self.kernels.BORDERED) if self.rigid else ()
+        if len(borders):
+            some = rows[borders]
+            self.events.append(np.stack([some[:, 0], some[:, 2] % (2 * np.pi), 0 * some[:, 0] - 1,
+                                         0 * some[:, 0] + BORDER, 0 * some[:, 0]], axis=1))
+            self.count += len(borders)
+            marked[borders] = True
         return marked
 
     def _at(self, face: int, column: int) -> int:
@@ -229,9 +252,11 @@ class _Run:
         book |= {"stored": now - self.begun, "peak_stored": max(float(self.books.ledger[5]), self.begun)}
         log = self.log()
         starts = _starts(log, begun, self.period)
-        high = self.dense.peak(late, self.plant, self.clock, float(self.drive.moving), self.room)
+        reactions = np.zeros(len(self.groups))
+        high = self.dense.peak(late, self.plant, self.clock, float(self.drive.moving), self.reading, reactions)
         phasors = self.books.phasors[done] @ [1, 1j]
         loops, *moved = self._loops(late)
+        loops = tuple(part._replace(force=max(part.force, float(held))) for part, held in zip(loops, reactions))
         return PieceRun(_chain([*parts, window]), window, self.books.extremes[done], phasors, book, self.outcome,
                         loops, starts, float(high), log, self.snapshots, int(self.books.ledger[6]), *moved,
                         stop / self.period, (Start(*self.motion.copy()), self.memory), self._ring(late, before),
@@ -247,19 +272,22 @@ class _Run:
 
     def sample(self, rows, grid) -> Response:
         """Histories at the times of a grid (k,) [s] and wherever a row begins with a turning point, a stop or a
-        release."""
+        release; of rigid elements, whose force jumps, on both sides of it."""
         shares = rows[:, self._at(0, 2)::self.kernels.EACH] >= SLIPS
-        events = (rows[:, 4] == 2) | np.any(np.diff(shares, axis=0, prepend=shares[:1]), axis=1)
+        jumps = (rows[:, 4] > self.kernels.TURNED) & self.rigid
+        turns = rows[:, 4] == self.kernels.TURNED
+        events = jumps | turns | np.any(np.diff(shares, axis=0, prepend=shares[:1]), axis=1)
         if np.count_nonzero(rows[:, 4]) <= 2 * grid.size:
-            events |= rows[:, 4] > 0  # the force bends at a yield, so both books close
-        time = np.unique(np.concatenate([grid, rows[events, 0]]))
+            events |= rows[:, 4] == self.kernels.YIELDED  # the force bends at a yield, so both books close
+        jumps = rows[jumps & (rows[:, 0] > grid[0]), 0]
+        time = np.unique(np.concatenate([grid, rows[events, 0], np.nextafter(jumps, -np.inf)]))
         owner = np.clip(np.searchsorted(rows[:, 0], time, side="right") - 1, 0, len(rows) - 1)
         return self._rows_as(rows, owner, np.clip(time - rows[owner, 0], 0.0, rows[owner, 1]), time)
 
     def dense_values(self, rows, owner, tau) -> np.ndarray:
         """Columns of `dense_kernels.evaluate` at tau (k,) [s] after the starts of the rows owner (k,)."""
         out = np.empty((owner.size, 2 * self.modes.omega.size + 1 + 6 * len(self.groups)))
-        self.dense.evaluate(rows, owner, tau, self.plant, self.clock, self.room, out)
+        self.dense.evaluate(rows, owner, tau, self.plant, self.clock, self.reading, out)
         return out
 
     def _rows_as(self, rows, owner, tau, time) -> Response:
@@ -311,6 +339,7 @@ class _Run:
         """(row (k,), time in it (k,) [s], weight (k,) [s]) of Gauss points that integrate products of the motion and
         of the third harmonic over the pieces of rows."""
         springs = rows[:, self._at(0, 1)::self.kernels.EACH][:, :len(self.groups)]
+        springs = np.where(np.isfinite(springs), springs, 0.0)
         square, damp = self.plant.square_most + springs @ self.plant.reach, 0.5 * self.plant.damping_most
         rate = np.maximum(damp + np.sqrt(damp**2 + square), 6 * np.pi / self.period)
         count = np.minimum(np.searchsorted(GAUSS, rate * rows[:, 1]), GAUSS.size - 1).clip(2)

@@ -1,18 +1,22 @@
-"""Compiled run from event to event of modes behind elastic-plastic elements.
+"""Compiled run from event to event of modes behind rigid and elastic-plastic elements.
 
-An event is a yield, a turning point of a slide or of the output (`search_kernels`), or a border of the drive.
+An event is a yield, the release of a slide that a rigid element holds, a turning point of a slide or of the output
+(`search_kernels`), or a border of the drive.
 """
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
-from .drive_kernels import RATE, drive_series, phase_of
-from .memory_kernels import carried, give_way, tangent, threshold, turn
-from .search_kernels import OUTPUT_TURNS, STOPS, TURNS, YIELDS, crossing, moved, next_event, speed_series
-from .series_kernels import EPS, NONE, REACH, fastest, motion_series, powers
+from .drive_kernels import KIND, RATE, SINE, drive_series, phase_of, value_now
+from .memory_kernels import carried, give_way, holds, pulled, tangent, threshold, turn
+from .search_kernels import OUTPUT_TURNS, RELEASES, STOPS, TURNS, YIELDS, crossing, moved, next_event, speed_series
+from .series_kernels import EPS, NONE, REACH, fastest, motion_series, powers, value
+from .stick_kernels import LAST, at_rest, keep, settle
 from .sum_kernels import sums
 
-DONE, FULL, TRAVEL, PILED = 0, 1, 2, 3  # how `march` returns
-HEAD, EACH = 8, 8  # columns of a row: of the piece, then of every interface behind z and v
+DONE, FULL, TRAVEL, PILED, OPEN = 0, 1, 2, 3, 4  # how `march` returns; OPEN: no choice of what holds obeys the law
+HEAD, EACH = 8, 9  # columns of a row: of the piece, then of every interface behind z and v
+# what begins a row: nothing, a yield, a turning point, a change of stick and slip, a border of the drive
+ON, YIELDED, TURNED, SWITCHED, BORDERED = 0, 1, 2, 3, 4
 AT_ONCE = 1e-12  # share of a piece in which what stood still stands still: two turning points at one place
 MOST_IDLE = 1000.0  # events in a row without progress
 
@@ -30,9 +34,10 @@ def left_of(clock, stop):
     return max(left, 0.0)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def arrive(clock, stop, left):
-    """Step onto the border `left` [s] away."""
+    """Step onto the border `left` [s] away; whether the drive changes there: to another sine, or by a jump."""
+    before, cycle, offset, changes = int(clock.now[2]), clock.now[0], clock.now[1] + left, False
     now, period = clock.now, clock.period[0]
     k = int(now[2]) + 1
     after = k < clock.segments.shape[0] and clock.segments[k, 0] == now[0] and clock.segments[k, 1] - now[1] <= left
@@ -47,12 +52,19 @@ def arrive(clock, stop, left):
     k = int(now[2]) + 1
     if k < clock.segments.shape[0] and clock.segments[k, 0] == now[0] and clock.segments[k, 1] <= now[1]:
         now[2] = k
+    if int(now[2]) != before:
+        segment = clock.segments[int(now[2])]
+        old = value_now(clock.segments[before], cycle, offset, period)
+        new = value_now(segment, now[0], now[1], period)
+        changes = (segment[KIND] == SINE and clock.segments[before, KIND] == SINE) or \
+            abs(new - old) > 1e-12 * max(abs(old), abs(new))
+    return changes
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def write(row, motion, span, theta, first, plant, table, memory, clock):
-    """A row of a piece as it begins: time, span, phase, segment, what begins it, cycle, then z, v, then of every
-    interface force, springs, share that slips, its limit, slip, work, loss, direction."""
+    """A row of a piece as it begins: time, span, phase, segment, what begins it, cycle, offset, then z, v, then of
+    every interface force, springs, share that slips, its limit, slip, work, loss, direction, slide."""
     n = len(plant.square)
     row[0] = clock.now[0] * clock.period[0] + clock.now[1]
     row[1], row[2], row[3], row[4], row[5], row[6] = span, theta, clock.now[2], first, clock.now[0], clock.now[1]
@@ -63,7 +75,8 @@ def write(row, motion, span, theta, first, plant, table, memory, clock):
         row[at] = memory.force[f]
         row[at + 1], row[at + 2], row[at + 3] = tangent(f, table, memory)
         row[at + 4], row[at + 5], row[at + 6] = memory.slip[f], memory.worked[f], memory.lost[f]
-        row[at + 7] = memory.way[f]
+        row[at + 7] = memory.way[f] if table.static[f] == 0.0 else memory.head[f] if abs(memory.head[f]) < 2.0 else 0.0
+        row[at + 8] = memory.place[f]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -72,6 +85,9 @@ def advance(u, h, top, motion, plant, table, memory, clock, books, room):
     the travel."""
     n, coefs, ledger = len(plant.square), room.coefs, books.ledger
     for f in range(len(plant.reach)):
+        if holds(f, table, memory):
+            memory.force[f] = value(room.reactions[f], 0, top - 2, u)
+            continue
         stiff, share, limit = tangent(f, table, memory)
         step = moved(room.polys[f], top, u)
         work = (memory.force[f] + 0.5 * stiff * step) * step
@@ -91,10 +107,13 @@ def advance(u, h, top, motion, plant, table, memory, clock, books, room):
         motion[1, i] = rate / h
         out += plant.output[i] * motion[0, i]
     for f in range(len(plant.reach)):
+        if holds(f, table, memory):
+            continue
         place = 0.0
         for i in range(n):
             place += plant.faces[f, i] * motion[0, i]
         memory.place[f] = place
+    keep(motion, plant, memory, room)
     widen(out, clock, books)
 
 
@@ -116,6 +135,39 @@ def stored(motion, plant, table, memory):
     for f in range(len(plant.reach)):
         out += carried(f, table, memory)[1]
     return out
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def enter(motion, plant, table, memory, clock, room):
+    """`settle` from here on, the guess and what rests being noted; whether a choice was found."""
+    segment, now = clock.segments[int(clock.now[2])], clock.now
+    for f in range(len(plant.reach)):
+        stiff = tangent(f, table, memory)[0]
+        room.springs[f] = 0.0 if table.static[f] > 0.0 and room.resting[f] == 1.0 else stiff
+    h = REACH / max(fastest(plant, room.springs), segment[RATE], 1 / clock.period[0])
+    drive_series(segment, now[0], now[1], clock.period[0], h, LAST + 1, room.waves)
+    return settle(motion, plant, table, memory, h, room)
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def begin(motion, plant, table, memory, clock, room):
+    """Choose what holds at the start of a run, where a rigid element holds if its slide rests; whether a choice was
+    found."""
+    rigid = False
+    for f in range(len(plant.reach)):
+        speed, size = 0.0, 0.0
+        for i in range(len(plant.square)):
+            part = plant.faces[f, i] * motion[1, i]
+            speed += part
+            size += abs(part)
+        moves = abs(speed) > 64 * EPS * size
+        room.signs[f] = 0.0 if table.static[f] == 0.0 or not moves else 1.0 if speed > 0 else -1.0
+        room.resting[f] = 1.0 if table.static[f] > 0.0 and not moves else 0.0
+        rigid = rigid or table.static[f] > 0.0
+        room.orders[f, 0], room.orders[f, 1] = 0.0, 0.0
+        if table.static[f] > 0.0:
+            memory.head[f] = room.signs[f]
+    return enter(motion, plant, table, memory, clock, room) if rigid else True
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -153,7 +205,7 @@ def happen(what, face, sign, plant, table, memory, clock):
             clock.rest[len(plant.reach)] = 1.0
     elif what == OUTPUT_TURNS:
         clock.rest[face] = 1.0
-    if what == YIELDS or what == TURNS:
+    if (what == YIELDS or what == TURNS) and table.static[face] == 0.0:
         memory.force[face] = carried(face, table, memory)[0]
 
 
@@ -174,30 +226,41 @@ def march(stop, motion, plant, table, memory, clock, books, room, rows):
     """Run from the clock's time to `stop` (cycle, offset [s]).
 
     motion (2, n), memory, clock and books move along; rows (r, HEAD + 2 n + EACH i): one per piece, none are written
-    where r = 0. Returns (DONE, FULL, TRAVEL or PILED, rows used). Cost: 0.2 to 0.5 us a piece of one mode.
+    where r = 0. Returns (DONE, FULL, TRAVEL, PILED or OPEN, rows used). Cost: 0.2 to 0.5 us a piece of one mode.
     """
-    used, first, now = 0, 1.0, clock.now
+    used, now = 0, clock.now
+    first, now[3] = max(now[3], float(YIELDED)), 0.0
     faces = len(plant.reach)
+    if room.orders[0, 0] < 0.0 and not begin(motion, plant, table, memory, clock, room):
+        return OPEN, used
     for f in range(faces):
-        memory.force[f] = carried(f, table, memory)[0]
+        memory.force[f] = pulled(f, table, memory)
     while now[0] < stop[0] or (now[0] == stop[0] and now[1] < stop[1]):
         if used == rows.shape[0] and used > 0:
+            now[3] = first
             return FULL, used
         left, segment = left_of(clock, stop), clock.segments[int(now[2])]
         theta = phase_of(segment, now[0], now[1], clock.period[0])
         for f in range(faces):
             room.springs[f] = tangent(f, table, memory)[0]
-        rate = max(fastest(plant, room.springs), segment[RATE], 1 / clock.period[0])
+        own = fastest(plant, room.springs) if room.held[1] == 0.0 else 0.0
+        rate = max(own, segment[RATE], 1 / clock.period[0])
         h = min(REACH / rate * min(1.0, max(rate * wait(motion, plant, table, memory), 0.02)), left)
         whole = h == left
         top = powers(rate * h)
         drive_series(segment, now[0], now[1], clock.period[0], h, top, room.waves)
-        motion_series(motion, memory.force, room.springs, plant, room.waves[0], h, top, room.coefs, room.pull)
+        motion_series(motion, memory.force, room.springs, plant, room.waves[0], h, top, room.coefs, room)
+        for f in range(faces):
+            if holds(f, table, memory):
+                memory.force[f] = room.reactions[f, 0]
         u, what, face, sign = next_event(top, plant, table, memory, clock, room)
         if books.limits[0] < 1e300 and u > 0:
             root = passed(top, plant, motion, room, books.limits[0], u)
             if root <= u:
                 u, what = root, STOPS
+        switches, changes = table.static[face] > 0.0 and (what == TURNS or what == RELEASES), False
+        if switches or whole:
+            at_rest(u, h, top, plant, table, memory, room)
         if u > 0:
             if now[1] == 0.0:
                 widen(output_of(motion, plant), clock, books)
@@ -208,22 +271,31 @@ def march(stop, motion, plant, table, memory, clock, books, room, rows):
             if u > AT_ONCE:
                 for f in range(faces + 1):
                     clock.rest[f] = 0.0
-            if whole and u == 1.0:
-                advance(u, h, top, motion, plant, table, memory, clock, books, room)
-                arrive(clock, stop, left)
+            for f in range(faces):
+                room.orders[f, 0], room.orders[f, 1] = 0.0, 0.0
+            advance(u, h, top, motion, plant, table, memory, clock, books, room)
+            if whole and (u == 1.0 or now[1] + u * h >= now[1] + left):  # an event on the border, to the last digit
+                changes = arrive(clock, stop, left)
             else:
-                advance(u, h, top, motion, plant, table, memory, clock, books, room)
                 now[1] += u * h
             books.ledger[5] = max(books.ledger[5], stored(motion, plant, table, memory))
             books.ledger[6] += 1
         books.limits[1] = books.limits[1] + 1 if u * h < 1e-13 * clock.period[0] else 0.0
         if books.limits[1] > MOST_IDLE:
             return PILED, used
-        first = 2.0 * (what == TURNS or what == OUTPUT_TURNS) + (what == YIELDS)
+        first = float(SWITCHED if switches else BORDERED if changes else YIELDED if what == YIELDS else
+                      TURNED if what == TURNS or what == OUTPUT_TURNS else ON)
         happen(what, face, sign, plant, table, memory, clock)
+        if switches:
+            room.resting[face] = 1.0
+            room.signs[face] = sign if what == RELEASES else 0.0
+        if (switches or changes) and not enter(motion, plant, table, memory, clock, room):
+            return OPEN, used
         if what == STOPS:
             return TRAVEL, used
+    now[3] = first
     return DONE, used
 
 
-__all__ = ["DONE", "EACH", "EPS", "FULL", "HEAD", "PILED", "TRAVEL", "march"]
+__all__ = ["BORDERED", "DONE", "EACH", "EPS", "FULL", "HEAD", "ON", "OPEN", "PILED", "SWITCHED", "TRAVEL", "TURNED",
+           "YIELDED", "march"]

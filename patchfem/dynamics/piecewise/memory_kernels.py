@@ -5,10 +5,17 @@ slide yields before one of a longer, since both were stretched by the same moves
 place `at`, the first ones stop together, stretched to side * y, and stay a group: each slips again after 2 y back, or
 all at once where the slide comes back to `at`. A group that slips as a whole is forgotten. So every event costs the
 same, whatever the number of elements. Twin: elements one by one, in the tests.
+
+Before the list may stand a rigid element, Coulomb friction: while it holds, the slide does not move (`stick_kernels`
+says which hold after an event); in slip it adds a constant.
 """
+
+from math import inf
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
+
+RIGID = inf  # stiffness of an element that holds the slide
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -46,6 +53,26 @@ def turn(face, memory):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def holds(face, table, memory):
+    """Whether the rigid element of an interface holds its slide."""
+    return table.static[face] > 0.0 and memory.head[face] == 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def rubbed(face, table, memory):
+    """Friction [N] of the rigid element of an interface: kinetic in slip, static at the limit while others hold the
+    slide, 0 where it holds or is none."""
+    head = memory.head[face]
+    return head * table.kinetic[face] if abs(head) == 1.0 else 0.5 * head * table.static[face]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def pulled(face, table, memory):
+    """Force [N] of an interface, without the reaction of a rigid element that holds."""
+    return rubbed(face, table, memory) + carried(face, table, memory)[0]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def carried(face, table, memory):
     """(force [N], elastic energy [J]) of the elements of an interface, group by group."""
     first, place = memory.slipping[face], memory.place[face]
@@ -64,7 +91,14 @@ def carried(face, table, memory):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def tangent(face, table, memory):
-    """(stiffness [N/m] of the elements that hold, share of the friction limit of those that slip, their limit [N])."""
+    """(stiffness [N/m] of the elements that hold, share of the friction limit of those that slip, their limit [N]); of
+    a rigid element that holds the stiffness is infinite. What has no elements slips freely."""
     first, all_of = memory.slipping[face], table.count[face]
     limit, whole = table.limit[face, first], table.limit[face, all_of]
-    return max(table.stiff[face, all_of] - table.stiff[face, first], 0.0), limit / whole if whole > 0 else 0.0, limit
+    stiff, slips = max(table.stiff[face, all_of] - table.stiff[face, first], 0.0), 1.0 if all_of == 0 else 0.0
+    if table.static[face] > 0.0:
+        if memory.head[face] == 0.0:
+            return RIGID, 0.0, 0.0
+        slips = 1.0 if abs(memory.head[face]) == 1.0 else 0.0
+        limit, whole = limit + slips * table.kinetic[face], whole + table.kinetic[face]
+    return stiff, limit / whole if whole > 0 else slips, limit

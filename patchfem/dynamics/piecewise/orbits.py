@@ -39,6 +39,7 @@ class Orbits:
         self.march, self.peak = self.kernels.march, load("dynamics.piecewise.dense_kernels").peak
         self.wide = self.kernels.HEAD + 2 * modes.omega.size + self.kernels.EACH * len(groups)
         self.rows, self.books = np.zeros((ROWS, self.wide)), books_of(1, np.ones(1))
+        self.forces = np.zeros(len(groups))
         self._given(modes)
 
     def _given(self, modes: ModalBasis) -> None:
@@ -92,7 +93,7 @@ class Orbits:
         """What a compiled function is called with."""
         one, key = self.one, (name, id(plant), moving)
         if key not in self.held:
-            self.held[key] = self.peak.held(plant, one.clock, moving, one.room) if name == "peak" else \
+            self.held[key] = self.peak.held(plant, one.clock, moving, one.room, self.forces) if name == "peak" else \
                 self.march.held(one.motion, plant, one.table, one.memory, one.clock, self.books, one.room, self.rows)
         return self.held[key]
 

@@ -125,7 +125,7 @@ class PeriodMap:
             mine[...] = given
         self.memory.place[:] = self.faces @ self.motion[0]
         clock.now[:], clock.rest[:], books.ledger[:], books.limits[1] = 0.0, 0.0, 0.0, 0.0
-        books.extremes[:] = np.inf, -np.inf
+        books.extremes[:], self.room.orders[:] = (np.inf, -np.inf), -1.0
 
     def _under(self, drive) -> None:
         """Set the clock to a sine; it is made once for each of the last drives."""

@@ -51,9 +51,9 @@ def plant_of(modes: ModalBasis) -> Plant:
 
 
 class Clock(NamedTuple):
-    """Time of a run: now (6,) cycle, offset in it [s], segment of the drive, and of a loop of one mode that stopped for
-    want of rows the drive and its quadrature [m s-2] and 1; segments (p, 10) rows of `drive_kernels`; period (1,) [s];
-    rest (i + 1,) 1 where a slide, or last the output, stands still at a turning point."""
+    """Time of a run: now (6,) cycle, offset in it [s], segment of the drive, what begins the next row, the rest of a
+    loop of one mode; segments (p, 12) rows of `drive_kernels`; period (1,) [s]; rest (i + 1,) 1 where a slide, or last
+    the output, stands still at a turning point."""
 
     now: np.ndarray
     segments: np.ndarray
@@ -62,16 +62,17 @@ class Clock(NamedTuple):
 
 
 def clock_of(drive, faces: int) -> Clock:
-    """The Clock of a drive of `core` or `structure.drives` at t = 0. PatchfemError for a segment of another frequency
-    than the cycle's."""
+    """The Clock of a drive of `core` or `structure.drives` at t = 0. PatchfemError where it begins later."""
     period = drive.period
     if drive.segments:
         rows = [_sine(part, period) for part in drive.segments]
     else:
         rows = (_swept if hasattr(drive, "low") else _lines)(drive)
-    out = np.zeros((len(rows), 10))
+    if rows[0][0] != 0:
+        raise PatchfemError("drive: the first segment must start at 0 s")
+    out = np.zeros((len(rows), 12))
     for row, (start, *numbers) in zip(out, rows):
-        row[:2], row[2:] = place(start, period), numbers
+        row[:2], row[2:2 + len(numbers)] = place(start, period), numbers
     return Clock(np.zeros(6), out, np.array([period]), np.zeros(faces + 1))
 
 
@@ -86,13 +87,13 @@ def place(time: float, period: float) -> tuple:
 
 def _sine(part, period: float) -> tuple:
     omega = part.omega if part.amplitude else 0.0
-    whole = omega * period / (2 * np.pi)
-    if abs(whole - round(whole)) > 1e-12 * max(1.0, whole):
-        raise PatchfemError("drive: a segment of another frequency than the cycle's has no exact solution here; use "
-                            "method = \"march\"")
+    turns = omega * period / (2 * np.pi)
+    more = 0.0 if abs(turns - round(turns)) < 4e-15 * max(1.0, turns) else turns - int(turns)
+    coarse = round(more * 2**24) / 2**24
     steady = part.constant + (0.0 if omega else part.amplitude * np.sin(part.phase))
     phase = part.phase - omega * place(part.start, period)[1]
-    return part.start, kinds.SINE, steady, part.amplitude if omega else 0.0, omega, phase, 0.0, 0.0, omega
+    return (part.start, kinds.SINE, steady, part.amplitude if omega else 0.0, omega, phase, 0.0, 0.0, omega, coarse,
+            more - coarse)
 
 
 def _swept(sweep) -> list:
@@ -117,7 +118,13 @@ def _lines(record) -> list:
 
 class Room(NamedTuple):
     """Room of the loop: coefs (terms, n), waves (3, terms) of the drive, polys (i + 3, terms), pull and springs (i,),
-    nodes (n, 4) of the sums, hulls of the search for roots."""
+    nodes (n, 4) of the sums, hulls of the search for roots.
+
+    Of slides that rigid elements hold (`stick_kernels`): mask (i,) which, held (2,) how many and whether nothing can
+    move, react (i, n) and tied (i,) as `constrain` leaves them, reactions (i, terms) [N] over a piece; orders (i, 2) of
+    the terms that vanish where a piece begins after an event, -1 before the first choice; resting, signs, guess (i,) of
+    a choice, scales (terms, n) and spans (i, terms) of its round-off, turned (i, n), mix and gram (i, i), row (8, i).
+    """
 
     coefs: np.ndarray
     waves: np.ndarray
@@ -126,14 +133,34 @@ class Room(NamedTuple):
     springs: np.ndarray
     nodes: np.ndarray
     hulls: np.ndarray
+    mask: np.ndarray
+    held: np.ndarray
+    react: np.ndarray
+    tied: np.ndarray
+    reactions: np.ndarray
+    orders: np.ndarray
+    resting: np.ndarray
+    signs: np.ndarray
+    guess: np.ndarray
+    scales: np.ndarray
+    spans: np.ndarray
+    turned: np.ndarray
+    mix: np.ndarray
+    gram: np.ndarray
+    row: np.ndarray
 
 
 def room_of(plant: Plant) -> Room:
     """Fresh Room for a Plant."""
     faces, n = plant.faces.shape
     wide = series.MOST + 5
-    return Room(np.zeros((wide, n)), np.zeros((3, wide)), np.zeros((faces + 3, wide)), np.zeros(faces), np.zeros(faces),
-                np.zeros((n, 4)), np.zeros((series.DEEP + 2, series.WIDE)))
+    fields = {"coefs": (wide, n), "waves": (3, wide), "polys": (faces + 3, wide), "nodes": (n, 4),
+              "hulls": (series.DEEP + 2, series.WIDE), "held": (2,), "react": (faces, n), "reactions": (faces, wide),
+              "orders": (faces, 2), "scales": (wide, n), "spans": (faces, wide), "turned": (faces, n),
+              "mix": (faces, faces), "gram": (faces, faces), "row": (8, faces)}
+    room = Room(*(np.zeros(fields.get(name, (faces,))) for name in Room._fields))
+    room.orders[:] = -1.0
+    return room
 
 
 class Books(NamedTuple):

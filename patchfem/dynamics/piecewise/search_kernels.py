@@ -1,4 +1,5 @@
-"""Compiled search for the first event of a piece: a yield, or a turning point of a slide or of the output.
+"""Compiled search for the first event of a piece: a yield, the release of a slide that a rigid element holds, or a
+turning point of a slide or of the output.
 
 Up to the first turning point of a slide, whose speed is proved free of roots before it, the slide is monotone, so a
 yield before it is one root of a monotone function: no event can be missed.
@@ -8,10 +9,10 @@ from math import sqrt
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
-from .memory_kernels import threshold
-from .series_kernels import NONE, OVER, first_root, polish
+from .memory_kernels import holds, threshold
+from .series_kernels import EPS, NONE, OVER, first_root, polish
 
-NOTHING, YIELDS, TURNS, OUTPUT_TURNS, STOPS = 0, 1, 2, 3, 4  # what ends a piece
+NOTHING, YIELDS, TURNS, OUTPUT_TURNS, STOPS, RELEASES = 0, 1, 2, 3, 4, 5  # what ends a piece
 TINY = 1e-14  # of the terms of a speed: below it a slide at a turning point has no acceleration
 
 
@@ -65,6 +66,41 @@ def crossing(poly, top, room, limit, spare):
     return polish(spare, 0, top, 0.0, limit, start)
 
 
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def released(face, top, limit, room):
+    """(u, side) at which the reaction of a slide that is held first passes its limit [N], +1 or -1; NONE for u if it
+    does not."""
+    react, spare, size = room.reactions[face], room.polys[room.react.shape[0]], limit
+    for k in range(top - 1):
+        size += abs(react[k])
+    best, to = NONE, 0.0
+    if size < 2 * limit and room.orders[face, 0] == 0.0 and room.orders[face, 1] == 0.0:
+        return best, to
+    for side in (1, -1):
+        order = int(room.orders[face, (1 - side) // 2])
+        for k in range(order, top - 1):
+            spare[k] = -side * react[k]
+        if order == 0:
+            spare[0] += limit
+            if spare[0] <= 4 * EPS * size:
+                spare[0] = max(spare[0], 0.0)
+        root = first_root(spare, order, top - 2, room.hulls) if order < top - 1 else NONE
+        if root < best:
+            best, to = root, float(side)
+    return best, to
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def rest(face, head, poly, top, room):
+    """u at which the slip of a rigid element first rests; NONE if it does not. poly: series of its speed."""
+    spare, order = room.polys[room.react.shape[0]], int(room.orders[face, 0])
+    if order == 0 and head * poly[0] <= 0.0:
+        return 0.0
+    for k in range(order, top):
+        spare[k] = head * poly[k]
+    return first_root(spare, order, top - 1, room.hulls) if order < top else NONE
+
+
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def next_event(top, plant, table, memory, clock, room):
     """(u, what, face, sign) of the first event of a piece; u = 1 and NOTHING where none ends it.
@@ -76,17 +112,32 @@ def next_event(top, plant, table, memory, clock, room):
     for f in range(faces):
         poly = polys[f]
         speed_series(plant.faces[f], len(plant.square), room.coefs, top, poly)
-        order, way = heading(poly, top, clock.rest[f] == 1.0)
-        if way == 0.0:
+        if holds(f, table, memory):
+            root, way = released(f, top, table.static[f], room)
+            if root <= u:
+                u, what, face, sign = root, RELEASES, f, way
             continue
-        if memory.slipping[f] > 0 and way != memory.way[f]:
-            return 0.0, TURNS, f, way
-        spare = polys[faces]
-        for k in range(order, top):
-            spare[k] = way * poly[k]
-        root = first_root(spare, order, top - 1, room.hulls)
-        if root < u:
-            u, what, face, sign = root, TURNS, f, -way
+        if table.static[f] > 0.0:
+            way = memory.head[f]
+            if abs(way) == 2.0:
+                continue
+            root = rest(f, way, poly, top, room)
+            if root <= u:
+                u, what, face, sign = root, TURNS, f, -way
+            if table.count[f] == 0 or u == 0.0:
+                continue
+        else:
+            order, way = heading(poly, top, clock.rest[f] == 1.0)
+            if way == 0.0:
+                continue
+            if memory.slipping[f] > 0 and way != memory.way[f]:
+                return 0.0, TURNS, f, way
+            spare = polys[faces]
+            for k in range(order, top):
+                spare[k] = way * poly[k]
+            root = first_root(spare, order, top - 1, room.hulls)
+            if root < u:
+                u, what, face, sign = root, TURNS, f, -way
         gap = threshold(f, way, table, memory) - memory.place[f]
         if way * gap <= 0:
             return 0.0, YIELDS, f, way

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
+from .memory_kernels import RIGID
 
 REACH = 2.0  # longest piece times the fastest rate
 MOST = 28  # highest power of a series
@@ -37,7 +38,7 @@ for _g in range(1, _NODES + 1):
     _PLACE[_g, :_g], _WEIGHT[_g, :_g] = (1 + _x) / 2, _w / 2
 
 
-@njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def powers(x):
     """Highest power that a piece of x times the fastest rate needs."""
     k = 4
@@ -55,12 +56,14 @@ def points(x):
     return g
 
 
-@njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def fastest(plant, springs):
-    """Bound [1/s] of the rates of the modes with springs (i,) [N/m] between the interfaces."""
+    """Bound [1/s] of the rates of the modes with springs (i,) [N/m] between the interfaces; those that hold a
+    slide only take motions away."""
     square = plant.square_most
     for f in range(len(plant.reach)):
-        square += springs[f] * plant.reach[f]
+        if springs[f] < RIGID:
+            square += springs[f] * plant.reach[f]
     return 0.5 * plant.damping_most + sqrt(0.25 * plant.damping_most**2 + square)
 
 
@@ -96,25 +99,65 @@ def double_series(motion, force, spring, plant, wave, h, top, coefs):
         coefs[k + 2, 0], coefs[k + 2, 1] = new_1, new_2
 
 
-@njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
-def motion_series(motion, force, springs, plant, wave, h, top, coefs, pull):
-    """Fill coefs (>= top + 1, n) with the series of z'' = -D z' - w^2 z - base a - slide^T (force + springs
-    slide)/mass.
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def still_series(motion, force, plant, wave, top, coefs, room):
+    """`motion_series` where what is held lets nothing move: the reactions alone."""
+    n = len(plant.square)
+    for k in range(top + 1):
+        for i in range(n):
+            coefs[k, i] = motion[0, i] if k == 0 else 0.0
+    for f in range(len(plant.reach)):
+        level, share = 0.0, 0.0
+        for i in range(n):
+            part = plant.square[i] * motion[0, i]
+            for g in range(len(plant.reach)):
+                if room.springs[g] < RIGID:
+                    part += plant.faces[g, i] * force[g] / plant.mass
+            level -= room.react[f, i] * part
+            share -= room.react[f, i] * plant.base[i]
+        for k in range(top - 1):
+            room.reactions[f, k] = plant.mass * share * wave[k]
+        room.reactions[f, 0] += plant.mass * level
 
-    motion (2, n): coordinates and rates at first; force (i,) [N] there; springs (i,) [N/m]; wave: series of a; pull:
-    room (i,).
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def constrained(k, scale, plant, coefs, room):
+    """Take from the coefficients k + 2 what moves a slide that is held, and note the reaction [N] that does:
+    a - slide^T r/mass with r = mass (slide slide^T)^+ slide a."""
+    for f in range(len(plant.reach)):
+        part = 0.0
+        for i in range(len(plant.square)):
+            part += room.react[f, i] * coefs[k + 2, i]
+        room.reactions[f, k] = part
+    for f in range(len(plant.reach)):
+        for i in range(len(plant.square)):
+            coefs[k + 2, i] -= plant.faces[f, i] * room.reactions[f, k]
+        room.reactions[f, k] *= plant.mass / scale
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def motion_series(motion, force, springs, plant, wave, h, top, coefs, room):
+    """Fill coefs (>= top + 1, n) with the series of z'' = -D z' - w^2 z - base a - slide^T (force + springs
+    slide)/mass; slides of infinite springs are held, and room.reactions (i, >= top - 1) are the forces [N] that do it.
+
+    motion (2, n): coordinates and rates at first; force (i,) [N] there; springs (i,) [N/m]; wave: series of a; room:
+    with react and held as `stick_kernels.constrain` leaves them.
     """
-    n, faces, squared = len(plant.square), plant.faces, h * h
+    n, faces, squared, pull = len(plant.square), plant.faces, h * h, room.pull
+    held = room.held[0] > 0.0
+    if room.held[1] == 1.0:
+        still_series(motion, force, plant, wave, top, coefs, room)
+        return
     if n == 1 and len(plant.reach) == 1:
         single_series(motion, force[0], springs[0], plant, wave, h, top, coefs)
         return
-    if n == 2 and len(plant.reach) == 1 and not plant.coupled:
+    if n == 2 and len(plant.reach) == 1 and not plant.coupled and not held:
         double_series(motion, force[0], springs[0], plant, wave, h, top, coefs)
         return
     for i in range(n):
         coefs[0, i], coefs[1, i] = motion[0, i], h * motion[1, i]
     for f in range(len(plant.reach)):
-        pull[f] = force[f] / plant.mass
+        pull[f] = force[f] / plant.mass if springs[f] < RIGID else 0.0
     for k in range(top - 1):
         scale, damp = TWICE[k + 2] * squared, TWICE[k + 2] * h * (k + 1)
         if k > 0:
@@ -122,7 +165,7 @@ def motion_series(motion, force, springs, plant, wave, h, top, coefs, pull):
                 part = 0.0
                 for i in range(n):
                     part += faces[f, i] * coefs[k, i]
-                pull[f] = part * springs[f] / plant.mass
+                pull[f] = part * springs[f] / plant.mass if springs[f] < RIGID else 0.0
         for i in range(n):
             part = -plant.square[i] * coefs[k, i] - plant.base[i] * wave[k]
             for f in range(len(plant.reach)):
@@ -134,6 +177,8 @@ def motion_series(motion, force, springs, plant, wave, h, top, coefs, pull):
             else:
                 lost = plant.damping[i, i] * coefs[k + 1, i]
             coefs[k + 2, i] = scale * part - damp * lost
+        if held:
+            constrained(k, scale, plant, coefs, room)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -249,7 +294,7 @@ def lone_root(poly, low, top, u, room):
     return NONE
 
 
-@njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def first_root(poly, low, top, hulls):
     """First u in (0, 1] at which sum poly[k] u^(k - low), positive just after 0, is no longer so; NONE if none.
 

@@ -10,7 +10,7 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from .drive_kernels import RATE, drive_series
 from .march_kernels import AT_ONCE, MOST_IDLE, advance, arrive, happen, left_of, output_of, wait, widen
-from .memory_kernels import carried, tangent
+from .memory_kernels import pulled, tangent
 from .search_kernels import TURNS, next_event
 from .series_kernels import REACH, fastest, motion_series, powers
 
@@ -36,7 +36,7 @@ def carry(u, h, top, slopes, marks, plant, table, memory, room, spare):
                 end = memory.upto[f, k]
                 force[f] -= (table.stiff[f, end] - table.stiff[f, first]) * marks[f, k, s]
                 first = end
-        motion_series(one, force, room.springs, plant, zero, h, top, coefs, room.pull)
+        motion_series(one, force, room.springs, plant, zero, h, top, coefs, room)
         for i in range(n):
             place, rate = coefs[top, i], top * coefs[top, i]
             for k in range(top - 1, 0, -1):
@@ -54,7 +54,7 @@ def follow(stop, motion, slopes, marks, plant, table, memory, clock, books, room
     spare: room as `carry` has it; seen (2, i): most elements that slip, fewest groups that stay.
     """
     for f in range(len(plant.reach)):
-        memory.force[f] = carried(f, table, memory)[0]
+        memory.force[f] = pulled(f, table, memory)
     now, faces, n, pieces = clock.now, len(plant.reach), len(plant.square), 0
     for k in range(room.waves.shape[1]):
         room.waves[1, k] = 0.0
@@ -69,7 +69,7 @@ def follow(stop, motion, slopes, marks, plant, table, memory, clock, books, room
         whole = h == left
         top = powers(rate * h)
         drive_series(segment, now[0], now[1], clock.period[0], h, top, room.waves)
-        motion_series(motion, memory.force, room.springs, plant, room.waves[0], h, top, room.coefs, room.pull)
+        motion_series(motion, memory.force, room.springs, plant, room.waves[0], h, top, room.coefs, room)
         u, what, face, sign = next_event(top, plant, table, memory, clock, room)
         if u > 0:
             if now[1] == 0.0:
@@ -79,7 +79,7 @@ def follow(stop, motion, slopes, marks, plant, table, memory, clock, books, room
                 for f in range(faces + 1):
                     clock.rest[f] = 0.0
             advance(u, h, top, motion, plant, table, memory, clock, books, room)
-            if whole and u == 1.0:
+            if whole and (u == 1.0 or now[1] + u * h >= now[1] + left):
                 arrive(clock, stop, left)
             else:
                 now[1] += u * h

@@ -47,7 +47,7 @@ def memory_of(most: int) -> Memory:
     """Room for the memory of at most so many elements."""
     lists = [np.zeros((1, most + 2), kind) for kind in (np.int64, float, float)]
     zeros = [np.zeros(1) for _ in range(6)]
-    return Memory(zeros[0], np.zeros(1, np.int64), zeros[1], np.ones(1, np.int64), *lists, *zeros[2:])
+    return Memory(zeros[0], np.zeros(1, np.int64), zeros[1], np.ones(1, np.int64), *lists, *zeros[2:], np.zeros(1))
 
 
 def search_room(most: int) -> tuple:

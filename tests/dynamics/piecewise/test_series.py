@@ -33,11 +33,11 @@ def test_exact_series_is_the_exponential_of_its_system(count, coupled):
     room, motion = room_of(plant), random.normal(size=(2, count))
     rate = max(series.fastest(plant, np.array([spring])), 2.0)
     h, theta, drive = series.REACH / rate, 0.7, np.array([0.3, 1.5, 2.0])
-    segment = np.array([0.0, 0.0, drives.SINE, *drive, theta, 0.0, 0.0, 2.0])
+    segment = np.array([0.0, 0.0, drives.SINE, *drive, theta, 0.0, 0.0, 2.0, 0.0, 0.0])
     top = series.powers(rate * h)
     drives.drive_series(segment, 0.0, 0.0, np.pi, h, top, room.waves)
     series.motion_series(motion, np.array([force]), np.array([spring]), plant, room.waves[0], h, top, room.coefs,
-                         room.pull)
+                         room)
     # state z, v, 1, a sin, a cos of the same system
     big = np.zeros((2 * count + 3, 2 * count + 3))
     held = np.diag(modes.omega**2) + spring / modes.mass * np.outer(modes.slide, modes.slide)

@@ -1,0 +1,469 @@
+"""Compiled choice of the interfaces that hold after an event: Coulomb friction at several interfaces at once.
+
+Slides that are held give z'' = P a, with a the acceleration without their friction and P the projector on the motions
+that leave them alone; their reactions are what the projection takes. Dependent ones (1-0, 2-0 and 1-2) share it by
+least squares: the motion is unique, the split between them is not, and one that this split would overload while the
+others hold it carries its limit and leaves the rest to them. A choice holds when every held slide is below its limit,
+or at it and going back, and every other one starts to move its own way, told by the first term that is not zero.
+"""
+
+from math import sqrt
+
+from ...compiled.inner import njit
+from ...friction.flags_kernels import FAST, LEAN
+from .memory_kernels import RIGID, holds, pulled, tangent
+from .series_kernels import EPS, TWICE, motion_series
+
+NOISE = 64 * EPS
+LOOSER = 1e4  # times that for sets of badly conditioned slides
+LAST = 8  # order of the terms that are looked at
+FEW, MANY = 4, 8  # slides at rest up to which every choice is tried at once, at last
+EDGES = 10  # slides at their limit of which every share is tried
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def turned_rows(plant, room):
+    """Turn the rows of the masked slides until they are orthogonal (one-sided Jacobi), room.turned = mix slide; the
+    length of the longest."""
+    n, faces = len(plant.square), len(plant.reach)
+    for f in range(faces):
+        for i in range(n):
+            room.turned[f, i] = plant.faces[f, i] if room.mask[f] == 1.0 else 0.0
+        for g in range(faces):
+            room.mix[f, g] = 1.0 if f == g else 0.0
+    for _ in range(40 if room.held[0] > 1.0 else 0):
+        quiet = True
+        for f in range(faces):
+            for g in range(f + 1, faces):
+                a, b, c = 0.0, 0.0, 0.0
+                for i in range(n):
+                    a += room.turned[f, i]**2
+                    b += room.turned[g, i]**2
+                    c += room.turned[f, i] * room.turned[g, i]
+                if abs(c) <= EPS * sqrt(a * b):
+                    continue
+                quiet = False
+                steep = (b - a) / (2 * c)
+                slope = (1.0 if steep >= 0 else -1.0) / (abs(steep) + sqrt(1 + steep * steep))
+                cosine = 1 / sqrt(1 + slope * slope)
+                for i in range(n):
+                    p, q = room.turned[f, i], room.turned[g, i]
+                    room.turned[f, i], room.turned[g, i] = cosine * (p - slope * q), cosine * (slope * p + q)
+                for h in range(faces):
+                    p, q = room.mix[f, h], room.mix[g, h]
+                    room.mix[f, h], room.mix[g, h] = cosine * (p - slope * q), cosine * (slope * p + q)
+        if quiet:
+            break
+    most = 0.0
+    for f in range(faces):
+        size = 0.0
+        for i in range(n):
+            size += room.turned[f, i]**2
+        most = max(most, size)
+    return sqrt(most)
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def constrain(plant, room):
+    """Hold the slides of room.mask (i,).
+
+    Fills react (i, n), the pseudo-inverse of their rows turned over (0 in those of the others), tied (i,) 1 where they
+    hold a slide, and held: (how many there are, whether nothing can move).
+    """
+    n, faces = len(plant.square), len(plant.reach)
+    count = 0.0
+    for f in range(faces):
+        count += room.mask[f]
+        room.tied[f] = 0.0
+        for i in range(n):
+            room.react[f, i] = 0.0
+    room.held[0], room.held[1] = count, 0.0
+    if count == 0.0:
+        return
+    most = turned_rows(plant, room)
+    for p in range(faces):
+        size = 0.0
+        for i in range(n):
+            size += room.turned[p, i]**2
+        if sqrt(size) <= 1e-10 * most:
+            continue
+        for q in range(faces):
+            if room.mask[q] == 1.0:
+                for i in range(n):
+                    room.react[q, i] += room.mix[p, q] * room.turned[p, i] / size
+    frees = 0.0 if count >= n else 1.0
+    if count >= n:
+        for i in range(n):
+            for j in range(n):
+                part = 1.0 if i == j else 0.0
+                for f in range(faces):
+                    part -= room.react[f, i] * plant.faces[f, j]
+                frees = max(frees, abs(part))
+    if frees < 1e-9:
+        room.held[1] = 1.0
+    for f in range(faces):
+        left, size = 0.0, 0.0
+        for j in range(n):
+            part = plant.faces[f, j]
+            for g in range(faces):
+                along = 0.0
+                for i in range(n):
+                    along += plant.faces[f, i] * room.react[g, i]
+                part -= along * plant.faces[g, j]
+            left += part * part
+            size += plant.faces[f, j]**2
+        if room.held[1] == 1.0 or left < 1e-18 * size:
+            room.tied[f] = 1.0
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def leave_alone(rates, plant, room):
+    """Take from rates (n,) what moves the slides that are held."""
+    n = len(plant.square)
+    if room.held[1] == 1.0:
+        for i in range(n):
+            rates[i] = 0.0
+        return
+    for f in range(len(plant.reach)):
+        room.row[0, f] = 0.0
+        for i in range(n):
+            room.row[0, f] += plant.faces[f, i] * rates[i]
+    for f in range(len(plant.reach)):
+        for i in range(n):
+            rates[i] -= room.react[f, i] * room.row[0, f]
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def keep(motion, plant, memory, room):
+    """Take the round-off of slides that are held out of coordinates and rates."""
+    if room.held[0] == 0.0 or room.held[1] == 1.0:
+        return
+    n = len(plant.square)
+    leave_alone(motion[1], plant, room)
+    for f in range(len(plant.reach)):
+        room.row[0, f] = memory.place[f]
+        for i in range(n):
+            room.row[0, f] -= plant.faces[f, i] * motion[0, i]
+    for f in range(len(plant.reach)):
+        for i in range(n):
+            motion[0, i] += room.react[f, i] * room.row[0, f]
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def round_off(motion, force, springs, plant, h, room):
+    """Fill scales (LAST + 2, n) with the magnitudes that the terms of a motion are added from, spans (i, LAST) with
+    those of the reactions [N]; arguments as of `motion_series`."""
+    n, faces, squared, wave = len(plant.square), plant.faces, h * h, room.waves[0]
+    for i in range(n):
+        room.scales[0, i], room.scales[1, i] = abs(motion[0, i]), abs(h * motion[1, i])
+    for k in range(LAST):
+        scale, damp = TWICE[k + 2] * squared, TWICE[k + 2] * h * (k + 1)
+        for f in range(len(plant.reach)):
+            room.pull[f] = 0.0
+            if springs[f] < RIGID and k == 0:
+                room.pull[f] = abs(force[f]) / plant.mass
+            elif springs[f] < RIGID:
+                for i in range(n):
+                    room.pull[f] += abs(faces[f, i]) * room.scales[k, i] * springs[f] / plant.mass
+        for i in range(n):
+            part, lost = plant.square[i] * room.scales[k, i] + abs(plant.base[i] * wave[k]), 0.0
+            for f in range(len(plant.reach)):
+                part += abs(faces[f, i]) * room.pull[f]
+            for j in range(n):
+                lost += abs(plant.damping[i, j]) * room.scales[k + 1, j]
+            room.scales[k + 2, i] = scale * part + damp * lost
+        if room.held[0] == 0.0:
+            continue
+        for f in range(len(plant.reach)):
+            room.spans[f, k] = 0.0
+            for i in range(n):
+                room.spans[f, k] += abs(room.react[f, i]) * room.scales[k + 2, i]
+        for f in range(len(plant.reach)):
+            for i in range(n):
+                room.scales[k + 2, i] += abs(faces[f, i]) * room.spans[f, k]
+            room.spans[f, k] *= plant.mass / scale
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def leaves(face, sign, noise, plant, room):
+    """(order, sign) of the first term of sign * speed of a slide that is above its round-off; (LAST, 0) without."""
+    for k in range(1, LAST):
+        rate, size = 0.0, 0.0
+        for i in range(len(plant.square)):
+            rate += plant.faces[face, i] * room.coefs[k + 1, i]
+            size += abs(plant.faces[face, i]) * room.scales[k + 1, i]
+        if abs(rate) > noise * size:
+            return float(k), 1.0 if sign * rate > 0 else -1.0
+    return float(LAST), 0.0
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def margin(face, side, noise, limit, room):
+    """(order, sign) of the first term of limit - side * reaction of a slide that is above its round-off; (LAST, 0)
+    without."""
+    for k in range(LAST):
+        left, size = -side * room.reactions[face, k], room.spans[face, k]
+        if k == 0:
+            left, size = left + limit, size + limit
+        if abs(left) > noise * size:
+            return float(k), 1.0 if left > 0 else -1.0
+    return float(LAST), 0.0
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def judge(noise, motion, plant, table, memory, h, room):
+    """Whether the signs of slip in room.guess (i,), 0 of slides that hold, obey the law just after an event, those of
+    room.resting having no speed.
+
+    memory.head, force, springs and what holds are left as they are under the guess, orders as the search for the next
+    event takes them.
+    """
+    faces = len(plant.reach)
+    for f in range(faces):
+        room.mask[f] = 1.0 if table.static[f] > 0.0 and room.guess[f] == 0.0 else 0.0
+    constrain(plant, room)
+    for f in range(faces):
+        if table.static[f] > 0.0:
+            others = room.guess[f] != 0.0 and room.tied[f] == 1.0 and room.resting[f] == 1.0
+            memory.head[f] = 2.0 * room.guess[f] if others else room.guess[f]
+        memory.force[f] = pulled(f, table, memory)
+        room.springs[f] = tangent(f, table, memory)[0]
+        room.orders[f, 0], room.orders[f, 1] = 0.0, 0.0
+    motion_series(motion, memory.force, room.springs, plant, room.waves[0], h, LAST + 1, room.coefs, room)
+    round_off(motion, memory.force, room.springs, plant, h, room)
+    for f in range(faces):
+        if room.resting[f] == 0.0 or table.static[f] == 0.0 or abs(memory.head[f]) == 2.0:
+            continue
+        if memory.head[f] != 0.0:
+            order, lead = leaves(f, memory.head[f], noise, plant, room)
+            if lead <= 0.0:
+                return False
+            room.orders[f, 0] = order
+            continue
+        for side in (1, -1):
+            order, lead = margin(f, side, noise, table.static[f], room)
+            if lead < 0.0:
+                return False
+            if lead > 0.0:
+                room.orders[f, (1 - side) // 2] = order
+    return True
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def every(noise, motion, plant, table, memory, h, room):
+    """Whether one of all choices of the slides at rest holds, those with few that slip first."""
+    faces, count, codes = len(plant.reach), 0, 1
+    for f in range(faces):
+        if room.resting[f] == 1.0:
+            count, codes = count + 1, codes * 3
+    for slips in range(count + 1):
+        for code in range(codes):
+            left, found = code, 0
+            for f in range(faces - 1, -1, -1):
+                room.guess[f] = room.signs[f]
+                if room.resting[f] == 1.0:
+                    digit = left % 3
+                    room.guess[f] = -1.0 if digit == 2 else float(digit)
+                    left, found = left // 3, found + (digit > 0)
+            if found == slips and judge(noise, motion, plant, table, memory, h, room):
+                return True
+    return False
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def solved(free, room):
+    """Solve gram x = right of the rows free (i,) (Cholesky): row[2] from row[1]; the others 0."""
+    gram, low, right, x = room.gram, room.mix, room.row[1], room.row[2]
+    count = right.size
+    for f in range(count):
+        x[f] = 0.0
+        if free[f] == 0.0:
+            continue
+        for g in range(f + 1):
+            if free[g] == 0.0:
+                continue
+            part = gram[f, g]
+            for k in range(g):
+                if free[k] == 1.0:
+                    part -= low[f, k] * low[g, k]
+            low[f, g] = sqrt(max(part, 1e-300)) if f == g else part / low[g, g]
+        x[f] = right[f]
+        for g in range(f):
+            if free[g] == 1.0:
+                x[f] -= low[f, g] * x[g]
+        x[f] /= low[f, f]
+    for f in range(count - 1, -1, -1):
+        if free[f] == 1.0:
+            for g in range(f + 1, count):
+                if free[g] == 1.0:
+                    x[f] -= low[g, f] * x[g]
+            x[f] /= low[f, f]
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def least_forces(within, fixed, plant, table, room):
+    """Forces room.row[3] (i,) [N] of the slides at rest that leave the smallest acceleration, of those the smallest.
+
+    within (i,): their limits; fixed (i,): sign of those that slip, at the kinetic limit. An active set: to the solution
+    of the free ones, or up to the first limit on the way to it; one whose acceleration pulls it off its limit is freed.
+    The acceleration of every slide without them is room.row[4].
+    """
+    count, force, free = within.size, room.row[3], room.row[5]
+    for f in range(count):
+        force[f] = fixed[f] * table.kinetic[f]
+        free[f] = 1.0 if room.resting[f] == 1.0 and fixed[f] == 0.0 else 0.0
+    for _ in range(6 * count):
+        for f in range(count):
+            room.row[1, f] = room.row[4, f]
+            for g in range(count):
+                if free[g] == 0.0:
+                    room.row[1, f] -= room.gram[f, g] * force[g]
+        solved(free, room)
+        share, block = 1.0, -1
+        for f in range(count):
+            new = room.row[2, f]
+            if free[f] == 1.0 and abs(new) > within[f]:
+                part = ((within[f] if new > 0 else -within[f]) - force[f]) / (new - force[f])
+                if part < share:
+                    share, block = max(part, 0.0), f
+        for f in range(count):
+            if free[f] == 1.0:
+                force[f] += share * (room.row[2, f] - force[f])
+        if block >= 0:
+            force[block], free[block] = within[block] if room.row[2, block] > 0 else -within[block], 0.0
+            continue
+        worst, freed = 0.0, -1
+        for f in range(count):
+            if room.resting[f] == 1.0 and fixed[f] == 0.0 and free[f] == 0.0:
+                left = room.row[4, f]
+                for g in range(count):
+                    left -= room.gram[f, g] * force[g]
+                back = -left if force[f] > 0 else left
+                if back > max(worst, 1e-12 * abs(room.row[4, f])):
+                    worst, freed = back, f
+        if freed < 0:
+            return
+        free[freed] = 1.0
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def by_squares(kinetic, noise, motion, plant, table, memory, h, room):
+    """Whether a choice holds that the smallest accelerations tell, for many slides at rest; kinetic: their forces are
+    within the kinetic limits, where the law always has a solution, else within the static ones.
+
+    Slides that move under these forces slip; those at their limit that do not are tried in every combination.
+    """
+    n, count = len(plant.square), len(plant.reach)
+    within, fixed, pull = room.row[6], room.row[7], room.scales[0]
+    for f in range(count):
+        within[f] = max(table.kinetic[f], 1e-9 * table.static[f]) if kinetic else table.static[f]
+        fixed[f] = 0.0
+        rests = room.resting[f] == 1.0
+        if table.static[f] > 0.0:
+            memory.head[f] = 0.0 if rests else room.signs[f]
+        memory.force[f] = pulled(f, table, memory)
+    for i in range(n):
+        pull[i] = -plant.square[i] * motion[0, i] - plant.base[i] * room.waves[0, 0]
+        for j in range(n):
+            pull[i] -= plant.damping[i, j] * motion[1, j]
+        for f in range(count):
+            pull[i] -= plant.faces[f, i] * memory.force[f] / plant.mass
+    most = 0.0
+    for f in range(count):
+        room.row[4, f] = 0.0
+        for i in range(n):
+            room.row[4, f] += plant.faces[f, i] * pull[i]
+        for g in range(count):
+            room.gram[f, g] = 0.0
+            for i in range(n):
+                room.gram[f, g] += plant.faces[f, i] * plant.faces[g, i] / plant.mass
+        most = max(most, room.gram[f, f])
+    for f in range(count):
+        room.gram[f, f] += 1e-12 * most  # picks the smallest forces among equal ones
+    for _ in range(4 * count):
+        least_forces(within, fixed, plant, table, room)
+        changed = False
+        for f in range(count):
+            if room.resting[f] == 0.0:
+                continue
+            left, large = room.row[4, f], 0.0
+            for i in range(n):
+                large += abs(plant.faces[f, i] * pull[i])
+            for g in range(count):
+                left -= room.gram[f, g] * room.row[3, g]
+                large += abs(room.gram[f, g]) * table.static[g]
+            if fixed[f] == 0.0 and abs(left) > 1e-7 * large:
+                fixed[f], changed = 1.0 if left > 0 else -1.0, True
+            elif fixed[f] * left < -1e-7 * large:
+                fixed[f], changed = 0.0, True
+        if not changed:
+            break
+    edges = 0
+    for f in range(count):
+        room.row[5, f] = 0.0  # what is at its limit without moving
+        at_limit = abs(room.row[3, f]) > within[f] * (1 - 1e-6)
+        if room.resting[f] == 1.0 and fixed[f] == 0.0 and at_limit and edges < EDGES:
+            room.row[5, f], edges = 1.0, edges + 1
+    for code in range(2**edges - 1, -1, -1):
+        left = code
+        for f in range(count):
+            room.guess[f] = fixed[f] if room.resting[f] == 1.0 else room.signs[f]
+            if room.row[5, f] == 1.0:
+                if left % 2 == 1:
+                    room.guess[f] = 1.0 if room.row[3, f] > 0 else -1.0
+                left //= 2
+        if judge(noise, motion, plant, table, memory, h, room):
+            return True
+    return False
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def settle(motion, plant, table, memory, h, room):
+    """Choose which rigid elements hold just after an event, and which way the others slip; whether a choice was found.
+
+    room.signs (i,): the first guess; of slides outside of room.resting (i,) their slip. room.waves[0]: series of the
+    drive over h [s]. Rates of the resting slides are taken out of the motion.
+    """
+    faces, count = len(plant.reach), 0
+    for f in range(faces):
+        room.mask[f] = room.resting[f]
+    constrain(plant, room)
+    if room.held[0] > 0.0:
+        leave_alone(motion[1], plant, room)
+    for f in range(faces):
+        if table.static[f] > 0.0 and room.tied[f] == 1.0:
+            room.resting[f] = 1.0
+        count += int(room.resting[f])
+    for noise in (NOISE, LOOSER * NOISE):
+        for f in range(faces):
+            room.guess[f] = room.signs[f]
+        if judge(noise, motion, plant, table, memory, h, room):
+            return True
+        if len(plant.reach) > FEW and count > FEW:
+            for kinetic in (False, True):
+                if by_squares(kinetic, noise, motion, plant, table, memory, h, room):
+                    return True
+        if count <= MANY and every(noise, motion, plant, table, memory, h, room):
+            return True
+    return False
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def at_rest(u, h, top, plant, table, memory, room):
+    """Note in room.resting (i,) which slides of rigid elements have no speed at u of a piece: those held, and those
+    whose speed is round-off; room.signs are those of their slip."""
+    for f in range(len(plant.reach)):
+        head = memory.head[f]
+        room.signs[f] = 0.0 if head == 0.0 else 1.0 if head > 0 else -1.0
+        room.resting[f] = 1.0 if table.static[f] > 0.0 else 0.0
+        if holds(f, table, memory) or table.static[f] == 0.0 or abs(head) == 2.0:
+            continue
+        speed, size, power = 0.0, 0.0, 1.0
+        for k in range(1, top + 1):
+            for i in range(len(plant.square)):
+                part = plant.faces[f, i] * room.coefs[k, i] * (k * power)
+                speed += part
+                size += abs(part)
+            power *= u
+        if room.signs[f] * speed > NOISE * size:
+            room.resting[f] = 0.0

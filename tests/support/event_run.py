@@ -1,0 +1,107 @@
+"""Coulomb runs for tests: one call with limits instead of elements, and the run as phases from event to event."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from patchfem.dynamics.piecewise import histories
+from patchfem.dynamics.piecewise.elements import coulomb
+
+
+def groups_of(modes, static, kinetic) -> list:
+    """A rigid element per interface, from limits [N] that are one for all or (i,)."""
+    count = len(modes.interfaces)
+    pairs = zip(np.broadcast_to(static, count), np.broadcast_to(kinetic, count))
+    return [coulomb(float(one), float(other)) for one, other in pairs]
+
+
+def simulate(modes, drive, static, kinetic, cycles, window=10, travel=np.inf, progress=None, start=None):
+    """`histories.simulate` of Coulomb friction."""
+    groups = groups_of(modes, static, kinetic)
+    return histories.simulate(modes, drive, groups, cycles, window, travel, 0, progress, start)
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Columns of `dense_kernels.evaluate` of a run, weighted, from the start of a phase on; their rates beside them."""
+
+    run: object
+    rows: np.ndarray
+    columns: tuple
+    rates: tuple
+    weights: tuple
+
+    def many(self, t):
+        """Values (j,) at times t (j,) [s] since the phase began."""
+        return self._of(self.columns, np.asarray(t, float))
+
+    def _of(self, columns, t):
+        at = self.rows[0, 0] + t
+        owner = np.clip(np.searchsorted(self.rows[:, 0], at, side="right") - 1, 0, len(self.rows) - 1)
+        # from the offset in the cycle, which has more digits than the time
+        since = np.concatenate([[0.0], np.cumsum(self.rows[:-1, 1])])
+        tau = np.clip(t - since[owner], 0.0, self.rows[owner, 1])
+        order = np.argsort(owner, kind="stable")
+        out = np.empty((t.size, 2 * len(self.run.modes.omega) + 1 + 6 * len(self.run.groups)))
+        out[order] = self.run.dense_values(self.rows, owner[order], tau[order])
+        return out[:, columns] @ np.array(self.weights)
+
+    def __call__(self, t):
+        return float(self.many(np.array([t]))[0])
+
+    def rate(self):
+        """The time derivative."""
+        return Signal(self.run, self.rows, self.rates, (), self.weights)
+
+
+def combine(signals, factors) -> Signal:
+    """Sum of signals over the same phase, weighted with `factors`."""
+    first = signals[0]
+    return Signal(first.run, first.rows, sum((s.columns for s in signals), ()), sum((s.rates for s in signals), ()),
+                  tuple(float(f) for f in factors))
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Motion from one event to the next, `span` [s] long from `time` [s] and drive phase `theta`; directions (i,) of
+    slip, 0 in stick; modal: a Signal of every coordinate; forces: of every interface [N]."""
+
+    time: float
+    theta: float
+    span: float
+    directions: tuple
+    modal: list
+    forces: list
+    rows: np.ndarray
+
+    @property
+    def direction(self) -> int:
+        """Of the first interface."""
+        return self.directions[0]
+
+    @property
+    def force(self) -> Signal:
+        """Of the first interface."""
+        return self.forces[0]
+
+
+def rows_of(modes, drive, static, kinetic, cycles, start=None, begin=0) -> tuple:
+    """(run, rows of all its pieces) from rest or `start`, the clock put to the cycle `begin` at first."""
+    one = histories._Run(modes, drive, groups_of(modes, static, kinetic), cycles, int(cycles) + 2, np.inf, start, None)
+    one.clock.now[0] = begin
+    return one, np.concatenate(one.until(cycles, True))
+
+
+def run(modes, drive, static, kinetic, duration, start=None) -> list:
+    """The phases of a run up to `duration` [s]; the last one is cut there."""
+    one, rows = rows_of(modes, drive, static, kinetic, duration / drive.period, start)
+    begins = np.flatnonzero(rows[:, 4] >= one.kernels.SWITCHED)
+    n, i = len(modes.omega), len(one.groups)
+    out = []
+    for first, end in zip([0, *begins[begins > 0]], [*begins[begins > 0], len(rows)]):
+        part = rows[first:end]
+        ways = tuple(int(part[0, one._at(f, 7)]) if group.static else 1 for f, group in enumerate(one.groups))
+        modal = [Signal(one, part, (k,), (n + k,), (1.0,)) for k in range(n)]
+        forces = [Signal(one, part, (2 * n + 1 + 6 * f + 2,), (), (1.0,)) for f in range(i)]
+        out.append(Phase(part[0, 0], part[0, 2], part[:, 1].sum(), ways, modal, forces, part))
+    return out
