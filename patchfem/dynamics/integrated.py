@@ -31,7 +31,8 @@ class Integrated:
     swing: half the range [m] of the output; acceleration: largest at the output [m s-2]; drift: time mean of the slide
     in the last cycle less that in the first, per cycle between them [m]; waves: sizes of the first and third harmonic
     of the absolute acceleration [m s-2]; loops: a Loop of every interface; starts: phases of the drive modulo pi at
-    which slips of the first begin; books: friction work [J] by samples, by the ledger, and to and fro.
+    which slips of the first begin; books: friction work [J] by samples, by the ledger, and to and fro; turns: (slide
+    [m], force [N]) of the first where its slide is smallest and where it is largest, a pair for every cycle.
     """
 
     swing: float | None = None
@@ -41,6 +42,7 @@ class Integrated:
     loops: tuple = ()
     starts: np.ndarray | None = None
     books: tuple | None = None
+    turns: tuple = ()
 
 
 @dataclass(frozen=True, eq=False, slots=True)

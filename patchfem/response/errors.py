@@ -31,6 +31,7 @@ BETWEEN = {"slip_start_phase": 1.0, "stick_fraction": 0.3}  # over the steps per
 # the place of a release between two samples leaves open
 SHARE, LEAST = 0.4, 0.2  # of the typical relative change, that of an irregular and of a regular measure at least
 OF_CHANGE, OF_TYPICAL = 0.5, 0.3  # of runs that a tolerance tells apart
+OF_FINER, OF_TYPICAL_FINER = 2.8, 0.4  # of runs that twice the harmonics tell apart: 99.5 % of 555 bars of 48 rigs
 OF_CELLS = 0.3  # of runs whose cells are half as many
 OF_FLOOR = 0.1  # of the floor of a measure, and its square where steps meet a tolerance: nobody uses the digits below.
 # Not of GAPS, which are errors themselves and are read by their size
@@ -150,6 +151,19 @@ def jumps_error(fine: dict, half: dict, quarter: dict, steps: int, size: float =
     """`step_error` of a set-valued law, whose releases lie between samples."""
     found = step_error(fine, half, quarter, steps, size)
     return {name: error + BETWEEN.get(of_first(name), 0.0) / steps for name, error in found.items()}
+
+
+def finer_error(values: dict, finer: dict) -> dict:
+    """Error by name of a motion that is a series of harmonics, from one of twice as many on twice the samples.
+
+    What a series leaves out falls when its harmonics are doubled, by 2 for sure and mostly by 4 and more, so the change
+    is most of the error. One change can be small by chance, so a share of what the main measures typically change by
+    counts besides, but for what a limit holds.
+    """
+    gaps = change(values, finer)
+    typical = typical_change(values, gaps)
+    return {name: OF_FINER * gap + (OF_TYPICAL_FINER * typical * abs(values[name]) if gap > ROUND * abs(values[name])
+                                    else 0.0) for name, gap in gaps.items()}
 
 
 def cells_error(fine: dict, coarse: dict) -> dict:

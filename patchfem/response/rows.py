@@ -14,7 +14,7 @@ from ..core import Response, Row
 from ..dynamics.integrated import Integrated
 from ..dynamics.second_book import gap
 from ..structure.drive_sizes import largest, whole
-from .loops import drift, half_range, interface_loop, secant_stiffness, turns_of
+from .loops import Turn, drift, half_range, interface_loop, secant_stiffness, turns_of
 from .measures import REST, acceleration_peak, circular_mean, energy_balance, ledger_measures, slip_measures
 from .spectrum import FLOOR, odd_harmonics, wave_measures
 
@@ -80,6 +80,8 @@ class Seen:
     @cached_property
     def turns(self) -> list:
         """(smallest, largest) Turn of the interface's slide in every whole cycle of the window."""
+        if self.own.turns:
+            return [tuple(Turn(*one) for one in pair) for pair in self.own.turns]
         w = self.window
         return turns_of(w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.by)
 

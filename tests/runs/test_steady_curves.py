@@ -192,7 +192,7 @@ def test_exact_coulomb_behind_shear_balances_beside_a_spring_that_bends(spring):
     """Behind the shear of the pieces Coulomb's law is a set of springs that slip: a march ends in the balance."""
     text = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n' + SHEAR + COULOMB + MODE.replace("0.003", "0.05") + spring
     steady = pf.run(text + SINE.format(143, 10), **STEADY)
-    march = pf.run(text + SINE.format(143, 60), **{"accuracy.method": "march", "accuracy.steps_per_cycle": "400"})
+    march = pf.run(text + SINE.format(143, 60), **{"accuracy.method": "march", "accuracy.steps_per_cycle": "800"})
     assert steady.outcome == march.outcome == "steady"
     for name in ("relative_displacement_amplitude", "absolute_acceleration_peak", "absolute_acceleration_fundamental",
                  "loop_area"):

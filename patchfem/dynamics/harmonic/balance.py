@@ -10,7 +10,7 @@ from ...core import Response
 from .branch import Backbone, Branch, backbone, branches, levels, response
 from .forces import Group
 from .laws import Flow, Interlock, Jenkins, OfSpeed, Spring, Track, law_of_model, synthesis
-from .point import Periodic, point
+from .point import Periodic, point, slip_of
 from .stability import with_stability
 
 __all__ = ["Backbone", "Branch", "Flow", "Group", "Interlock", "Jenkins", "OfSpeed", "Periodic", "Spring", "backbone",
@@ -80,12 +80,9 @@ def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> 
         - group.rows.T @ forces / modes.mass
     track = Track(periodic.coefficients[0], omega, inner)
     found = [law.sample(track) for law in group.laws[0]]
-    limit = sum(s.limit for s in found)
-    stretch = sum(s.stretch for s in found if s.stretch is not None)
-    slip = track.q - stretch / limit if limit > 0 else np.zeros(inner)
     floor = base if drive.moving else 0 * base
     loads = [cycle(s.load) for s in found if s.load is not None]
     return Response(np.arange(samples + 1) * (2 * np.pi / omega / samples), cycle(z), cycle(rate), cycle(track.q),
                     cycle(omega * track.rate), cycle(modes.output @ z), cycle(modes.output @ rate),
-                    cycle(modes.output @ accel + floor), cycle(floor), cycle(forces[0]), cycle(slip),
+                    cycle(modes.output @ accel + floor), cycle(floor), cycle(forces[0]), cycle(slip_of(track, found)),
                     {"normal_load": loads[0]} if loads else {})

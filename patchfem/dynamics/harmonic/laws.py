@@ -230,13 +230,15 @@ class Flow:
     def along(self, track: Track) -> "Nodes":
         """The periodic state, that of a virgin contact where several are, at samples and turning points."""
         angles, places, cells, _ = track.turning
-        n, at = track.samples, cells + 1
-        angle = np.insert(np.arange(n) * (2 * np.pi / n), at, angles)
-        q, speed = np.insert(track.q, at, places), np.insert(track.omega * track.rate, at, 0.0)
+        n, own = track.samples, np.ones(track.samples + len(cells), bool)
+        own[cells + 1 + np.arange(len(cells))] = False
+        angle, q, speed = np.zeros((3, own.size))  # the slide rests at a turn
+        angle[own], q[own], speed[own] = np.arange(n) * (2 * np.pi / n), track.q, track.omega * track.rate
+        angle[~own], q[~own] = angles, places
         dt = np.maximum(np.diff(angle, append=2 * np.pi) / track.omega, 1e-300)
         z, steps, force, slopes = np.empty(q.size), np.empty((3, q.size)), np.empty(q.size), np.empty((2, q.size))
         flow_kernels(self.element.kernels).cycle(self.element.numbers[None], q, speed, dt, z, steps, force, slopes)
-        return Nodes(angle, np.insert(np.ones(n, bool), at, False), dt, z, steps, force, slopes)
+        return Nodes(angle, own, dt, z, steps, force, slopes)
 
     def sample(self, track: Track) -> Sampled:
         """Force at the samples of the periodic state. Where the law knows no time its slopes are those over the slide

@@ -13,13 +13,15 @@ from ...core import NotConverged
 from .continuation import follow
 from .forces import Group
 from .harmonic import Balance, newton, pack, solve_linear, unpack
-from .laws import synthesis
+from .laws import Track, synthesis
 from .starts import one_harmonic
 
 LADDER = (7, 15, 31, 63, 127, 255)  # harmonics that are tried
 WIDER = 4  # harmonics that follow, over those that are solved for
 CLIMB = (11, 15, 23, 31, 47, 63, 95, 127, 191)  # on the way from few
 SWEEPS = 40
+CLOSED = 1e-5  # of the tolerance, what the last sweep may change
+TOLERANCE = 1e-3  # where none is given
 
 
 class _Unbounded(NotConverged):
@@ -33,6 +35,7 @@ class Periodic:
     coefficients (i, K + 1) complex: slides [m] of the rows of `group`, x = Re sum X_k exp(i k omega t); forces (i, K +
     1) [N], modal (K + 1, n) [m]; harmonics H solved for (K >= H). residual: rms of the force that the motion does not
     balance in time, on twice the samples, over the rms of the force; error: estimate for the motion, relative to it;
+    left: what the sweeps of the higher harmonics still change of it;
     stable and multipliers None until asked for; unknowns: those of the balance, a start for a neighbour.
     """
 
@@ -48,6 +51,7 @@ class Periodic:
     iterations: int
     unknowns: np.ndarray
     group: Group
+    left: float = 0.0
     stable: bool | None = None
     multipliers: np.ndarray | None = None
 
@@ -60,6 +64,27 @@ class Periodic:
         """(max - min)/2 [m] of row @ coordinates, row (n,), between the samples by parabolas."""
         y = synthesis(self.modal @ np.asarray(row, float), samples)
         return (_top(y) + _top(-y)) / 2
+
+
+    def turns(self) -> tuple:
+        """(slide [m], force [N], slip [m]) of the first row where its slide is smallest and where it is largest;
+        () of one that rests."""
+        angles, places, _, _ = Track(self.coefficients[0], self.omega, self.samples).turning
+        if not angles.size:
+            return ()
+        k, out = np.arange(self.coefficients.shape[1]), []
+        for at in (np.argmin(places), np.argmax(places)):  # the cycle begins there: its first sample is the turn
+            track = Track(self.coefficients[0] * np.exp(1j * k * angles[at]), self.omega, self.samples)
+            found = [law.sample(track) for law in self.group.laws[0]]
+            out.append((float(places[at]), float(sum(one.force[0] for one in found)), float(slip_of(track, found)[0])))
+        return tuple(out)
+
+
+def slip_of(track: Track, found: list) -> np.ndarray:
+    """Irreversible part (N,) [m] of a slide from the laws sampled along it; 0 where nothing rubs."""
+    limit = sum(one.limit for one in found)
+    stretch = sum(one.stretch for one in found if one.stretch is not None)
+    return track.q - stretch / limit if limit > 0 else np.zeros(track.samples)
 
 
 def _top(y) -> float:
@@ -127,7 +152,17 @@ def cut(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
     return np.concatenate([pack(y), unknowns[y.shape[0] * (2 * h + 1):]])
 
 
-def _solved(modes, drive, group, h, x, wider, tolerance=1e-3, near=0) -> Periodic:
+def finer(found: Periodic, modes, drive) -> Periodic:
+    """The same motion with twice its harmonics and samples, those above following where they do. NotConverged where it
+    is not found."""
+    h, top, x = found.harmonics, found.coefficients.shape[1] - 1, found.unknowns
+    balance = balance_of(modes, found.group, 2 * found.base_samples)
+    here = balance.system(x, drive.omega, drive.acceleration, h)
+    one = _widened(balance, x, here, drive, h, 2 * top // h, TOLERANCE, 0)
+    return one if np.isfinite(one.error) else _solved(modes, drive, balance.contact, 2 * top, x, 1)
+
+
+def _solved(modes, drive, group, h, x, wider, tolerance=TOLERANCE, near=0) -> Periodic:
     """The balance with h harmonics, those above up to wider h following, on samples sharp enough for its slides; near:
     samples that a neighbour took."""
     samples = group.samples or max(group.samples_for(h * wider), near)
@@ -246,7 +281,7 @@ def _widened(balance, x, here, drive, h, wider, tolerance, count) -> Periodic:
         q = new
         if fine > samples or (wider == 1 and sweep):
             break
-        if sweep and changes[-1] <= 1e-2 * tolerance * size:
+        if sweep and changes[-1] <= CLOSED * tolerance * size:
             fine = 2 * samples
         if sweep > 2 and (changes[-1] > changes[-2] > changes[-3] or changes[-1] > changes[1]):
             return _diverged(balance, here, drive, h, samples, size, count, start)
@@ -289,9 +324,11 @@ def _periodic(balance, x, drive, h, top, samples, changes, size, count, q) -> Pe
     scale = float(np.sqrt(np.mean(fine**2)))
     residual = float(np.sqrt(np.mean(left**2))) / scale if scale > 0 else 0.0
     z = balance.motion(x, omega, level, h, used)
-    error = max(changes)
+    error, left = max(changes), 0.0
     if top > h:
         # what is left of the sweeps, and what lies beyond the top: as below it, falling like k^-5/2
         ratio = min((changes[-2] / changes[1])**(1 / max(len(changes) - 3, 1)), 0.9) if len(changes) > 3 else 0.9
-        error = 2 * (changes[-1] + changes[-2] * ratio / (1 - ratio) + max(changes) * (h / top)**2.5)
-    return Periodic(omega, level, q, used, z, h, samples, residual, error / max(size, 1e-300), count, x, group)
+        left = changes[-2] * ratio / (1 - ratio)
+        error = 2 * (changes[-1] + left + max(changes) * (h / top)**2.5)
+    size = max(size, 1e-300)
+    return Periodic(omega, level, q, used, z, h, samples, residual, error / size, count, x, group, left / size)

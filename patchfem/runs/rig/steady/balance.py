@@ -13,11 +13,12 @@ from ....dynamics.harmonic.balance import regime as balanced_regime
 from ....dynamics.harmonic.forces import Group
 from ....dynamics.harmonic.harmonic import pack
 from ....dynamics.harmonic.laws import Interlock, Spring, analysis
-from ....dynamics.harmonic.point import balance_of
+from ....dynamics.harmonic.point import balance_of, finer
 from ....dynamics.harmonic.point import point as periodic_point
 from ....dynamics.harmonic.stability import with_stability
 from ....dynamics.integrated import Integrated, Run
 from ....dynamics.march.march import march
+from ....response.errors import finer_error
 from ....response.measures import acceleration_peak
 from ....response.spectrum import odd_harmonics, wave_measures
 from ..interface import contact_model, flank_of, model_of
@@ -30,21 +31,27 @@ ADRIFT = ("the steady motion that the balance found over the grooves does not la
           'use accuracy.method = "march"')
 CYCLES, STEPS, FEW = 30, 256, 31  # of the march that a balance over grooves starts from, and its harmonics
 SAMPLES = 4096  # of the cycle that measures are read off
-BESIDE = 2  # points on either side of one of a curve, whose changes count for it
-OF_HALF = 0.7  # of the change by half the harmonics and samples: seen at 350 points of elastic-plastic elements, whose
-# motion is known exactly, 0.1 of it is left on the mean and 0.55 at most
 
 
 class Balanced(Reader):
-    """What one cycle of a balance shows."""
+    """What one cycle of a balance shows; turns: `Periodic.turns` of it."""
+
+    turns: tuple = ()
 
     def integrated(self, run, drive) -> Integrated:
-        """The two books of friction work; the middle of a motion that repeats stays."""
-        return Integrated(drift=0.0, books=books_of(run.response, run.ledger["friction"]))
+        """The two books of friction work and the turns; the middle of a motion that repeats stays."""
+        return Integrated(drift=0.0, books=books_of(run.response, run.ledger["friction"]),
+                          turns=(tuple(one[:2] for one in self.turns),) if self.turns else ())
 
     def more(self, run, drive, stuck: bool) -> dict:
-        """The loop of a cycle by the trapezoidal rule."""
-        return {"loop": sampled_loop(run.window, drive, run.ledger["friction"])}
+        """The loop of a cycle by the trapezoidal rule, force and slip as its samples and turns have them."""
+        loop = sampled_loop(run.window, drive, run.ledger["friction"])
+        if not self.rubs or not self.turns:
+            return {"loop": loop}
+        _, forces, slips = (np.append(beside, own) for beside, own in
+                            zip(zip(*self.turns), (0.0, run.window.force, run.window.slip)))
+        return {"loop": loop, "known": {"friction_force_peak": float(np.abs(forces).max()),
+                                        "slip_amplitude": float(np.ptp(slips)) / 2}}
 
 
 class Balance:
@@ -83,7 +90,7 @@ class Balance:
 
     def point(self, drive, near=None) -> tuple:
         """The steady motion, from the point `near` of a curve where there are several, its measures read off one cycle,
-        and its Periodic; errors from half the harmonics, twice as many over grooves, and the balance's own."""
+        and its Periodic; errors from twice its harmonics, its samples and those it is read at."""
         begin = perf_counter()
         try:
             near = self._near(drive, near)
@@ -92,18 +99,11 @@ class Balance:
                 raise
             return gone, None
         found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance, start=near)
-        others = 2 * found.harmonics if self.climbing is not None else max(1, found.harmonics // 2)
-        other = periodic_point(self.modes, drive, self.group, others, self.tolerance,
-                               start=found if near is not None else None)
         stable, notes = self._judged(found, drive), ()
         if self.climbing is None and not stable.stable:
-            found, stable, other, notes = self._lasting(drive, found, stable, other)
+            found, stable, notes = self._lasting(drive, found, stable)
         values, response, book = self._measured(found, drive)
-        rough = self._measured(other, drive)[0]
-        # the higher harmonics follow those of `found`, not those of half as many: measured, 20 times less is left out
-        share = 1.0 if self.climbing is not None else 0.1
-        errors = {name: share * abs(v - rough.get(name, v)) + abs(v) * min(found.error, 1.0)
-                  for name, v in values.items()}
+        errors = self._errors(values, found, drive, lambda *of: self._measured(*of, 2 * SAMPLES)[0])
         if "slip_start_phase" in errors:
             errors["slip_start_phase"] = min(errors["slip_start_phase"], np.pi / 2) + 2 * np.pi / SAMPLES
             errors["stick_fraction"] = errors.get("stick_fraction", 0.0) + 4 / SAMPLES
@@ -127,25 +127,37 @@ class Balance:
         return Solution(values, response, response, amplitude, (None, None), outcome, [], book, perf_counter() - begin,
                         message=message, errors=errors, extra=extra, notes=notes), found
 
+    def _errors(self, values: dict, found, drive, read) -> dict:
+        """Errors by name of the measures of a Periodic; where no finer one balances, what the balance leaves open.
+
+        read(Periodic, drive) -> measures by name.
+        """
+        out = {name: abs(v) * min(found.error, 1.0) for name, v in values.items()}
+        try:
+            better = finer(found, self.modes, drive)
+        except NotConverged:
+            return out
+        left = max(found.left, better.left)
+        better = read(better, drive) if np.isfinite(better.error) else {}
+        return out | {name: error + abs(values[name]) * left for name, error in finer_error(values, better).items()}
+
     def _left(self, drive, start=None) -> Solution | None:
         """As of `left_grooves`."""
         return left_grooves(self.model, self.numerics, self.patch, drive, self.climbing, start)
 
-    def _lasting(self, drive, found, stable, other) -> tuple:
+    def _lasting(self, drive, found, stable) -> tuple:
         """In place of a Periodic that does not last the smallest one under the same drive that does, with its
-        multipliers and with half its harmonics, and a note on it; what is given, where none is found."""
+        multipliers and a note on it; what is given, where none is found."""
         every = branches.branches(self.modes, drive, self.group, self.tolerance)
         lasts = [one for one in every if one.stable]
         if not lasts:
-            return found, stable, other, ()
+            return found, stable, ()
         found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance, start=lasts[0])
-        half = max(1, found.harmonics // 2)
-        other = periodic_point(self.modes, drive, self.group, half, self.tolerance, start=found)
         sizes = ", ".join(say(one.amplitude(self.modes.output), 3) for one in every)
         note = f"at this drive {len(every)} steady motions balance ({sizes}), {len(lasts)} of which last" + (
             "" if len(lasts) == 1 else "; the smallest of these is shown, accuracy.method = \"march\" tells which one "
             "is reached from rest")
-        return found, with_stability(found, self.modes), other, (note,)
+        return found, with_stability(found, self.modes), (note,)
 
     def shown(self, drive, near=None) -> Shown:
         """A point of a curve, its errors unknown."""
@@ -172,18 +184,14 @@ class Balance:
 
     def _read(self, found, drive) -> dict:
         """The measures that a curve shows, by name."""
-        response = self._response(found, drive)
+        response = periodic_response(found, self.modes, drive, SAMPLES)
         row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {SHOWN["amplitude"]: found.amplitude(row), SHOWN["acceleration_peak"]: acceleration_peak(response),
                   **wave_measures(*odd_harmonics(response, drive))}
         return {name: value for name, value in values.items() if value is not None}
 
-    def _response(self, found, drive):
-        """One cycle of a Periodic as histories."""
-        return periodic_response(found, self.modes, drive, SAMPLES)
-
-    def _measured(self, found, drive) -> tuple:
-        response = self._response(found, drive)
+    def _measured(self, found, drive, samples: int = SAMPLES) -> tuple:
+        response = periodic_response(found, self.modes, drive, samples)
         book = cycle_energy(found, self.modes) | {"stored": 0.0, "iterations": float(found.iterations)}
         speed = np.arange(len(found.modal))[:, None] * found.omega * np.abs(found.modal)
         book |= {"power": abs(book["work_in"]), "peak_stored": self.modes.mass / 2 * float(np.sum(speed**2))}
@@ -191,7 +199,9 @@ class Balance:
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
         run = Run(response, response, extremes, np.zeros(1), book)
-        return Balanced(self.model, self.numerics, self.patch, steps=SAMPLES).values(run, drive), response, book
+        reader = Balanced(self.model, self.numerics, self.patch, steps=samples)
+        reader.turns = found.turns()
+        return reader.values(run, drive), response, book
 
     def curve(self, drive) -> tuple:
         """(points of the curve over the frequency through its folds, the frequencies [Hz] of these)."""
@@ -200,26 +210,11 @@ class Balance:
                                    self.tolerance, True)
         found = branch.points if self.climbing is None else [self._judged(one, first) for one in branch.points]
         points = [self._shown(one)._replace(regime="stable" if one.stable else "unstable") for one in found]
-        return self._with_errors(points), branch.folds
+        return [self._with_errors(one) for one in points], branch.folds
 
-    def _with_errors(self, points) -> list:
-        """Points along a curve with errors: a share of what half the harmonics and samples change, there or at points
-        beside it, as a change that passes zero tells nothing; and what the balance itself leaves open."""
-        changes = {name: np.zeros(len(points)) for name in SHOWN.values()}
-        for k, one in enumerate(points):
-            half = self.group.with_samples(one.near.base_samples // 2)
-            try:
-                fewer = periodic_point(self.modes, one.drive, half, max(1, one.near.harmonics // 2), self.tolerance,
-                                       start=one.near)
-                rough = self._read(fewer, one.drive)
-            except NotConverged:
-                rough = {}  # then nothing is known of it
-            for name, value in one.values.items():
-                changes[name][k] = abs(value - rough.get(name, 0.0))
-        out, reach = [], BESIDE + 1
-        for k, one in enumerate(points):
-            size = {name: float(changes[name][max(k - BESIDE, 0):k + reach].max()) for name in one.values}
-            errors = {name: OF_HALF * size[name] + abs(value) * (min(one.near.error, 1.0) + LAST)
-                      + LAST * (name == "acceleration_distortion") for name, value in one.values.items()}
-            out.append(one._replace(errors=errors))
-        return out
+    def _with_errors(self, point: Shown) -> Shown:
+        """A point of a curve with its errors."""
+        errors = self._errors(point.values, point.near, point.drive, self._read)
+        least = {"acceleration_distortion": LAST}  # besides that of the value
+        return point._replace(errors={name: error + LAST * abs(point.values[name]) + least.get(name, 0.0)
+                                      for name, error in errors.items()})
