@@ -30,9 +30,3 @@ def closed(num, mem, e, free, beta):
 def knee(num):
     """The `knee` of laws whose rates have no kink at a speed: 0 [m/s]."""
     return 0.0
-
-
-@njit(error_model="numpy", **LEAN)
-def layer(num):
-    """The `layer` of laws whose force knows no speed: 0 [m/s]."""
-    return 0.0

@@ -23,11 +23,7 @@ kink and 1 above, 0 below the speed of the knee; dq [m] is the slide since the m
 path to the next kink sets y from the memory; rate(num, mem, turn, dq, v, y, out) -> force [N] writes dy/dt into out;
 shown(num, mem, turn, dq, q, v, y) -> (force, stored energy, irreversible part of q); finish(num, mem, turn, dq, v, y)
 -> energy dissipated [J], or nan, moves the memory; knee(num) -> speed [m/s] at which the rates have a kink, 0 for none.
-One without states may offer its force without branches, for motions side by side and their series: with y = n0 times
-the speed, where OF_SPEED is true, or times the slide dq, and w = share(y), which obeys dw/dy = a + b w + c w^2 with
-GROWS = (a, b, c), it is along(n0, n1, n2, n3, dq, v) -> n1 + n2 w + n3 y (1 - w) [N], the last term only where MIXED is
-true. ahead(num, mem, way) -> n0 to n3 of a motion that begins, and layer(num) -> speed [m/s] over which the force turns
-with the slide, 0 for none. Its irreversible part of q turns where q does or the force passes zero.
+Its irreversible part of q turns where q does or the force passes zero.
 """
 
 from typing import NamedTuple

@@ -4,18 +4,24 @@ from typing import NamedTuple
 
 import numpy as np
 
+# of Moving.now
+(TIME, STEP, TURNED, ORIGIN, LEFT, CREST, CREST_SPEED, PACE, BEGUN, STOOD, MASS, KIND, PIECE, MOVES, STIFF) = range(15)
+# of Kept.tally
+POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, PARTS, PERIOD, FORCE = range(10)
+NODES = 9  # places of a part of a step at which it stands
+ENDS = (1 - np.cos(np.pi * np.arange(NODES) / (NODES - 1))) / 2  # these places, as shares of it (Chebyshev)
+
 
 class Moving(NamedTuple):
     """Modes, drive, law and the state of a motion, in few arrays, as each is handed on in every call.
 
     rows (5, n): omega, 2 zeta omega, slide, base, output; damping: (n, n) where it couples, else (0, 0). pieces (p, 6):
     of the drive, `waves.Wave`. num, mem of the law, turn (3,) as the law takes it. y (N,): state; work (26, N): slopes
-    of the 16 stages, extension of the step (8), sizes of the law's states, state after a step. now (16,): time [s],
+    of the 16 stages, extension of the step (8), sizes of the law's states, state after a step. now (15,): time [s],
     length of the next step and of the first after a reversal [s], slide at the start of the motion in this direction
     [m], energy lost to friction till then [J], largest coordinate [m] and rate [m/s] of late, rate of the fastest mode
     [1/s], 1 once it has begun and 2 where it was left at a reversal, piece of the drive for which the first slopes
-    stand, mass [kg], kind of the drive, its piece now, 1 where it moves the base, stiffness of the law [N/m],
-    length of the next step that creeps [s].
+    stand, mass [kg], kind of the drive, its piece now, 1 where it moves the base, stiffness of the law [N/m].
     """
 
     rows: np.ndarray
@@ -34,19 +40,15 @@ class Kept(NamedTuple):
 
     cycles (4, c): smallest and largest output in every cycle [m], its part at the frequency of the cycle [m], NaN
     where it is not asked for; samples (s, 2 n + 7): time that is asked for, z, z', slide, its speed, force,
-    irreversible slip, energy in the interface, friction work [J]; turns (r, 2 n + 7): the same at reversals. tally
-    (32,): largest |acceleration|, |force|, slip, -slip, output, -output of the last cycles; integrals over them of
-    slide and force times cos and -sin; |work| of the drive, largest stored energy and energy lost to friction [J],
-    steps taken and refused, rows of turns; sample that comes next, 1 where peaks are wanted;
-    period [s]; time [s] in which the interface sticks in the last cycles, sums of cos and sin of twice the phases at
-    which slip starts, their number, < 0 where it sticks;
-    integrals of the output times cos and -sin of one and of three times the phase, and of the
-    slide over the first and the last cycle of those; where they begin and end [s]. room (2, N); table (10, 6).
+    irreversible slip, energy in the interface, friction work [J]; turns (r, 2 n + 7): the same at reversals; parts (k,
+    NODES, 2 n + 7): the same at the places ENDS of parts of steps. tally (10,): |work| of the
+    drive, largest stored energy and energy lost to friction [J], steps taken and refused, rows of turns, sample that
+    comes next, rows of parts, period [s], largest force in the parts [N]. room (N,): to work in.
     """
 
     cycles: np.ndarray
     samples: np.ndarray
     turns: np.ndarray
+    parts: np.ndarray
     tally: np.ndarray
     room: np.ndarray
-    table: np.ndarray

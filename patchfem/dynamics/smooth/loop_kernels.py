@@ -14,6 +14,27 @@ from ...friction.flags_kernels import INNER, LEAN
 from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps
 from . import watch_kernels as watching
+from .arrays import (
+    BEGUN,
+    CREST,
+    CREST_SPEED,
+    DONE,
+    LEFT,
+    LOST,
+    ORIGIN,
+    PACE,
+    PARTS,
+    PERIOD,
+    PIECE,
+    REFUSED,
+    SAMPLE,
+    STEP,
+    STOOD,
+    STORED,
+    TIME,
+    TURNED,
+    TURNS,
+)
 
 NOTHING, STOP, KINK, KNEE, TRAVEL = range(5)  # what ends a step
 FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED = range(6)  # how a call ends
@@ -37,8 +58,8 @@ def left(m, what, y, slopes, travel):
     if what == STOP:
         return way * v, way * gain, still(m)
     if what == KINK:
-        path = way * (q - m.now[steps.ORIGIN])
-        return m.turn[1] - path, -way * v, 1e-15 * (m.now[steps.CREST] + m.turn[1])
+        path = way * (q - m.now[ORIGIN])
+        return m.turn[1] - path, -way * v, 1e-15 * (m.now[CREST] + m.turn[1])
     if what == KNEE:
         side = 1.0 if m.turn[2] > 0 else -1.0
         floor = law.knee(m.num)
@@ -115,13 +136,13 @@ def located(m, h, what, share, travel):
         new = at - value / rate if rate < 0 else 0.5 * (low + high)
         # what leaves its rest is within round-off of it too, but does not end there: it would stand for ever
         there = abs(value) <= noise and rate < 0
-        if there or abs(new - at) <= 2e-16 * (m.now[steps.TIME] + at) or high - low <= 1e-15 * h:
+        if there or abs(new - at) <= 2e-16 * (m.now[TIME] + at) or high - low <= 1e-15 * h:
             break
         at = new if low < new < high and turn < 20 else 0.5 * (low + high)
     return at
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", forceinline=True, **INNER)
 def dips(m, h):
     """Share [1] of the step of h [s] at which the speed, > 0 at both ends, may have a least value below zero; 0 for
     none."""
@@ -153,7 +174,7 @@ def dip_of(a, p, b, r):
 @njit(error_model="numpy", **INNER)
 def still(m):
     """Round-off [m/s] of the speed of the slide, below which it rests."""
-    return 4e-16 * (m.now[steps.CREST_SPEED] + m.now[steps.PACE] * m.now[steps.CREST])
+    return 4e-16 * (m.now[CREST_SPEED] + m.now[PACE] * m.now[CREST])
 
 
 @njit(error_model="numpy", **INNER)
@@ -161,10 +182,10 @@ def enter(m, way):
     """Begin a motion in the direction `way` from the state as it stands: the law's states, and the slopes there."""
     n = m.rows.shape[1]
     q, v = steps.slide_of(m, m.y)
-    m.now[steps.ORIGIN], m.turn[0] = q, way
+    m.now[ORIGIN], m.turn[0] = q, way
     m.turn[1] = law.begin(m.num, m.mem, way, m.y[2 * n:m.y.size - 3])
     m.turn[2] = 1.0 if way * v > law.knee(m.num) else 0.0
-    steps.slope(m, m.now[steps.TIME], m.y, m.work[0])
+    steps.slope(m, m.now[TIME], m.y, m.work[0])
 
 
 @njit(error_model="numpy", **INNER)
@@ -172,17 +193,17 @@ def leave(m, k):
     """End the motion in one direction: move the memory of the law and book what it dissipated."""
     n, size = m.rows.shape[1], m.y.size
     q, v, _, before, _ = watching.state_of(m, m.y)
-    lost = law.finish(m.num, m.mem, m.turn, q - m.now[steps.ORIGIN], v, m.y[2 * n:size - 3])
+    lost = law.finish(m.num, m.mem, m.turn, q - m.now[ORIGIN], v, m.y[2 * n:size - 3])
     if np.isnan(lost):
-        lost = m.y[size - 1] - m.now[steps.LEFT] - before
-        m.now[steps.LEFT] = m.y[size - 1] - before
-    k.tally[watching.LOST] += lost
+        lost = m.y[size - 1] - m.now[LEFT] - before
+        m.now[LEFT] = m.y[size - 1] - before
+    k.tally[LOST] += lost
 
 
 @njit(error_model="numpy", **INNER)
 def heading(m):
     """Direction of a motion that starts: that of its speed, of its acceleration at rest, or of what comes next."""
-    n, t = m.rows.shape[1], m.now[steps.TIME]
+    n, t = m.rows.shape[1], m.now[TIME]
     v = steps.slide_of(m, m.y)[1]
     if v != 0:
         return 1.0 if v > 0 else -1.0
@@ -194,7 +215,7 @@ def heading(m):
         if gain != 0:
             return 1.0 if gain > 0 else -1.0
         if look == 0:
-            steps.slope(m, t + m.now[steps.STEP], m.y, m.work[1])
+            steps.slope(m, t + m.now[STEP], m.y, m.work[1])
     return 1.0
 
 
@@ -205,9 +226,9 @@ def turns_around(m, period):
     Where speed and acceleration vanish together the next derivative decides: the motion has the direction of its speed
     an INSTANT of the period [s] after the stop, v + a t + j t^2/2. What is opposed to that ends within the instant.
     """
-    n, t, way = m.rows.shape[1], m.now[steps.TIME], -m.turn[0]
+    n, t, way = m.rows.shape[1], m.now[TIME], -m.turn[0]
     enter(m, way)
-    ahead, near, gain, later = INSTANT * period, 1e-3 * m.now[steps.STEP], 0.0, 0.0
+    ahead, near, gain, later = INSTANT * period, 1e-3 * m.now[STEP], 0.0, 0.0
     for c in range(m.y.size):
         m.work[steps.TRIAL, c] = m.y[c] + near * m.work[0, c]
     steps.slope(m, t + near, m.work[steps.TRIAL], m.work[1])
@@ -221,23 +242,23 @@ def turns_around(m, period):
     return False
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", forceinline=True, **INNER)
 def accept(m, h, k):
     """Move on by the step of h [s] that stands in m.work[steps.TRIAL]."""
     n = m.rows.shape[1]
-    fade = 1 - min(h / (FORGET * k.tally[watching.PERIOD]), 1.0)
-    m.now[steps.CREST] *= fade
-    m.now[steps.CREST_SPEED] *= fade
+    fade = 1 - min(h / (FORGET * k.tally[PERIOD]), 1.0)
+    m.now[CREST] *= fade
+    m.now[CREST_SPEED] *= fade
     for c in range(m.y.size):
         m.y[c] = m.work[steps.TRIAL, c]
         m.work[0, c] = m.work[12, c]
     for i in range(n):
-        m.now[steps.CREST] = max(m.now[steps.CREST], abs(m.y[i]))
-        m.now[steps.CREST_SPEED] = max(m.now[steps.CREST_SPEED], abs(m.y[n + i]))
-    m.now[steps.TIME] += h
+        m.now[CREST] = max(m.now[CREST], abs(m.y[i]))
+        m.now[CREST_SPEED] = max(m.now[CREST_SPEED], abs(m.y[n + i]))
+    m.now[TIME] += h
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", forceinline=True, **INNER)
 def try_step(m, h, tolerance, k):
     """Take a step of at most h [s] whose error meets the tolerance: (its length, the next length)."""
     for _ in range(60):
@@ -251,11 +272,11 @@ def try_step(m, h, tolerance, k):
             h *= dip
         else:
             h *= max(0.9 * error**-0.125, SLOWER) if np.isfinite(error) else SLOWER
-        k.tally[watching.REFUSED] += 1
+        k.tally[REFUSED] += 1
     return 0.0, 0.0
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", forceinline=True, **INNER)
 def pass_end(m, k, what):
     """Go on beyond the end of a step: turn around, or into the next part of the law."""
     n = m.rows.shape[1]
@@ -263,15 +284,15 @@ def pass_end(m, k, what):
         if n == 1:
             m.y[1] = 0.0  # to the last digit
         leave(m, k)
-        if turns_around(m, k.tally[watching.PERIOD]):
-            watching.write(m, m.now[steps.TIME], m.y, k.turns[int(k.tally[watching.TURNS])])
-            k.tally[watching.TURNS] += 1
+        if turns_around(m, k.tally[PERIOD]):
+            watching.write(m, m.now[TIME], m.y, k.turns[int(k.tally[TURNS])])
+            k.tally[TURNS] += 1
     elif what == KINK:
         leave(m, k)
         enter(m, m.turn[0])
     elif what == KNEE:
         m.turn[2] = 1 - m.turn[2]
-        steps.slope(m, m.now[steps.TIME], m.y, m.work[0])
+        steps.slope(m, m.now[TIME], m.y, m.work[0])
 
 
 @njit(error_model="numpy", **INNER)
@@ -279,29 +300,29 @@ def begin(m, k):
     """Begin a motion from the state as it stands."""
     n = m.rows.shape[1]
     for i in range(n):
-        m.now[steps.CREST] = max(m.now[steps.CREST], abs(m.y[i]))
-        m.now[steps.CREST_SPEED] = max(m.now[steps.CREST_SPEED], abs(m.y[n + i]))
+        m.now[CREST] = max(m.now[CREST], abs(m.y[i]))
+        m.now[CREST_SPEED] = max(m.now[CREST_SPEED], abs(m.y[n + i]))
     enter(m, heading(m))
-    k.tally[watching.STORED] = watching.stored(m, m.y)
-    m.now[steps.LEFT] = m.y[m.y.size - 1] - watching.state_of(m, m.y)[3]
-    m.now[steps.BEGUN] = 1.0
+    k.tally[STORED] = watching.stored(m, m.y)
+    m.now[LEFT] = m.y[m.y.size - 1] - watching.state_of(m, m.y)[3]
+    m.now[BEGUN] = 1.0
 
 
 @njit(error_model="numpy", **INNER)
 def sampled(m, k):
     """Take the samples that are asked for at the time as it stands."""
-    at = int(k.tally[watching.SAMPLE])
-    while at < k.samples.shape[0] and k.samples[at, 0] <= m.now[steps.TIME]:
-        watching.write(m, m.now[steps.TIME], m.y, k.samples[at])
+    at = int(k.tally[SAMPLE])
+    while at < k.samples.shape[0] and k.samples[at, 0] <= m.now[TIME]:
+        watching.write(m, m.now[TIME], m.y, k.samples[at])
         at += 1
-    k.tally[watching.SAMPLE] = at
+    k.tally[SAMPLE] = at
 
 
 @njit(error_model="numpy", **INNER)
 def went_on(m):
     """STANDS where a motion was left at a reversal, for lack of room, else 0: it goes on as if it had not been left."""
-    fresh = STANDS if m.now[steps.BEGUN] == TURNING else 0
-    m.now[steps.BEGUN] = 1.0
+    fresh = STANDS if m.now[BEGUN] == TURNING else 0
+    m.now[BEGUN] = 1.0
     return fresh
 
 
@@ -309,33 +330,33 @@ def went_on(m):
 def advance(m, k, until, edge, tolerance, travel):
     """Move on to the time `until` [s], or to the edge [s] of the piece of the drive: how it ended.
 
-    tolerance: of a step, relative; travel [m] of the output. FULL: the room for reversals is used up; PAUSED: CALL
-    tries are made. The motion goes on from either to the last bit as if it had not been left.
+    tolerance: of a step, relative; travel [m] of the output. FULL: the room for reversals or parts is used up; PAUSED:
+    CALL tries are made. The motion goes on from either to the last bit as if it had not been left.
     """
-    if m.now[steps.BEGUN] == 0:
+    if m.now[BEGUN] == 0:
         begin(m, k)
     end, fresh = min(until, edge), went_on(m)
-    if m.now[steps.STOOD] != m.now[steps.PIECE]:  # the drive has changed
-        steps.slope(m, m.now[steps.TIME], m.y, m.work[0])
-        m.now[steps.STOOD] = m.now[steps.PIECE]
+    if m.now[STOOD] != m.now[PIECE]:  # the drive has changed
+        steps.slope(m, m.now[TIME], m.y, m.work[0])
+        m.now[STOOD] = m.now[PIECE]
     sampled(m, k)
-    begun, tried = m.now[steps.TIME], k.tally[watching.DONE] + k.tally[watching.REFUSED]
-    while m.now[steps.TIME] < end:
-        full = k.tally[watching.TURNS] >= k.turns.shape[0]
-        spent = k.tally[watching.DONE] + k.tally[watching.REFUSED] - tried > CALL and fresh != FLIPPED
-        if spent and m.now[steps.TIME] - begun < GETS_ON / m.now[steps.PACE]:
+    begun, tried = m.now[TIME], k.tally[DONE] + k.tally[REFUSED]
+    while m.now[TIME] < end:
+        full = k.tally[TURNS] >= k.turns.shape[0] or 0 < k.parts.shape[0] < k.tally[PARTS] + watching.MOST_PARTS
+        spent = k.tally[DONE] + k.tally[REFUSED] - tried > CALL and fresh != FLIPPED
+        if spent and m.now[TIME] - begun < GETS_ON / m.now[PACE]:
             return ENDLESS
         if full or spent:
-            m.now[steps.BEGUN] = TURNING if fresh > 0 else 1.0
+            m.now[BEGUN] = TURNING if fresh > 0 else 1.0
             return FULL if full else PAUSED
-        room = end - m.now[steps.TIME]
-        whole = m.now[steps.STEP] >= room * (1 - 1e-9)
-        h, wanted = try_step(m, room if whole else m.now[steps.STEP], tolerance, k)
+        room = end - m.now[TIME]
+        whole = m.now[STEP] >= room * (1 - 1e-9)
+        h, wanted = try_step(m, room if whole else m.now[STEP], tolerance, k)
         if h <= 1e-16 * end:
             return ENDLESS
         taken = h
         what, share = first_end(m, h, travel, NOTHING)
-        if what == STOP and fresh > 0 and share * h < INSTANT * k.tally[watching.PERIOD]:
+        if what == STOP and fresh > 0 and share * h < INSTANT * k.tally[PERIOD]:
             if fresh == FLIPPED:  # neither way: no motion of a law that is smooth does so
                 return ENDLESS
             enter(m, -m.turn[0])
@@ -350,16 +371,16 @@ def advance(m, k, until, edge, tolerance, travel):
         if what != NOTHING:  # the stages of the step that was tried may have passed by what bends beside its end
             error = steps.missed(m, taken, tolerance)
             if error > 1:
-                m.now[steps.STEP] = taken * max(0.9 * error**-0.125, SLOWER)
-                k.tally[watching.REFUSED] += 1
+                m.now[STEP] = taken * max(0.9 * error**-0.125, SLOWER)
+                k.tally[REFUSED] += 1
                 continue
         watching.watch(m, taken, k)
         accept(m, taken, k)
         if whole and taken == room:
-            m.now[steps.TIME] = end
-        m.now[steps.STEP] = max(wanted, m.now[steps.STEP]) if whole and h == room else wanted
+            m.now[TIME] = end
+        m.now[STEP] = max(wanted, m.now[STEP]) if whole and h == room else wanted
         if fresh == STANDS:
-            m.now[steps.TURNED] = wanted
+            m.now[TURNED] = wanted
         fresh = 0
         if not np.isfinite(m.y[0]):
             return WILD
@@ -369,7 +390,7 @@ def advance(m, k, until, edge, tolerance, travel):
             pass_end(m, k, what)
             if what == STOP:
                 fresh = STANDS
-                m.now[steps.STEP] = min(m.now[steps.TURNED], m.now[steps.STEP])
+                m.now[STEP] = min(m.now[TURNED], m.now[STEP])
     sampled(m, k)
     return FINISHED
 
@@ -379,6 +400,6 @@ def settled(m, k, row):
     """Energy of modes and interface [J] as the motion stands; writes its sample into row, and moves the memory of the
     law to there: for a copy of the motion."""
     out = watching.stored(m, m.y)
-    watching.write(m, m.now[steps.TIME], m.y, row)
+    watching.write(m, m.now[TIME], m.y, row)
     leave(m, k)
     return out

@@ -2,79 +2,90 @@
 
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cache
 from math import ceil
 
 import numpy as np
 
+from ... import compiled
 from ...core import ModalBasis, Outcome, Response
 from ...friction.laws.stretch import bonds_of
 from ..march.march import MarchResult
 from ..second_book import sampled_work
-from .arrays import Kept, Moving
-from .lanes import OF_KEPT, OF_MOVING, advance, loops_of, stacked
-from .waves import fits, wave_of
+from .arrays import (
+    CREST,
+    CREST_SPEED,
+    DONE,
+    KIND,
+    LEFT,
+    LOST,
+    MASS,
+    MOVES,
+    NODES,
+    PACE,
+    PARTS,
+    PERIOD,
+    PIECE,
+    POWER,
+    REFUSED,
+    SAMPLE,
+    STEP,
+    STIFF,
+    STORED,
+    TIME,
+    TURNED,
+    TURNS,
+    Kept,
+    Moving,
+)
+from .reader import Fine, fine_of
+from .waves import SINES, wave_of
 
 SAMPLES = 400  # per drive cycle in the kept window
 LEAST = 101  # samples of a run that has no cycles
 ROOM = 4096  # reversals kept in one call
+STEPS = 1024  # steps of the last cycles kept in one call
 MOST_KEPT = 400_000  # reversals kept outside the last cycles
 CLOSER = 0.01  # of the tolerance, that of the last cycles, which are read between the ends of the steps
 TAIL = 8  # windows whose phasors are kept: a steady amplitude takes five (`response.settling.steady_amplitudes`)
 FIRST = 1e-3  # length of the first step over the shortest time of the rig
-# of Moving.now
-TIME, STEP, TURNED, PACE, STOOD, MASS, KIND, PIECE, MOVES, STIFF, STRIDE = 0, 1, 2, 7, *range(9, 16)
-# of Kept.tally
-ACCELERATION, FORCE, SLIP, SLIP_LEAST, OUTPUT, OUTPUT_LEAST = range(6)
-WAVES, POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, WANTED, PERIOD = 6, *range(10, 19)
-HELD, START, STARTS, SIDE, OUTPUTS, MEANS, BEGIN, END = 19, 20, 22, 23, 24, 28, 30, 31
+APART = 4  # cycles after which a motion is first looked at whether it repeats; then twice as many each time
+REPEATS = 10.0  # tolerances of a step by which a motion that repeats may still change in all that is left of it
 FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED = range(6)  # how a call ends
+HERE = "dynamics.smooth"
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Fine:
-    """What the integrator knows of the last cycles better than their samples.
-
-    acceleration: largest |absolute acceleration| [m s-2], force: largest |force| [N], slip and swing: half the range
-    of the irreversible slip and of the output [m]; slide, pull: first Fourier coefficients of slide [m] and force [N];
-    work: of friction [J]; held: time [s] for which the interface sticks; start: mean phase [rad] modulo pi at which
-    slip starts after it, None where it never does; first, third: Fourier coefficients of the acceleration of the output
-    relative to the base [m s-2] at the drive's frequency and three times it; drift: time mean of the slide in the last
-    cycle less that in the first, per cycle between them [m], None of fewer than 1.5 cycles.
-    """
-
-    acceleration: float
-    force: float
-    slip: float
-    swing: float
-    slide: complex
-    pull: complex
-    work: float
-    held: float
-    start: float | None
-    first: complex
-    third: complex
-    drift: float | None
+@cache
+def loops_of(law: str, say=None):
+    """The compiled loop for the law of a module of kernels; say: told before it is compiled."""
+    law = compiled.load(law, say)
+    steps = compiled.instance(f"{HERE}.step_kernels", {"law": law})
+    watching = compiled.instance(f"{HERE}.watch_kernels", {"law": law, "steps": steps})
+    return compiled.instance(f"{HERE}.loop_kernels", {"law": law, "steps": steps, "watching": watching})
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SmoothResult(MarchResult):
-    """A MarchResult, what the integrator knows besides, and the last cycles with the samples at reversals among the
-    others (`turned`)."""
+    """A MarchResult, what the integrator knows besides, the last cycles with the samples at reversals among the others
+    (`turned`), and what the motion still changes by, over its size, where its last cycles stand for others
+    (`unlike`); tolerance: of its steps."""
 
     fine: Fine | None = None
     turned: Response | None = None
+    unlike: float = 0.0
+    tolerance: float = 0.0
 
 
 def started(modes: ModalBasis, drive, wave, element, cycles: float, start=None) -> tuple:
-    """(Moving, Kept) of a motion before it begins, without room for reversals; wave: that of the drive."""
+    """(Moving, Kept) of a motion before it begins; wave: that of the drive."""
     n, l = modes.omega.size, len(element.sizes)
     size, damping = 2 * n + l + 3, np.zeros((0, 0)) if modes.damping is None else modes.damping
     state = np.zeros(size)
     if start is not None:
         state[:n], state[n:2 * n] = start.z, start.v
     pace = max(float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)), 2 * np.pi / drive.period)
-    now, tally, work = np.zeros(16), np.zeros(32), np.zeros((26, size))
-    now[[STEP, TURNED, STRIDE, PACE, MASS]] = FIRST / pace, FIRST / pace, FIRST / pace, pace, modes.mass
+    now, tally, work = np.zeros(15), np.zeros(10), np.zeros((26, size))
+    now[[STEP, TURNED, PACE, MASS]] = FIRST / pace, FIRST / pace, pace, modes.mass
     now[STIFF] = element.limit / element.length if element.length else 0.0
     now[[KIND, MOVES]], tally[PERIOD] = (wave.kind, drive.moving), drive.period
     work[24, 2 * n:-3] = element.sizes
@@ -84,32 +95,8 @@ def started(modes: ModalBasis, drive, wave, element, cycles: float, start=None) 
     moving = Moving(*(np.array(part, float, order="C") for part in own))
     cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))
     cycles[0], cycles[1], width = np.inf, -np.inf, 2 * n + 7
-    return moving, Kept(cycles, np.zeros((0, width)), np.zeros((0, width)), tally, np.zeros((2, size)),
-                        np.zeros((10, 6)))
-
-
-def fine_of(tally, begin, end) -> dict:
-    """The fields of Fine of n motions as columns (n,), NaN where there is none.
-
-    tally (n, 32): of Kept; begin, end (n, 4): time [s], output [m], its rate [m/s] and friction work [J] where the last
-    cycles begin and end. Accelerations are those of the motion by parts, so its jumps cost nothing.
-    """
-    span, omega = np.maximum(end[:, 0] - begin[:, 0], 1e-300), 2 * np.pi / tally[:, PERIOD]
-    slide, pull, *outputs = ((tally[:, k] + 1j * tally[:, k + 1]) * 2 / span for k in (
-        WAVES, WAVES + 2, OUTPUTS, OUTPUTS + 2))
-    gains = []
-    for n, output in zip((1j, 3j), outputs):
-        after, before = ((one[:, 2] + n * omega * one[:, 1]) * np.exp(-n * omega * one[:, 0]) for one in (end, begin))
-        gains.append(2 / span * (after - before) + (n * omega)**2 * output)
-    cycles, (before, after) = span / tally[:, PERIOD], tally[:, MEANS:MEANS + 2].T / tally[:, PERIOD]
-    drift = np.where(cycles < 1.5, np.nan, (after - before) / np.where(cycles < 1.5, 1.0, cycles - 1))
-    start = np.arctan2(tally[:, START + 1], tally[:, START]) / 2 % np.pi
-    return {"acceleration": tally[:, ACCELERATION], "force": tally[:, FORCE],
-            "slip": (tally[:, SLIP] + tally[:, SLIP_LEAST]) / 2,
-            "swing": (tally[:, OUTPUT] + tally[:, OUTPUT_LEAST]) / 2, "slide": slide, "pull": pull,
-            "work": end[:, 3] - begin[:, 3], "held": tally[:, HELD],
-            "start": np.where(tally[:, STARTS] > 0, start, np.nan), "first": gains[0], "third": gains[1],
-            "drift": drift}
+    return moving, Kept(cycles, np.zeros((0, width)), np.zeros((ROOM, width)), np.zeros((0, NODES, width)), tally,
+                        np.zeros(size))
 
 
 def response_of(modes, drive, rows, stored: float) -> Response:
@@ -136,16 +123,18 @@ def asked(count: int, window: int) -> np.ndarray:
 
 
 class Run:
-    """A motion as it stands: the arrays that its loops move, and what was read off it."""
+    """A motion as it stands: the arrays that its loops move, and what was read off it.
+
+    unlike: what it still changed by, over its size, where cycles were left out as it repeats.
+    """
 
     def __init__(self, modes: ModalBasis, drive, element, cycles: float, tolerance: float, travel: float = np.inf,
                  start=None):
         self.modes, self.drive, self.element, self.tolerance, self.travel = modes, drive, element, tolerance, travel
         self.cycles, self.loops, self.wave = cycles, loops_of(element.kernels), wave_of(drive)
         self.moving, self.kept = started(modes, drive, self.wave, element, cycles, start)
-        self.kept = self.kept._replace(turns=np.zeros((ROOM, self.kept.turns.shape[1])))
-        self.turns, self.begun, self.outcome, self.message, self.progress = [], 0.0, None, "", None
-        self.swift = fits(modes, element, self.wave, travel)
+        self.turns, self.parts, self.begun, self.unlike = [], [], 0.0, 0.0
+        self.outcome, self.message, self.progress = None, "", None
         self.until(0.0)
         self.first, self.begun = self.settled()[0], float(self.kept.tally[STORED])
 
@@ -157,7 +146,6 @@ class Run:
         twin.kept, twin.turns = type(self.kept)(*(array.copy() for array in self.kept)), list(self.turns)
         if drive is not self.drive:
             twin.drive, twin.wave = drive, wave_of(drive)
-            twin.swift = fits(twin.modes, twin.element, twin.wave, twin.travel)
             twin.moving = twin.moving._replace(pieces=twin.wave.pieces)
             twin._enter(int(np.searchsorted(twin.wave.ends, twin.time, side="right")))
         return twin
@@ -179,24 +167,22 @@ class Run:
     def _enter(self, piece: int) -> None:
         self.moving.now[PIECE] = piece
 
-    def until(self, time: float, times=(), peaks: bool = False) -> np.ndarray:
+    def until(self, time: float, times=(), whole: bool = False) -> np.ndarray:
         """Move on to a time [s]; rows (s, 2 n + 7) of the samples at `times` (s,) on the way, fewer where it ends
         before.
 
-        peaks: peaks and harmonics are gathered.
+        whole: all steps are kept in `parts`.
         """
-        times = np.asarray(times, float)
-        samples = np.zeros((times.size, self.kept.turns.shape[1]))
-        samples[:, 0], self.kept = times, self.kept._replace(samples=samples)
-        self.kept.tally[SAMPLE], self.kept.tally[WANTED] = 0, peaks
-        swift = self.swift and self.time < time
+        times, width = np.asarray(times, float), self.kept.turns.shape[1]
+        samples, parts = np.zeros((times.size, width)), np.zeros((STEPS if whole else 0, NODES, width))
+        samples[:, 0], self.kept = times, self.kept._replace(samples=samples, parts=parts)
+        self.kept.tally[SAMPLE] = 0
         while self.outcome is None:
             end = float(self.wave.ends[int(self.moving.now[PIECE])])
             if self.time >= end:
                 self._enter(int(self.moving.now[PIECE]) + 1)
                 continue
-            status = self._beside(float(time)) if swift else \
-                self.loops.advance(self.moving, self.kept, float(time), end, self.tolerance, float(self.travel))
+            status = self.loops.advance(self.moving, self.kept, float(time), end, self.tolerance, float(self.travel))
             self._judge(status)
             if self.progress is not None:  # here alone, for a step cut for its sake would change the motion
                 self.progress(min(self.time / (self.cycles * self.drive.period), 1.0))
@@ -204,16 +190,76 @@ class Run:
                 break
         return self.kept.samples[:int(self.kept.tally[SAMPLE])]
 
-    def _beside(self, time: float) -> int:
-        """Move on to a time [s] in one of the lanes of `lanes`."""
-        many, kept = stacked(self.moving, OF_MOVING), stacked(self.kept, OF_KEPT)
-        return int(advance(self.element.kernels, many, kept, np.array([time]), np.array([self.tolerance]))[0])
+    def onward(self, time: float) -> None:
+        """Move on to a time [s], where the motion repeats under a sine without an end by many cycles at once.
+
+        It is looked at after APART cycles, then after twice as many each time. What it changed by between the last
+        two looks tells what it will change by yet: less and less by the share by which the changes fell, as what dies
+        out does, or as much each time. Its books go on as in the last quarter of these cycles, so that change itself
+        has to be as small.
+        """
+        period, wave, far, before = self.drive.period, self.wave, 2 * APART, None
+        first = ceil(max(self.time, wave.pieces[-1, 0]) / period - 1e-9)
+        if not self._swings() or (first + far) * period >= time:
+            self.until(time)
+            return
+        self.until((first + APART) * period)
+        last = self.moving.y.copy()
+        while self.outcome is None and (first + far) * period < time:
+            self.kept.cycles[2:, first + far - 1] = 0.0  # its phasor is asked for
+            self.until((first + far - far // 4) * period)
+            books = self._sums()
+            self.until((first + far) * period)
+            change, left = self._changed(last), int(time / period + 1e-9) - first - far
+            if before is not None and self.outcome is None and left > 0:
+                fell = (np.sqrt(1 + 4 * change / before) - 1) / 2  # a + a^2 = change/before of what dies out by a
+                ahead = change * max(1.0, min(fell**2 / (1 - fell**2) if fell < 1 else np.inf, 2 * left / far))
+                if ahead <= REPEATS * self.tolerance:
+                    self._leave_out(left, (self._sums() - books) / (far // 4))
+                    self.unlike = ahead
+                    break
+            last, before, far = self.moving.y.copy(), change, 2 * far
+        self.until(time)
+
+    def _swings(self) -> bool:
+        """Whether the drive ends in a sine of its own period."""
+        last = self.wave.pieces[-1]
+        return self.wave.kind == SINES and last[2] != 0 and abs(last[3] * self.drive.period / (2 * np.pi) - 1) < 1e-12
+
+    def _changed(self, last) -> float:
+        """Largest change [1] since the state `last` (N,): of coordinates and rates over the largest of late, of states
+        of the law over their sizes; the tolerance at least, as more is round-off."""
+        now, n, sizes = self.moving.now, self.modes.omega.size, self.moving.work[24]
+        scale = np.concatenate([np.repeat(now[[CREST, CREST_SPEED]], n), sizes[2 * n:-3]])
+        return max(float(np.max(np.abs(self.moving.y - last)[:-3] / np.maximum(scale, 1e-300))), self.tolerance)
+
+    def _sums(self) -> np.ndarray:
+        """Work of the drive less what is stored, viscous loss, friction work, |work| of the drive and energy lost to
+        friction [J]."""
+        return np.append(self.moving.y[-3:] - [self.settled()[3], 0.0, 0.0], self.kept.tally[[POWER, LOST]])
+
+    def _leave_out(self, count: int, sums) -> None:
+        """Go on by `count` cycles that are as the last one; sums (5,): what `_sums` grows by in one."""
+        period = self.drive.period
+        at, turns = round(self.time / period), np.concatenate([self.kept.turns[:0], *self.turns[-2:]])
+        self.moving.y[-3:] += count * sums[:3]
+        self.moving.now[LEFT] += count * sums[2]
+        self.kept.tally[[POWER, LOST]] += count * sums[3:]
+        self.kept.cycles[:, at:at + count] = self.kept.cycles[:, at - 1:at]
+        turns = turns[turns[:, 0] > self.time - period * (1 - 1e-9)]
+        shown = min(count, max(0, MOST_KEPT - sum(map(len, self.turns))) // max(1, len(turns)))
+        later = np.zeros((shown, 1, turns.shape[1]))
+        later[:, 0, 0], later[:, 0, -1] = period * np.arange(1, shown + 1), sums[2] * np.arange(1, shown + 1)
+        self.turns.append((turns + later).reshape(-1, turns.shape[1]))
+        self.moving.now[TIME] = (at + count) * period
 
     def _judge(self, status: int) -> None:
         count = int(self.kept.tally[TURNS])
-        if len(self.turns) * ROOM < MOST_KEPT:
+        if count and sum(map(len, self.turns)) < MOST_KEPT:
             self.turns.append(self.kept.turns[:count].copy())
-        self.kept.tally[TURNS] = 0
+        if self.kept.tally[PARTS]:
+            self.parts.append(self.kept.parts[:int(self.kept.tally[PARTS])].copy())
+        self.kept.tally[[TURNS, PARTS]] = 0
         if status == TRAVELLED:
             self.outcome = Outcome.EXCEEDS_TRAVEL
         elif status in (WILD, ENDLESS):
@@ -246,25 +292,16 @@ class Run:
         n, y, output = self.modes.omega.size, self.moving.y, self.modes.output
         return np.array([self.time, y[:n] @ output, y[n:2 * n] @ output, y[-1]])
 
-    def fine(self, begin) -> Fine:
-        """The last cycles since `begin`, as `ends` gave it."""
-        found = {name: column[0].item() for name, column in fine_of(
-            self.kept.tally[None], begin[None], self.ends()[None]).items()}
-        return Fine(**found | {name: None for name in ("start", "drift") if np.isnan(found[name])})
-
     def last(self, end: float, window: float, shots=(), seen: list | None = None) -> tuple:
         """Move on to the time `end` [s] and keep the last `window` [s]: (rows, Fine).
 
         shots: times [s] of snapshots of the interface, which are added to `seen`.
         """
         begin = max(end - window, self.time)
-        self.until(begin)
-        tally, since = self.kept.tally, self.ends()
-        tally[:WAVES], tally[WAVES:POWER], tally[HELD:], tolerance = -np.inf, 0.0, 0.0, self.tolerance
-        tally[BEGIN], tally[END] = begin, end
-        if not self.swift:  # the extension of a step errs more than the step does
-            self.tolerance *= CLOSER
-            self.moving.now[STEP] *= CLOSER**0.125
+        self.onward(begin)
+        since, tolerance, self.parts = self.ends(), self.tolerance, []
+        self.tolerance *= CLOSER  # the extension of a step errs more than the step does
+        self.moving.now[STEP] *= CLOSER**0.125
         count = max(LEAST, round((end - begin) / self.drive.period * SAMPLES) + 1)
         times, rows, after = np.linspace(begin, end, count), [], -np.inf
         for shot in [*[t for t in shots if begin <= t < end], end]:
@@ -274,8 +311,12 @@ class Run:
                 seen.append(self._snapshot())
             if self.outcome is not None:
                 break
-        tally[WANTED], self.tolerance = 0, tolerance
-        return np.concatenate(rows), self.fine(since)
+        self.tolerance, rows = tolerance, np.concatenate(rows)
+        if not self.parts:
+            return rows, None
+        places = np.concatenate(self.parts)
+        return rows, fine_of(self.response(places.reshape(-1, places.shape[2])), self.drive.period,
+                             np.array([since, self.ends()]))
 
     def _snapshot(self) -> dict:
         row, _, memory, _ = self.settled()
@@ -300,7 +341,7 @@ def simulate(modes: ModalBasis, drive, element, cycles: float, tolerance: float,
     run.progress = progress
     whole = min(2.0, cycles) * period
     if window * period < whole:
-        run.until(end - whole)
+        run.onward(end - whole)
         count = max(2, round((whole - window * period) / period * SAMPLES) + 1)
         kept = [run.until(end - window * period, np.linspace(end - whole, end - window * period, count))[:-1]]
     at = end - np.linspace(min(1.0, cycles), 0.0, frames + 1)[1:] * period if frames else []
@@ -314,7 +355,7 @@ def simulate(modes: ModalBasis, drive, element, cycles: float, tolerance: float,
     phasors = np.array([1, 1j]) @ run.kept.cycles[2:, :done]
     book = run.book() | _second(turned)
     return SmoothResult(run.response(rows), last, np.zeros(0), run.extremes(done), phasors, book, run.outcome,
-                        shots, fine.work, run.time / period, run.message, (), fine, turned)
+                        shots, fine.work, run.time / period, run.message, (), fine, turned, run.unlike, tolerance)
 
 
 def _second(turned) -> dict:

@@ -1,12 +1,10 @@
-"""A drive as numbers for compiled code: pieces on which it is smooth, and where they end; nothing is compiled here, so
-that a plan can ask which motions may move side by side."""
+"""A drive as numbers for compiled code: pieces on which it is smooth, and where they end."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 SINES, SWEEP, ROWS = range(3)  # as in `step_kernels`
-FREE = 7  # of the numbers of points of bonds: share of the bond length that stretches without damage
 
 
 class Wave(NamedTuple):
@@ -45,12 +43,3 @@ def wave_of(drive) -> Wave:
 def _wave(kind: int, rows) -> Wave:
     pieces = np.array(rows, float)
     return Wave(kind, pieces, np.append(pieces[1:, 0], np.inf))
-
-
-def fits(modes, element, wave, travel: float = np.inf) -> bool:
-    """Whether a motion may move side by side with others: one mode with its own damping, one sine without an end, no
-    stop at a travel [m], a law without states of its own and without kinks."""
-    plain = element.form == "speed" or (element.form == "points" and not element.numbers[FREE])
-    sine = wave.kind == SINES and len(wave.pieces) == 1 and wave.pieces[0, 2] != 0
-    return bool(plain and element.sizes == () and modes.omega.size == 1 and modes.damping is None and sine
-                and np.isinf(travel))

@@ -10,14 +10,10 @@ exponentials of the slide, and (eps, m, z, s2) where it grows.
 from math import exp, expm1, inf, nan
 
 from ...compiled.inner import njit
-from ...compiled.series_kernels import gone
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
-from ..flags_kernels import LEAN, closed, layer
+from ..flags_kernels import LEAN, closed
 
-__all__ = ["ahead", "along", "begin", "closed", "commit", "finish", "flow", "knee", "layer", "mean", "middle", "pull",
-           "rate", "share", "shown", "state"]
-
-GROWS, OF_SPEED, MIXED = (1.0, -1.0, 0.0), False, True  # of `share`, as `protocol` has it
+__all__ = ["begin", "closed", "commit", "finish", "flow", "knee", "mean", "middle", "pull", "rate", "shown", "state"]
 
 GROWTH, WEIGHT = 2, 8  # of num: where the growth and the weights begin
 FREE = 7  # of num: share of the bond length that stretches without damage
@@ -178,25 +174,3 @@ def finish(num, mem, turn, dq, v, y):
         mem[0, 5] = turn[0]
     return 0.5 * num[0, WEIGHT] * lost
 
-
-@njit(error_model="numpy", **LEAN)
-def ahead(num, mem, way):
-    """The four numbers of `along` for a motion in the direction `way` at a constant bond length eps: way/eps [1/m], the
-    force [N] at its start, what it lacks of way mu N [N], and minus that force times the share of bonds still to form.
-    """
-    limit, start = way * num[0, WEIGHT] * mem[0, 0], num[0, WEIGHT] * mem[0, 2]
-    return way / mem[0, 0], start, limit - start, limit * (mem[0, 1] - 1)
-
-
-@njit(error_model="numpy", fastmath={"contract"}, **LEAN)
-def share(y):
-    """Share of the bonds at the start that are broken after y bond lengths, 1 - exp(-y), without branches."""
-    return gone(y)
-
-
-@njit(error_model="numpy", fastmath={"contract"}, **LEAN)
-def along(pace, start, lack, fresh, dq, v):
-    """Force [N] after a slide dq [m] without branches, as `slid` has it."""
-    y = pace * dq
-    broken = gone(y)
-    return start + broken * lack + fresh * (y - y * broken)

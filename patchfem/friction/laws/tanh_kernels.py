@@ -3,16 +3,12 @@
 num: limit [N], v_0 [m/s]; no memory.
 """
 
-from math import copysign, inf, nan, tanh
+from math import inf, nan, tanh
 
 from ...compiled.inner import njit
-from ...compiled.series_kernels import gone
 from ..flags_kernels import LEAN, closed, knee, middle
 
-__all__ = ["ahead", "along", "at_end", "begin", "closed", "commit", "finish", "knee", "layer", "mean", "middle",
-           "rate", "share", "shown", "state"]
-
-GROWS, OF_SPEED, MIXED = (1.0, 0.0, -1.0), True, False  # of `share`, as `protocol` has it
+__all__ = ["at_end", "begin", "closed", "commit", "finish", "knee", "mean", "middle", "rate", "shown", "state"]
 
 
 @njit(error_model="numpy", **LEAN)
@@ -71,27 +67,3 @@ def finish(num, mem, turn, dq, v, y):
     """There is no memory; nan, as only the work tells what is dissipated."""
     return nan
 
-
-@njit(error_model="numpy", **LEAN)
-def layer(num):
-    """Speed [m/s] over which the force turns with the slide: v_0."""
-    return num[0, 2]
-
-
-@njit(error_model="numpy", **LEAN)
-def ahead(num, mem, way):
-    """The four numbers of `along`: 1/v_0 [s/m], no constant force, limit [N], nothing mixed."""
-    return 1 / num[0, 2], 0.0, num[0, 1], 0.0
-
-
-@njit(error_model="numpy", fastmath={"contract"}, **LEAN)
-def share(y):
-    """tanh y without branches: g/(2 - g) with g = 1 - exp(-2 |y|)."""
-    g = gone(2 * abs(y))
-    return copysign(g / (2 - g), y)
-
-
-@njit(error_model="numpy", fastmath={"contract"}, **LEAN)
-def along(scale, none, limit, nothing, dq, v):
-    """Force [N] of eq. 2.4 at the speed v [m/s] without branches."""
-    return limit * share(scale * v)

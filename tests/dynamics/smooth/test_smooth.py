@@ -10,6 +10,7 @@ from patchfem.core import BaseSine, ModalBasis, Outcome, Start
 from patchfem.dynamics import tableau_kernels as tableau
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
+from patchfem.dynamics.smooth.arrays import DONE
 from patchfem.dynamics.smooth.run import Run, simulate
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
@@ -67,7 +68,6 @@ def numpy_step(slope, t, y, h):
 def test_exact_compiled_steps_are_the_method_in_numpy():
     """A sample at the end of a first step of given length, against the same step of eq. 3.4 and the law in NumPy."""
     run = Run(ONE, SINE, element(SHORT), 1, 1e-3)
-    run.swift = False
     run.until(1e-3 * SINE.period)
     t, y, h = run.time, run.moving.y[:2].copy(), 2e-2 * SINE.period
     origin, weight = run.moving.now[3], 0.3 * LOAD / SHORT.length
@@ -79,7 +79,7 @@ def test_exact_compiled_steps_are_the_method_in_numpy():
 
     run.moving.now[1] = h
     run.until(t + h)
-    assert run.kept.tally[13] <= 3  # the last of them the step of this length
+    assert run.kept.tally[DONE] <= 3  # the last of them the step of this length
     assert run.moving.y[:2] == pytest.approx(numpy_step(slope, t, y, h), rel=1e-12)
 
 
@@ -195,7 +195,7 @@ def test_exact_a_fork_goes_on_as_the_run_would():
     twin = run.fork(SINE)
     run.until(3 * SINE.period)
     twin.until(3 * SINE.period)
-    assert np.array_equal(run.moving.y, twin.moving.y) and twin.kept.tally[13] == run.kept.tally[13]
+    assert np.array_equal(run.moving.y, twin.moving.y) and twin.kept.tally[DONE] == run.kept.tally[DONE]
 
 
 def test_exact_extremes_are_those_of_steps_read_inside():
@@ -246,7 +246,7 @@ def test_exact_slides_far_below_the_bond_length_cost_no_small_steps(drive):
         sway = np.exp(-decay * times) * (np.cos(free * times) + decay / free * np.sin(free * times))
         want = rest + (1e-14 - rest) * sway
         assert rows[:, 1] == pytest.approx(want, abs=1e-7 * 1e-14)
-    assert run.kept.tally[13] < 1500
+    assert run.kept.tally[DONE] < 1500
 
 
 @pytest.mark.parametrize("share", [0.33, 0.348, 0.385])

@@ -6,6 +6,7 @@ from march_paths import OMEGA, one_mode
 from test_smooth import ONE, element
 
 from patchfem.core import BaseSine, Outcome, Start
+from patchfem.dynamics.smooth.arrays import DONE, REFUSED
 from patchfem.dynamics.smooth.run import Run
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
@@ -17,35 +18,32 @@ RINGS = Bonds(0.3, 1e-6)
 PERIOD = 2 * np.pi / OMEGA
 
 
-def moved(law, push: float, cycles: float, swift: bool) -> tuple:
-    """(Run, times of its reversals [s]) of a motion under a sine of `push` [m s-2]; swift: in a lane."""
+def moved(law, push: float, cycles: float) -> tuple:
+    """(Run, times of its reversals [s]) of a motion under a sine of `push` [m s-2]."""
     run = Run(ONE, BaseSine(push, OMEGA), law, 20, 1e-9)
-    run.swift = swift
     run.until(cycles * PERIOD)
     return run, np.concatenate(run.turns)[:, 0]
 
 
-@pytest.mark.parametrize("swift", [True, False])
-def test_always_a_motion_turns_once_where_it_stops(swift):
+def test_always_a_motion_turns_once_where_it_stops():
     """After its stop at 8.07 cycles it goes on and is back at rest within the first step: it is not astray."""
-    run, times = moved(points_element(RINGS, [1.0], [84.82758620689656]), 33.333333333333336, 20, swift)
+    run, times = moved(points_element(RINGS, [1.0], [84.82758620689656]), 33.333333333333336, 20)
     assert run.outcome is None and run.time == 20 * PERIOD
     assert 60 < times.size < 300 and np.diff(times).min() > 1e-6 * PERIOD
 
 
-@pytest.mark.parametrize("swift", [True, False])
 @pytest.mark.parametrize(("few", "many"), [(33.0, 34.0), (53.0, 52.0)])
-def test_exact_a_motion_that_touches_its_rest_is_that_which_turns_there_twice(few, many, swift):
+def test_exact_a_motion_that_touches_its_rest_is_that_which_turns_there_twice(few, many):
     """Two turns come with the push. Where they do, to the last bit of it, rate and acceleration vanish together; there
     the motion with them is the one without."""
     law = element(RINGS)
-    count = moved(law, few, 1, swift)[1].size
+    count = moved(law, few, 1)[1].size
     while abs(many - few) > 2e-14:
         middle = 0.5 * (few + many)
-        run, times = moved(law, middle, 1, swift)
+        run, times = moved(law, middle, 1)
         assert run.outcome is None and times.size in (count, count + 2)
         few, many = (middle, many) if times.size == count else (few, middle)
-    (one, _), (other, times) = (moved(law, push, 1, swift) for push in (few, many))
+    (one, _), (other, times) = (moved(law, push, 1) for push in (few, many))
     assert times.size == count + 2 and np.diff(times).min() > 0
     size = [1e-6, 1e-6 * OMEGA]  # of the motion and its rate
     assert abs(one.moving.y[:2] - other.moving.y[:2]) / size == pytest.approx(0, abs=1e-8)
@@ -59,7 +57,7 @@ def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
     run = Run(one_mode(omega, 0.05, 0.7626), free, law, 104, 1e-9, start=Start(np.array([4.631e-5]), np.zeros(1)))
     for cycle in range(105):
         run.until(cycle / 162.4)
-    z, v, done = abs(run.moving.y[0]), abs(run.moving.y[1]), run.kept.tally[13:15].sum()
+    z, v, done = abs(run.moving.y[0]), abs(run.moving.y[1]), run.kept.tally[DONE:REFUSED + 1].sum()
     assert run.outcome is None and done < 2000
     assert z < 1e-25 * 4.631e-5 and v < 1e-25 * 4.631e-5 * omega
     # what friction and damping took is the energy of the start
@@ -76,7 +74,7 @@ def test_always_a_motion_held_at_a_distance_is_not_refused_for_its_round_off(tol
     run = Run(one_mode(omega, 0.05, 0.2199), drives.release(1 / 153.52), law, 104, tolerance, start=start)
     run.until(104 / 153.52)
     y, force = run.moving.y, run.settled()[0][5]
-    assert run.outcome is None and run.kept.tally[13:15].sum() < 12_000
+    assert run.outcome is None and run.kept.tally[DONE:REFUSED + 1].sum() < 12_000
     assert abs(y[1]) < 1e-13 * omega * abs(y[0]) and y[0] == pytest.approx(5.673e-5, rel=1e-3)
     assert force == pytest.approx(-0.2199 * omega**2 * y[0], rel=1e-9)  # friction balances the spring
 
@@ -91,7 +89,7 @@ def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for
     run = Run(one_mode(omega, 0.05, 0.4143), drives.release(1 / 62.86), law, 108, tolerance, start=start)
     run.until(108 / 62.86)
     y, force = run.moving.y, run.settled()[0][5]
-    assert run.outcome is None and run.kept.tally[13:15].sum() < 40_000
+    assert run.outcome is None and run.kept.tally[DONE:REFUSED + 1].sum() < 40_000
     assert abs(y[1]) < 1e-9 * omega * abs(y[0])
     assert force == pytest.approx(-0.4143 * omega**2 * y[0], rel=1e-8)  # the bonds balance the spring
 
@@ -103,7 +101,6 @@ def test_exact_a_long_call_is_left_now_and_then_and_goes_on_to_the_last_bit():
     long.kept = long.kept._replace(turns=np.zeros((9000, 9)))
     long.progress = told.append
     for run in (often, long):
-        run.swift = False
         run.until(2500 * PERIOD)
     assert run.outcome is not Outcome.NOT_CONVERGED and len(told) > 1
     np.testing.assert_array_equal(long.moving.y, often.moving.y)

@@ -8,15 +8,15 @@ from ....friction.laws.stretch import points_element
 from ....friction.protocol import Element
 from ....friction.record import law_from
 from ....model.model import Model
-from ....structure.drive_sizes import fastest, largest, omega_of
+from ....structure.drive_sizes import fastest, largest, omega_of, sinusoidal, slowest
 from ...effort import steps_per_cycle
 
 PINNED = ("steps_per_cycle", "tail", "merge", "shear_modes")  # knobs of the march
 STEP = 2e-6  # seconds
-MORE = 1.5  # times the steps of a march, of which more are not worth their digits
+REPEATS = 30.0  # times of decay of the slowest mode, after which a motion is seen to repeat to its digits
+MORE = 3.5  # times the steps of a march, of which more are not worth their digits: a step costs less than one of it
 EASES = 9.0  # steps of a stiff law of the speed per cycle, over those of one that holds: .5 at r = 1.07, .1 at 1.26
 STABLE = 3.0  # times the length over which a state of a law relaxes, in a step
-FARTHER = 7.0  # of a series, whose order is higher
 
 
 def not_smooth(model: Model) -> str:
@@ -53,8 +53,6 @@ def element_of(model: Model) -> Element | None:
 def steps_of(model: Model, element: Element) -> float:
     """Steps per cycle to expect: some per radian of the fastest motion, some at every reversal, and those that keep a
     state of the law which relaxes over a short path or time stable."""
-    from ....dynamics.smooth.waves import fits, wave_of  # not for the rigs that are refused before
-
     rig, modes = model.rig, model.rig.modes
     omega, period = omega_of(rig.drive), rig.drive.period
     damper = modes.damping if modes.damping is not None else np.diag(2 * modes.zeta * modes.omega)
@@ -63,11 +61,10 @@ def steps_of(model: Model, element: Element) -> float:
     rigid = 0.0 if element.length else element.limit / model.friction.reference_speed * ease * clings(model, element)
     path = 4 * model.speed / omega
     states = path / element.length if element.sizes and element.length else 0.0
-    stable = FARTHER if fits(modes, element, wave_of(rig.drive), rig.travel) else STABLE
     grown = model.friction.slip_growth if has(model.friction.law, "bonds") else None
     if grown:
         states = max(states, path / grown)
-    return 24 + 1.2 * pace * period + (states + rigid * period) / stable
+    return 24 + 1.2 * pace * period + (states + rigid * period) / STABLE
 
 
 def clings(model: Model, element: Element) -> float:
@@ -86,7 +83,10 @@ def clings(model: Model, element: Element) -> float:
 
 def smooth_cost(model: Model) -> tuple:
     """Steps of all runs, and their seconds."""
-    steps = 2 * model.rig.cycles * steps_of(model, element_of(model))
+    rig, cycles = model.rig, model.rig.cycles
+    if sinusoidal(rig.drive) and (decay := slowest(rig.modes) * rig.drive.period) > 0:  # then it repeats
+        cycles = min(cycles, 20 + REPEATS / decay)
+    steps = 2 * cycles * steps_of(model, element_of(model))
     return int(steps), 0.02 + STEP * steps
 
 

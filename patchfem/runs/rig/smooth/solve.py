@@ -25,6 +25,11 @@ STUCK = {"stick_fraction": (2.5, 0.5), "slip_start_phase": (2.5, 1.0)}
 
 def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """One run with steps that meet numerics.local; patch: the solved Patch or None."""
+    return moved(model, numerics, patch, frames, say, progress)[0]
+
+
+def moved(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
+    """(Solution, SmoothResult) of a run; arguments as `run_smooth`."""
     rig, begin = model.rig, perf_counter()
     contact = model_of(model, numerics, patch)
     hub.loops_of(contact.element.kernels, say)
@@ -32,13 +37,13 @@ def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None)
     begin = perf_counter()
     done = hub.simulate(rig.modes, rig.drive, contact.element, numerics.cycles, numerics.local, numerics.window,
                         rig.travel, frames, rig.start, progress)
-    reader = _Smooth(model, replace(numerics, steps=hub.SAMPLES), patch, contact)
+    reader = Smooth(model, replace(numerics, steps=hub.SAMPLES), patch, contact)
     found = reader.solution(done, perf_counter() - begin, {"compiled_code": loaded})
-    return replace(found, errors=reader.sampling(done), extra={"step_tolerance": numerics.local,
-                                                               "steps_taken": int(done.ledger["steps"])})
+    return replace(found, errors=reader.left_open(done, found.values), extra={
+        "step_tolerance": numerics.local, "steps_taken": int(done.ledger["steps"])}), done
 
 
-class _Smooth(Read):
+class Smooth(Read):
     """The measures of a run of high order: what the integrator knows comes before what samples show."""
 
     def between(self, window) -> dict:
@@ -90,6 +95,13 @@ class _Smooth(Read):
     def _clear(part, even) -> bool:
         """Whether the slip of a SmoothResult with samples `even` is no round-off."""
         return 2 * part.fine.slip > CLEAR * slip_noise(even)
+
+    def left_open(self, done, values: dict) -> dict:
+        """Errors of the measures `values` by name that a SmoothResult leaves open itself: those of samples, of peaks,
+        and of cycles that were left out."""
+        found, size = self.sampling(done), values.get("relative_displacement_amplitude", 0.0)
+        return {name: found.get(name, 0.0) + done.fine.unsure.get(name, 0.0)
+                + done.unlike * (size if name == "drift_per_cycle" else abs(value)) for name, value in values.items()}
 
     def sampling(self, done) -> dict:
         """Errors of the measures that are read off the samples of a SmoothResult, by those off every second one."""

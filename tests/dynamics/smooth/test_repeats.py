@@ -1,0 +1,55 @@
+"""A motion that repeats is carried on by whole cycles: its last cycles, its books and its extremes are those of all."""
+
+import numpy as np
+import pytest
+from march_paths import OMEGA, one_mode
+from test_smooth import MASS, element
+
+from patchfem.core import BaseSine
+from patchfem.dynamics.smooth.arrays import DONE
+from patchfem.dynamics.smooth.run import REPEATS, Run, simulate
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.laws.bouc_wen import BoucWen
+from patchfem.friction.laws.tanh import Rate
+
+LAWS = {"tanh": Rate(0.3, 5e-3), "bonds": Bonds(0.3, 5e-6), "bouc-wen": BoucWen(0.3, 5e-6)}
+MODES, SINE = one_mode(OMEGA, 0.02, MASS), BaseSine(49.0, OMEGA * 0.9)
+
+
+def law_of(name):
+    return LAWS[name].element(60.0) if name != "bonds" else element(LAWS[name])
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_exact_cycles_that_are_left_out_are_as_the_last_one(name):
+    left, whole = (Run(MODES, SINE, law_of(name), 400, 1e-9) for _ in range(2))
+    left.onward(400 * SINE.period)
+    whole.until(400 * SINE.period)
+    size = abs(whole.kept.cycles[:2]).max()
+    assert 0 < left.unlike <= REPEATS * 1e-9 and left.kept.tally[DONE] < 0.5 * whole.kept.tally[DONE]
+    assert left.time == pytest.approx(whole.time, rel=1e-14)
+    scale = [size, size * OMEGA]
+    assert left.moving.y[:2] / scale == pytest.approx(whole.moving.y[:2] / scale, abs=1e-7)
+    assert left.kept.cycles[:2] / size == pytest.approx(whole.kept.cycles[:2] / size, abs=1e-7)
+    one, other = left.book(), whole.book()
+    for key in ("work_in", "viscous", "friction"):
+        assert one[key] == pytest.approx(other[key], rel=1e-7), key
+    assert one["power"] == pytest.approx(other["power"], rel=1e-3)  # a sum of |work| over steps, which may differ
+    miss = one["work_in"] - one["stored"] - one["friction"] - one["viscous"]
+    assert abs(miss) < 1e-8 * one["power"]
+    one, other = np.concatenate(left.turns), np.concatenate(whole.turns)
+    assert len(one) == len(other) and one[-1] == pytest.approx(other[-1], rel=1e-5, abs=1e-6 * size)
+
+
+def test_exact_the_last_cycles_after_a_million_others():
+    few, many = (simulate(MODES, SINE, law_of("tanh"), cycles, 1e-9) for cycles in (400, 1_000_000))
+    assert many.ledger["steps"] < 2 * few.ledger["steps"] and len(many.amplitudes) == 1_000_000
+    for name in ("swing", "acceleration", "force", "work"):
+        assert getattr(many.fine, name) == pytest.approx(getattr(few.fine, name), rel=1e-7)
+    assert abs(many.fine.slide) == pytest.approx(abs(few.fine.slide), rel=1e-7)
+
+
+def test_always_a_motion_that_still_grows_is_not_carried_on():
+    run = Run(one_mode(OMEGA, 1e-5, MASS), BaseSine(49.0, OMEGA), law_of("tanh"), 300, 1e-9)
+    run.onward(300 * 2 * np.pi / OMEGA)
+    assert run.unlike == 0 and run.time == 300 * 2 * np.pi / OMEGA
