@@ -106,8 +106,8 @@ class Smooth(Read):
     def sampling(self, done) -> dict:
         """Errors of the measures that are read off the samples of a SmoothResult, by those off every second one."""
         even, turned = done.window, done.turned
-        half = _picked(even, np.arange(even.time.size) % 2 == (even.time.size - 1) % 2)
-        fewer = _picked(turned, np.isin(turned.time, half.time) | ~np.isin(turned.time, even.time))
+        half = even.at(np.arange(even.time.size) % 2 == (even.time.size - 1) % 2)
+        fewer = turned.at(np.isin(turned.time, half.time) | ~np.isin(turned.time, even.time))
         every, second = (self._measured(done, *pair, done.amplitudes, None) for pair in (
             (turned, even), (fewer, half)))
         clear = self._clear(done, even)
@@ -116,9 +116,3 @@ class Smooth(Read):
         found = {name: share[name][0] * gap + share[name][1] / hub.SAMPLES
                  for name, gap in change(every, second).items()}
         return found | {name: LOCATED for name in STUCK if name in found} if clear else found
-
-
-def _picked(response, pick):
-    """Some samples (k,) bool of a Response."""
-    columns = {name: getattr(response, name)[pick] for name in response.__dataclass_fields__ if name != "extra"}
-    return replace(response, **columns, extra={k: v[:, pick] for k, v in response.extra.items()})
