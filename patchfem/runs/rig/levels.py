@@ -2,10 +2,15 @@
 
 from dataclasses import replace
 
-from ...core import Measure
+import numpy as np
+
+from ...core import BaseSine, Measure
+from ...response import run_events
 from ...response.levels import JUMP, Level, bracket, hysteresis, jump, no_onset, past_onset
 from ...response.rows import TABLE
+from ...structure.drive_sizes import omega_of
 
+EXACT = 1e-9  # relative error of what is read off a motion in closed form
 MOST = 40  # halvings of the bracket of an onset
 
 
@@ -106,3 +111,69 @@ def _unit(rig) -> str:
 def _size(rig) -> float:
     """What a level of the drive [m s-2] is in the unit of the scene, over it."""
     return rig.modes.mass if rig.kind == "force" else 1.0
+
+
+def by_levels(reader, go, state, end, progress=None) -> tuple:
+    """Runs of all levels of a drive one after the other, each from where the one before it ended: (their run, the
+    fields `levels` and `probe` of its Solution).
+
+    reader: Reader of the runs; go(sine, state, watch, last) -> run; state: to begin from; end(run) -> state.
+    """
+    rig, states, parts, found = reader.model.rig, [state], [], []
+
+    def at(level, state, watch=None, last=False) -> tuple:
+        sine = BaseSine(level, omega_of(rig.drive), rig.drive.moving)
+        done = go(sine, state, watch, last)
+        return done, reader.level(level, done, sine, EXACT)
+
+    for k, level in enumerate(rig.levels):
+        watch = None if progress is None else (lambda part, k=k: progress((k + part) / len(rig.levels)))
+        done, seen = at(level, states[-1], watch, k + 1 == len(rig.levels))
+        parts.append(done)
+        found.append(seen)
+        states.append(end(done))
+        if done.outcome is not None:
+            break
+    return joined_runs(parts, rig.level_cycles * rig.drive.period), {
+        "levels": tuple(found), "probe": lambda number, level: at(level, states[number + 1])[1]}
+
+
+def whole_cycles(done):
+    """The run without the extremes and the phasor of a last cycle that is cut short."""
+    count = int(done.cycles_done + 1e-9)
+    if not count or count >= len(done.amplitudes):
+        return done
+    return replace(done, amplitudes=done.amplitudes[:count], phasors=done.phasors[:count])
+
+
+def joined_runs(parts, each: float):
+    """Runs of `each` [s] one after the other as one EventRun or PieceRun; its window and loop are those of the last."""
+    shift = [k * each for k in range(len(parts))]
+    last, rows = parts[-1], [slice(None, -1)] * (len(parts) - 1) + [slice(None)]  # where one ends the next begins
+
+    def column(of):
+        return np.concatenate([of(p)[part] for p, part in zip(parts, rows)])
+
+    columns = {name: column(lambda p, name=name: getattr(p.response, name))
+               for name in type(last.response).__dataclass_fields__ if name not in ("time", "extra")}
+    time = np.concatenate([_later(p.response.time, t)[part] for p, part, t in zip(parts, rows, shift)])
+    extra = {name: column(lambda p, name=name: p.response.extra[name]) for name in last.response.extra
+             if name != "ledger"}
+    if "ledger" in last.response.extra:
+        extra["ledger"] = column(lambda p: p.response.extra["ledger"].T).T
+    response = replace(last.response, time=time, extra=extra, **columns)
+    window = replace(last.window, time=_later(last.window.time, shift[-1]))
+    ledger = {name: sum(p.ledger[name] for p in parts) for name in last.ledger}
+    ledger["peak_stored"] = max(p.ledger["peak_stored"] for p in parts)
+    return replace(last, response=response, window=window, ledger=ledger,
+                   log=run_events.joined_logs([p.log for p in parts], shift),
+                   amplitudes=np.concatenate([p.amplitudes for p in parts]),
+                   phasors=np.concatenate([p.phasors for p in parts]), events=sum(p.events for p in parts))
+
+
+def _later(time, shift: float):
+    """Times moved by `shift` [s], the two sides of an event still apart."""
+    moved = time + shift
+    before = np.flatnonzero(moved[1:] <= moved[:-1])
+    moved[before] = np.nextafter(moved[before], -np.inf)
+    return moved

@@ -83,8 +83,9 @@ class Reader:
         drive, window = drive or self.model.rig.drive, self.numerics.window
         stuck, (rings, own) = self.sticks(run), self.rings(run, drive)
         values = self.values(run, drive, stuck, run.response.extra.get("ledger")) | rings
-        more = {"steady": steady_of(drive, *window_ends(run.amplitudes, run.phasors, window)), "message":
-                getattr(run, "message", ""), "log": getattr(run, "log", None), "snapshots": run.snapshots} | more
+        kept = {"message": "", "log": None, "snapshots": []}
+        more = {name: getattr(run, name, none) for name, none in kept.items()} | {
+            "steady": steady_of(drive, *window_ends(run.amplitudes, run.phasors, window))} | more
         return Solution(values=values, response=run.response, window=run.window,
                         amplitudes=window_amplitudes(run.amplitudes, window),
                         outcome=run.outcome or (Outcome.STUCK if stuck else None), book=run.ledger, seconds=seconds,

@@ -13,34 +13,35 @@ from ....friction.record import law_from
 from ....response import run_events
 from ....response.measures import window_amplitudes
 from ....response.ringing import held_ring
-from ....structure.drive_sizes import omega_of, sinusoidal
-from ..exact import joined_runs, whole_cycles
+from ....structure.drive_sizes import sinusoidal
 from ..interface import contact_model
+from ..levels import by_levels, whole_cycles
 from ..reading import Reader, books_of
 from ..solution import Solution
 from .costs import refuse_endless
 
-EXACT = 1e-9  # relative error of what is read off a motion in closed form
 CHANGES = 1e-2  # share of the tolerance by which windows may differ in a motion that has settled
 
 
 def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """Solution of a rig behind elastic-plastic elements; patch: the solved Patch, or None."""
     refuse_endless(model)
-    rig, drive, begin = model.rig, model.rig.drive, perf_counter()
+    rig, begin, more = model.rig, perf_counter(), {}
     found = Interfaces(model, numerics, patch)
     reduced = perf_counter() - begin
     histories.warm_up(say)
     loaded, begin = perf_counter() - begin - reduced, perf_counter()
     reader = Pieces(model, numerics, patch, found)
+
+    def go(drive, state, watch, last: bool, cycles: float = rig.level_cycles):
+        return histories.simulate(rig.modes, drive, found.groups, cycles, numerics.window, rig.travel, frames * last,
+                                  watch, *state)
+
     if rig.levels:
-        done, levels, probe = _levels(reader, frames, progress)
+        done, more = by_levels(reader, go, (rig.start, None), lambda run: run.end, progress)
     else:
-        done = histories.simulate(rig.modes, drive, found.groups, numerics.cycles, numerics.window, rig.travel, frames,
-                                  progress, rig.start)
-        levels, probe, done = (), None, whole_cycles(done)
-    return reader.solution(done, perf_counter() - begin, levels=levels, probe=probe,
-                           prepare={"reduce": reduced, "compiled_code": loaded})
+        done = whole_cycles(go(rig.drive, (rig.start, None), progress, True, numerics.cycles))
+    return reader.solution(done, perf_counter() - begin, prepare={"reduce": reduced, "compiled_code": loaded}, **more)
 
 
 class Pieces(Reader):
@@ -136,28 +137,3 @@ def group_of(element) -> elements.Elements:
     """Elements of an Element of form "parallel"."""
     count = int(element.numbers[1])
     return elements.elements_of(element.numbers[2:2 + count], element.numbers[2 + count:2 + 2 * count])
-
-
-def _levels(reader: Pieces, frames: int, progress) -> tuple:
-    """Run of all levels one after the other: (PieceRun, its Levels, probe as `levels.onset` asks)."""
-    rig, window = reader.model.rig, reader.numerics.window
-    cycles, states, parts, levels, last = rig.level_cycles, [(rig.start, None)], [], [], len(rig.levels) - 1
-
-    def go(level, state, watch=None, frames=0):
-        sine = BaseSine(level, omega_of(rig.drive), rig.drive.moving)
-        done = histories.simulate(rig.modes, sine, reader.groups, cycles, window, rig.travel, frames, watch, *state)
-        return done, reader.level(level, done, sine, EXACT)
-
-    for k, level in enumerate(rig.levels):
-        share = None if progress is None else (lambda part, k=k: progress((k + part) / len(rig.levels)))
-        done, seen = go(level, states[-1], share, frames * (k == last))
-        levels.append(seen)
-        parts.append(done)
-        states.append(done.end)
-        if done.outcome is not None:
-            break
-
-    def probe(number, level):
-        return go(level, states[number + 1])[1]
-
-    return joined_runs(parts, cycles * rig.drive.period), tuple(levels), probe
