@@ -32,9 +32,10 @@ class Code(NamedTuple):
 
 NONE = Code(0.0, 0.0)
 FEW, EVENTS = Code(6e6, 0.05), Code(28e6, 0.25)  # exact: of one mode under sines or no friction; of any
-STEPS, SMOOTH = Code(58e6, 0.4, 8.0), Code(74e6, 0.4, 20.0)
-PIECES, BALANCE = Code(82e6, 0.4, 15.0), Code(1e8, 0.55, 12.0)
+STEPS, FOLLOWED = Code(58e6, 0.4, 8.0), Code(58e6, 0.4, 3.0)  # a march; a slide or a method of few kernels
+SMOOTH, PIECES, BALANCE = Code(74e6, 0.4, 13.0), Code(82e6, 0.4, 15.0), Code(1e8, 0.55, 3.0)
 CODES = {"static": NONE, "bench, closed form": NONE, "bench, law step by step": NONE, "bench, two directions": NONE,
+         "bench, parallel elements": FOLLOWED, "duhamel": FOLLOWED, "newmark": FOLLOWED, "euler": FOLLOWED,
          "smooth": SMOOTH, "piecewise": PIECES, "harmonic": BALANCE}
 
 

@@ -8,7 +8,7 @@ from ..model.model import Model, build
 from ..model.source import placed
 from . import memory
 
-START = 0.5  # seconds of CPU until a run begins, and of its files and its page
+START = 0.7  # seconds of CPU until a run begins, and of its files and its page
 LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from ...core import PatchfemError
-from ...runs.many.many import taken
+from ...runs.many.many import compile_seconds, taken
 from ...runs.plan import plan
 from .asked import Asked
 from .cases import Cases
 
 LOOKED = 9  # cases that are planned, spread over the sweep
-ONCE = 0.75  # seconds of a plan that a sweep spends once: its start, its files and its page
+ONCE = 0.95  # seconds of a plan that a sweep spends once: its start, its files and its page
 TOGETHER = 2e-3  # seconds of a case of a batch from its values to its folder (1.9 ms of 2000 lumped cases)
 DISK = 6000  # bytes of a case in its folder and in the tables
 
@@ -33,8 +33,10 @@ def estimate(asked: Asked, cases: Cases) -> dict:
     each = sum(one if batch is None else max(TOGETHER, batch.share * one) for one, batch in zip(alone, batches))
     each /= len(plans)
     once = ONCE + max(one * (batch is not None) for one, batch in zip(alone, batches))  # the first as a single run
-    return plans[0].as_json() | {"seconds": round(once + each * len(cases), 2), "seconds_per_case": round(each, 4),
-                            "bytes": max(one.bytes for one in plans), "disk_bytes": DISK * len(cases),
-                            "cases": len(cases),
-                            "values": {axis.key: len(set(axis.texts)) for axis in cases.axes}}
+    first = batches[0]
+    compiles = plans[0].compile_seconds if first is None else compile_seconds(first, plans[0].model)
+    return plans[0].as_json() | {
+        "compile_seconds": compiles, "seconds": round(once + each * len(cases), 2), "seconds_per_case": round(each, 4),
+        "bytes": max(one.bytes for one in plans), "disk_bytes": DISK * len(cases), "cases": len(cases),
+        "values": {axis.key: len(set(axis.texts)) for axis in cases.axes}}
 

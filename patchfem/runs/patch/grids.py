@@ -16,8 +16,8 @@ from ...core import NotConverged, frozen_array
 from ...elasticity.grid_fronts import predicted_bytes, predicted_seconds
 from ...mesh.grading import Layout, columns, rows
 from ...mesh.nested import coarser, finer, plan_of
-from ...mesh.tensor import TensorGrid, graded_grid
-from ...model.pieces import outlined, rounded_edges
+from ...mesh.tensor import TensorGrid
+from ...model.pieces import grid_of, outlined, rounded_edges
 from .condensed import condensed
 from .press import Patch, pressed
 from .values import found_ends
@@ -258,7 +258,7 @@ def sizes(asked, tolerance: float) -> Sizes:
             ladder.insert(0, bodies)
     else:
         pieces = (asked.lower,) if asked.alike else (asked.lower, asked.upper)
-        ladder = [[graded_grid(asked.length, piece.height, asked.size, piece.thickness) for piece in pieces]]
+        ladder = [[grid_of(asked, piece) for piece in pieces]]
         while len(ladder) < LEAST_LEVELS and ladder[-1][0].x.size > 8:
             ladder.append([coarser(body) for body in ladder[-1]])
     finest = tuple(map(_nodes, ladder[0]))

@@ -144,26 +144,29 @@ def quadrature_of(model: Model, numerics: Numerics):
     bonds would outgrow any room: it is taken as DECAYED times that of its start. That of a block which the printed law
     holds is HELD times what the drive would give.
     """
-    if numerics.choice is not None:
-        return numerics.choice
+    return numerics.choice or _summed_by(model, numerics, _stretch(model), model.accuracy.quadrature)
+
+
+def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
+    """The Choice of `quadrature_of` by an engine, or "auto", for a block that bonds let move by `stretch` lengths."""
     from ...friction.bonds.engines import choose as engine_for
 
     law, accuracy = model.bonds, model.accuracy
     once = model.rig.kind == "free" or model.rig.waveform == "step"
     left = HELD if chatters(model) else DECAYED if once else 1.0
-    stroke = max(4 * left * min(model.speed / omega_of(model.rig.drive) / law.length, _stretch(model)), 1e-9)
+    stroke = max(4 * left * min(model.speed / omega_of(model.rig.drive) / law.length, stretch), 1e-9)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
-    return engine_for(law, accuracy.tolerance, stroke, numerics.steps / 2, accuracy.quadrature, tail, accuracy.merge)
+    return engine_for(law, accuracy.tolerance, stroke, numerics.steps / 2, engine, tail, accuracy.merge)
 
 
-def _stretch(model: Model) -> float:
+def _stretch(model: Model, least: float = FAST) -> float:
     """Bond lengths by which a drive moves a block that its bonds hold by their stiffness mu_s N/eps_0; inf where they
-    do not hold it, or the printed law gives them no stiffness."""
+    do not hold it, their limit `least` times what that takes, or the printed law gives them no stiffness."""
     f, rig = model.friction, model.rig
     if f.reading == "report" or rig.kind == "free":
         return inf
     needed, limit = holding(rig), f.static * model.nominal_load
-    return needed / limit if limit >= FAST * needed else inf
+    return needed / limit if limit >= least * needed else inf
 
 
 def halvings(model: Model) -> int:
@@ -328,8 +331,11 @@ def _probes(model: Model) -> int:
 
 
 def list_cost(model: Model, numerics: Numerics) -> tuple:
-    """Expected strips of a shared list of bonds and the seconds of the run with it."""
+    """Expected strips of a shared list of bonds and the seconds of the run with it; a block that its bonds just hold
+    leaves a list as long as one that they hold fast."""
     found = quadrature_of(model, numerics)
+    if found.engine != "recursion" and numerics.choice is None:
+        found = _summed_by(model, numerics, _stretch(model, 1.0), found.engine)
     steps = numerics.cycles * numerics.steps
     strips = min(found.strips, 2 * steps * max(1.0, found.strips)) if found.tail else min(found.strips, 8 * steps)
     return strips, steps * found.seconds * (strips / found.strips if found.strips else 1.0)
