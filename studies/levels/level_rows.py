@@ -111,4 +111,4 @@ def folds_of(case: str) -> tuple:
     modes, drive = model.rig.modes, BaseSine(up[0] * G_N, 2 * np.pi * frequency)
     joint = contact_model(model, choose(model), None)
     group = Group(modes, [(0, joint), (modes.output, Spring(0.0, model.rig.cubic))])
-    return tuple(f / G_N for f in follow(modes, drive, group, up[[0, -1]] * G_N, HARMONICS).folds)
+    return tuple(f / G_N for f in follow(modes, drive, group, up[[0, -1]] * G_N, harmonics=HARMONICS).folds)

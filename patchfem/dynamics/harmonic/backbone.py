@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import ModalBasis, NotConverged, say
-from .harmonic import Balance, pack, solve_linear, unpack
+from .harmonic import Balance, Plant, System, damped, pack, unpack
 
 
 class Free(NamedTuple):
@@ -43,94 +43,51 @@ class FreeBalance:
     """Equations of the free motion of one mode that a negative damping keeps up.
 
     balance: Balance of the rows; mode: number of the coordinate whose amplitude is given; scale [rad/s]. Unknowns:
-    packed slides of `Balance`, omega/scale and zeta.
+    packed slides of `Balance` over the amplitude, omega/scale and zeta. The given coordinate is one without receptance,
+    whose two equations stand for omega and zeta.
     """
 
     def __init__(self, balance: Balance, mode: int, harmonics: int, scale: float):
         self.balance, self.mode, self.h, self.scale = balance, mode, harmonics, scale
-        n = balance.modes.omega.size
-        self.others = np.array([j for j in range(n) if j != mode], int)
 
-    def impedance(self, omega: float, zeta: float) -> tuple:
-        """(P, dP/d omega, dP/d zeta), each (H + 1, n, n)."""
+    def plant(self, omega: float, zeta: float) -> Plant:
+        """The modes at omega [rad/s] with the damping -2 zeta omega besides, the given coordinate free."""
         m, k = self.balance.modes, np.arange(self.h + 1)[:, None, None]
-        eye = np.eye(m.omega.size)
+        eye, keep = np.eye(m.omega.size), np.arange(m.omega.size) != self.mode
         p = np.diag(m.omega**2) - (k * omega)**2 * eye + 1j * k * omega * (m.dampers - 2 * zeta * omega * eye)
-        return p, -2 * k**2 * omega * eye + 1j * k * (m.dampers - 4 * zeta * omega * eye), -2j * k * omega**2 * eye
+        inverse, right, left = np.zeros_like(p), eye[self.mode] + 0j, eye[self.mode] + 0j
+        inverse[np.arange(self.h + 1) != 1] = _inverse(p[np.arange(self.h + 1) != 1])
+        inverse[np.ix_([1], keep, keep)] = np.linalg.inv(p[1][np.ix_(keep, keep)])
+        right -= inverse[1] @ p[1][:, self.mode]
+        left -= p[1][self.mode] @ inverse[1]
+        slope = -2 * k**2 * omega * eye + 1j * k * (m.dampers - 4 * zeta * omega * eye)
+        return Plant(inverse, slope, ((1, right, left, left @ p[1][:, self.mode]),))
 
-    def system(self, x, amplitude: float) -> tuple:
-        """(residual (N,), Jacobian (N, N), Free) at unknowns x and the amplitude of the mode's coordinate [m]."""
-        balance, h, j, o = self.balance, self.h, self.mode, self.others
-        r, faces, mass = balance.lift.shape[1], balance.faces, balance.modes.mass
-        omega, zeta = x[-2] * self.scale, x[-1]
-        y = unpack(x[:-2], r)
-        fold = balance.contact(balance.lift @ y, omega)
-        p, by_omega, by_zeta = self.impedance(omega, zeta)
-        inverse = np.zeros_like(p)
-        keep = np.arange(h + 1) != 1
-        inverse[keep] = _inverse(p[keep])
-        if o.size:
-            inverse[np.ix_([1], o, o)] = np.linalg.inv(p[1][np.ix_(o, o)])[None]
-        push = -(fold.force.T @ balance.rows) / mass + 0j
-        given = np.zeros(p.shape[1])
-        given[j] = amplitude
-        push[1] -= p[1] @ given
-        z = np.einsum("kab,kb->ka", inverse, push)
-        z[1, j] = amplitude
-        miss = y - (z @ faces.T).T
-        last = p[1, j] @ z[1] + (balance.rows[:, j] @ fold.force[:, 1]) / mass
-        # slopes
-        linked = balance.gathered(fold.slope)
-        through = inverse @ faces.T / mass  # (H + 1, n, r): -dz/d(forces on y)
-        size = x.size - 2
-        block = (faces @ through @ linked).reshape(h + 1, r, r, 2 * h + 1)
-        block = np.concatenate([block.real, block.imag[1:]]).transpose(1, 0, 2, 3).reshape(size, size)
-        jacobian = np.zeros((size + 2, size + 2))
-        jacobian[:size, :size] = np.eye(size) + block
-        grip = faces[:, j] / mass - p[1, j] @ through[1]
-        line = (grip @ linked[1]) / self.scale**2
-        jacobian[size, :size], jacobian[size + 1, :size] = line.real, line.imag
-        for column, dp, unit in ((size, by_omega, self.scale), (size + 1, by_zeta, 1.0)):
-            turned = np.einsum("kab,kbc,kc->ka", inverse, dp, z)
-            end = dp[1, j] @ z[1] - p[1, j] @ turned[1]
-            if dp is by_omega and fold.rate is not None:
-                turned = turned + np.einsum("kar,rk->ka", through, balance.lift.T @ fold.rate)
-                end = end + grip @ (balance.lift.T @ fold.rate)[:, 1]
-            jacobian[:size, column] = pack((turned @ faces.T).T) * unit
-            end = end * unit / self.scale**2
-            jacobian[size:, column] = end.real, end.imag
-        residual = np.concatenate([pack(miss), [last.real / self.scale**2, last.imag / self.scale**2]])
-        return residual, jacobian, Free(amplitude, omega, zeta, balance.lift @ y, fold.force, z)
+    def system(self, x, amplitude: float) -> System:
+        """The equations at unknowns x (N,) and the amplitude of the mode's coordinate [m], lengths over it."""
+        omega, zeta, balance = x[-2] * self.scale, x[-1], self.balance
+        if not omega > 0:
+            return System(np.full(x.size, np.inf), np.eye(x.size), None, None, None)
+        here = self.plant(omega, zeta)
+        one = balance.system(np.append(x[:-2] * amplitude, [amplitude, 0.0]), omega, 0.0, self.h, here)
+        by_zeta = -2j * np.arange(self.h + 1)[:, None] * omega**2 * one.modal  # of the linear part, times the motion
+        turned = balance.faces @ np.einsum("kab,kb->ak", here.inverse, by_zeta)
+        last = here.free[0][2] @ by_zeta[1] / omega**2
+        jacobian = one.jacobian.copy()
+        jacobian[:, -2] = one.by_omega * self.scale / amplitude
+        jacobian[:, -1] = np.append(pack(turned), [last.real, last.imag]) / amplitude
+        return one._replace(residual=one.residual / amplitude, jacobian=jacobian)
 
-    def solve(self, x, amplitude: float, goal: float = 1e-10, most: int = 30):
-        """(unknowns (N,), Free) by Newton's method from x (N,), at an amplitude [m] of the mode's coordinate.
-
-        goal: of the step, motions counted per amplitude. NotConverged after `most` steps.
-        """
-        unit = np.append(np.full(x.size - 2, amplitude), [1.0, 1.0])
-        rows = np.full(x.size, 1 / amplitude)
-        for _ in range(most):
-            residual, jacobian, _ = self.system(x, amplitude)
-            solve = solve_linear(jacobian * unit * rows[:, None])
-            step = -solve(residual * rows)
-            length, share, best = float(np.linalg.norm(step)), 1.0, None
-            if not np.isfinite(length):
-                break
-            if length <= goal and np.linalg.norm((residual + jacobian @ (unit * step)) * rows) < 1e-7:
-                x = x + unit * step
-                return x, self.system(x, amplitude)[2]
-            while True:
-                tried = x + share * unit * step
-                left = np.inf
-                if tried[-2] > 0:
-                    left = float(np.linalg.norm(solve(self.system(tried, amplitude)[0] * rows)))
-                if best is None or left < best[0]:
-                    best = (left, tried)
-                if left <= (1 - share / 4) * length or share < 0.02:
-                    break
-                share /= 2
-            x = best[1]
-        raise NotConverged(f"backbone: no free motion of amplitude {say(amplitude, 3)} was found; give more amplitudes")
+    def solve(self, x, amplitude: float) -> tuple:
+        """(unknowns (N,), Free) from x (N,), at an amplitude [m] of the mode's coordinate. NotConverged where there is
+        none near."""
+        found = damped(lambda v: self.system(v, amplitude), x, lambda _, left, size: np.linalg.norm(left) < 1e-7)
+        if found is None:
+            raise NotConverged(f"backbone: no free motion of amplitude {say(amplitude, 3)} was found; give more "
+                               "amplitudes")
+        x, one = found[0], self.system(found[0], amplitude)
+        slides = self.balance.lift @ unpack(x[:-2] * amplitude, self.balance.lift.shape[1])
+        return x, Free(amplitude, x[-2] * self.scale, x[-1], slides, one.fold.force, one.modal)
 
 
 def _inverse(p) -> np.ndarray:
@@ -155,10 +112,8 @@ def trace(equations: FreeBalance, amplitudes, omega: float, shape) -> list:
     for target in amplitudes:
         stops = [float(target)]
         while stops:
-            guess = x.copy()
-            guess[:-2] *= stops[-1] / done
             try:
-                x, free = equations.solve(guess, stops[-1])
+                x, free = equations.solve(x, stops[-1])
             except NotConverged:
                 if len(stops) > 12 or not out:
                     raise

@@ -1,6 +1,7 @@
 """Curves of steady motions: over frequency or drive level through folds, every motion at one drive, the backbone."""
 
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,48 +36,56 @@ class Branch:
         return np.array([p.amplitude(row) for p in self.points])
 
 
-def response(modes, drive: BaseSine, group, frequencies, harmonics: int | None = None, tolerance: float = 1e-3,
-             stability: bool = False, start=None, longest: float = 0.05) -> Branch:
+def response(modes, drive: BaseSine, group, frequencies, stability: bool = False, **how) -> Branch:
     """Steady motions over frequency [Hz] at the drive's amplitude.
 
     frequencies: (first, last), followed from the first through folds, or more than two: a point at each, started from
-    the one before. longest: step of the arc. stability: multipliers at every point.
+    the one before. stability: multipliers at every point. how: `How`.
     """
-    group, values = group_of(modes, group), np.asarray(frequencies, float)
-    if values.size < 2 or not (np.isfinite(values).all() and values.min() > 0):
-        raise PatchfemError("drive.frequency: a response wants two or more positive frequencies")
-    drives = [replace(drive, omega=2 * np.pi * f) for f in values]
-    if values.size == 2:
-        found = _curve(modes, drives, group, "frequency", harmonics, tolerance, start, longest)
-    else:
-        found = _listed(modes, drives, group, "frequency", harmonics, tolerance, start)
-    return replace(found, points=tuple(with_stability(p, modes) for p in found.points)) if stability else found
+    drives = [replace(drive, omega=2 * np.pi * f)
+              for f in _values(frequencies, "drive.frequency: a response", "frequencies")]
+    return _along("frequency", modes, drives, group, How(**how), stability)
 
 
-def levels(modes, drive: BaseSine, group, accelerations, harmonics: int | None = None, tolerance: float = 1e-3,
-           stability: bool = False, start=None, longest: float = 0.05) -> Branch:
+def levels(modes, drive: BaseSine, group, accelerations, stability: bool = False, **how) -> Branch:
     """Steady motions over the drive's amplitude [m s-2] at its frequency; arguments as in `response`."""
-    group, values = group_of(modes, group), np.asarray(accelerations, float)
+    drives = [replace(drive, acceleration=float(a))
+              for a in _values(accelerations, "drive.acceleration: a level sweep", "amplitudes")]
+    return _along("level", modes, drives, group, How(**how), stability)
+
+
+class How(NamedTuple):
+    """harmonics: exactly so many, None: as many as tolerance wants; start: as of `point`; longest: step of the arc."""
+
+    harmonics: int | None = None
+    tolerance: float = 1e-3
+    start: Any = None
+    longest: float = 0.05
+
+
+def _values(given, what: str, noun: str) -> np.ndarray:
+    values = np.asarray(given, float)
     if values.size < 2 or not (np.isfinite(values).all() and values.min() > 0):
-        raise PatchfemError("drive.acceleration: a level sweep wants two or more positive amplitudes")
-    drives = [replace(drive, acceleration=float(a)) for a in values]
-    if values.size == 2:
-        found = _curve(modes, drives, group, "level", harmonics, tolerance, start, longest)
-    else:
-        found = _listed(modes, drives, group, "level", harmonics, tolerance, start)
+        raise PatchfemError(f"{what} wants two or more positive {noun}")
+    return values
+
+
+def _along(parameter: str, modes, drives, group, how: How, stability: bool) -> Branch:
+    found = (_curve if len(drives) == 2 else _listed)(modes, drives, group_of(modes, group), parameter, how)
     return replace(found, points=tuple(with_stability(p, modes) for p in found.points)) if stability else found
 
 
-def _listed(modes, drives, group, parameter, harmonics, tolerance, start) -> Branch:
-    points, last = [], start
+def _listed(modes, drives, group, parameter, how: How) -> Branch:
+    points, last = [], how.start
     for drive in drives:
-        last = point(modes, drive, group, harmonics, tolerance, last)
+        last = point(modes, drive, group, how.harmonics, how.tolerance, last)
         points.append(last)
     return Branch(tuple(points), parameter)
 
 
-def _curve(modes, drives, group, parameter, harmonics, tolerance, start, longest) -> Branch:
+def _curve(modes, drives, group, parameter, how: How) -> Branch:
     """By arc length with as many harmonics everywhere; more where what follows above them is not small."""
+    harmonics, tolerance, start, longest = how
     first = point(modes, drives[0], group, harmonics, tolerance, start)
     for h in [harmonics] if harmonics else [h for h in LADDER if h >= first.harmonics]:
         points, above, path, scale = _followed(modes, drives, group, parameter, h, first, longest)

@@ -89,7 +89,8 @@ def plant(modes: ModalBasis, omega: float, harmonics: int) -> Plant:
 class System(NamedTuple):
     """The equations at one point.
 
-    residual (N,), its Jacobian (N, N), its slopes over omega and over the drive level (N,), and the contact's Fold.
+    residual (N,), its Jacobian (N, N), its slopes over omega and over the drive level (N,), the contact's Fold and the
+    modal harmonics (H + 1, n) [m].
     """
 
     residual: np.ndarray
@@ -97,6 +98,7 @@ class System(NamedTuple):
     by_omega: np.ndarray
     by_level: np.ndarray
     fold: Fold
+    modal: np.ndarray | None = None
 
 
 class Balance:
@@ -151,12 +153,13 @@ class Balance:
         K may exceed H: what the balance leaves out then takes part.
         """
         top = force.shape[1] - 1
-        return self._motion(self.plant(omega, top), self._coordinates(x, omega, harmonics), level, force)
+        return self._motion(self.plant(omega, top), self._coordinates(x, self.plant(omega, harmonics), harmonics),
+                            level, force)
 
-    def _coordinates(self, x, omega, harmonics) -> list:
+    def _coordinates(self, x, here: Plant, harmonics) -> list:
         rest = x[self.lift.shape[1] * (2 * harmonics + 1):]
         out, at = [], 0
-        for k, *_ in self.plant(omega, harmonics).free:
+        for k, *_ in here.free:
             out.append(complex(rest[at], rest[at + 1] if k else 0.0))
             at += 2 if k else 1
         return out
@@ -170,11 +173,12 @@ class Balance:
             z[k] += right * c
         return z
 
-    def system(self, x, omega: float, level: float, harmonics: int) -> System:
-        """Residual [m] and derivatives at unknowns x, frequency omega [rad/s] and drive amplitude level [m s-2]."""
+    def system(self, x, omega: float, level: float, harmonics: int, here: Plant | None = None) -> System:
+        """Residual [m] and derivatives at unknowns x, frequency omega [rad/s] and drive amplitude level [m s-2]; here:
+        a linear part other than that of the modes."""
         h, r, mass = harmonics, self.lift.shape[1], self.modes.mass
-        here = self.plant(omega, h)
-        coordinates = self._coordinates(x, omega, h)
+        here = here or self.plant(omega, h)
+        coordinates = self._coordinates(x, here, h)
         y = unpack(x[:r * (2 * h + 1)], r)
         fold = self.contact(self.lift @ y, omega)
         z = self._motion(here, coordinates, level, fold.force[:, :h + 1])
@@ -195,7 +199,14 @@ class Balance:
             lifted[:, 1] = 1j * through[1] @ self.modes.base
         parts = [[pack(miss)], [pack(turned)], [pack(lifted)]]
         self._free(here, coordinates, jacobian, parts, fold, z, level, linked, omega, size)
-        return System(*[np.concatenate(parts[0])], jacobian, np.concatenate(parts[1]), np.concatenate(parts[2]), fold)
+        return System(*[np.concatenate(parts[0])], jacobian, np.concatenate(parts[1]), np.concatenate(parts[2]), fold,
+                      z)
+
+    def free_miss(self, free, c, omega: float, level: float, force) -> complex:
+        """What the coordinate c [m] without receptance, (k, left, stiffness), misses of its balance, over omega^2."""
+        k, left, stiffness = free
+        drive = left @ self.modes.base if k == 1 else 0.0
+        return (stiffness * c + left @ (self.rows.T @ force[:, k]) / self.modes.mass - 1j * level * drive) / omega**2
 
     def gathered(self, slope) -> np.ndarray:
         """Slopes (i, H + 1, 2 H + 1) of the rows' forces as those of the forces on y to y, (H + 1, r, r (2 H + 1))."""
@@ -223,7 +234,7 @@ class Balance:
         for (k, right, left, stiffness), c in zip(here.free, coordinates):
             w = left @ self.rows.T / self.modes.mass / omega**2
             drive = left @ self.modes.base / omega**2 if k == 1 else 0.0
-            miss = stiffness / omega**2 * c + w @ fold.force[:, k] - 1j * level * drive
+            miss = self.free_miss((k, left, stiffness), c, omega, level, fold.force)
             by_omega = left @ here.slope[k] @ z[k] / omega**2 - 2 * miss / omega
             if fold.rate is not None:
                 by_omega = by_omega + w @ fold.rate[:, k]
@@ -254,12 +265,13 @@ def solve_linear(matrix):
     return lambda b: np.linalg.lstsq(matrix, b, rcond=1e-12)[0]
 
 
-def newton(balance: Balance, x, omega: float, level: float, harmonics: int, goal: float = 1e-10, most: int = 40):
+def damped(system, x, met, goal: float = 1e-10, most: int = 40) -> tuple | None:
     """(unknowns, System one last step before, iterations) by Newton's method damped by the natural monotonicity test.
 
-    Ends when a step is below `goal` of the motion; NotConverged after `most` steps.
+    system(x) -> System; met(System, what its last step leaves of the residual (N,), size of x) -> whether that is
+    rounding. It ends when a step is below `goal` of x; None where that is not so after `most` steps.
     """
-    here = balance.system(x, omega, level, harmonics)
+    here = system(x)
     for count in range(1, most + 1):
         solve = solve_linear(here.jacobian)
         step = -solve(here.residual)
@@ -267,15 +279,13 @@ def newton(balance: Balance, x, omega: float, level: float, harmonics: int, goal
         if not np.isfinite(length):
             break
         if length <= goal * max(size, 1e-300) or length < 1e-300:
-            if not balance.met(here, here.residual + here.jacobian @ step, omega, level, harmonics, size):
-                break
-            return x + step, here, count
+            return (x + step, here, count) if met(here, here.residual + here.jacobian @ step, size) else None
         share, best = 1.0, None
         while True:
             tried = x + share * step
-            there = balance.system(tried, omega, level, harmonics)
+            there = system(tried)
             left = float(np.linalg.norm(solve(there.residual)))
-            if best is None or left < best[0]:
+            if best is None or left < best[0] or not np.isfinite(best[0]):
                 best = (left, tried, there)
             # natural monotonicity (Deuflhard): the next simplified step is shorter; a tiny step is taken as
             # it is
@@ -283,5 +293,17 @@ def newton(balance: Balance, x, omega: float, level: float, harmonics: int, goal
                 break
             share /= 2
         _, x, here = best
-    raise NotConverged(f"accuracy.harmonics: the balance with {harmonics} harmonics at {omega / (2 * np.pi):.6g} Hz "
-                       f"missed its residual in {most} steps; give a start or follow a branch from a lower level")
+    return None
+
+
+def newton(balance: Balance, x, omega: float, level: float, harmonics: int, most: int = 40):
+    """(unknowns, System one last step before, iterations) of a balance by `damped`, NotConverged where it ends."""
+    def met(here, left, size) -> bool:
+        return balance.met(here, left, omega, level, harmonics, size)
+
+    found = damped(lambda v: balance.system(v, omega, level, harmonics), x, met, most=most)
+    if found is None:
+        at = f"{harmonics} harmonics at {omega / (2 * np.pi):.6g} Hz"
+        raise NotConverged(f"accuracy.harmonics: the balance with {at} missed its residual in {most} steps; give a "
+                           "start or follow a branch from a lower level")
+    return found

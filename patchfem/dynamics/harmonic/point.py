@@ -298,21 +298,15 @@ def _diverged(balance, here, drive, h, samples, size, count, x) -> Periodic:
 
 def _missed(balance, x, omega, level, h, force, z) -> np.ndarray:
     """Residual (N,) under forces (i, K + 1) that come from more harmonics than the unknowns have."""
-    low = balance.lift.shape[1] * (2 * h + 1)
+    low, at = balance.lift.shape[1] * (2 * h + 1), 0
     y = unpack(x[:low], balance.lift.shape[1])
-    return np.concatenate([pack(y - (z[:h + 1] @ balance.faces.T).T),
-                           _free_miss(balance, x, omega, level, h, force)])
-
-
-def _free_miss(balance, x, omega, level, h, force):
-    out, at = [], balance.lift.shape[1] * (2 * h + 1)
+    out = [pack(y - (z[:h + 1] @ balance.faces.T).T)]
     for k, _, left, stiffness in balance.plant(omega, h).free:
-        c = complex(x[at], x[at + 1] if k else 0.0)
-        miss = (stiffness * c + left @ (balance.rows.T @ force[:, k]) / balance.modes.mass
-                - 1j * level * (left @ balance.modes.base if k == 1 else 0.0)) / omega**2
-        out += [miss.real, miss.imag][:2 if k else 1]
-        at += 2 if k else 1
-    return np.array(out)
+        parts = x[low + at:low + at + (2 if k else 1)]
+        miss = balance.free_miss((k, left, stiffness), complex(*parts), omega, level, force)
+        out.append(np.array([miss.real, miss.imag])[:parts.size])
+        at += parts.size
+    return np.concatenate(out)
 
 
 def _periodic(balance, x, drive, h, top, samples, changes, size, count, q) -> Periodic:

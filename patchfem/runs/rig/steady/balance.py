@@ -206,8 +206,8 @@ class Balance:
     def curve(self, drive) -> tuple:
         """(points of the curve over the frequency through its folds, the frequencies [Hz] of these)."""
         first = BaseSine(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
-        branch = branches.response(self.modes, first, self.group, (drive.low, drive.high), self.harmonics,
-                                   self.tolerance, True)
+        branch = branches.response(self.modes, first, self.group, (drive.low, drive.high), True,
+                                   harmonics=self.harmonics, tolerance=self.tolerance)
         found = branch.points if self.climbing is None else [self._judged(one, first) for one in branch.points]
         points = [self._shown(one)._replace(regime="stable" if one.stable else "unstable") for one in found]
         return [self._with_errors(one) for one in points], branch.folds
