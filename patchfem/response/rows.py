@@ -25,7 +25,7 @@ SAMPLED = Integrated()  # of an engine that knows no more than its samples
 class Seen:
     """The last cycles of a run, with what its engine knows better than its samples.
 
-    window: histories; steps: samples per cycle; extremes (c, 2): of the output in every cycle of the window [m]; book:
+    window: histories; extremes (c, 2): of the output in every cycle of the window [m]; book:
     energies of the whole run; load [N], None where nothing rubs; stiffness K [N/m] of the first mode as the contact
     meets it, 0 where no damping ratio refers to it; sine: the drive ends as a sine. own: what the engine integrated
     itself; loop: (first harmonics of slide and force, work per cycle [J]), where it is known otherwise, None where the
@@ -37,7 +37,6 @@ class Seen:
 
     window: Response
     drive: object
-    steps: int
     extremes: np.ndarray
     book: dict
     load: float | None
@@ -69,7 +68,9 @@ class Seen:
             return {}
         first = self.own.loops[0] if self.own.loops else None
         if first is None or first.stuck is None:
-            found = slip_measures(self.even or self.window, self.drive, self.steps)
+            window = self.even or self.window
+            steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
+            found = slip_measures(window, self.drive, steps)
         else:
             starts = self.own.starts
             found = {"stick_fraction": stuck_share(first.stuck, self.span)} | (
@@ -167,6 +168,7 @@ def _moved(values: dict):
     return np.where(slip > 0, slip, np.abs(values.get("relative_displacement_amplitude", 0.0)))
 
 
+FOURTH = 0.2, 0.0  # of the change by half the samples: what is read off cubics between them is of fourth order
 ROWS = (
     Row("relative_displacement_amplitude", "m", 1e-10, "half peak-to-peak motion at the output, relative to the base",
         lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2 if s.own.swing is None else s.own.swing),
@@ -189,7 +191,7 @@ ROWS = (
         "time mean of the slide in the last cycle less that in the first of the last cycles, per cycle between them",
         lambda s: drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period) if s.own.drift is None
         else s.own.drift,
-        term=("slip, or motion", _moved)),
+        term=("slip, or motion", _moved), halves=FOURTH),
     Row("slip_amplitude", "m", 1e-10,
         "half peak-to-peak of the irreversible part of the slide, its parts weighted by their "
         "friction limits: the points of a patch by the pressure, the sliders of law 'iwan' by their slip forces",
@@ -198,11 +200,11 @@ ROWS = (
         "share of the time of the last cycles in which the interface as a whole sticks: less than half of its slide is "
         "irreversible, in the mean of slip_amplitude; part of a patch, or some sliders of law 'iwan', may slip "
         "meanwhile",
-        lambda s: s.slip.get("stick_fraction"), group="friction", term=("1", lambda _: 1.0)),
+        lambda s: s.slip.get("stick_fraction"), group="friction", term=("1", lambda _: 1.0), halves=(2.5, 0.5)),
     Row("slip_start_phase", "rad", 1e-3,
         "phase of the base displacement at which slip of the interface as a whole, in the mean of slip_amplitude, "
         "starts after a stick, modulo pi",
-        lambda s: s.slip.get("slip_start_phase"), group="friction", term=("pi", lambda _: np.pi)),
+        lambda s: s.slip.get("slip_start_phase"), group="friction", term=("pi", lambda _: np.pi), halves=(2.5, 1.0)),
     Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together", lambda s: s.load,
         group="friction"),
     Row("loop_area", "J", 1e-10,
@@ -215,12 +217,12 @@ ROWS = (
         term=("whole first harmonic", first_harmonic)),
     Row("secant_stiffness", "N m-1", 1.0,
         "friction at the largest slide of a cycle less that at the smallest over their distance, where it jumps the "
-        "mean of both sides", lambda s: s.cycle.get("secant_stiffness"), group="friction"),
+        "mean of both sides", lambda s: s.cycle.get("secant_stiffness"), group="friction", halves=FOURTH),
     Row("equivalent_damping", "1", 1e-8,
         "damping ratio that friction gives mode 1: loop area over 2 pi K A^2, K = moving_mass omega_1^2 the stiffness "
         "of the first mode that is not rigid, A its motion, half the range of the slide in a cycle over its slide, the "
         "mean over the last cycles; without a value where another mode carries more than 5 % of the slide",
-        lambda s: s.cycle.get("equivalent_damping"), group="friction"),
+        lambda s: s.cycle.get("equivalent_damping"), group="friction", halves=FOURTH),
     Row("friction_work", "J", 1e-10, "work that went into all interfaces together over the run",
         lambda s: s.energies.get("friction_work"), group="energy"),
     Row("energy_stored", "J", 1e-10, "energy in all interfaces at the end: elastic, over grooves with the "

@@ -169,7 +169,7 @@ def test_exact_run_measures():
     window = response(time, slide=slide, force=3 * np.cos(phase), acceleration=8 * np.sin(phase))
     book = {"work_in": 1.0, "stored": 0.0, "friction": 1.0, "viscous": 0.0, "power": 1.0, "peak_stored": 0.0}
     extremes = np.array([[-9.0, 9.0], [-1e-6, 2e-6], [-1e-6, 1e-6], [-3e-6, 1e-6]])
-    seen = Seen(window, DRIVE, 100, extremes[-3:], book, 10.0, 0.0, True)
+    seen = Seen(window, DRIVE, extremes[-3:], book, 10.0, 0.0, True)
     found = measures_of(seen)
     assert found["relative_displacement_amplitude"] == pytest.approx(2.5e-6, rel=1e-15)
     assert found["absolute_acceleration_peak"] == pytest.approx(8.0, rel=1e-6)

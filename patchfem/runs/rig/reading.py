@@ -47,7 +47,7 @@ class Reader:
             given = {"by": at_turns(self.model), "ledger": ledger} | given
         window, book = given.pop("window", run.window), given.pop("book", run.ledger)
         last = run.amplitudes[-min(self.numerics.window, len(run.amplitudes)):]
-        return measures_of(seen(self.model, self.patch, window, last, book, self.steps, drive=drive, **given))
+        return measures_of(seen(self.model, self.patch, window, last, book, drive=drive, **given))
 
     def sticks(self, run) -> bool:
         """Whether no interface slips in the last cycles of a run by more than `held`, or the last digit."""
@@ -68,11 +68,14 @@ class Reader:
         """What the run itself leaves open of its values by name, beside its rings."""
         return {}
 
+    def fewer(self, run):
+        """The run with every second of its samples."""
+        return replace(run, window=thinned(run.window))
+
     def sampled(self, run, drive, values: dict) -> dict:
         """What samples leave open of the values by name of a motion that is exact, by every second of them: nothing of
         those that the engine integrated."""
-        fewer = self.values(replace(run, window=thinned(run.window)), drive,
-                            ledger=run.response.extra.get("ledger"))
+        fewer = self.values(self.fewer(run), drive, ledger=run.response.extra.get("ledger"))
         own = self.integrated(run, drive)
         apart = {name: gap for name, gap in change(values, fewer).items() if gap > 0 and name not in GAPS}
         return {name: row_of(name).halves[0] * gap + row_of(name).halves[1] / self.steps

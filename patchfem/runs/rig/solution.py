@@ -79,15 +79,15 @@ def borne(model, patch) -> float | None:
     return patch.pressure.load if patch is not None else model.point.load
 
 
-def seen(model, patch, window, extremes, book: dict, steps: int, **more) -> Seen:
+def seen(model, patch, window, extremes, book: dict, **more) -> Seen:
     """The last cycles of a run of a model, as the measures see them (`response.rows.Seen`).
 
-    window: Response; extremes: (c, 2) [m] of the output; book: energies; steps: samples per cycle; more: the other
+    window: Response; extremes: (c, 2) [m] of the output; book: energies; more: the other
     fields of Seen, with `drive` where it is not the model's own.
     """
     drive = more.pop("drive", model.rig.drive)
     stiffness = 0.0 if model.rig.beside_first(window.modal) > SHARED else model.rig.stiffness
-    return Seen(window, drive, steps, extremes, book, borne(model, patch), stiffness, sinusoidal(drive), **more)
+    return Seen(window, drive, extremes, book, borne(model, patch), stiffness, sinusoidal(drive), **more)
 
 
 def sampled_loop(window, drive, work: float, force: complex | None = None) -> tuple | None:
