@@ -101,8 +101,23 @@ def analysis(values, harmonics: int) -> np.ndarray:
     return out
 
 
+class Law:
+    """A law of a row. total: tangent stiffness at rest [N/m], 0 of one that creeps under any force."""
+
+    __slots__ = ()
+    total = 0.0
+
+    def sharpness(self, amplitude: float) -> int:
+        """Samples of a cycle that resolve its corners at a slide amplitude [m]; 0 of one that has none."""
+        return 0
+
+    def sample(self, track: "Track") -> "Sampled":
+        """Its periodic state along a slide, that of a virgin contact where several are."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True, eq=False, slots=True)
-class Jenkins:
+class Jenkins(Law):
     """Parallel elastic-plastic elements: stiffness (t,) [N/m] > 0, limit_slide (t,) [m] >= 0."""
 
     stiffness: np.ndarray
@@ -142,7 +157,7 @@ class Jenkins:
 
 
 @dataclass(frozen=True, slots=True)
-class Spring:
+class Spring(Law):
     """Bonded spring: stiffness [N/m], cubic [N/m3] q^3 besides."""
 
     stiffness: float = 0.0
@@ -153,10 +168,6 @@ class Spring:
         """Tangent stiffness at rest [N/m]."""
         return self.stiffness
 
-    def sharpness(self, amplitude: float) -> int:
-        """No corner."""
-        return 0
-
     def sample(self, track: Track) -> Sampled:
         """Force and slope at the samples."""
         q = track.q
@@ -164,7 +175,7 @@ class Spring:
 
 
 @dataclass(frozen=True, slots=True)
-class Interlock:
+class Interlock(Law):
     """Interlocking of wavelength [m]: stiffness wavelength/(2 pi) sin(2 pi q/wavelength), stiffness [N/m] at rest."""
 
     stiffness: float
@@ -186,19 +197,10 @@ class Interlock:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class OfSpeed:
+class OfSpeed(Law):
     """A law without memory, whose force follows the speed of the slide alone: its Element of form "speed"."""
 
     element: Element
-
-    @property
-    def total(self) -> float:
-        """It creeps under any force: no stiffness."""
-        return 0.0
-
-    def sharpness(self, amplitude: float) -> int:
-        """Left to the finer grid of the check."""
-        return 0
 
     def sample(self, track: Track) -> Sampled:
         """Force and slope at the samples."""
@@ -208,7 +210,7 @@ class OfSpeed:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Flow:
+class Flow(Law):
     """A law whose memory is its stretch alone, which flows along the slide: its Element of form "flow"."""
 
     element: Element

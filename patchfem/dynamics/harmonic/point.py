@@ -178,37 +178,38 @@ def _solved(modes, drive, group, h, x, wider, tolerance=TOLERANCE, near=0) -> Pe
 
 
 def _reach(balance, x, drive, h: int):
-    """`newton` from a start of any number of harmonics, from the held contact, or along weaker drives."""
+    """`newton` from a start of any number of harmonics, from the held contact, what one harmonic would do, or along
+    weaker drives."""
     omega, level = drive.omega, drive.acceleration
-    starts = []
-    if x is not None:
-        r = balance.lift.shape[1]
-        free = sum(1 if k == 0 else 2 for k, *_ in balance.plant(omega, h).free)
-        have = (x.size - free) // r // 2 if (x.size - free) % r == 0 else -1
-        if have >= 0 and r * (2 * have + 1) + free == x.size:
-            y = unpack(x[:r * (2 * have + 1)], r)
-            starts.append(lambda: cut(balance, balance.lift @ y, x, have, h))
-    for one in [*starts, lambda: _held(balance, omega, level, h)]:
+    for start in _starts(balance, x, omega, level, h):
         try:
-            return newton(balance, one(), omega, level, h)
-        except NotConverged:
-            pass
-    for one in one_harmonic(balance, omega, level):
-        try:
-            return newton(balance, cut(balance, balance.slides(one, omega, 1), one, 1, h), omega, level, h)
+            return newton(balance, start, omega, level, h)
         except NotConverged:
             pass
     return newton(balance, _climbed(balance, omega, level, h), omega, level, h)
 
 
+def _starts(balance, x, omega, level, h: int):
+    """Unknowns from which Newton's method may lead to a motion, the likeliest first."""
+    r = balance.lift.shape[1]
+    if x is not None:
+        free = sum(1 if k == 0 else 2 for k, *_ in balance.plant(omega, h).free)
+        have, rest = divmod(x.size - free - r, 2 * r)
+        if have >= 0 and not rest:
+            yield cut(balance, balance.lift @ unpack(x[:r * (2 * have + 1)], r), x, have, h)
+    yield _held(balance, omega, level, h)
+    for one in one_harmonic(balance, omega, level):
+        yield cut(balance, balance.slides(one, omega, 1), one, 1, h)
+
+
 def _climbed(balance, omega, level, h: int) -> np.ndarray:
     """Unknowns by way of few harmonics, which are cheap to follow from weaker drives, to more of them."""
-    below = min(7, h)
+    below = min(LADDER[0], h)
     x = _along_levels(balance, omega, level, below)
-    for rung in [k for k in CLIMB if below < k < h] + [h] * (h > below):
+    for more in [k for k in CLIMB if below < k < h] + [h] * (h > below):
         try:
-            start = cut(balance, balance.slides(x, omega, below), x, below, rung)
-            x, below = newton(balance, start, omega, level, rung)[0], rung
+            start = cut(balance, balance.slides(x, omega, below), x, below, more)
+            x, below = newton(balance, start, omega, level, more)[0], more
         except NotConverged:
             pass
     return x if below == h else _along_levels(balance, omega, level, h)
