@@ -11,7 +11,7 @@ from ...structure.drive_sizes import largest, omega_of
 from ..effort import exact_effort, refuse_endless
 from .engines import ENGINES, PIECES, steady_by
 from .numerics import bonds_cost, chatters, choose, halvings, limp, lists_grow, quadrature_of, stalls
-from .pieces.costs import pieces, seconds_of_pieces, words
+from .pieces.costs import expected_seconds, pieces, words
 from .smooth import choice
 
 STEP, STEP_MODE = 7e-7, 1e-7  # seconds of a step of one mode, and of each further one
@@ -43,7 +43,7 @@ def refuse_events(model: Model, numerics) -> None:
 
 def pieces_cost(model: Model, numerics, unknowns: dict) -> tuple:
     """Pieces and seconds of a run from yield to yield."""
-    return int(pieces(model) * numerics.cycles), seconds_of_pieces(model)
+    return int(pieces(model) * numerics.cycles), expected_seconds(model)
 
 
 def smooth_cost(model: Model, numerics, unknowns: dict) -> tuple:

@@ -1,11 +1,8 @@
 """What a run from yield to yield costs beside a march, before anything runs.
 
-Measured on one core: a piece of one mode takes 1 us, of which 0.5 us are its motion and the rest what is read off it; a
-step of the march 0.43 us and 0.9 ns per element, and a cycle of it 0.3 ms besides. With one element the run from yield
-to yield takes an eighth of the march with its two coarser runs at 400 steps a cycle, with 100 elements a third, with
-all 769 cells of the Iwan law a fifth more. So at a tolerance of 1e-3 the border lies at about 600 elements that slip
-one after the other, and grows as the root of the tolerance falls; a spring that rings hundreds of times a cycle is left
-to the march too.
+Measured on one core: a piece of one mode takes 0.25 us, and 3 ns more for each element; a step of the march 0.43 us and
+0.9 ns per element, and a cycle of it 0.3 ms besides. What an element rings on costs pieces only while it holds: all the
+time where the friction limit exceeds the push of the drive, hardly any where it is half of it.
 """
 
 from functools import lru_cache
@@ -18,10 +15,13 @@ from ....effects import has
 from ....friction.bonds.parameters import LONGEST
 from ....friction.record import law_from
 from ....model.model import Model
-from ....structure.drive_sizes import fastest
+from ....structure.drive_sizes import fastest, largest
 from ...effort import steps_per_cycle
 
-PIECE, PIECE_MODE = 1e-6, 1.5e-7  # seconds of a piece of the motion, and of each further mode in it
+# seconds of a piece of the motion, of each further mode in it, of each element
+PIECE, PIECE_MODE, PIECE_ELEMENT = 2.5e-7, 1.5e-7, 3e-9
+MOST_PIECE = 1e-6  # of one at most
+HELD = 6  # power of the limit over the push that gives the share of the time in which an element holds (measured .01)
 CYCLE, STEP, STEP_ELEMENT = 3e-4, 4.3e-7, 9e-10  # seconds of a cycle of the march, of a step, of each element in it
 MOST_PAIRS, AT = 4, 1e-3  # 49 of 769 cells at this tolerance and above: 2e-4 of the motion behind a joint that slips
 REACH = 2.0  # of `dynamics.piecewise.series_kernels`
@@ -60,6 +60,11 @@ def sizes(model: Model) -> tuple:
 
 def pieces(model: Model) -> float:
     """Pieces of the motion per cycle of the drive at most: of its fastest rate while all holds, and of every yield."""
+    return sum(_ringing_and_yields(model))
+
+
+def _ringing_and_yields(model: Model) -> tuple:
+    """Pieces per cycle of a motion whose elements hold all the time, and those of every yield and row."""
     modes, drive = model.rig.modes, model.rig.drive
     count, stiff = sizes(model)
     reach = float((np.asarray(modes.interfaces)**2).sum(axis=1).max(initial=0.0)) / modes.mass
@@ -67,13 +72,24 @@ def pieces(model: Model) -> float:
     damping = float(np.linalg.norm(dampers, 2)) if dampers.size > 1 else abs(float(dampers[0, 0]))
     rate = damping / 2 + sqrt(damping**2 / 4 + float(modes.omega.max())**2 + stiff * reach)
     rows = 0 if drive.segments else len(drive.breaks) / model.rig.cycles
-    return max(rate * drive.period, 2 * pi * fastest(drive)) / REACH + 2 * count * fastest(drive) + 2 + rows
+    return max(rate * drive.period, 2 * pi * fastest(drive)) / REACH, 2 * count * fastest(drive) + 2 + rows
 
 
 def seconds_of_pieces(model: Model) -> float:
-    """Estimated seconds of a run from yield to yield."""
-    each = PIECE + PIECE_MODE * (model.rig.modes.omega.size - 1)
+    """Seconds of a run from yield to yield at most, by which its engine is chosen: all holds all the time."""
+    each = MOST_PIECE + PIECE_MODE * (model.rig.modes.omega.size - 1)
     return each * pieces(model) * model.rig.cycles
+
+
+def expected_seconds(model: Model) -> float:
+    """Seconds of a run from yield to yield as a plan counts them: what rings while an element holds is passed in the
+    share of the time in which it does."""
+    rig = model.rig
+    limit = sum(one.numbers.static * (model.nominal_load if one.load is None else one.load) for one in rig.interfaces)
+    push = rig.force or rig.mass * largest(rig.drive)
+    ringing, yields = _ringing_and_yields(model)
+    each = PIECE + PIECE_MODE * (rig.modes.omega.size - 1) + PIECE_ELEMENT * sizes(model)[0]
+    return each * (ringing * (min(1.0, limit / push)**HELD if push else 1.0) + yields) * rig.cycles
 
 
 def seconds_of_steps(model: Model) -> float:
@@ -94,6 +110,6 @@ def refuse_endless(model: Model) -> None:
 
 def words(model: Model, engine: str) -> list:
     """The sentence of a plan on which engine takes the elements, and why."""
-    count, exact, march = sizes(model)[0], seconds_of_pieces(model), seconds_of_steps(model)
+    count, exact, march = sizes(model)[0], expected_seconds(model), seconds_of_steps(model)
     return [f"{count} element{'s' * (count > 1)} by engine {engine}: about {exact:.2g} s from yield to yield, exact, "
             f"about {march:.2g} s by steps at this tolerance"]
