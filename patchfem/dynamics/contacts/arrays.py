@@ -144,44 +144,28 @@ class Stops(NamedTuple):
 
 
 class Faces(NamedTuple):
-    """Elements (e,) on ports (p,) beside a contact on port 0 where `there` (1,) is 1.
+    """Elements (e,) on ports (p,) beside a contact on port 0, or in its place; rows are named in `march.stops_kernels`.
 
-    beta (p, p) [m/N]; rows (p, n): slide of every port per coordinate; ports (e,); rubs (e,): 1 for friction, 0 for
-    springs; num, mem (e, ...) as the laws have them, num[e, 0] which law; bound (e,) [N], infinite where nothing
-    bounds it; goal (1 + e,) [N] of the contact and the elements; give (n,) [m/N] of the coordinates; beside (n,)
-    [m/s2]: accelerations by what pushes the modes besides. State: last (e, 2) slide increments, forces (e,), own (2,):
-    force of the contact and its last increment; found (1,): 1 where the stops of the step are known. Scratch: free
-    (p,); q, v, eps, dq, miss (e,); system (e, e); room (3, n); hess (n, n). Of the set-valued elements: gamma (p, p)
-    [m/(s N)], what port forces take from the rates of ports by the end of a step; rate (p,) [m/s] of the free motion
-    there; stops.
+    rows (p, n): slide of every port per coordinate; gives (2, p, p): what port forces take from the slides [m/N] and
+    rates [m/(s N)] of ports over a step; of (2, e): port, and 1 for friction, 0 for springs; num, mem (e, ...) as the
+    laws have them, num[e, 0] which law; each (10, e): force [N], slide, speed, bond length and slide increment of the
+    step, residual, largest force [N], infinite where nothing bounds it, goal [N], last two slide increments; own (5,):
+    of the contact its force, last increment, force at the sample and goal, and 1 where the stops of the step are known;
+    port (2, p): free slide [m] and rate [m/s] in the step; modal (5, n): give of the coordinates [m/N], accelerations
+    by what pushes the modes besides [m/s2], room; system (e, e), hess (n, n): room; stops: the set-valued elements.
     """
 
-    there: np.ndarray
-    beta: np.ndarray
     rows: np.ndarray
-    ports: np.ndarray
-    rubs: np.ndarray
+    gives: np.ndarray
+    of: np.ndarray
     num: np.ndarray
     mem: np.ndarray
-    bound: np.ndarray
-    goal: np.ndarray
-    give: np.ndarray
-    beside: np.ndarray
-    last: np.ndarray
-    forces: np.ndarray
+    each: np.ndarray
     own: np.ndarray
-    found: np.ndarray
-    free: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    eps: np.ndarray
-    dq: np.ndarray
-    miss: np.ndarray
+    port: np.ndarray
+    modal: np.ndarray
     system: np.ndarray
-    room: np.ndarray
     hess: np.ndarray
-    gamma: np.ndarray
-    rate: np.ndarray
     stops: Stops
 
 
@@ -192,7 +176,7 @@ class Pressing(NamedTuple):
     constant forces in a step take from them; arm (1,) [m]: half the length of the patch; force (2,): mu_s, mu_k of a
     law on the resultant load; now (m,): nodal forces [N]; loads (steps + 1,) [N]: prescribed load at the steps, empty
     where the contact says it; slot (1,): of the present contact set, below 0 where none fits; mean (1,): friction
-    force of the step before [N]; few (22,): room.
+    force of the step before [N]; goal (1,) [N]: of the residuals; few (22,): room.
     """
 
     sets: tuple
@@ -204,6 +188,7 @@ class Pressing(NamedTuple):
     loads: np.ndarray
     slot: np.ndarray
     mean: np.ndarray
+    goal: np.ndarray
     few: np.ndarray
 
 

@@ -5,5 +5,8 @@ Numba leaves out the branches behind what is False, so nothing is compiled that 
 
 MANY = False  # elements beside the contact, or in place of it
 STOPS = False  # elements that are set-valued
+SMOOTH = False  # elements that have a slope
+THERE = True  # the contact; it is not where elements take its place
+SEVERAL = False  # of elements and contact more than one
 PRESSED = False  # a load that changes
 POINTED = False  # points that bear their own share of it

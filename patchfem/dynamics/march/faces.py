@@ -21,7 +21,6 @@ def faces_of(model, prop, plant, mass: float):
         num[k, :one.numbers.size], mem[k, :one.memory.size] = one.numbers, one.memory
         num[k, 0] = numbers[one.kernels or COULOMB]
     there, scale = getattr(model, "patch", None) is not None, getattr(model, "scale", 0.0)
-    goal = [model.patch.limit if there else model.limit, *(one.limit or max(scale, 1e-300) for one in elements)]
     ports = np.array([one.port for one in model.joints], np.int64)
     holds = np.array([k for k, one in enumerate(elements) if (one.kernels or COULOMB) == COULOMB], np.int64)
     quick = prop.rows * prop.push[1] if not prop.dense.size else prop.rows @ prop.dense[n:, 2 * n:]
@@ -29,9 +28,13 @@ def faces_of(model, prop, plant, mass: float):
     gives = [give[np.ix_(at, at)] for give in (prop.beta, gamma, prop.rows @ prop.rows.T / mass)]
     stops = arrays.Stops(holds, np.zeros(m, np.int64), np.tile(num[holds, 1:3].T, (2, 1)), np.array(gives),
                          np.ascontiguousarray(prop.rows[at]), np.zeros((m, m)), np.zeros((18, m)))
+    each = np.zeros((10, e))
+    each[6] = [one.limit if one.bounded else np.inf for one in elements]
+    each[7] = [GOAL * (one.limit or max(scale, 1e-300)) for one in elements]
+    modal = np.zeros((5, n))
+    modal[0] = plant.push[0] / mass
     return arrays.Faces(
-        np.array([there], np.int64), np.array(prop.beta, float), np.ascontiguousarray(prop.rows, float), ports,
-        np.array([one.potential is None for one in model.joints], np.int64), num, mem,
-        np.array([one.limit if one.bounded else np.inf for one in elements]), GOAL * np.array(goal),
-        plant.push[0] / mass, np.zeros(n), np.zeros((e, 2)), np.zeros(e), np.zeros(2), np.zeros(1), np.zeros(p),
-        *np.zeros((5, e)), np.zeros((e, e)), np.zeros((3, n)), np.zeros((n, n)), gamma, np.zeros(p), stops)
+        np.ascontiguousarray(prop.rows, float), np.array([prop.beta, gamma]),
+        np.array([ports, [one.potential is None for one in model.joints]], np.int64), num, mem, each,
+        np.array([0.0, 0.0, 0.0, GOAL * (model.patch.limit if there else model.limit), 0.0]), np.zeros((2, p)), modal,
+        np.zeros((e, e)), np.zeros((n, n)), stops)

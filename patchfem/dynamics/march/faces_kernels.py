@@ -10,7 +10,7 @@ with any contact and any laws: `hub` makes an instance per set of them. j: `cont
 import numpy as np
 
 from ...compiled.inner import njit
-from ...friction.flags_kernels import LEAN
+from ...friction.flags_kernels import INNER
 from ...friction.laws import elastic_plastic_kernels as law
 from ...friction.laws.coulomb_kernels import stick
 from ..contacts import element_kernels as contact
@@ -19,207 +19,258 @@ from ..modal_kernels import ended, free_rate, free_slide
 from . import alone_kernels as parts
 from . import stops_kernels as stops
 from . import together_kernels as together
-from .stops_kernels import BLOW, DQ, END, FOUND, FREE, HOLDS, MEAN, RATE, START, STATIC, WAY
+from .stops_kernels import (
+    AIM,
+    BESIDE,
+    BETA,
+    BLOW,
+    CLOSE,
+    DQ,
+    END,
+    EPS,
+    FORCE_OWN,
+    FOUND,
+    FREE,
+    GAMMA,
+    HOLDS,
+    KNOWN,
+    MEAN,
+    MOST,
+    NOW_OWN,
+    PACE,
+    PLACE,
+    PORT,
+    PULL,
+    RATE,
+    ROOM,
+    RUBS,
+    START,
+    STATIC,
+    STEP,
+    STEP_OWN,
+    WAY,
+    WENT,
+    WENT_BEFORE,
+)
 
-STOPS = parts.STOPS  # a name of this module, which numba leaves branches out by
+STOPS, SMOOTH, THERE, SEVERAL = parts.STOPS, parts.SMOOTH, parts.THERE, parts.SEVERAL  # by which branches are left out
 TURNS, FEW = 1000, 60  # of all elements in a step before it counts as failed; with stops and releases inside it
 ROUND = 4e-15  # of a slide over its give, and of a force: no residual is smaller
 EACH = 5  # columns of an element in a row: slide, speed, force, slip, mean force of the step that follows
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def sampled(q, v, motion, row, c, j):
     """(force, energy of friction, slip, energy of springs) at a sample: of the contact, or else of the first element;
     slide, speed, force and slip of every element into its row."""
     n, m = motion.shape[1], 2 * motion.shape[1] + 7
     first, slip, energy, springs = 0.0, q, 0.0, 0.0
-    for e in range(j.ports.size):
+    for e in range(j.of.shape[1]):
         here, rate = 0.0, 0.0
         for k in range(n):
-            here += j.rows[j.ports[e], k] * motion[0, k]
-            rate += j.rows[j.ports[e], k] * motion[1, k]
+            here += j.rows[j.of[PORT, e], k] * motion[0, k]
+            rate += j.rows[j.of[PORT, e], k] * motion[1, k]
         force, stock, moved = law.state(j.num, j.mem, e, here, rate)
-        j.q[e], j.v[e] = here, rate
+        j.each[PLACE, e], j.each[PACE, e] = here, rate
         at = m + EACH * e
         row[at], row[at + 1], row[at + 2], row[at + 3] = here, rate, force, moved
-        if j.rubs[e]:
+        if j.of[RUBS, e]:
             energy += stock
         else:
             springs += stock
-        if e == 0 and j.rubs[0]:
+        if e == 0 and j.of[RUBS, 0]:
             first, slip = force, moved
-    if j.there[0]:
+    if THERE:
         first, stock, slip = contact.state(c, q, v)
         energy += stock
+        j.own[NOW_OWN] = first
     return first, energy, slip, springs
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def held(motion, plant, drive, force, row, j):
     """Write the forces of the set-valued elements at a sample into their memory and the row: kinetic friction of those
-    that slide, of those that rest what leaves them no acceleration. Returns the force [N] of the contact, as it was
-    given, or else of the first element; drive [m s-2]."""
-    s, m, accel, count = j.stops, 2 * motion.shape[1] + 7, plant.room[0], j.ports.size
-    own = force if j.there[0] else 0.0
+    that slide, of those that rest what leaves them no acceleration. Returns the force [N] of the first element where it
+    is one of them and no contact is there, else `force`; drive [m s-2]."""
+    s, m, accel, count = j.stops, 2 * motion.shape[1] + 7, plant.room[0], j.of.shape[1]
     for i in range(s.names.size):
         e, way = s.element[i], s.field[WAY, i]
         limit = j.num[e, 1] if abs(way) == 2.0 else j.num[e, 2]
         j.mem[e, 0] = np.sign(way) * limit
         row[m + EACH * e + 2] = j.mem[e, 0]
     for k in range(accel.size):
-        accel[k] = j.beside[k] - plant.slide[k] * own / plant.mass
+        accel[k] = j.modal[BESIDE, k] - plant.slide[k] * j.own[NOW_OWN] / plant.mass
         for e in range(count):
-            accel[k] -= j.rows[j.ports[e], k] * row[m + EACH * e + 2] / plant.mass
+            accel[k] -= j.rows[j.of[PORT, e], k] * row[m + EACH * e + 2] / plant.mass
     for i in range(stops.reactions(motion, plant, drive, accel, plant.room[1:], s)):
         e = s.element[s.names[i]]
         j.mem[e, 0] = min(max(s.field[FOUND, i], -j.num[e, 1]), j.num[e, 1])
         row[m + EACH * e + 2] = j.mem[e, 0]
-    return row[m + 2] if j.num[0, 0] == HOLDS and not j.there[0] else force
+    if THERE:
+        return force
+    else:
+        return row[m + 2] if j.num[0, 0] == HOLDS else force
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, **INNER)
 def begun(motion, plant, table, at, dt, j):
     """Free slides, and where elements are set-valued free rates, of all ports in the step; the lengths of its bonds."""
-    for p in range(j.free.size):
-        j.free[p] = free_slide(motion, plant.reach, p, table, at)
+    for p in range(j.port.shape[1]):
+        j.port[FREE, p] = free_slide(motion, plant.reach, p, table, at)
         if STOPS:
-            j.rate[p] = free_rate(motion, j.rows[p], plant.free, plant.dense, table, at)
-    for e in range(j.ports.size):
-        j.eps[e] = law.middle(j.num, j.mem, e, j.v[e], dt)
+            j.port[RATE, p] = free_rate(motion, j.rows[p], plant.free, plant.dense, table, at)
+    for e in range(j.of.shape[1]):
+        j.each[EPS, e] = law.middle(j.num, j.mem, e, j.each[PACE, e], dt)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def elsewhere(mine, port, j):
     """Slide [m] that the forces of all others take from a port; mine: the element, -1 for the contact on port 0."""
     out = 0.0
-    for k in range(j.forces.size):
+    for k in range(j.of.shape[1]):
         if k != mine:
-            out += j.beta[port, j.ports[k]] * j.forces[k]
-    return out + j.beta[port, 0] * j.own[0] if mine >= 0 else out
+            out += j.gives[BETA, port, j.of[PORT, k]] * j.each[PULL, k]
+    return out + j.gives[BETA, port, 0] * j.own[FORCE_OWN] if mine >= 0 else out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def turned(e, turn, j, dt):
     """Solve element e with all others held: (change of its force over its goal [1], iterations).
 
     turn: from 0; the change is inf where the solve failed.
     """
-    p = j.ports[e]
-    beta = j.beta[p, p]
-    mine = j.free[p] - elsewhere(e, p, j)
-    if j.num[e, 0] == HOLDS:
-        j.dq[e], used = stick(mine, beta, j.num[e, 1], j.num[e, 2])
-        tries = 1
-    else:
-        guess = 2 * j.last[e, 0] - j.last[e, 1] if turn == 0 else j.dq[e]
-        j.dq[e], used, tries = solver.solve_element(mine, beta, j.num, j.mem, e, j.q[e], j.eps[e], dt, guess,
-                                                    j.bound[e], 0.1 * j.goal[1 + e])
-    used = (mine - j.dq[e]) / beta
-    change = abs(used - j.forces[e]) / (j.goal[1 + e] + ROUND * (abs(mine) / beta + abs(used)))
-    j.forces[e] = used
+    p = j.of[PORT, e]
+    beta, dq, tries = j.gives[BETA, p, p], j.each[STEP, e], 1
+    mine = j.port[FREE, p] - elsewhere(e, p, j)
+    if STOPS:
+        if j.num[e, 0] == HOLDS:
+            dq = stick(mine, beta, j.num[e, 1], j.num[e, 2])[0]
+    if SMOOTH:
+        if j.num[e, 0] != HOLDS:
+            guess = 2 * j.each[WENT, e] - j.each[WENT_BEFORE, e] if turn == 0 else dq
+            dq, _, tries = solver.solve_element(mine, beta, j.num, j.mem, e, j.each[PLACE, e], j.each[EPS, e], dt,
+                                                guess, j.each[MOST, e], 0.1 * j.each[CLOSE, e])
+    used = (mine - dq) / beta
+    change = abs(used - j.each[PULL, e]) / (j.each[CLOSE, e] + ROUND * (abs(mine) / beta + abs(used)))
+    j.each[STEP, e], j.each[PULL, e] = dq, used
     return change if tries >= 0 else np.inf, abs(tries)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def turned_contact(q, v, dt, c, j):
     """Solve the contact on port 0 with all elements held: (its slide, change of its force over its goal, iterations).
     """
-    free = j.free[0] - elsewhere(-1, 0, j)
-    dq, _, tries = contact.solve(free, j.beta[0, 0], q, v, dt, c, j.goal[0])
-    used = (free - dq) / j.beta[0, 0]
-    change = abs(used - j.own[0]) / (j.goal[0] + ROUND * (abs(j.free[0]) / j.beta[0, 0] + abs(used)))
-    j.own[0] = used
+    free, beta = j.port[FREE, 0] - elsewhere(-1, 0, j), j.gives[BETA, 0, 0]
+    dq, _, tries = contact.solve(free, beta, q, v, dt, c, j.own[AIM])
+    used = (free - dq) / beta
+    change = abs(used - j.own[FORCE_OWN]) / (j.own[AIM] + ROUND * (abs(j.port[FREE, 0]) / beta + abs(used)))
+    j.own[FORCE_OWN] = used
     return dq, change if tries >= 0 else np.inf, abs(tries)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def agreed(q, v, plant, c, j):
-    """Forces of contact and elements over a step, in j.own, j.forces and j.dq: (slide of the contact, iterations), < 0
+    """Forces of contact and elements over a step, in j.own and j.each: (slide of the contact, iterations), < 0
     where they do not agree. Every element takes its turn, a set-valued one by the mean force alone."""
-    count, there, dt = j.ports.size, j.there[0], plant.dt
-    smooth = j.stops.names.size == 0 and there == 0 and plant.dense.size == 0
-    iterations, last_worst, worst, dq = 0, np.inf, 0.0, 0.0
+    count, dt, iterations, last_worst, dq = j.of.shape[1], plant.dt, 0, np.inf, 0.0
     for turn in range(TURNS):
         worst = 0.0
-        if there:
+        if THERE:
             dq, worst, tries = turned_contact(q, v, dt, c, j)
             iterations += tries
         for e in range(count):
             change, tries = turned(e, turn, j, dt)
             worst = max(worst, change)
             iterations += tries
-        if worst <= 1.0 or count + there == 1:
+        if worst <= 1.0:
+            return dq, iterations
+        if SEVERAL:
+            if turn > 1:
+                iterations += together_now(turn, worst, last_worst, plant, j)
+        else:
             return dq, iterations if worst < np.inf else -iterations
-        if smooth and turn > 1:
-            iterations += abs(together.solve_smooth(j, dt))
-        elif turn > 4 and not there and worst > 0.2 * last_worst:
-            together.newton_turn(j, dt, False)
         last_worst = worst
     return dq, -iterations
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
+def together_now(turn, worst, last_worst, plant, j):
+    """A step on the forces of all elements at once, where there is no contact: of laws with a slope to their minimum,
+    of others where the turns get there too slowly. Iterations."""
+    if THERE:
+        return 0
+    elif SMOOTH:
+        if j.stops.names.size == 0 and plant.dense.size == 0:
+            return abs(together.solve_smooth(j, plant.dt))
+    if turn > 4 and worst > 0.2 * last_worst:
+        together.newton_turn(j, plant.dt, False)
+    return 0
+
+
+@njit(error_model="numpy", forceinline=True, **INNER)
 def between(j):
     """Free slides and speeds of the set-valued elements under the forces of all others, into j.stops.field."""
     s = j.stops
     for i in range(s.names.size):
-        p = j.ports[s.element[i]]
-        slide, speed = j.free[p] - j.beta[p, 0] * j.own[0], j.rate[p] - j.gamma[p, 0] * j.own[0]
-        for e in range(j.ports.size):
+        p = j.of[PORT, s.element[i]]
+        slide = j.port[FREE, p] - j.gives[BETA, p, 0] * j.own[FORCE_OWN]
+        speed = j.port[RATE, p] - j.gives[GAMMA, p, 0] * j.own[FORCE_OWN]
+        for e in range(j.of.shape[1]):
             if j.num[e, 0] != HOLDS:
-                slide -= j.beta[p, j.ports[e]] * j.forces[e]
-                speed -= j.gamma[p, j.ports[e]] * j.forces[e]
+                slide -= j.gives[BETA, p, j.of[PORT, e]] * j.each[PULL, e]
+                speed -= j.gives[GAMMA, p, j.of[PORT, e]] * j.each[PULL, e]
         s.field[FREE, i], s.field[RATE, i] = slide, speed
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def taken(j):
-    """Forces and slides of the set-valued elements into j.forces and j.dq; the largest change of a force over its
+    """Forces and slides of the set-valued elements into j.each; the largest change of a force over its
     goal."""
     s, worst = j.stops, 0.0
     for i in range(s.names.size):
         e, force = s.element[i], s.field[MEAN, i]
-        worst = max(worst, abs(force - j.forces[e]) / (j.goal[1 + e] + ROUND * abs(force)))
-        j.forces[e], j.dq[e] = force, s.field[DQ, i]
+        worst = max(worst, abs(force - j.each[PULL, e]) / (j.each[CLOSE, e] + ROUND * abs(force)))
+        j.each[PULL, e], j.each[STEP, e] = force, s.field[DQ, i]
     return worst
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def still(motion, plant, table, at, j):
     """Whether all set-valued elements rest through the step and at its end, held by static friction."""
     if not stops.stays(j.stops):
         return False
     taken(j)
-    end, accel = j.room[:2], plant.room[0]
+    end, accel = j.modal[ROOM:ROOM + 2], plant.room[0]
     pushed(plant, j, accel)
     ended(motion, plant.free, plant.push, plant.dense, table, at, accel, end)
     for i in range(j.stops.names.size):
         e = j.stops.element[i]
         for k in range(accel.size):
-            accel[k] += j.rows[j.ports[e], k] * j.forces[e] / plant.mass
+            accel[k] += j.rows[j.of[PORT, e], k] * j.each[PULL, e] / plant.mass
     return stops.stays_to_the_end(end, plant, table[at, 8 * accel.size + 2], accel, plant.room[1:], j.stops)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def passed(q, v, motion, plant, table, at, c, j):
     """As `agreed`, with the stops and releases of the set-valued elements inside the step, and their blows.
 
     (slide of the contact, iterations, True), False where no such step is found or it would give energy. Which of them
     stop and go is settled in the first turns; then the slides that follow from it are kept.
     """
-    s, there, iterations, last_worst, dq, dt = j.stops, j.there[0], 0, np.inf, 0.0, plant.dt
+    s, iterations, last_worst, dq, dt = j.stops, 0, np.inf, 0.0, plant.dt
     for i in range(s.names.size):
-        s.field[START, i] = j.v[s.element[i]]
+        s.field[START, i] = j.each[PACE, s.element[i]]
     for turn in range(FEW):
         worst = 0.0
-        if there:
+        if THERE:
             dq, worst, tries = turned_contact(q, v, dt, c, j)
             iterations += tries
-        for e in range(j.ports.size):
-            if j.num[e, 0] != HOLDS:
-                change, tries = turned(e, turn, j, dt)
-                worst = max(worst, change)
-                iterations += tries
+        if SMOOTH:
+            for e in range(j.of.shape[1]):
+                if j.num[e, 0] != HOLDS:
+                    change, tries = turned(e, turn, j, dt)
+                    worst = max(worst, change)
+                    iterations += tries
         between(j)
         if turn < FEW // 2 and not (still(motion, plant, table, at, j) or stops.watched(dt, s)):
             return dq, iterations, False
@@ -227,87 +278,110 @@ def passed(q, v, motion, plant, table, at, c, j):
             return dq, iterations, False
         worst = max(worst, taken(j))
         iterations += 1
-        if worst <= 1.0 or (s.names.size == j.ports.size and not there):
+        if worst <= 1.0 or settles_at_once(j):
             return dq, iterations, stops.blows(s) >= 0.0
-        if turn > 4 and not there and worst > 0.2 * last_worst:
-            together.newton_turn(j, dt, True)
+        if SEVERAL:
+            if turn > 4 and worst > 0.2 * last_worst:
+                newton_of_stops(j, dt)
         last_worst = worst
     return dq, iterations, False
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
+def settles_at_once(j):
+    """Whether all that rubs is set-valued, which is solved as one."""
+    if THERE:
+        return False
+    else:
+        return j.stops.names.size == j.of.shape[1]
+
+
+@njit(error_model="numpy", **INNER)
+def newton_of_stops(j, dt):
+    """A Newton step on the forces of all elements beside the stops that are known, where there is no contact."""
+    if SMOOTH:
+        if THERE:
+            return
+        else:
+            together.newton_turn(j, dt, True)
+
+
+@njit(error_model="numpy", **INNER)
 def solved(q, v, motion, plant, table, at, c, j):
     """Forces of contact and elements over a step whose free slides stand in j: (slide of the contact, iterations),
     below 0 where they do not agree. Blows of set-valued elements stand in j.stops, or are left to `blown`."""
     if STOPS:
         dq, tried, found = passed(q, v, motion, plant, table, at, c, j)
         if found:
-            j.found[0] = 1.0
+            j.own[KNOWN] = 1.0
             return dq, tried
         dq, iterations = agreed(q, v, plant, c, j)
-        j.found[0] = 0.0
+        j.own[KNOWN] = 0.0
         return dq, iterations + tried if iterations >= 0 else iterations - tried
     else:
         return agreed(q, v, plant, c, j)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def pushed(plant, j, accel):
     """Modal accelerations (n,) [m s-2] of all forces into `accel`."""
     for k in range(accel.size):
-        accel[k] = j.beside[k] - plant.slide[k] * j.own[0] / plant.mass if j.there[0] else j.beside[k]
-    for e in range(j.ports.size):
+        accel[k] = j.modal[BESIDE, k] - plant.slide[k] * j.own[FORCE_OWN] / plant.mass
+    for e in range(j.of.shape[1]):
         for k in range(accel.size):
-            accel[k] -= j.rows[j.ports[e], k] * j.forces[e] / plant.mass
+            accel[k] -= j.rows[j.of[PORT, e], k] * j.each[PULL, e] / plant.mass
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, **INNER)
 def worked(dq, row, j):
     """Friction work of the step [J]; its mean forces go into the row of its first sample. dq [m]: slide of the contact.
     """
-    m = 2 * j.beside.size + 7
-    work = j.own[0] * dq if j.there[0] else 0.0
-    row[m - 3] = j.own[0] if j.there[0] else (j.forces[0] if j.rubs[0] else 0.0)
-    for e in range(j.ports.size):
-        row[m + EACH * e + 4] = j.forces[e]
-        if j.rubs[e]:
-            work += j.forces[e] * j.dq[e]
+    m = 2 * j.modal.shape[1] + 7
+    work = j.own[FORCE_OWN] * dq
+    row[m - 3] = j.each[PULL, 0] if j.of[RUBS, 0] else 0.0
+    if THERE:
+        row[m - 3] = j.own[FORCE_OWN]
+    for e in range(j.of.shape[1]):
+        row[m + EACH * e + 4] = j.each[PULL, e]
+        if j.of[RUBS, e]:
+            work += j.each[PULL, e] * j.each[STEP, e]
     return work
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, **INNER)
 def blown(motion, mass, j):
     """Strike the modes by the blows of the set-valued elements, in place; the energy that they take [J]. Where no stops
     were found those are brought to rest that did not slide."""
     s = j.stops
-    if j.found[0] == 0.0:
+    if j.own[KNOWN] == 0.0:
         for i in range(s.names.size):
-            s.field[DQ, i] = j.dq[s.element[i]]
+            s.field[DQ, i] = j.each[STEP, s.element[i]]
         stops.brought(motion, s)
     return stops.struck(motion, mass, s)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def committed(q, v, dq, motion, plant, c, j):
     """Move the memories of contact and elements by the step: (energy dissipated [J], False where one is full)."""
     lost, ok = 0.0, True
-    if j.there[0]:
+    if THERE:
         speed = 0.0
         for k in range(plant.slide.size):
             speed += plant.slide[k] * motion[1, k]
-        lost, ok = contact.commit(dq, j.own[0], q, v, speed, plant.dt, c)
-        j.own[1] = dq
-    for e in range(j.ports.size):
+        lost, ok = contact.commit(dq, j.own[FORCE_OWN], q, v, speed, plant.dt, c)
+        j.own[STEP_OWN] = dq
+    for e in range(j.of.shape[1]):
         speed = 0.0
         for k in range(plant.slide.size):
-            speed += j.rows[j.ports[e], k] * motion[1, k]
-        lost += law.commit(j.num, j.mem, e, j.dq[e], j.forces[e], j.v[e], speed, plant.dt, j.eps[e])
-        j.last[e, 1] = j.last[e, 0]
-        j.last[e, 0] = j.dq[e]
+            speed += j.rows[j.of[PORT, e], k] * motion[1, k]
+        lost += law.commit(j.num, j.mem, e, j.each[STEP, e], j.each[PULL, e], j.each[PACE, e], speed, plant.dt,
+                           j.each[EPS, e])
+        j.each[WENT_BEFORE, e] = j.each[WENT, e]
+        j.each[WENT, e] = j.each[STEP, e]
     return lost, ok
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def limited(load0, load1, mu, j):
     """The set-valued elements under a load that goes from load0 to load1 [N] in the step; mu (2,): static and kinetic
     coefficient."""
@@ -319,7 +393,7 @@ def limited(load0, load1, mu, j):
             j.num[e, 1 + k] = 0.5 * mu[k] * (load0 + load1)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def capped(j):
     """No force of a set-valued element at a sample above what its load bears."""
     for i in range(j.stops.names.size):
@@ -327,10 +401,10 @@ def capped(j):
         j.mem[e, 0] = min(max(j.mem[e, 0], -j.num[e, 1]), j.num[e, 1])
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def slid(used, j):
     """Let the one set-valued element slide through the step under a mean force [N], without a blow; its slide [m]."""
     f = j.stops.field
-    j.forces[0], j.dq[0], j.found[0] = used, j.free[0] - j.beta[0, 0] * used, 1.0
+    j.each[PULL, 0], j.each[STEP, 0], j.own[KNOWN] = used, j.port[FREE, 0] - j.gives[BETA, 0, 0] * used, 1.0
     f[BLOW, 0], f[WAY, 0] = 0.0, 1.0 if used >= 0 else -1.0
-    return j.dq[0]
+    return j.each[STEP, 0]

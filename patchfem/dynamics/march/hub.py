@@ -28,11 +28,12 @@ def contact_of(kind: tuple):
 
 
 @cache
-def loop_of(kind: tuple, laws: tuple = (), load: str = STEADY):
+def loop_of(kind: tuple, laws: tuple = (), load: str = STEADY, there: bool = True, several: bool = False):
     """The loop of a rig: its `march` and `follow`. kind: of the contact; laws: modules of the elements beside it or in
-    its place; load: STEADY, WHOLE or POINTS."""
+    its place; load: STEADY, WHOLE or POINTS; there: whether the contact is; several: whether more than one rub."""
     contact, named = contact_of(kind), {}
-    flags = {"MANY": bool(laws), "STOPS": COULOMB in laws, "PRESSED": load != STEADY, "POINTED": load == POINTS}
+    flags = {"MANY": bool(laws), "STOPS": COULOMB in laws, "SMOOTH": {*laws} > {COULOMB} or COULOMB not in laws,
+             "THERE": there, "SEVERAL": several, "PRESSED": load != STEADY, "POINTED": load == POINTS}
     text = '"""Parts of a loop, written by patchfem.dynamics.march.hub."""\n\n' + "".join(
         f"{name} = {value}\n" for name, value in flags.items())
     parts = compiled.written(f"{HERE}.parts_{compiled.digest(text)}_kernels", text)
@@ -50,7 +51,9 @@ def loop_of(kind: tuple, laws: tuple = (), load: str = STEADY):
 
 def march(model, *arguments) -> tuple:
     """`loop_kernels.march` with the faces of a model: (steps done, status)."""
-    return loop_of(model.kind, model.laws, model.loading).march(*arguments)
+    there = not model.joints or getattr(model, "patch", None) is not None
+    several = len(model.joints) + there > 1
+    return loop_of(model.kind, model.laws, model.loading, there, several).march(*arguments)
 
 
 def follow_path(path, dt, kind, contact, work, goal, energies, forces) -> int:

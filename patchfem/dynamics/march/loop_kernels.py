@@ -64,7 +64,7 @@ def march(first, steps, motion, plant, table, c, j, n, travel, ledger, rows):
             break
         at = (first + i) % around
         if PRESSED:
-            dq, used, count = pressing.agreed(i, q, v, motion, plant, table, at, c, j, n, j.goal[0])
+            dq, used, count = pressing.agreed(i, q, v, motion, plant, table, at, c, j, n)
             if n.slot[0] < 0:
                 return i, UNFIT
         elif MANY:

@@ -239,8 +239,9 @@ class Run:
         """Histories with the elements beside the first: `extra` has slides, slide_rates, forces, slips (k, i) of the
         interfaces and spring_forces (k, s)."""
         modes, faces = self.modes, self.faces
-        parts, rubs = self._elements(rows), faces.rubs == 1
-        push = -np.einsum("ke,en->kn", parts[:, :, 2], faces.rows[faces.ports]) / modes.mass
+        parts, (ports, rubs) = self._elements(rows), faces.of
+        rubs = rubs == 1
+        push = -np.einsum("ke,en->kn", parts[:, :, 2], faces.rows[ports]) / modes.mass
         if self.model.patch is None:
             push += np.outer(out.force, modes.slide) / modes.mass  # of the first element, counted already
         extra = out.extra | {"spring_forces": parts[:, ~rubs, 2]}

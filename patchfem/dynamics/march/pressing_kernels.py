@@ -13,17 +13,18 @@ import numpy as np
 from ...compiled.inner import njit
 from ...contact.press_kernels import locate, press_state, pull
 from ...contact.press_path_kernels import path_mean
-from ...friction.flags_kernels import LEAN
+from ...friction.flags_kernels import INNER
 from ..contacts import element_kernels as contact
 from ..modal_kernels import free_rate, free_slide
 from . import alone_kernels as parts
 from . import faces_kernels as faces
+from .stops_kernels import BESIDE, FREE, GAMMA, PULL, RATE, STEP
 
 STOPS, POINTED = parts.STOPS, parts.POINTED
 TIGHT = 0.01  # of the goal, to which friction and normal contact agree
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def place_of(motion, rows, r):
     """Slide, heave or pitch of the modes."""
     out = 0.0
@@ -32,7 +33,7 @@ def place_of(motion, rows, r):
     return out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def press_step(n, k0, begin, f1, f2, turn, out):
     """Heave and pitch of a step: (dh, dt) = (f1, f2) - beta mean slope, by Newton's method with step halving from the
     guess in `turn` (2,). Returns (set at the end, iterations, residual as a force [N]); `out` as in `path_mean`.
@@ -71,7 +72,7 @@ def press_step(n, k0, begin, f1, f2, turn, out):
     return k, 100, best / (b11 + b22 / (arm * arm) + 2 / sets.base[4])
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def pressed(i, last, motion, mass, c, j, n, row):
     """Load [N], moment [N m], energy [J] of the preloaded contact, heave and pitch at sample i into the last columns of
     its row; what rubs knows its load. The energy [J]; n.slot < 0 where no contact set fits."""
@@ -94,11 +95,11 @@ def pressed(i, last, motion, mass, c, j, n, row):
     weigh(load, load, c, j, n)
     if STOPS:
         faces.capped(j)
-        pushes(begin[3], begin[4], mass, n, j.beside)
+        pushes(begin[3], begin[4], mass, n, j.modal[BESIDE])
     return begin[2]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def weigh(before, after, c, j, n):
     """Tell what rubs its load at both ends of a step [N]; the nodal forces of points at the later one stand in n.now.
     """
@@ -112,47 +113,47 @@ def weigh(before, after, c, j, n):
         c.bound[0] = c.num[0, 1]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def pushes(heave, pitch, mass, n, accel):
     """Modal accelerations (n,) under forces that resist heave [N] and pitch [N m]."""
     for i in range(accel.size):
         accel[i] = -(n.rows[1, i] * heave + n.rows[2, i] * pitch) / mass
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def pushed(n, mass, accel):
     """Add the modal accelerations of the mean forces of a step on heave and pitch, n.few[3:5], to accel (n,)."""
     for i in range(accel.size):
         accel[i] -= (n.rows[1, i] * n.few[3] + n.rows[2, i] * n.few[4]) / mass
 
 
-@njit(error_model="numpy", **LEAN)
-def rubbed(q, v, force, motion, plant, table, at, c, j, n, goal):
+@njit(error_model="numpy", **INNER)
+def rubbed(q, v, force, motion, plant, table, at, c, j, n):
     """(slide dq [m], mean friction force [N], iterations) of a step under the mean forces force (2,) on heave and
     pitch; iterations < 0 where it failed."""
     free = free_slide(motion, plant.reach, 0, table, at) - n.beta[0, 1] * force[0] - n.beta[0, 2] * force[1]
     if STOPS:
-        pushes(force[0], force[1], plant.mass, n, j.beside)
-        j.free[0] = free
+        pushes(force[0], force[1], plant.mass, n, j.modal[BESIDE])
+        j.port[FREE, 0] = free
         if n.beta[0, 0] == 0.0:  # nothing slides
             return faces.slid(0.0, j), 0.0, 1
-        j.rate[0] = free_rate(motion, plant.slide, plant.free, plant.dense, table, at) \
-            - j.gamma[0, 1] * force[0] - j.gamma[0, 2] * force[1]
+        j.port[RATE, 0] = free_rate(motion, plant.slide, plant.free, plant.dense, table, at) \
+            - j.gives[GAMMA, 0, 1] * force[0] - j.gives[GAMMA, 0, 2] * force[1]
         _, count = faces.solved(q, v, motion, plant, table, at, c, j)
-        return j.dq[0], j.forces[0], count
+        return j.each[STEP, 0], j.each[PULL, 0], count
     else:
-        return contact.solve(free, n.beta[0, 0], q, v, plant.dt, c, TIGHT * goal)
+        return contact.solve(free, n.beta[0, 0], q, v, plant.dt, c, TIGHT * n.goal[0])
 
 
-@njit(error_model="numpy", **LEAN)
-def agreed(i, q, v, motion, plant, table, at, c, j, n, goal):
+@njit(error_model="numpy", **INNER)
+def agreed(i, q, v, motion, plant, table, at, c, j, n):
     """Friction and normal contact over a step from sample i, each under the mean force of the other: (dq [m], mean
     friction force [N], iterations, < 0 where they disagree); n.slot < 0 where no contact set fits. The mean forces on
     heave and pitch stand in n.few[3:5].
 
     Where friction moves heave and pitch too the secant, kept inside its bracket, finds the force that both agree on.
     """
-    few, beta, load = n.few, n.beta, n.few[0]
+    few, beta, load, goal = n.few, n.beta, n.few[0], n.goal[0]
     force, turn, out, begin = few[3:5], few[6:8], few[8:17], few[17:22]
     given, coupled = n.loads.size > 0, beta[0, 1] != 0 or beta[0, 2] != 0
     moves = not given and (beta[1, 1] != 0 or beta[2, 2] != 0)
@@ -179,7 +180,7 @@ def agreed(i, q, v, motion, plant, table, at, c, j, n, goal):
             if POINTED:
                 press_state(n.sets, end, -(begin[0] + turn[0]), begin[1] + turn[1], n.now)
         weigh(load, after, c, j, n)
-        dq, used, its = rubbed(q, v, force, motion, plant, table, at, c, j, n, goal)
+        dq, used, its = rubbed(q, v, force, motion, plant, table, at, c, j, n)
         count += abs(its)
         bad = its < 0 or wrong > goal
         miss = used - guess

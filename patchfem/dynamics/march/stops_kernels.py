@@ -15,11 +15,16 @@ would give some. s: `contacts.arrays.Stops`. Read `watched` first.
 import numpy as np
 
 from ...compiled.inner import njit
-from ...friction.flags_kernels import LEAN
+from ...friction.flags_kernels import INNER, LEAN
 from ..dense_kernels import factor, solve
 from ..modal_kernels import accelerations
 
 HOLDS = 0  # of num: the law that holds without a stretch
+# of arrays.Faces: rows of `of` and of `modal`, places of `own`, rows of `each`
+PORT, RUBS = range(2)
+GIVE, BESIDE, ROOM = range(3)
+FORCE_OWN, STEP_OWN, NOW_OWN, AIM, KNOWN = range(5)
+PULL, PLACE, PACE, EPS, STEP, LACK, MOST, CLOSE, WENT, WENT_BEFORE = range(10)
 TRACE = 1e-10  # of the diagonal: give of dependent faces, which leaves their share free
 TIED = 1e-7  # of the diagonal: what is left of a face's own give where others hold it
 BETA, GAMMA, TUG = range(3)  # of `gives`
@@ -31,13 +36,13 @@ STATIC, KINETIC, END = range(3)  # of `limit`: at the start of the step, and END
  BLOW) = range(18)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def bound(which, e, x, s):
     """Static or kinetic friction [N] of face e at the place x of the step."""
     return s.limit[which, e] + x * (s.limit[which + END, e] - s.limit[which, e])
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def shared(which, count, s):
     """Put the solution x of A x = b into row FOUND of s.field, b in row RIGHT, A = s.gives[which] of the faces
     s.names[:count].
@@ -68,7 +73,7 @@ def shared(which, count, s):
     return True
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def resting(s):
     """Numbers of the faces that rest into s.names; how many."""
     count = 0
@@ -79,7 +84,7 @@ def resting(s):
     return count
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def forces_at(x, s):
     """Forces of all faces at the place x of the step and their slopes, into s.field; False where there are none."""
     f, count = s.field, resting(s)
@@ -107,7 +112,7 @@ def forces_at(x, s):
     return True
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def let_go(e, way, s):
     """Let face e slide along way, or carry its static friction where the others that rest hold it."""
     f = s.field
@@ -124,7 +129,7 @@ def let_go(e, way, s):
         f[WAY, e] = 2 * way
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def settled(x, s):
     """Which faces rest, slide or carry at the place x, and their forces; False where no choice is found."""
     f = s.field
@@ -145,7 +150,7 @@ def settled(x, s):
     return False
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def passes_zero(speed, start, bend):
     """Where speed + start y + bend y^2 falls to 0, infinite where it does not; speed >= 0, start >= 0 where it is 0."""
     if speed == 0.0:
@@ -157,7 +162,7 @@ def passes_zero(speed, start, bend):
     return 2 * speed / below if below > 0 else np.inf
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def pulls(e, x, dt, s):
     """(change of speed [m/s] of face e per length of the step at the place x, half of the slope of that)."""
     start, bend, f = 0.0, 0.0, s.field
@@ -170,7 +175,7 @@ def pulls(e, x, dt, s):
     return start, bend
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def next_event(x, dt, s):
     """(how far from the place x the next face stops or goes, which, the way it goes or 0)."""
     f, y, who, way = s.field, 1.0 - x, -1, 0.0
@@ -190,7 +195,7 @@ def next_event(x, dt, s):
     return y, who, way
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def moved(x, y, who, dt, s):
     """Move all faces on by y from the place x, where face `who` stops if it slides."""
     f = s.field
@@ -225,7 +230,7 @@ def followed(dt, s):
     return False
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def slides_on(s):
     """Whether all faces slide the way they do to the end of the step; ways and speeds stand in s.field then."""
     f, count = s.field, s.names.size
@@ -245,7 +250,7 @@ def slides_on(s):
     return True
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def asked(dt, s):
     """Forces that would hold the faces at the ends of the step, rows FIRST and LAST of s.field; False: none found.
 
@@ -365,7 +370,7 @@ def blows(s):
     return work
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def brought(motion, s):
     """After a step by mean forces alone: blows that bring the faces without a slide to rest, as the modes move."""
     f, count = s.field, 0
@@ -380,7 +385,7 @@ def brought(motion, s):
             f[BLOW, s.names[i]] = f[FOUND, i]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def speed_of(motion, e, s):
     """Speed [m/s] of face e as the modes move."""
     out = 0.0
@@ -404,7 +409,7 @@ def struck(motion, mass, s):
     return lost
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def reactions(motion, plant, drive, accel, spare, s):
     """Forces that leave the faces at rest, row WAY of s.field, no acceleration at an instant, into row FOUND in the
     order of s.names; how many they are, 0 where none are found.

@@ -9,51 +9,51 @@ elements that depend on each other, however many there are.
 import numpy as np
 
 from ...compiled.inner import njit
-from ...friction.flags_kernels import LEAN
+from ...friction.flags_kernels import INNER
 from ...friction.laws import elastic_plastic_kernels as law
 from ..dense_kernels import eliminate, factor, solve
-from .stops_kernels import HOLDS, SLIDE, SLIDES
+from .stops_kernels import BETA, CLOSE, EPS, FREE, GIVE, HOLDS, LACK, PLACE, PORT, PULL, ROOM, SLIDE, SLIDES
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def slide_of(e, y, j):
     """Slide of element e [m] at y (n,)."""
-    p = j.ports[e]
-    out = j.free[p]
+    p = j.of[PORT, e]
+    out = j.port[FREE, p]
     for i in range(y.size):
         out -= j.rows[p, i] * y[i]
     return out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def along(t, y, step, trial, j, dt):
     """Slope of the minimum's function along `step` at y + t step."""
     out = 0.0
     for i in range(y.size):
         trial[i] = y[i] + t * step[i]
-        out += step[i] * trial[i] / j.give[i]
-    for e in range(j.ports.size):
-        force = law.mean(j.num, j.mem, e, j.q[e], slide_of(e, trial, j), j.eps[e], dt)[0]
+        out += step[i] * trial[i] / j.modal[GIVE, i]
+    for e in range(j.of.shape[1]):
+        force = law.mean(j.num, j.mem, e, j.each[PLACE, e], slide_of(e, trial, j), j.each[EPS, e], dt)[0]
         for i in range(y.size):
-            out -= step[i] * j.rows[j.ports[e], i] * force
+            out -= step[i] * j.rows[j.of[PORT, e], i] * force
     return out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def slope_at(y, step, j, dt, hess):
-    """Newton's equations at y (n,): minus the slope in `step`, the Hessian, j.forces of the laws; the largest change of
-    a force over its goal."""
+    """Newton's equations at y (n,): minus the slope in `step`, the Hessian, the forces of the laws; the largest change
+    of a force over its goal."""
     n, worst = y.size, 0.0
     for i in range(n):
-        step[i] = -y[i] / j.give[i]
+        step[i] = -y[i] / j.modal[GIVE, i]
         for k in range(n):
             hess[i, k] = 0.0
-        hess[i, i] = 1 / j.give[i]
-    for e in range(j.ports.size):
-        p = j.ports[e]
-        force, slope = law.mean(j.num, j.mem, e, j.q[e], slide_of(e, y, j), j.eps[e], dt)
-        worst = max(worst, abs(force - j.forces[e]) / j.goal[1 + e])
-        j.forces[e] = force
+        hess[i, i] = 1 / j.modal[GIVE, i]
+    for e in range(j.of.shape[1]):
+        p = j.of[PORT, e]
+        force, slope = law.mean(j.num, j.mem, e, j.each[PLACE, e], slide_of(e, y, j), j.each[EPS, e], dt)
+        worst = max(worst, abs(force - j.each[PULL, e]) / j.each[CLOSE, e])
+        j.each[PULL, e] = force
         slope = max(slope, 0.0)
         for i in range(n):
             step[i] += j.rows[p, i] * force
@@ -62,18 +62,18 @@ def slope_at(y, step, j, dt, hess):
     return worst
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def solve_smooth(j, dt):
-    """Forces j.forces (e,) of a step in place, from those there are, where every law has a slope.
+    """Forces of a step in place, from those there are, where every law has a slope.
 
     Returns the iterations, below 0 where the minimum was not reached.
     """
-    y, step, trial, hess = j.room[0], j.room[1], j.room[2], j.hess
-    n, count = y.size, j.ports.size
+    y, step, trial, hess = j.modal[ROOM], j.modal[ROOM + 1], j.modal[ROOM + 2], j.hess
+    n, count = y.size, j.of.shape[1]
     for i in range(n):
         y[i] = 0.0
         for e in range(count):
-            y[i] += j.give[i] * j.rows[j.ports[e], i] * j.forces[e]
+            y[i] += j.modal[GIVE, i] * j.rows[j.of[PORT, e], i] * j.each[PULL, e]
     for turn in range(1, 80):
         worst = slope_at(y, step, j, dt, hess)
         if turn > 1 and worst <= 0.1:
@@ -97,43 +97,43 @@ def solve_smooth(j, dt):
     return -80
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def equations(j, dt, known):
-    """Newton's equations j.system (e, e), j.miss (e,) on the forces of all elements, residual forces - law(free - beta
-    forces).
+    """Newton's equations j.system (e, e), row LACK of j.each on the forces of all elements, residual forces -
+    law(free - beta forces).
 
     An element that holds asks for no slide, with a trace of give where elements that depend on each other share their
     force in more ways than one; one that slips keeps its force. known: the slides of those that do not slip all the way
     stand in j.stops instead (`stops_kernels`).
     """
-    count, beta, face = j.forces.size, j.beta, 0
+    count, beta, face = j.of.shape[1], j.gives[BETA], 0
     for e in range(count):
-        p = j.ports[e]
-        dq, own = j.free[p], beta[p, p]
+        p = j.of[PORT, e]
+        dq, own = j.port[FREE, p], beta[p, p]
         for k in range(count):
-            dq -= beta[p, j.ports[k]] * j.forces[k]
+            dq -= beta[p, j.of[PORT, k]] * j.each[PULL, k]
         if j.num[e, 0] == HOLDS:
-            holds, goal = abs(j.forces[e]) < j.num[e, 1] * (1 - 1e-12) and abs(j.forces[e]) != j.num[e, 2], 0.0
+            holds, goal = abs(j.each[PULL, e]) < j.num[e, 1] * (1 - 1e-12) and abs(j.each[PULL, e]) != j.num[e, 2], 0.0
             if known:
                 holds, goal = j.stops.field[SLIDES, face] == 0.0, j.stops.field[SLIDE, face]
             face += 1
-            j.miss[e] = (dq - goal) / own if holds else 0.0
+            j.each[LACK, e] = (dq - goal) / own if holds else 0.0
             for k in range(count):
-                j.system[e, k] = beta[p, j.ports[k]] / own if holds else 0.0
+                j.system[e, k] = beta[p, j.of[PORT, k]] / own if holds else 0.0
             j.system[e, e] += 1e-9 if holds else 1.0
             continue
-        force, slope = law.mean(j.num, j.mem, e, j.q[e], dq, j.eps[e], dt)
-        j.miss[e] = force - j.forces[e]
+        force, slope = law.mean(j.num, j.mem, e, j.each[PLACE, e], dq, j.each[EPS, e], dt)
+        j.each[LACK, e] = force - j.each[PULL, e]
         for k in range(count):
-            j.system[e, k] = slope * beta[p, j.ports[k]]
+            j.system[e, k] = slope * beta[p, j.of[PORT, k]]
         j.system[e, e] += 1.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **INNER)
 def newton_turn(j, dt, known):
     """One Newton step on the forces of all elements at once, without a patch; False where it fails. known: as of
     `equations`."""
-    count, miss = j.forces.size, j.miss
+    count, miss = j.of.shape[1], j.each[LACK]
     equations(j, dt, known)
     if not eliminate(j.system, miss):  # pivots in place: 1 + slope beta leads its row for laws that resist
         return False
@@ -141,7 +141,7 @@ def newton_turn(j, dt, known):
         if not np.isfinite(miss[e]):
             return False
     for e in range(count):
-        j.forces[e] += miss[e]
+        j.each[PULL, e] += miss[e]
         if j.num[e, 0] == HOLDS:
-            j.forces[e] = min(max(j.forces[e], -j.num[e, 1]), j.num[e, 1])
+            j.each[PULL, e] = min(max(j.each[PULL, e], -j.num[e, 1]), j.num[e, 1])
     return True

@@ -243,7 +243,7 @@ class VaryingLoadRun(Run):
             self.contact = arrays.Rub(*rub_of(model.law, now, model.shear, model.limit))
         return arrays.Pressing((), np.ascontiguousarray(model.rows, float), self.prop.beta.copy(),
                                np.array([float(np.ptp(x) / 2) or 1.0]), np.array(model.law.force[:2]), now, np.zeros(0),
-                               np.array([slot]), np.zeros(1), np.zeros(22))
+                               np.array([slot]), np.zeros(1), np.array([GOAL * model.limit]), np.zeros(22))
 
     def _load(self, count: int) -> arrays.Pressing:
         loads = self.load.loads
