@@ -105,8 +105,8 @@ class Balance:
         values, response, book = self._measured(found, drive)
         errors = self._errors(values, found, drive, lambda *of: self._measured(*of, 2 * SAMPLES)[0])
         if "slip_start_phase" in errors:
-            errors["slip_start_phase"] = min(errors["slip_start_phase"], np.pi / 2) + 2 * np.pi / SAMPLES
-            errors["stick_fraction"] = errors.get("stick_fraction", 0.0) + 4 / SAMPLES
+            errors["slip_start_phase"] = max(min(errors["slip_start_phase"], np.pi / 2), 2 * np.pi / SAMPLES)
+            errors["stick_fraction"] = max(errors.get("stick_fraction", 0.0), 4 / SAMPLES)
         name, _ = balanced_regime(found)
         held = name == "stuck"
         extra = {"regime": name if stable.stable else f"{name}, unstable", "multipliers": stable.multipliers,
