@@ -88,8 +88,9 @@ class Phase:
 def rows_of(modes, drive, static, kinetic, cycles, start=None, begin=0) -> tuple:
     """(run, rows of all its pieces) from rest or `start`, the clock put to the cycle `begin` at first."""
     one = histories._Run(modes, drive, groups_of(modes, static, kinetic), cycles, int(cycles) + 2, np.inf, start, None)
-    one.clock.now[0] = begin
-    return one, np.concatenate(one.until(cycles, True))
+    one.clock.now[0], rows = begin, []
+    one.until(cycles, one._into(rows))
+    return one, np.concatenate(rows)
 
 
 def run(modes, drive, static, kinetic, duration, start=None) -> list:
@@ -105,3 +106,10 @@ def run(modes, drive, static, kinetic, duration, start=None) -> list:
         forces = [Signal(one, part, (2 * n + 1 + 6 * f + 2,), (), (1.0,)) for f in range(i)]
         out.append(Phase(part[0, 0], part[0, 2], part[:, 1].sum(), ways, modal, forces, part))
     return out
+
+
+def starts(done) -> np.ndarray:
+    """Phases modulo pi of the releases of the first interface in the window of a PieceRun."""
+    log = done.log
+    late = (log.interface == 0) & (np.abs(log.what) == 1) & (log.time > done.window.time[0])
+    return log.phase[late] % np.pi

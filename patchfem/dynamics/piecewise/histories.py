@@ -1,73 +1,78 @@
 """Samples, extremes, energies and events of a run of rigid and piecewise-linear elements."""
 
-from dataclasses import dataclass
-from math import ceil, factorial
+from dataclasses import dataclass, field, replace
+from math import ceil
 
 import numpy as np
 
 from ...compiled import load
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
 from ..events.event_list import BORDER, RELEASE, REVERSAL, ROOM, STOP, EventLog
-from ..integrated import Loop
-from ..piecewise_one import room as one
 from .elements import stretches, table_of, virgin
-from .plant import books_of, clock_of, place, plant_of, room_of
+from .names_kernels import OF_FACE, OF_RUN
+from .plant import books_of, clock_of, into, past_of, place, plant_of, room_of
+from .reading import Reading, ring_of
 
-HERE, ALONE = "dynamics.piecewise", "dynamics.piecewise_one"
+HERE = "dynamics.piecewise"
 SAMPLES = 400  # per drive cycle in the kept window
 LEAST = 101  # of a run that has no cycles
 CHUNK = 4096  # rows held at once
 CORNERS = 400_000  # turning points kept from before the window
 NOISE = 64 * 2.0**-52  # of what a speed is added from, below which it rests
+REPEATS = 2  # of `Past.about`
+LARGEST, SLIPPED = 5, 7  # of the ledger, no sums
 SLIPS = 0.5  # share of the slide that is irreversible from which an interface slips
-# largest piece times rate for which g Gauss points, g = 0 to 12, integrate a product of two motions to 1e-14
-GAUSS = np.array([0.0] + [0.5 * (1e-14 * (2 * g + 1) * factorial(2 * g)**3 / factorial(g)**4)**(1 / (2 * g))
-                          for g in range(1, 13)])
-PLACE, WEIGHT = np.zeros((2, GAUSS.size, GAUSS.size))  # of g Gauss points on [-1, 1], in row g
-for _g in range(1, GAUSS.size):
-    PLACE[_g, :_g], WEIGHT[_g, :_g] = np.polynomial.legendre.leggauss(_g)
+WHOLE = 3  # cycles of a motion that repeats, which hold every stick of one of them whole
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PieceRun:
     """A run of piecewise-linear elements.
 
-    response, window: histories; their `extra` has "ledger" (4, k) [J] of all interfaces, and of several interfaces
-    slides, slide_rates, forces, slips (k, i). amplitudes (c, 2): extremes of the output per cycle; phasors (c,): its
-    drive-frequency part in the last cycle of every window, 0 in the others; ledger: energies [J]; loops: a Loop per
-    interface; starts: phases of the release of the first interface in the window, mod pi;
-    acceleration: largest at the output in the window; log: events; snapshots: of the elements in the last cycle;
-    events: how many pieces; swing, drift: half the range of the output in the window and the motion of the slide's
-    mean per cycle [m]; waves: first and third harmonic of the absolute acceleration in the window [m s-2]; end:
-    (Start, memory) to go on from; ring: (amplitude [m s-2], frequency [rad/s], damping ratio) of what rings while a
-    single element holds, with an amplitude of 0 where nothing does, as behind elements whose sticks are too short for
-    it; None where the samples have to tell; repeats: whether every cycle of the window is the same to the last bit.
+    amplitudes (c, 2): extremes of the output per cycle; phasors (c,): its drive-frequency part in the last cycle of
+    every window, 0 in the others; ledger: energies [J]; outcome: None where the run came to its end; reading: what the
+    window shows; events: how many pieces; end: (Start, memory) to go on from; slips: whether an interface slipped as a
+    whole at some time; ring: as `reading.ring_of`, None also of other rigs; repeats: whether every cycle of the window
+    is the same to the last bit. response, window: histories, None of a run without; their `extra` has "ledger" (4, k)
+    [J] of all interfaces, and of several interfaces slides, slide_rates, forces, slips (k, i). log: events; snapshots:
+    of the elements in the last cycle.
     """
 
-    response: Response
-    window: Response
     amplitudes: np.ndarray
     phasors: np.ndarray
     ledger: dict
     outcome: Outcome | None
-    loops: tuple
-    starts: np.ndarray
-    acceleration: float
-    log: EventLog
-    snapshots: list
+    reading: Reading
     events: int
-    swing: float
-    drift: float
-    waves: tuple
     cycles_done: float
     end: tuple
-    ring: tuple | None = None
-    repeats: bool = False
+    slips: bool
+    ring: tuple | None
+    repeats: bool
+    response: Response | None = None
+    window: Response | None = None
+    log: EventLog | None = None
+    snapshots: list = field(default_factory=list)
+
+    @property
+    def loops(self) -> tuple:
+        """A Loop of the window per interface."""
+        return self.reading.loops
+
+    @property
+    def swing(self) -> float:
+        """Half the range of the output in the window [m]."""
+        return float(self.reading.swing)
+
+    @property
+    def acceleration(self) -> float:
+        """Largest absolute acceleration of the output in the window [m s-2]."""
+        return float(self.reading.acceleration)
 
 
 def warm_up(say=None) -> tuple:
-    """The compiled loop and the sums over its rows; `say` is told where they have to be compiled first."""
-    return load(f"{HERE}.march_kernels", say), load(f"{HERE}.dense_kernels", say)
+    """The compiled loop and what reads its rows; `say` is told where they have to be compiled first."""
+    return tuple(load(f"{HERE}.{name}_kernels", say) for name in ("march", "dense", "read"))
 
 
 def simulate(modes: ModalBasis, drive, groups, cycles: float, window: int = 10, travel: float = np.inf,
@@ -89,77 +94,136 @@ def simulate(modes: ModalBasis, drive, groups, cycles: float, window: int = 10, 
     return done
 
 
-class _Run:
-    """Rows as they come: what is summed is summed, all but turning points and slips is forgotten before the window."""
+def briefly(cases, cycles: int, window: int) -> list:
+    """What `simulate` gives of many runs, without histories and events, in a tenth of the time.
 
-    def __init__(self, modes, drive, groups, cycles, window, travel, start, memory):
+    cases: (modes, drive, groups, start) of each. NotConverged where events pile up in one.
+    """
+    out, run = [], None
+    for modes, drive, groups, start in cases:
+        run = _Run(modes, drive, groups, cycles, window, np.inf, start, None, run)
+        out.append(run.brief())
+    return out
+
+
+class _Run:
+    """Rows as they come: what is summed is summed, all but turning points and slips is forgotten before the window.
+
+    like: a run that has ended, whose arrays may be taken.
+    """
+
+    def __init__(self, modes, drive, groups, cycles, window, travel, start, memory, like=None):
         self.modes, self.drive, self.groups, self.window = modes, drive, tuple(groups), window
-        self.kernels, self.dense = warm_up()
-        self.table, self.plant = table_of(self.groups), plant_of(modes)
-        if np.any(~self.plant.faces.any(axis=1) & (self.table.static > 0)):
+        self.kernels, self.dense, self.reader = warm_up()
+        self.plant, old = plant_of(modes), like.arrays if like is not None else (None,) * 7
+        n, count, table = modes.omega.size, max(1, ceil(cycles - 1e-9)), table_of(self.groups)
+        if np.any(~self.plant.faces.any(axis=1) & (table.static > 0)):
             raise PatchfemError("structure.mode.slide: no mode moves the interface, so friction cannot act")
-        self.clock, self.room = clock_of(drive, len(self.groups)), room_of(self.plant)
-        self.reading, self.rigid = room_of(self.plant), bool(self.table.static.any())
-        n, count = modes.omega.size, max(1, ceil(cycles - 1e-9))
-        self.motion = np.zeros((2, n))
-        if start is not None:
-            self.motion[:] = start.z, start.v
-        fresh = virgin(self.table, self.plant.faces @ self.motion[0])
-        self.memory = fresh if memory is None else type(fresh)(*(part.copy() for part in memory))
+        motion = np.zeros((2, n)) if start is None else np.array([start.z, start.v], float)
+        fresh = virgin(table, self.plant.faces @ motion[0])
+        memory = fresh if memory is None else type(fresh)(*(part.copy() for part in memory))
         wanted = np.zeros(count)
         wanted[max(0, int(cycles + 1e-9)) - 1::-window] = 1.0  # the last whole cycle of every window
-        self.books, self.cycles, self.period = books_of(count, wanted, travel), cycles, drive.period
-        alone = not self.rigid and one.serves(self.plant, self.clock, travel)
-        self.alone = one.rig_of(self.plant) if alone else None
-        self.lines = one.room_of() if self.alone is not None else None
-        self.last = one.last_of(self.table.reach.shape[1])
+        new = (table, memory, past_of(self.plant, table), clock_of(drive, len(self.groups)),
+               books_of(count, wanted, travel), room_of(self.plant), room_of(self.plant))
+        self.arrays = tuple(map(into, old, new))
+        self.table, self.memory, self.past, self.clock, self.books, self.room, self.spare = self.arrays
+        self.motion, self.cycles, self.period = motion, cycles, drive.period
         self.width = self.kernels.HEAD + 2 * n + self.kernels.EACH * len(self.groups)
         self.early, self.kept, self.events, self.count = [], 0, [], 0
-        self.outcome, self.snapshots = None, []
+        self.rigid, self.outcome, self.snapshots = bool(self.table.static.any()), None, []
         self.before = self._ways(self.plant.faces @ self.motion[1], np.abs(self.plant.faces) @ np.abs(self.motion[1]))
-        self.passed, self.repeats = False, False
+        self.passed, self.repeats, self.marked = False, False, np.zeros(0, bool)
         self.begun = self.kernels.stored(self.motion, self.plant, self.table, self.memory)
-        still = self.kernels.stored(np.zeros_like(self.motion), self.plant, self.table, self.memory)
-        self.stretched = still - float(np.sum(self.memory.worked - self.memory.lost))  # [J] from before the books began
+        self.rows = np.empty((CHUNK, self.width)) if like is None or like.width != self.width else like.rows
 
-    def until(self, cycles: float, whole: bool, progress=None) -> list:
-        """Rows up to a time in cycles: all of them, or where not `whole` only turning points and slips."""
-        out, stop = [], place(cycles * self.period, self.period)
-        rows = np.empty((CHUNK, self.width))
-        code = self.kernels.FULL
-        while code == self.kernels.FULL and not self.passed:
-            code, used = self._march(stop, rows)
-            if code == self.kernels.PILED:
-                raise NotConverged(f"dynamics: events pile up at t = {rows[max(used - 1, 0), 0]:.9g} s")
-            if code == self.kernels.OPEN:
-                raise NotConverged("dynamics: no state of stick and slip that satisfies the law of friction was found "
-                                   "after an event; bring friction.kinetic nearer to static, or use method = "
-                                   "\"march\"")
-            if code == self.kernels.TRAVEL:
-                self.passed = True
-                break
-            done = rows[:used]
-            marked = self._note(done) | (done[:, 4] == self.kernels.TURNED)
-            if whole:
-                out.append(done.copy())
-            elif self.kept < CORNERS:
-                self.early.append(done[marked])
-                self.kept += int(marked.sum())
+    def until(self, cycles: float, keep=None, progress=None) -> None:
+        """Run up to a time in cycles; keep: called with the rows as they come, None where no row is wanted.
+
+        Where the motion repeats and rows are not wanted one by one, the cycles left are the last one.
+        """
+        stop, rows = place(cycles * self.period, self.period), self.rows[:0] if keep is None else self.rows
+        while not self.passed:
+            code, done = self._march(stop, rows)
+            if keep is not None:
+                keep(done)
             if progress is not None:
                 progress(min(self.now / (self.cycles * self.period), 1.0))
-        return out
+            if code == self.kernels.REPEATS and keep in (None, self._keep):
+                self._count_on(int(stop[0]), rows)
+            elif code == self.kernels.DONE:
+                break
 
     def _ways(self, speeds, sizes) -> np.ndarray:
         """Signs (i,) of the slip of rigid elements at speeds (i,) [m/s] that are added from sizes (i,)."""
         return np.where((self.table.static > 0) & (np.abs(speeds) > NOISE * sizes), np.sign(speeds), 0.0)
 
     def _march(self, stop, rows) -> tuple:
-        """(code, rows used) of the compiled loop, of one mode its own."""
-        if self.alone is None:
-            return self.kernels.march(stop, self.motion, self.plant, self.table, self.memory, self.clock, self.books,
-                                      self.room, rows)
-        return load(f"{ALONE}.one_kernels").march(stop, self.motion, self.alone, self.table, self.memory, self.clock,
-                                                  self.books, self.last, self.lines, rows)
+        """(code, rows done (k, w)) of the compiled loop."""
+        code, used = self.kernels.march(stop, self.motion, self.plant, self.table, self.memory, self.past, self.clock,
+                                        self.books, self.room, rows)
+        if code == self.kernels.PILED:
+            raise NotConverged(f"dynamics: events pile up at t = {rows[max(used - 1, 0), 0]:.9g} s")
+        if code == self.kernels.OPEN:
+            raise NotConverged("dynamics: no state of stick and slip that satisfies the law of friction was found "
+                               "after an event; bring friction.kinetic nearer to static, or use method = \"march\"")
+        self.passed = code == self.kernels.TRAVEL
+        return code, rows[:0 if self.passed else used]
+
+    def _into(self, out: list):
+        """What takes rows into a list, their events noted."""
+        def keep(rows) -> None:
+            self._note(rows)
+            out.append(rows.copy())
+
+        return keep
+
+    def _keep(self, rows) -> None:
+        """Keep the turning points and slips of rows from before the window."""
+        self.marked = self._note(rows) | (rows[:, 4] == self.kernels.TURNED)
+        if self.kept < CORNERS:
+            self.early.append(rows[self.marked])
+            self.kept += int(self.marked.sum())
+
+    def _count_on(self, end: int, rows) -> None:
+        """Count the cycles up to the last one before the number `end`, or before the next segment of the drive, as the
+        next one, bit by bit, of a motion that repeats; rows: room, where that cycle wants more all are run."""
+        books, begin, k = self.books, int(self.clock.now[0]), int(self.clock.now[2]) + 1
+        if k < len(self.clock.segments):
+            end = min(end, int(self.clock.segments[k, 0]))
+        end -= 1  # the last one is run: it crosses the border
+        many = end - begin - 1
+        if many < 1:
+            return
+        sums = books.ledger, self.memory.worked, self.memory.lost
+        before, noted, asked = [part.copy() for part in sums], (len(self.events), self.count), books.wanted[begin]
+        books.wanted[begin] = 1.0
+        code, done = self._march((begin + 1.0, 0.0), rows)
+        books.wanted[begin] = asked
+        if len(rows):
+            self._keep(done)
+        if code != self.kernels.DONE:
+            return
+        before[0][[LARGEST, SLIPPED]] = books.ledger[[LARGEST, SLIPPED]]
+        for part, was in zip(sums, before):
+            part += many * (part - was)
+        for part in (books.extremes, books.phasors):
+            part[begin + 1:end] = part[begin]
+        books.phasors[begin:end] *= books.wanted[begin:end, None]
+        self.clock.now[0] = end
+        if len(rows):
+            self._again(done, many, *noted)
+
+    def _again(self, rows, many: int, first: int, count: int) -> None:
+        """Keep the rows (k, w) of a cycle, and its events from the list's number `first` on, `many` times more."""
+        turned = rows[self.marked]
+        few = max(0, min(many, -(-(CORNERS - self.kept) // max(len(turned), 1))))
+        self.early.append(_later(turned, self.period * np.arange(1, few + 1)))
+        self.kept += few * len(turned)
+        found = np.concatenate([np.empty((0, 5)), *self.events[first:]])
+        few = min(many, -(-ROOM // max(len(found), 1)))
+        self.events.append(_later(found, self.period * np.arange(many - few + 1, many + 1)))
+        self.count += many * (self.count - count)
 
     def _note(self, rows) -> np.ndarray:
         """Note stops, releases and reversals of all interfaces and borders of the drive; which rows (k,) begin with a
@@ -194,23 +258,48 @@ class _Run:
 
     def go(self, frames: int, progress) -> PieceRun | None:
         """The whole run; None where its output passed the travel."""
-        end = self.cycles
+        end, wide, late, memory = self.cycles, [], [], self.memory
+        still = self.kernels.stored(np.zeros_like(self.motion), self.plant, self.table, memory)
+        self.stretched = still - float(np.sum(memory.worked - memory.lost))  # [J] from before the books began
         first, last = max(0.0, end - self.window), max(0.0, end - 1)
         begin = max(0.0, min(first, end - 2))
         if begin > 0:
-            self.until(begin, False, progress)
-        wide = self.until(first, True, progress) if first > begin else []
-        late = []
-        before = float(self.before[0]) if len(self.before) else 0.0
-        self.repeats = self.alone is not None and bool(self.last[0, one.REPEATS])
-        for stop in (first + 1, last):  # the drift asks for the first and the last cycle of the window
-            if first < stop < end:
-                late += self.until(stop, True, progress)
+            self.until(begin, self._keep, progress)
+        if first > begin:
+            self.until(first, self._into(wide), progress)
+        self.repeats = bool(self.past.about[REPEATS])
+        for stop in self._stops(first, last):
+            self.until(stop, self._into(late), progress)
         for k in range(frames):
-            late += self.until(last + (end - last) * (k + 1) / frames, True)
+            self.until(last + (end - last) * (k + 1) / frames, self._into(late))
             self.snapshots.append(self._snapshot())
-        late += self.until(end, True, progress)
-        return None if self.passed else self._close(wide, late, before)
+        self.until(end, self._into(late), progress)
+        return None if self.passed else self._close(wide, self._ended(late))
+
+    def brief(self) -> PieceRun:
+        """The run without histories and events; of a motion that repeats few cycles are read."""
+        end, late = self.cycles, []
+        self.until(end - self.window)
+        self.repeats = bool(self.past.about[REPEATS])
+        if self.repeats:
+            self.until(end - min(WHOLE, self.window))
+        self.until(end, lambda rows: late.append(rows.copy()))
+        return self._found(self._ended(late))
+
+    def _stops(self, first: float, last: float) -> list:
+        """Times in cycles at which every cycle of the window ends but the last, of a run that ends within one."""
+        whole = abs(self.cycles - round(self.cycles)) < 1e-9
+        return [] if whole else [stop for stop in self.cycles - np.arange(self.window, 0, -1) if first < stop <= last]
+
+    def _ended(self, late) -> np.ndarray:
+        """Rows (k + 1, w) of the window, and one of no length for its end."""
+        head, each, n, memory = self.kernels.HEAD, self.kernels.EACH, self.modes.omega.size, self.memory
+        row = np.zeros((1, self.width))
+        row[0, 0], row[0, 3], row[0, 5:7] = self.now, self.clock.now[2], self.clock.now[:2]
+        row[0, head:head + n], row[0, head + n:head + 2 * n] = self.motion
+        for k, part in ((0, memory.force), (4, memory.slip), (5, memory.worked), (6, memory.lost), (8, memory.place)):
+            row[0, head + 2 * n + k::each] = part
+        return np.concatenate([*late, row])
 
     @property
     def now(self) -> float:
@@ -222,45 +311,40 @@ class _Run:
                 "rate": float(self.plant.faces[0] @ self.motion[1]), "slip": float(self.memory.slip[0]),
                 "stretch": stretches(self.groups[0], self.memory, 0)}
 
-    def _ring(self, late, before: float) -> tuple | None:
-        """`PieceRun.ring` of the rows of the window; before: way of the slip before them."""
-        if self.alone is None or len(self.drive.segments) != 1:
-            return None
-        found, last = np.zeros(one.NUMBERS), self.clock.segments[0]
-        load(f"{ALONE}.window_kernels").rings(late, before, self.period, (last[5], last[4], last[3]), self.alone, found)
-        if self.table.count[0] > 1:
-            return (0.0, 0.0, 0.0) if found[one.SWING] < one.RINGS else None
-        return one.ring_of(self.alone, self.table.stiff[0, -1], found[one.RING])
-
-    def _close(self, wide, late, before: float) -> PieceRun:
-        """Everything kept, as a PieceRun."""
-        none, late = np.empty((0, self.width)), np.concatenate(late)
-        stop = late[-1, 0] + late[-1, 1]
-        early, begun = np.concatenate([none, *self.early]), late[0, 0]
-        number = max(LEAST, round((stop - begun) / self.period * SAMPLES) + 1)
-        window = self.sample(late, np.linspace(begun, stop, number))
-        parts = [self._rows_as(early, np.arange(len(early)), np.zeros(len(early)), early[:, 0])] if len(early) else []
-        wide = np.concatenate([none, *wide])
-        if len(wide):
-            span = begun - wide[0, 0]
-            more = self.sample(wide, np.linspace(wide[0, 0], begun, round(span / self.period * SAMPLES) + 1))
-            parts.append(_part(more, more.time < begun))
+    def _found(self, rows) -> PieceRun:
+        """What the run shows without histories, off the rows of its window."""
+        begun, stop, faces = rows[0, 0], rows[-1, 0], len(self.groups)
+        span = stop - begun
+        numbers = np.zeros(OF_RUN), np.zeros((faces, OF_FACE))
+        cycles = max(1, round(span / self.period))
+        self.reader.read(rows, cycles, self.plant, self.clock, float(self.drive.moving), self.spare, *numbers)
+        reading = Reading(*numbers, float(span), self.period)
         done = slice(0, max(1, ceil(stop / self.period - 1e-9)))
         names = ("work_in", "viscous", "power")
         book = dict(zip(names, map(float, self.books.ledger[:3]))) | {"friction": float(self.books.ledger[4])}
         now = self.kernels.stored(self.motion, self.plant, self.table, self.memory)
-        book |= {"stored": now - self.begun, "peak_stored": max(float(self.books.ledger[5]), self.begun)}
-        log = self.log()
-        starts = _starts(log, begun, self.period)
-        reactions = np.zeros(len(self.groups))
-        high = self.dense.peak(late, self.plant, self.clock, float(self.drive.moving), self.reading, reactions)
-        phasors = self.books.phasors[done] @ [1, 1j]
-        loops, *moved = self._loops(late)
-        loops = tuple(part._replace(force=max(part.force, float(held))) for part, held in zip(loops, reactions))
-        return PieceRun(_chain([*parts, window]), window, self.books.extremes[done], phasors, book, self.outcome,
-                        loops, starts, float(high), log, self.snapshots, int(self.books.ledger[6]), *moved,
-                        stop / self.period, (Start(*self.motion.copy()), self.memory), self._ring(late, before),
-                        self.repeats)
+        book |= {"stored": now - self.begun, "peak_stored": max(float(self.books.ledger[LARGEST]), self.begun)}
+        alone = len(self.drive.segments) == 1 and self.plant.faces.shape == (1, 1) and self.plant.faces[0, 0] != 0 \
+            and not self.rigid
+        ring = ring_of(self.plant, self.table, reading) if alone else None
+        end = Start(*self.motion.copy()), type(self.memory)(*(part.copy() for part in self.memory))
+        ledger, phasors = self.books.ledger, self.books.phasors[done] @ [1, 1j]
+        return PieceRun(self.books.extremes[done].copy(), phasors, book, self.outcome, reading, int(ledger[6]),
+                        stop / self.period, end, bool(ledger[SLIPPED]), ring, self.repeats)
+
+    def _close(self, wide, rows) -> PieceRun:
+        """Everything kept, as a PieceRun."""
+        none, late, begun, stop = np.empty((0, self.width)), rows[:-1], rows[0, 0], rows[-1, 0]
+        early, wide = np.concatenate([none, *self.early]), np.concatenate([none, *wide])
+        number = max(LEAST, round((stop - begun) / self.period * SAMPLES) + 1)
+        window = self.sample(late, np.linspace(begun, stop, number))
+        parts = [self._rows_as(early, np.arange(len(early)), np.zeros(len(early)), early[:, 0])] if len(early) else []
+        if len(wide):
+            span = begun - wide[0, 0]
+            more = self.sample(wide, np.linspace(wide[0, 0], begun, round(span / self.period * SAMPLES) + 1))
+            parts.append(_part(more, more.time < begun))
+        return replace(self._found(rows), response=_chain([*parts, window]), window=window, log=self.log(),
+                       snapshots=self.snapshots)
 
     def log(self) -> EventLog:
         """The last stops and releases."""
@@ -287,7 +371,7 @@ class _Run:
     def dense_values(self, rows, owner, tau) -> np.ndarray:
         """Columns of `dense_kernels.evaluate` at tau (k,) [s] after the starts of the rows owner (k,)."""
         out = np.empty((owner.size, 2 * self.modes.omega.size + 1 + 6 * len(self.groups)))
-        self.dense.evaluate(rows, owner, tau, self.plant, self.clock, self.reading, out)
+        self.dense.evaluate(rows, owner, tau, self.plant, self.clock, self.spare, out)
         return out
 
     def _rows_as(self, rows, owner, tau, time) -> Response:
@@ -310,53 +394,12 @@ class _Run:
                         v @ modes.output, accel @ modes.output + base, base, forces[:, 0].copy(), slips[:, 0].copy(),
                         extra)
 
-    def _loops(self, rows) -> tuple:
-        """(what the measures ask of every interface over the pieces of the window, half the range of the output, motion
-        of the first slide per cycle), by Gauss points and the ends of the pieces."""
-        owner, tau, weight = self._points(rows)
-        n, out, time = self.modes.omega.size, self.dense_values(rows, owner, tau), rows[owner, 0] + tau
-        turn = np.exp(-2j * np.pi * time / self.period) * weight
-        begin = self.dense_values(rows, np.arange(len(rows)), np.zeros(len(rows)))
-        close = self.dense_values(rows[-1:], np.zeros(1, np.int64), rows[-1:, 1].copy())
-        ends, span = np.concatenate([begin, close]), rows[:, 1].sum()
-        found = []
-        for f in range(len(self.groups)):
-            at = 2 * n + 1 + 6 * f
-            slide, force, slip, work = (ends[:, at + k] for k in (0, 2, 3, 4))
-            stuck = rows[rows[:, self._at(f, 2)] < SLIPS, 1].sum()
-            middle = slide.mean()
-            q, pull = (2 / span * np.sum(turn * part) for part in (out[:, at] - middle, out[:, at + 2]))
-            found.append(Loop(complex(q), complex(pull),
-                              float(self.memory.worked[f] - work[0]), float(np.ptp(slip)), float(stuck),
-                              float(np.abs(force).max())))
-        output, felt = ends[:, :n] @ self.modes.output, self._as_response(out, time).acceleration
-        waves = tuple(complex(2 / span * np.sum(weight * felt * np.exp(-2j * np.pi * k * time / self.period)))
-                      for k in (1, 3))
-        drift = self._drift(time, weight, out[:, 2 * n + 1], rows[0, 0], rows[-1, 0] + rows[-1, 1], ends[:, 2 * n + 1])
-        return tuple(found), float(np.ptp(output)) / 2, drift, waves
 
-    def _points(self, rows) -> tuple:
-        """(row (k,), time in it (k,) [s], weight (k,) [s]) of Gauss points that integrate products of the motion and
-        of the third harmonic over the pieces of rows."""
-        springs = rows[:, self._at(0, 1)::self.kernels.EACH][:, :len(self.groups)]
-        springs = np.where(np.isfinite(springs), springs, 0.0)
-        square, damp = self.plant.square_most + springs @ self.plant.reach, 0.5 * self.plant.damping_most
-        rate = np.maximum(damp + np.sqrt(damp**2 + square), 6 * np.pi / self.period)
-        count = np.minimum(np.searchsorted(GAUSS, rate * rows[:, 1]), GAUSS.size - 1).clip(2)
-        owner = np.repeat(np.arange(len(rows)), count)
-        each = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
-        half = rows[owner, 1] / 2
-        return owner, half * (1 + PLACE[count[owner], each]), half * WEIGHT[count[owner], each]
-
-    def _drift(self, time, weight, slide, start: float, end: float, ends) -> float:
-        """Mean of a slide in the last cycle of [start, end] less that in the first, per cycle between them [m]; in
-        fewer than 1.5 cycles the motion from end to end."""
-        cycles = (end - start) / self.period
-        if cycles < 1.5:
-            return float(ends[-1] - ends[0]) / max(cycles, 1e-9)
-        means = [np.sum((weight * slide)[part]) / np.sum(weight[part])
-                 for part in (time < start + self.period, time > end - self.period)]
-        return float(means[1] - means[0]) / (cycles - 1)
+def _later(rows, times) -> np.ndarray:
+    """Rows (k, w), the first column a time [s], once for each of some times (m,) [s] later."""
+    out = np.tile(rows, (len(times), 1))
+    out[:, 0] += np.repeat(times, len(rows))
+    return out
 
 
 _COLUMNS = ("time", "modal", "modal_rate", "slide", "slide_rate", "output", "output_rate", "acceleration",
@@ -366,17 +409,6 @@ _COLUMNS = ("time", "modal", "modal_rate", "slide", "slide_rate", "output", "out
 def _part(response: Response, which) -> Response:
     extra = {name: part[:, which] if name == "ledger" else part[which] for name, part in response.extra.items()}
     return Response(*(getattr(response, name)[which] for name in _COLUMNS), extra)
-
-
-def _starts(log: EventLog, begun: float, period: float) -> np.ndarray:
-    """Phases modulo pi of the releases of the first interface after `begun` [s].
-
-    Where a slip turns at the limit a release stands between two stops at one time: nothing sticks or slips there.
-    """
-    mine = log.interface == 0
-    time, phase = log.time[mine], log.phase[mine]
-    lasts = np.append(np.diff(time), np.inf) > 1e-9 * period
-    return phase[(np.abs(log.what[mine]) == RELEASE) & lasts & (time > begun)] % np.pi
 
 
 def _chain(parts) -> Response:

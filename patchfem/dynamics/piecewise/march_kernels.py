@@ -8,12 +8,25 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from .drive_kernels import KIND, RATE, SINE, drive_series, phase_of, value_now
 from .memory_kernels import carried, give_way, holds, pulled, tangent, threshold, turn
-from .search_kernels import OUTPUT_TURNS, RELEASES, STOPS, TURNS, YIELDS, crossing, moved, next_event, speed_series
+from .repeat_kernels import come_back, forget
+from .search_kernels import (
+    NOTHING,
+    OUTPUT_TURNS,
+    RELEASES,
+    STOPS,
+    TURNS,
+    YIELDS,
+    crossing,
+    moved,
+    next_event,
+    speed_series,
+)
 from .series_kernels import EPS, NONE, REACH, fastest, motion_series, powers, value
 from .stick_kernels import LAST, at_rest, keep, settle
 from .sum_kernels import sums
 
-DONE, FULL, TRAVEL, PILED, OPEN = 0, 1, 2, 3, 4  # how `march` returns; OPEN: no choice of what holds obeys the law
+# how `march` returns; OPEN: no choice of what holds obeys the law
+DONE, FULL, TRAVEL, PILED, OPEN, REPEATS = 0, 1, 2, 3, 4, 5
 HEAD, EACH = 8, 9  # columns of a row: of the piece, then of every interface behind z and v
 # what begins a row: nothing, a yield, a turning point, a change of stick and slip, a border of the drive
 ON, YIELDED, TURNED, SWITCHED, BORDERED = 0, 1, 2, 3, 4
@@ -97,6 +110,8 @@ def advance(u, h, top, motion, plant, table, memory, clock, books, room):
         memory.force[f] += stiff * step
         ledger[3] += work
         ledger[4] += limit * abs(step)
+        if share >= 0.5:
+            ledger[7] = 1.0
     out = 0.0
     for i in range(n):
         place, rate = coefs[top, i], top * coefs[top, i]
@@ -222,22 +237,26 @@ def passed(top, plant, motion, room, travel, u):
 
 
 @njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
-def march(stop, motion, plant, table, memory, clock, books, room, rows):
+def march(stop, motion, plant, table, memory, past, clock, books, room, rows):
     """Run from the clock's time to `stop` (cycle, offset [s]).
 
-    motion (2, n), memory, clock and books move along; rows (r, HEAD + 2 n + EACH i): one per piece, none are written
-    where r = 0. Returns (DONE, FULL, TRAVEL, PILED or OPEN, rows used). Cost: 0.2 to 0.5 us a piece of one mode.
+    motion (2, n), memory, clock and books move along; past: the state a cycle before, as `repeat_kernels` notes it;
+    rows (r, HEAD + 2 n + EACH i): one per piece, none are written where r = 0. Returns (DONE, FULL, TRAVEL, PILED,
+    OPEN, or REPEATS at the first border from where on every cycle is the last one bit by bit, rows used). Where it goes
+    on does not change a bit. Cost: 0.2 to 0.5 us a piece of one mode.
     """
-    used, now = 0, clock.now
+    used, now, came = 0, clock.now, False
     first, now[3] = max(now[3], float(YIELDED)), 0.0
     faces = len(plant.reach)
     if room.orders[0, 0] < 0.0 and not begin(motion, plant, table, memory, clock, room):
         return OPEN, used
-    for f in range(faces):
-        memory.force[f] = pulled(f, table, memory)
+    if now[5] == 0.0:
+        for f in range(faces):
+            memory.force[f] = pulled(f, table, memory)
+    now[5] = 0.0
     while now[0] < stop[0] or (now[0] == stop[0] and now[1] < stop[1]):
         if used == rows.shape[0] and used > 0:
-            now[3] = first
+            now[3], now[5] = first, 1.0  # the forces go on as they are
             return FULL, used
         left, segment = left_of(clock, stop), clock.segments[int(now[2])]
         theta = phase_of(segment, now[0], now[1], clock.period[0])
@@ -276,6 +295,12 @@ def march(stop, motion, plant, table, memory, clock, books, room, rows):
             advance(u, h, top, motion, plant, table, memory, clock, books, room)
             if whole and (u == 1.0 or now[1] + u * h >= now[1] + left):  # an event on the border, to the last digit
                 changes = arrive(clock, stop, left)
+                if now[1] == 0.0 and what == NOTHING:
+                    came = come_back(motion, plant, memory, clock, past)
+                elif now[1] == 0.0:
+                    forget(past)
+                for f in range(faces):  # at every border, so that a run in parts is the run
+                    memory.force[f] = pulled(f, table, memory)
             else:
                 now[1] += u * h
             books.ledger[5] = max(books.ledger[5], stored(motion, plant, table, memory))
@@ -293,9 +318,12 @@ def march(stop, motion, plant, table, memory, clock, books, room, rows):
             return OPEN, used
         if what == STOPS:
             return TRAVEL, used
+        if came:
+            now[3] = first
+            return REPEATS, used
     now[3] = first
     return DONE, used
 
 
-__all__ = ["BORDERED", "DONE", "EACH", "EPS", "FULL", "HEAD", "ON", "OPEN", "PILED", "SWITCHED", "TRAVEL", "TURNED",
-           "YIELDED", "march"]
+__all__ = ["BORDERED", "DONE", "EACH", "EPS", "FULL", "HEAD", "ON", "OPEN", "PILED", "REPEATS", "SWITCHED", "TRAVEL",
+           "TURNED", "YIELDED", "march"]

@@ -10,7 +10,7 @@ from ...core import ModalBasis, NotConverged, Response, Start
 from . import histories
 from .elements import Memory
 from .period import PeriodMap, Point
-from .plant import books_of, plant_of
+from .plant import books_of, past_of, plant_of
 from .steady import turning
 
 ROWS = 256  # pieces of half a period for which there is room at first
@@ -40,6 +40,7 @@ class Orbits:
         self.wide = self.kernels.HEAD + 2 * modes.omega.size + self.kernels.EACH * len(groups)
         self.rows, self.books = np.zeros((ROWS, self.wide)), books_of(1, np.ones(1))
         self.forces = np.zeros(len(groups))
+        self.past = past_of(self.one.plant, self.one.table)
         self._given(modes)
 
     def _given(self, modes: ModalBasis) -> None:
@@ -94,7 +95,8 @@ class Orbits:
         one, key = self.one, (name, id(plant), moving)
         if key not in self.held:
             self.held[key] = self.peak.held(plant, one.clock, moving, one.room, self.forces) if name == "peak" else \
-                self.march.held(one.motion, plant, one.table, one.memory, one.clock, self.books, one.room, self.rows)
+                self.march.held(one.motion, plant, one.table, one.memory, self.past, one.clock, self.books, one.room,
+                                self.rows)
         return self.held[key]
 
 

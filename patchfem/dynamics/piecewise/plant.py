@@ -6,6 +6,7 @@ import numpy as np
 
 from ...compiled import kernels
 from ...core import ModalBasis, PatchfemError
+from .elements import Memory, Table, virgin
 
 kinds, series = kernels("dynamics.piecewise.drive_kernels"), kernels("dynamics.piecewise.series_kernels")
 
@@ -40,20 +41,21 @@ def plant_of(modes: ModalBasis) -> Plant:
     """The Plant of a basis."""
     damping, faces = np.array(modes.dampers, float), np.array(modes.interfaces, float)
     output = np.array(modes.output, float)
-    along = next((k for k, face in enumerate(faces) if not np.any(np.outer(face, output) - np.outer(output, face))), -1)
-    coupled = bool(np.any(damping != np.diag(np.diag(damping))))
+    along = next((k for k, face in enumerate(faces) if len(face) == 1 or
+                  not np.any(np.outer(face, output) - np.outer(output, face))), -1)
+    coupled = len(damping) > 1 and bool(np.any(damping != np.diag(np.diag(damping))))
+    most = np.linalg.norm(damping, 2) if coupled else np.abs(damping).max()
     square, reach = np.array(modes.omega, float)**2, (faces**2).sum(axis=1) / modes.mass
     if faces.shape == (1, 1):
         square, reach = tuple(square.tolist()), tuple(reach.tolist())
     return Plant(square, np.ascontiguousarray(damping), np.array(modes.base, float), np.ascontiguousarray(faces),
-                 output, reach, float(modes.mass), float(modes.omega.max()**2), float(np.linalg.norm(damping, 2)),
-                 int(coupled), along)
+                 output, reach, float(modes.mass), float(modes.omega.max()**2), float(most), int(coupled), along)
 
 
 class Clock(NamedTuple):
-    """Time of a run: now (6,) cycle, offset in it [s], segment of the drive, what begins the next row, the rest of a
-    loop of one mode; segments (p, 12) rows of `drive_kernels`; period (1,) [s]; rest (i + 1,) 1 where a slide, or last
-    the output, stands still at a turning point."""
+    """Time of a run: now (6,) cycle, offset in it [s], segment of the drive, what begins the next row, and last 1 where
+    the loop stopped for want of rows; segments (p, 12) rows of `drive_kernels`; period (1,) [s]; rest (i + 1,) 1 where
+    a slide, or last the output, stands still at a turning point."""
 
     now: np.ndarray
     segments: np.ndarray
@@ -116,6 +118,42 @@ def _lines(record) -> list:
     return [*rows, (float(record.time[-1]), kinds.LINE, *[0.0] * 7)]
 
 
+def into(old, new):
+    """A tuple of arrays, or of such tuples, in the arrays of another: compiled code knows where these are, which takes
+    most of the time of a short call. `new` itself where `old` is None or has other shapes."""
+    if old is None or not _fits(old, new):
+        return new
+    for mine, given in zip(old, new):
+        if isinstance(mine, tuple):
+            into(mine, given)
+        else:
+            mine[...] = given
+    return old
+
+
+def _fits(old, new) -> bool:
+    """Whether two tuples of arrays have the same shapes."""
+    return all(_fits(mine, given) if isinstance(mine, tuple) else mine.shape == given.shape
+               for mine, given in zip(old, new))
+
+
+class Past(NamedTuple):
+    """State at the last border of a cycle, by which `repeat_kernels` knows a motion that repeats.
+
+    about (3,): segment of the drive then, -1 before there is a state; cycle up to which states lay far apart; 1 where
+    the motion repeats to the last bit. motion (2, n); memory: of the elements.
+    """
+
+    about: np.ndarray
+    motion: np.ndarray
+    memory: Memory
+
+
+def past_of(plant: Plant, table: Table) -> Past:
+    """The Past of a run that begins."""
+    return Past(np.array([-1.0, 0.0, 0.0]), np.zeros((2, len(plant.square))), virgin(table, np.zeros(len(plant.reach))))
+
+
 class Room(NamedTuple):
     """Room of the loop: coefs (terms, n), waves (3, terms) of the drive, polys (i + 3, terms), pull and springs (i,),
     nodes (n, 4) of the sums, hulls of the search for roots.
@@ -165,9 +203,9 @@ def room_of(plant: Plant) -> Room:
 
 class Books(NamedTuple):
     """What a run sums: ledger (8,) work of the drive, viscous loss, integral of its |power|, friction work, energy
-    dissipated, largest energy stored [J], pieces, events; extremes (c, 2) [m] of the output per cycle; phasors (c, 2)
-    of its drive-frequency part, real and imaginary, in the cycles where wanted (c,) is 1; limits (2,): travel [m],
-    idle events."""
+    dissipated, largest energy stored [J], pieces, 1 where an interface slipped by half or more; extremes (c, 2) [m] of
+    the output per cycle; phasors (c, 2) of its drive-frequency part, real and imaginary, in the cycles where wanted
+    (c,) is 1; limits (2,): travel [m], idle events."""
 
     ledger: np.ndarray
     extremes: np.ndarray

@@ -86,8 +86,13 @@ def seen(model, patch, window, extremes, book: dict, **more) -> Seen:
     fields of Seen, with `drive` where it is not the model's own.
     """
     drive = more.pop("drive", model.rig.drive)
-    stiffness = 0.0 if model.rig.beside_first(window.modal) > SHARED else model.rig.stiffness
-    return Seen(window, drive, extremes, book, borne(model, patch), stiffness, sinusoidal(drive), **more)
+    return Seen(window, drive, extremes, book, borne(model, patch), stiffness_of(model, window), sinusoidal(drive),
+                **more)
+
+
+def stiffness_of(model, window) -> float:
+    """Stiffness [N/m] of the first mode as the contact meets it, 0 where another mode carries part of the slide."""
+    return 0.0 if model.rig.beside_first(window.modal) > SHARED else model.rig.stiffness
 
 
 def sampled_loop(window, drive, work: float, force: complex | None = None) -> tuple | None:

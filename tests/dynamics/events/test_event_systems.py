@@ -7,7 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 from event_reference import basis_of, march_reference, random_basis, run_reference
-from event_run import combine, rows_of, run, simulate
+from event_run import combine, rows_of, run, simulate, starts
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -401,7 +401,7 @@ def test_table_check_15_bonded_spring(hertz, level, size, top):
 def test_table_check_9_waveform():
     done = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.82802, 0.82802, 200)
     stops = done.log.phase[-9:][done.log.what[-9:] == STOP] % pi
-    np.testing.assert_allclose(np.degrees(done.starts), 42.69, atol=0.03)
+    np.testing.assert_allclose(np.degrees(starts(done)), 42.69, atol=0.03)
     np.testing.assert_allclose(np.degrees(stops), 164.09, atol=0.03)
     w = done.window
     assert np.abs(w.slide_rate).max() == pytest.approx(0.2529, abs=1e-3)

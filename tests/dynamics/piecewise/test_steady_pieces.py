@@ -1,5 +1,7 @@
 """Periodic motions by the map from yield to yield: closed form, long runs, finite differences, energies and limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -194,3 +196,20 @@ def test_refuses_what_does_not_repeat():
     free = basis([1.0], [0.0], [1.0], [1.0], [1.0])
     with pytest.raises(NotConverged, match="grows from period to period"):  # 0.7 is below pi/4
         steady(free, BaseSine(1.0, 1.0), [elements_of([20.0], [0.7 / 20])])
+
+
+def test_exact_a_last_step_that_forgets_a_turn_ends_the_search():
+    """Newton's last step may leave a turning place that the period behind it slips past: the point before it counts."""
+    r = np.random.default_rng(1068)
+    count, omega = int(np.exp(r.uniform(0, np.log(40)))), r.choice([0.0, 1.0, np.exp(r.uniform(-1, 2))])
+    zeta = float(r.choice([0.0, 0.003, 0.1, 1.0, 2.5]))
+    shares, mass = r.uniform(0.3, 1.5, 3) * r.choice([-1, 1], 3), float(np.exp(r.uniform(-1, 1)))
+    modes = replace(basis([omega], [zeta], *([one] for one in shares)), mass=mass)
+    y, k = np.exp(r.uniform(-3, 0, count)), np.exp(r.uniform(-1, 2, count))
+    k *= mass * np.exp(r.uniform(-2, 0.3)) / (k @ y)
+    drive, groups = BaseSine(1.0, float(np.exp(r.uniform(-1, 1)))), [elements_of(k, y)]
+    done = simulate(modes, drive, groups, 40, window=4)
+    one = settled(modes, drive, groups, *done.end)
+    on = simulate(modes, drive, groups, 2, window=1, start=one.start, memory=one.memory)
+    assert one.amplitude == pytest.approx(on.swing, rel=1e-9)
+    np.testing.assert_allclose([on.end[0].z, on.end[0].v], [one.start.z, one.start.v], atol=1e-9 * on.swing)

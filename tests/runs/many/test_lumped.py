@@ -134,16 +134,17 @@ def test_exact_what_is_extrapolated_far_is_that_of_a_single_run(monkeypatch):
 def test_exact_cycles_that_repeat_are_counted_at_once(law, monkeypatch):
     """Damped cases that settle long before their last cycles: one cycle stands for all that are left, with the bits of
     single runs, which move through every one of them."""
-    from patchfem.dynamics.piecewise_one import names_kernels as names
-    from patchfem.runs.many.lumped import pieces
+    from patchfem.dynamics.piecewise import histories
 
     base = base_of(load(SCENE.format(law=LAWS[law], kind="base", kind_size=SIZES["base"])))
     shared = ["drive.cycles=120", "structure.mode.axial.damping=0.1"]
     cases = [build(base.changed([*shared, f"normal.load={load} N"])) for load in ("30", "80")]
-    works, made = [], pieces.made.work_of
-    monkeypatch.setattr(pieces.made, "work_of", lambda *given: works.append(made(*given)) or works[-1])
+    done, march, brief = [], [], histories.briefly
+    monkeypatch.setattr(histories, "briefly", lambda *given: done.extend(brief(*given)) or done[-1:])
+    real = histories._Run._march
+    monkeypatch.setattr(histories._Run, "_march", lambda self, *given: march.append(1) or real(self, *given))
     many = [lumped.solve([case]) for case in cases]
-    assert all(work[5][0, names.REPEATS] == 1 and work[3].now[0] == 120 for work in works)
+    assert done and all(one.repeats and one.cycles_done == 120 for one in done) and len(march) <= 6 * len(done)
     monkeypatch.undo()
     assert list(many[0].outcome) == ["steady"]
     held_against(cases, one_by_one.solve(cases), batch(cases))
@@ -182,30 +183,6 @@ def test_exact_nothing_rings_in_a_motion_that_holds_and_repeats(monkeypatch):
     monkeypatch.setattr(one_by_one, "solve", None)
     many = batch(cases)
     held_against(cases, ones, many)
-
-
-def test_exact_elements_of_all_cases_are_those_of_each():
-    """Sums and numbers of pieces that are made for all cases at once, beside those of one after the other."""
-    from patchfem.dynamics.piecewise.elements import elements_of, table_of
-    from patchfem.runs.many.lumped import pieces
-    from patchfem.runs.rig.pieces import costs
-
-    rng = np.random.default_rng(4)
-    groups = [elements_of(rng.uniform(1, 2, count), rng.uniform(1, 2, count)) for count in (1, 5, 3, 0, 5)]
-    counts, sorts = pieces.tables_of(groups)
-    for group, count, columns in zip(groups, counts, sorts):
-        one = table_of([group])
-        assert count == one.count[0] == group.stiffness.size
-        for column, part in zip(columns, (one.reach, one.stiff, one.limit, one.twice)):
-            np.testing.assert_array_equal(column[:count + 1], part[0])
-            np.testing.assert_array_equal(column[count + 1:], part[0, -1])
-    for case in (one for law in ("elastic-plastic", "iwan") for one in models(law, 6, 5)):
-        rig, *_, group, _ = pieces.row_of(case)
-        all_of = group.stiffness.size
-        for _ in range(pieces.coarsened(case)):
-            group = pieces.paired(group)
-        told = costs.pieces(case) + 2 * (group.stiffness.size - (all_of >> pieces.coarsened(case)))  # an odd one stays
-        assert pieces.most_pieces(np.array([rig]), case.rig.drive.period, [group]) == pytest.approx(told, rel=1e-12)
 
 
 def test_always_few_cells_are_told_from_many():

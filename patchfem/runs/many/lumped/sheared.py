@@ -1,7 +1,7 @@
-"""Patches that slip part by part, on one mode under a sine: the elements of all cases in one compiled call.
+"""Patches that slip part by part, on one mode under a sine, many together.
 
 Each patch is pressed and measured as its run does it. Its elements, and those of its coarser mesh for the error, then
-move beside those of the others, `dynamics.piecewise_one`. A case that sticks, or rings in its sticks, is run by itself.
+move without histories, as `pieces` has it. A case that sticks, or rings in its sticks, is run by itself.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,6 @@ from ....effects import has
 from ....model.model import Model
 from ....model.source import placed
 from ....response.errors import pieces_error
-from ....response.measures import energy_balance
 from ...patch import result as of_patch
 from ...remedies import loose
 from ...results.result import placeless
@@ -27,7 +26,7 @@ from ...rig.pieces.run import Interfaces
 from .. import one_by_one
 from ..answers import Answers
 from . import pieces
-from .columns import MAIN, Runs, answered
+from .columns import answered
 from .lumped import forget, not_one_sine
 
 TOGETHER = 128  # cases of one compiled call: their elements and histories of cycles are held at once
@@ -126,28 +125,19 @@ def _moved(models, held: list, say) -> tuple:
     """(Answers of pressed cases, (n,) whether a case must be run by itself)."""
     cycles = int(models[0].rig.cycles)
     window = min(10, cycles // 10)
-    rows = [pieces.row_of(model, one.fine, one.patch.pressure.load) for model, one in zip(models, held)]
-    fine = pieces.moved(rows, cycles, window, say, LEAST)
-    coarse = pieces.moved([(*row[:3], one.coarse.groups[0], row[4]) for row, one in zip(rows, held)], cycles, window,
+    cases = [pieces.Case(model, one.fine.groups, one.fine.held, one.patch.pressure.load)
+             for model, one in zip(models, held)]
+    fine = pieces.moved(cases, cycles, window, say, LEAST)
+    coarse = pieces.moved([case._replace(groups=one.coarse.groups) for case, one in zip(cases, held)], cycles, window,
                           say, LEAST, steady=False)
-    runs = _with_mesh(fine, coarse, tuple({"elements": int(one.fine.contact.reduction.stiffness.size),
-                                           "interface_nodes": int(one.patch.x.size)} for one in held))
+    chosen = tuple({"elements": int(one.fine.contact.reduction.stiffness.size),
+                    "interface_nodes": int(one.patch.x.size)} for one in held)
+    runs = replace(pieces.with_errors(fine, coarse, pieces_error), chosen=chosen, again=False)
     found, alone, _ = answered(models, runs, pieces.NUMERICS | {"window_cycles": window})
     alone = alone | runs.stuck | coarse.lost
     for case in np.flatnonzero(~alone).tolist():
         _tell(found, case, models[case], held[case], runs.extremes[case])
     return found, alone
-
-
-def _with_mesh(fine: Runs, coarse: Runs, chosen: tuple) -> Runs:
-    """Runs with the errors that runs on coarser meshes tell."""
-    whole = [one.values | {MAIN: one.amplitudes, "energy_balance": energy_balance(one.book)} for one in (fine, coarse)]
-    for case in range(len(chosen)):
-        a, b = ({name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])} for one in whole)
-        told = pieces_error(a, b)
-        for name, value in a.items():
-            fine.errors.setdefault(name, np.zeros(len(chosen)))[case] = told.get(name, abs(value))
-    return replace(fine, chosen=chosen, again=False)
 
 
 def _tell(found: Answers, case: int, model: Model, one: _Pressed, extremes) -> None:

@@ -8,17 +8,17 @@ from ....core import BaseSine, NotConverged
 from ....dynamics.integrated import Integrated
 from ....dynamics.piecewise import elements, histories
 from ....dynamics.piecewise.steady import settled
-from ....dynamics.piecewise_one.steady import settled_alone
 from ....friction.record import law_from
 from ....response import run_events
 from ....response.measures import window_amplitudes
 from ....response.ringing import held_ring
-from ....structure.drive_sizes import sinusoidal
+from ....structure.drive_sizes import largest, sinusoidal, whole
 from ..interface import contact_model
 from ..levels import by_levels, whole_cycles
-from ..reading import Reader, books_of
-from ..solution import Solution
+from ..reading import Reader
+from ..solution import Solution, stiffness_of
 from .costs import refuse_endless
+from .values import read_off
 
 CHANGES = 1e-2  # share of the tolerance by which windows may differ in a motion that has settled
 
@@ -52,11 +52,14 @@ class Pieces(Reader):
         self.groups = found.groups
 
     def integrated(self, run, drive) -> Integrated:
-        """What the series of the pieces give."""
-        works = run.window.extra["ledger"][0]
-        books = books_of(run.window, float(works[-1] - works[0]), float(np.abs(np.diff(works)).sum()))
-        return Integrated(run.swing, run.acceleration, run.drift, tuple(np.abs(run.waves)), run.loops, run.starts,
-                          books)
+        """The loops of the interfaces; what else the series of the pieces give stands in `more`."""
+        return Integrated(loops=run.loops)
+
+    def more(self, run, drive, stuck: bool) -> dict:
+        """What the series of the pieces give, by name."""
+        found = read_off(run.reading, run.ledger, sinusoidal(drive), bool(whole(run.reading.span, drive)),
+                         stiffness_of(self.model, run.window), largest(drive))
+        return {"known": {name: None if np.isnan(value) else float(value) for name, value in found.items()}}
 
     def rings(self, run, drive) -> tuple:
         """What rings is known in closed form of a single element, and of a motion that repeats by one of its cycles."""
@@ -93,27 +96,24 @@ def settles(modes, drive, groups, done) -> tuple | None:
             or abs(done.cycles_done - round(done.cycles_done)) > 1e-9:
         return None
     sine = BaseSine(last.amplitude, last.omega, drive.moving)
-    found = settled_alone(modes, sine, groups, *done.end)
-    if found is None:
-        try:
-            one = settled(modes, sine, groups, *done.end)
-        except NotConverged:
-            return None
-        found = one.amplitude, one.residual, one.multipliers
-    amplitude, error = (float(one[0]) for one in settled_of(*(np.asarray(one)[None] for one in found)))
+    try:
+        one = settled(modes, sine, groups, *done.end)
+    except NotConverged:
+        return None
+    amplitude, error = settled_of(one.amplitude, one.residual, one.multipliers)
     return None if np.isnan(amplitude) else (amplitude, error)
 
 
-def settled_of(amplitude, residual, multipliers) -> tuple:
-    """Amplitudes [m] of stable motions and their errors, NaN of others, (n,) each.
+def settled_of(amplitude: float, residual: float, multipliers) -> tuple:
+    """Amplitude [m] of a stable motion and its error, NaN of another.
 
-    residual (n,): by which they miss to close, over their size; multipliers (n, m) over a period. What it leaves in the
-    motion is that over how far they are from 1, and its last digits are rounding.
+    residual: by which it misses to close, over its size; multipliers (m,) over a period. What it leaves in the motion
+    is that over how far they are from 1, and its last digits are rounding.
     """
-    apart = np.maximum(np.abs(1 - multipliers).min(axis=1, initial=1.0), 1e-12)
-    error = amplitude * np.maximum(1e-9, 10 * residual / apart)
-    stable = np.abs(multipliers).max(axis=1, initial=0.0) < 1
-    return np.where(stable, amplitude, np.nan), np.where(stable, error, np.nan)
+    if np.abs(multipliers).max(initial=0.0) >= 1:
+        return np.nan, np.nan
+    apart = max(float(np.abs(1 - multipliers).min(initial=1.0)), 1e-12)
+    return float(amplitude), float(amplitude * max(1e-9, 10 * residual / apart))
 
 
 class Interfaces:

@@ -53,7 +53,7 @@ class Yields:
         amplitude = one.amplitude if gauge is None else \
             half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge)
         values = {SHOWN["amplitude"]: amplitude, SHOWN["acceleration_peak"]: done.acceleration,
-                  **wave_measures(*np.abs(done.waves))}
+                  **wave_measures(*map(float, done.reading.waves))}
         values = {name: value for name, value in values.items() if value is not None}
         holds = Pieces(self.model, self.numerics, self.patch, self.found).sticks(done)
         outcome = Outcome.STUCK if holds else Outcome.STEADY
