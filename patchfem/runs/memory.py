@@ -1,4 +1,4 @@
-"""Memory of a run, foreseen from its sizes by what takes it, and the memory that the process may still take."""
+"""Memory of a run and the code that it compiles, from its sizes, and the memory that the process may still take."""
 
 import os
 from pathlib import Path
@@ -31,7 +31,7 @@ class Code(NamedTuple):
 
 
 NONE = Code(0.0, 0.0)
-FEW, EVENTS = Code(6e6, 0.05), Code(28e6, 0.25)  # exact: of one mode under sines or no friction; of any
+FEW, EVENTS = Code(6e6, 0.05), Code(28e6, 0.25, 3.0)  # exact: of one mode under sines or no friction; of any
 STEPS, FOLLOWED = Code(58e6, 0.4, 8.0), Code(58e6, 0.4, 3.0)  # a march; a slide or a method of few kernels
 SMOOTH, PIECES, BALANCE = Code(74e6, 0.4, 13.0), Code(82e6, 0.4, 15.0), Code(1e8, 0.55, 3.0)
 CODES = {"static": NONE, "bench, closed form": NONE, "bench, law step by step": NONE, "bench, two directions": NONE,
