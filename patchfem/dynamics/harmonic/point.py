@@ -6,13 +6,14 @@ stiffness), and what that changes below H tells what H had missed.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ...core import NotConverged
 from .continuation import follow
 from .forces import Group
-from .harmonic import Balance, newton, pack, solve_linear, unpack
+from .harmonic import Balance, System, newton, pack, solve_linear, unpack
 from .laws import Track, synthesis
 from .starts import one_harmonic
 
@@ -158,7 +159,7 @@ def finer(found: Periodic, modes, drive) -> Periodic:
     h, top, x = found.harmonics, found.coefficients.shape[1] - 1, found.unknowns
     balance = balance_of(modes, found.group, 2 * found.base_samples)
     here = balance.system(x, drive.omega, drive.acceleration, h)
-    one = _widened(balance, x, here, drive, h, 2 * top // h, TOLERANCE, 0)
+    one = _widened(balance, Reached(x, here, 0, found.coefficients), drive, h, 2 * top // h, TOLERANCE)
     return one if np.isfinite(one.error) else _solved(modes, drive, balance.contact, 2 * top, x, 1)
 
 
@@ -174,7 +175,7 @@ def _solved(modes, drive, group, h, x, wider, tolerance=TOLERANCE, near=0) -> Pe
         if want <= balance.contact.samples:
             break
         balance = balance.on(balance.contact.with_samples(want))
-    return _widened(balance, x, here, drive, h, wider, tolerance, count)
+    return _widened(balance, Reached(x, here, count), drive, h, wider, tolerance)
 
 
 def _reach(balance, x, drive, h: int):
@@ -243,7 +244,7 @@ def by_omega(balance, x, omega, level, h) -> tuple:
 def plain(balance, x, drive, h: int) -> tuple:
     """(Periodic of solved unknowns, share of the motion that the next h harmonics would add) without more of them."""
     here = balance.system(x, drive.omega, drive.acceleration, h)
-    found = _widened(balance, x, here, drive, h, 1, 1.0, 0)
+    found = _widened(balance, Reached(x, here), drive, h, 1, 1.0)
     force = balance.contact.force(found.coefficients, drive.omega, 2 * h, balance.contact.samples)
     z = balance.motion(x, drive.omega, drive.acceleration, h, force)
     above = float(np.linalg.norm(z[h + 1:] @ balance.rows.T))
@@ -257,19 +258,31 @@ def _held(balance, omega, level, h: int) -> np.ndarray:
     return -solve_linear(here.jacobian)(here.residual)
 
 
-def _widened(balance, x, here, drive, h, wider, tolerance, count) -> Periodic:
+class Reached(NamedTuple):
+    """Where sweeps begin: unknowns (N,), their System, iterations so far, and slides (i, K + 1) [m] that know harmonics
+    above those of the unknowns."""
+
+    x: np.ndarray
+    system: System
+    count: int = 0
+    slides: np.ndarray | None = None
+
+
+def _widened(balance, start: Reached, drive, h, wider, tolerance) -> Periodic:
     """Harmonics above h by sweeps with the Jacobian of those below; the error they leave.
 
     The last sweep takes twice the samples. changes: of the slides per sweep [m], first those that follow alone.
     """
+    x, here, count, known = start
     omega, level, top = drive.omega, drive.acceleration, h * wider
     solve = solve_linear(here.jacobian)
     probe = max(top, 2 * h)  # harmonics that tell what is left out
     q = np.zeros((len(balance.rows), probe + 1), complex)
+    if known is not None:
+        q[:, :known.shape[1]] = known[:, :probe + 1]
     q[:, :h + 1] = balance.slides(x, omega, h)
     samples = fine = balance.contact.samples
     size, changes = float(np.linalg.norm(q)), []
-    start, x = x, np.array(x)
     for sweep in range(SWEEPS):
         force = balance.contact.force(q, omega, probe, fine)
         z = balance.motion(x, omega, level, h, force)
@@ -285,12 +298,13 @@ def _widened(balance, x, here, drive, h, wider, tolerance, count) -> Periodic:
         if sweep and changes[-1] <= CLOSED * tolerance * size:
             fine = 2 * samples
         if sweep > 2 and (changes[-1] > changes[-2] > changes[-3] or changes[-1] > changes[1]):
-            return _diverged(balance, here, drive, h, samples, size, count, start)
+            return _diverged(balance, start, drive, h, samples)
     return _periodic(balance, x, drive, h, top, fine, changes, size, count, q)
 
 
-def _diverged(balance, here, drive, h, samples, size, count, x) -> Periodic:
+def _diverged(balance, start: Reached, drive, h, samples) -> Periodic:
     """The plain balance, where the harmonics above h do not follow: nothing is known of its error."""
+    x, here, count, _ = start
     q = balance.slides(x, drive.omega, h)
     z = balance.motion(x, drive.omega, drive.acceleration, h, here.fold.force)
     return Periodic(drive.omega, drive.acceleration, q, here.fold.force, z, h, samples, np.inf, np.inf, count, x,
