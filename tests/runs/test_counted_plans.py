@@ -185,3 +185,38 @@ def test_always_the_search_of_an_onset_is_counted_with_lists_of_its_own(monkeypa
     assert two == pytest.approx(4 * one)
     alone = plan(loads(HELD.format(order=1.085, cycles=1).replace('"24.7 m/s^2", ', ""))).model
     assert one / bonds_cost(alone, choose(alone))[1] == pytest.approx((2**2 + 9) / (1 + 9))
+
+
+JUST_HELD = """[normal]
+load = "12.9 N"
+[friction]
+law = "nonlocal"
+static = 0.3
+bond_length = "0.3 um"
+order = {order}
+[structure]
+moving_mass = "0.38 kg"
+[[structure.mode]]
+name = "m0"
+frequency = "113 Hz"
+damping = 0.01
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "100 Hz"
+acceleration = "9 m/s^2"
+cycles = 4
+[accuracy]
+tolerance = 0.01
+"""
+
+
+@pytest.mark.parametrize("order", ["0.0", "0.5"])
+def test_always_the_list_of_a_block_that_is_just_held_is_foreseen(order):
+    """Its limit is 1.13 times what holds it. Bonds of order 0 pull alike at any stretch: it turns back in every step,
+    and each leaves a strip. 55 and 61 strips were planned."""
+    scene = loads(JUST_HELD.format(order=order))
+    found, book = plan(scene), run(scene, estimate=False).extra["book"]
+    model = found.model
+    assert book["strips"] / 3 <= bonds_cost(model, choose(model))[0] <= 3 * book["strips"]
+    assert any("bonds of order 0 hold the block" in text for text in found.verdict) == (order == "0.0")
