@@ -16,6 +16,7 @@ from .arrays import ENDS, NODES
 # places of a step between which slip may begin or end once: close to its ends, as a stick may last no longer
 FINER = np.sort(np.append((1 - np.cos(np.pi * np.arange(25) / 24)) / 2, [1e-3, 1 - 1e-3]))
 FINEST = np.linspace(0.0, 1.0, 257)  # among which its peaks are looked for: three make a parabola, to 1e-11 of its rise
+BEST = 6  # steps with the largest values at FINER, which are looked at closely
 RISES = 0.5  # of what a number changes by in a step, by which it may rise above its places
 GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 GAUSS, WEIGHTS = (1 + GAUSS) / 2, WEIGHTS / 2
@@ -93,6 +94,8 @@ class Parts:
         """(largest of values (k, NODES) between the places, what the last terms of its polynomial are)."""
         top, least = values.max(axis=1), values.min(axis=1)
         steps = np.flatnonzero(top + RISES * (top - least) >= top.max())
+        if steps.size > BEST:
+            steps = steps[np.argsort(places_of(values[steps], CLOSE).max(axis=1))[-BEST:]]
         seen = places_of(values[steps], CLOSEST)
         every, at = np.arange(len(steps)), np.clip(np.argmax(seen, axis=1), 1, FINEST.size - 2)
         left, mid, right = (seen[every, at + side] for side in (-1, 0, 1))

@@ -58,11 +58,11 @@ def _columns(rows) -> dict:
 def _solved(model, window: int) -> tuple:
     """(measures and their errors by name, SmoothResult, whether it sticks, whether it must be run by itself)."""
     numerics = replace(choose(model), window=window)
-    (found, done), (other, _) = (moved(model, replace(numerics, local=share * numerics.local), None) for share in (
-        1.0, COARSER))
+    (found, done, reader), (other, *_) = (moved(model, replace(numerics, local=share * numerics.local), None)
+                                          for share in (1.0, COARSER))
     values, coarse = ({name: value for name, value in one.values.items() if value is not None} for one in (
         found, other))
-    coming = tolerance_error(values, coarse, model.rig.displacement)
-    errors = {name: coming.get(name, abs(value)) + found.errors.get(name, 0.0) + found.own.get(name, 0.0)
+    coming, left = tolerance_error(values, coarse, model.rig.displacement), reader.left_open(done, values)
+    errors = {name: coming.get(name, abs(value)) + left.get(name, 0.0) + found.own.get(name, 0.0)
               for name, value in values.items()}
     return values, errors, done, found.outcome is not None and str(found.outcome) == "stuck", done.outcome is not None

@@ -20,11 +20,12 @@ LOCATED = 1e-7  # what a crossing of that share may be off: the extension of a s
 
 def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """One run with steps that meet numerics.local; patch: the solved Patch or None."""
-    return moved(model, numerics, patch, frames, say, progress)[0]
+    found, done, reader = moved(model, numerics, patch, frames, say, progress)
+    return replace(found, errors=reader.left_open(done, found.values))
 
 
 def moved(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
-    """(Solution, SmoothResult) of a run; arguments as `run_smooth`."""
+    """(Solution without what it leaves open itself, SmoothResult, Smooth that tells it); arguments as `run_smooth`."""
     rig, begin = model.rig, perf_counter()
     contact = model_of(model, numerics, patch)
     hub.loops_of(contact.element.kernels, say)
@@ -33,9 +34,8 @@ def moved(model, numerics, patch, frames: int = 0, say=None, progress=None) -> t
     done = hub.simulate(rig.modes, rig.drive, contact.element, numerics.cycles, numerics.local, numerics.window,
                         rig.travel, frames, rig.start, progress)
     reader = Smooth(model, numerics, patch, contact)
-    found = reader.solution(done, perf_counter() - begin, prepare={"compiled_code": loaded}, extra={
-        "step_tolerance": numerics.local, "steps_taken": int(done.ledger["steps"])})
-    return replace(found, errors=reader.left_open(done, found.values)), done
+    return reader.solution(done, perf_counter() - begin, prepare={"compiled_code": loaded}, extra={
+        "step_tolerance": numerics.local, "steps_taken": int(done.ledger["steps"])}), done, reader
 
 
 class Smooth(Reader):
