@@ -3,6 +3,8 @@
 Fast-math is limited to what keeps NaN and infinity meaningful.
 """
 
+from math import inf
+
 from numba.core.options import DefaultOptions
 
 from ..compiled.inner import njit
@@ -12,6 +14,7 @@ LEAN = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 # of functions that compiled code alone calls: their wrappers for Python take most of the time of compiling them
 INNER = LEAN | {flag: True for flag in ("no_cpython_wrapper", "no_cfunc_wrapper") if hasattr(DefaultOptions, flag)}
 FAST = {"reassoc", "contract", "arcp"}
+SET_VALUED = False  # whether a law holds without a stretch
 
 
 @njit(error_model="numpy", **LEAN)
@@ -30,3 +33,15 @@ def closed(num, mem, e, free, beta):
 def knee(num):
     """The `knee` of laws whose rates have no kink at a speed: 0 [m/s]."""
     return 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def gives(num, turn):
+    """The `gives` of laws that hold nothing without a stretch: they slide."""
+    return 1.0
+
+
+@njit(error_model="numpy", **LEAN)
+def longest(num, turn):
+    """The `longest` of laws whose rates tell the error of a step: no bound [s]."""
+    return inf

@@ -2,8 +2,7 @@
 
 In: `core.ModalBasis`, a drive, grooves under their load, a law of friction. Out: a `MarchResult`, as the march gives
 it. Under Coulomb's law, or a force that follows the speed, the motion between a stop and the next release is smooth:
-eq. 3.4 with the force of the flank, by a Runge-Kutta method whose steps the error chooses. Read `run`, then
-`loop_kernels`: where steps end; `step_kernels`: the force of the flank, one step. Laws with memory are a contact of the
-march, `climbing` and `contact_kernels`; `periodic` and `cycle_kernels` sample laws along a cycle for the harmonic
-balance.
+eq. 3.4 with the force of the flank, by the integrator of `dynamics.smooth`. Read `flank_kernels`, the force as a law
+that holds; `run`, which samples the motion. Laws with memory are a contact of the march, `climbing` and
+`contact_kernels`; `periodic` and `cycle_kernels` sample laws along a cycle for the harmonic balance.
 """

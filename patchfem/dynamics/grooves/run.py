@@ -1,21 +1,23 @@
-"""The march of modes whose load climbs grooves, under Coulomb's law or a force that follows the speed."""
+"""Modes whose load climbs grooves, under Coulomb's law or a force that follows the speed: by `dynamics.smooth`, with
+the samples of a march."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...compiled import load as compiled
-from ...core import Outcome, PatchfemError, Response
+from ...core import Outcome, PatchfemError, Response, Start
 from ...friction.grooves import STEADY, Grooves, Swing
+from ...friction.protocol import Element
 from ..march.march import Run
 from ..march.models import coulomb_model
 from ..second_book import sampled_work
-from ..smooth.waves import wave_of
+from ..smooth import run as smooth
+from ..smooth.arrays import DONE, PACE, POWER, STORED
 
-KIND, PIECE = 11, 12  # of Climb.now
-RAISED = 7  # of Climb.flags
 TOLERANCE = 1e-11  # relative error of a step
 REST = 1e-6  # of wavelength/(2 pi), below which a motion is at rest to the choice of the step
+HERE = "dynamics.grooves.flank_kernels"
+ENDS = {Outcome.LEAVES_GROOVES: 5, Outcome.NOT_CONVERGED: 3}  # status of a march
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -91,44 +93,77 @@ def lifts(grooves: Grooves, time: float) -> str:
 
 
 class GroovesRun(Run):
-    """The arrays of a march over grooves, and its clock."""
+    """The arrays of a march over grooves, its clock, and the motion that is sampled."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
-        self.loop = compiled("dynamics.grooves.loop_kernels")
         super().__init__(modes, drive, model, steps_per_cycle, travel, hub, start)
-        g, size, swing = model.grooves, 2 * modes.omega.size + 5, model.swing
-        least, pace = REST / g.wave, max(float(modes.omega.max()), 2 * np.pi / drive.period)
-        num = [model.load, g.wave, g.amplitude, g.phase, g.lifted_mass, model.static, model.kinetic,
-               model.speed or 0.0, least, least * pace, swing.amplitude, swing.omega, swing.phase]
-        damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
-        parts = (modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output, damping,
-                 [modes.mass], np.zeros((1, 6)), np.zeros(14), num, np.zeros(8), np.zeros((9, size)))
-        self.climb = compiled("dynamics.grooves.step_kernels").Climb(*(np.array(p, float, order="C") for p in parts))
-        self._driven()
-        self.climb.flags[RAISED] = swing.about(model.load, 0.0) * g.height(modes.slide @ self.state[0])
         self.width += 2
+        self._begin()
         self.ledger[0] += self.strained()
 
-    def _driven(self) -> None:
-        """Bring the drive as it stands into the arrays."""
-        self.wave = wave_of(self.drive)
-        piece = int(np.searchsorted(self.wave.ends, self.done * self.prop.dt, side="right"))
-        self.climb.now[[KIND, PIECE]] = self.wave.kind, piece
-        self.climb = self.climb._replace(pieces=self.wave.pieces)
+    def _begin(self) -> None:
+        """Begin the motion from the state as it stands, at the start of the drive."""
+        g, model, swing = self.model.grooves, self.model, self.model.swing
+        raised = swing.about(model.load, 0.0) * g.height(self.modes.slide @ self.state[0])
+        numbers = [1.0, model.load, g.wave, g.amplitude, g.phase, g.lifted_mass, model.static, model.kinetic,
+                   model.speed or 0.0, swing.amplitude, swing.omega, swing.phase]
+        element = Element(HERE, np.array(numbers), np.array([raised, 0.0]), model.limit, sizes=(np.inf,) * 4)
+        self.motion_of = smooth.Run(self.modes, self.drive, element, 1.0, TOLERANCE, start=Start(*self.state))
+        self.motion_of.ends_only(1)
+        n, least = self.modes.omega.size, self.motion_of.moving.work[24]
+        least[:n], least[n:2 * n] = REST / g.wave, REST / g.wave * self.motion_of.moving.now[PACE]
+        self.booked = self._sums_of()
+
+    def _sums_of(self) -> np.ndarray:
+        """Work of the drive, viscous loss, its |work|, friction's own loss, steps and work of the slide [J]."""
+        y, own, n = self.motion_of.moving.y, self.motion_of.kept.tally, 2 * self.modes.omega.size
+        return np.array([y[-3], y[-2], own[POWER], y[n], own[DONE], y[-1]])
 
     def fork(self, drive):
         """As of a Run."""
         twin = super().fork(drive)
-        twin.climb = type(self.climb)(*(array.copy() for array in self.climb))
-        twin._driven()
+        twin.motion_of = self.motion_of.fork(drive)
         return twin
 
     def _slid(self, path) -> None:
         """Nothing: there is no memory."""
 
     def _steps(self, count: int, rows) -> tuple:
-        return self.loop.march(self.climb, self.wave.ends, self.done, count, float(self.prop.dt), self.state, TOLERANCE,
-                               float(self.travel), self.ledger, rows)
+        """As of a Run: the motion is sampled; rows have friction's own loss in the step and the vertical force besides.
+        """
+        n, dt = self.modes.omega.size, float(self.prop.dt)
+        times, motion = (self.done + np.arange(count + 1)) * dt, self.motion_of
+        if motion.time != times[0] or not np.array_equal(motion.moving.y[:2 * n], self.state.ravel()):
+            self._begin()
+            motion = self.motion_of
+        seen = motion.until(times[-1], times)
+        if motion.outcome is not None and len(seen) <= count:  # where it ends, at the sample that follows
+            seen = np.concatenate([seen, motion.settled()[0][None]])
+        out = seen[:, 1:1 + n] @ self.modes.output
+        beyond = np.flatnonzero(np.abs(out) > self.travel)
+        last, status = (int(beyond[0]), 1) if beyond.size else (len(seen) - 1, ENDS.get(motion.outcome, 0))
+        seen, work, slid = seen[:last + 1], np.diff(seen[:last + 1, -1]), np.diff(seen[:last + 1, 2 * n + 1])
+        part = rows[:last + 1]
+        part[:, :2 * n + 2], part[:, 2 * n + 2], part[:, 2 * n + 3] = seen[:, 1:2 * n + 3], seen[:, 2 * n + 3], \
+            seen[:, 2 * n + 4]
+        part[:, 2 * n + 4], part[:, 2 * n + 5] = seen[:, 2 * n + 3], seen[:, 2 * n + 5]
+        part[:-1, 2 * n + 4] = np.divide(work, slid, out=seen[:-1, 2 * n + 3].copy(), where=slid != 0)
+        part[:-1, 2 * n + 6], part[:-1, 2 * n + 7] = work, work - np.diff(seen[:, 2 * n + 5])
+        part[:, 2 * n + 8] = self._upright(times[:last + 1], seen)
+        self.state[:] = motion.moving.y[:2 * n].reshape(2, n)
+        sums = self._sums_of()
+        self.ledger[[0, 1, 2, 3, 5, 8]] += sums - self.booked
+        self.ledger[4], self.booked = max(self.ledger[4], motion.kept.tally[STORED]), sums
+        return last, status
+
+    def _upright(self, time, seen) -> np.ndarray:
+        """Vertical force N + m (t q'' + t' q'^2) [N] at samples of a motion."""
+        g, modes, n = self.model.grooves, self.modes, self.modes.omega.size
+        z, rate, (q, v, force) = seen[:, 1:1 + n], seen[:, 1 + n:1 + 2 * n], seen[:, 2 * n + 1:2 * n + 4].T
+        push = np.outer(self.drive.values(time), modes.base)
+        along = -(push + rate @ modes.dampers.T + z * modes.omega**2 + np.outer(force, modes.slide) / modes.mass) \
+            @ modes.slide
+        return self.model.swing.about(self.model.load, time) + g.lifted_mass * (g.slope(q) * along + g.bend(q) * v**2)
 
     def _works(self, rows) -> np.ndarray:
         return rows[:-1, 2 * self.modes.omega.size + 6]
@@ -160,7 +195,8 @@ class GroovesRun(Run):
         """Energy of the height of the load, or done against one that swings, and of the speed of what rises [J]."""
         g, (z, v) = self.model.grooves, self.state
         q, rate = float(self.modes.slide @ z), float(self.modes.slide @ v)
-        height = self.climb.flags[RAISED] if self.model.swing.amplitude else self.model.load * g.height(q)
+        swings = self.model.swing.amplitude
+        height = self.motion_of.moving.y[2 * z.size + 1] if swings else self.model.load * g.height(q)
         return float(height + 0.5 * g.lifted_mass * (g.slope(q) * rate)**2)
 
     def response(self, rows, number) -> Response:

@@ -36,14 +36,15 @@ from .arrays import (
     TURNS,
 )
 
-NOTHING, STOP, KINK, KNEE, TRAVEL = range(5)  # what ends a step
-FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED = range(6)  # how a call ends
+NOTHING, STOP, KINK, KNEE, TRAVEL, RELEASE, LIFT = range(7)  # what ends a step
+FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED, LIFTED = range(7)  # how a call ends
 SLOWER, FASTER = 0.2, 8.0  # bounds of the change of a step
 TURNING = 2.0  # of now[BEGUN]: the motion was left at a reversal
 FORGET = 3.0  # cycles over which a largest value is forgotten
 CALL = 50_000  # tries of a call, a tenth of a second: no signal is heard inside compiled code
 GETS_ON = 1e-3  # of the time of the fastest motion: what CALL tries must come on by at least
 INSTANT = 1e-13  # of a period: what lies nearer together happens at once
+STUCK = 0.02  # of a period: longest step of what holds, as nothing else tells when it lets go
 STANDS, FLIPPED = 1, 2  # of a motion that has not moved on from a stop: it is there, it was found to go the other way
 
 
@@ -64,6 +65,8 @@ def left(m, what, y, slopes, travel):
         side = 1.0 if m.turn[2] > 0 else -1.0
         floor = law.knee(m.num)
         return side * (way * v - floor), side * way * gain, 1e-12 * floor
+    if what >= RELEASE:  # a law that holds writes what is left of its hold and of the load behind its two losses
+        return slopes[2 * n + what - RELEASE + 2], 0.0, 0.0
     x, w = watching.output_of(m, y)
     return travel - abs(x), -w if x > 0 else w, 1e-13 * travel
 
@@ -75,14 +78,16 @@ def possible(m, what, travel):
         return m.turn[1] < np.inf
     if what == KNEE:
         return law.knee(m.num) > 0
-    return what == STOP or travel < np.inf
+    if what >= RELEASE:
+        return law.SET_VALUED and (what == LIFT or m.turn[0] == 0)
+    return m.turn[0] != 0 if what == STOP else travel < np.inf
 
 
 @njit(error_model="numpy", **INNER)
 def first_end(m, h, travel, skip):
     """(what ends the step of h [s] first, guess of the share of it) by cubics through both ends; NOTHING, 1."""
     found, where = NOTHING, 1.0
-    for what in range(STOP, TRAVEL + 1):
+    for what in range(STOP, LIFT + 1 if law.SET_VALUED else TRAVEL + 1):
         if what == skip or not possible(m, what, travel):
             continue
         b, rate_b, noise = left(m, what, m.work[steps.TRIAL], m.work[12], travel)
@@ -142,10 +147,36 @@ def located(m, h, what, share, travel):
     return at
 
 
+@njit(error_model="numpy", **INNER)
+def let_go(m, h, what, travel):
+    """Length [s] of the step that ends just beyond where a hold or a load is used up, within a step of h [s] whose end
+    is beyond it; m.work[steps.TRIAL] is the state at its end. Regula falsi with halved ends (Illinois), then halving.
+    """
+    a, b = max(left(m, what, m.y, m.work[0], travel)[0], 0.0), left(m, what, m.work[steps.TRIAL], m.work[12], travel)[0]
+    low, high = 0.0, h
+    for turn in range(80):
+        if high - low <= 1e-15 * (m.now[TIME] + high) or high - low <= 1e-13 * h:
+            break
+        at = low + (high - low) * a / (a - b) if turn < 25 and a > b else 0.5 * (low + high)
+        at = min(max(at, low + 1e-3 * (high - low)), high - 1e-3 * (high - low)) if turn < 4 else at
+        if not low < at < high:
+            at = 0.5 * (low + high)
+        steps.step(m, at)
+        value = left(m, what, m.work[steps.TRIAL], m.work[12], travel)[0]
+        if value < 0:
+            high, b, a = at, value, 0.5 * a
+        else:
+            low, a, b = at, value, 0.5 * b
+    steps.step(m, high)
+    return high
+
+
 @njit(error_model="numpy", forceinline=True, **INNER)
 def dips(m, h):
     """Share [1] of the step of h [s] at which the speed, > 0 at both ends, may have a least value below zero; 0 for
     none."""
+    if m.turn[0] == 0:
+        return 0.0
     a, p, _ = left(m, STOP, m.y, m.work[0], np.inf)
     b, r, _ = left(m, STOP, m.work[steps.TRIAL], m.work[12], np.inf)
     return dip_of(a, p * h, b, r * h)
@@ -207,6 +238,8 @@ def heading(m):
     v = steps.slide_of(m, m.y)[1]
     if v != 0:
         return 1.0 if v > 0 else -1.0
+    if law.SET_VALUED:
+        return lets_go(m)
     steps.slope(m, t, m.y, m.work[0])
     for look in range(2):
         gain = 0.0
@@ -217,6 +250,24 @@ def heading(m):
         if look == 0:
             steps.slope(m, t + m.now[STEP], m.y, m.work[1])
     return 1.0
+
+
+@njit(error_model="numpy", **INNER)
+def lets_go(m):
+    """Direction in which a law that holds lets go of the slide at rest, as the motion stands; 0 where it holds."""
+    m.turn[0] = 0.0
+    steps.slope(m, m.now[TIME], m.y, m.work[0])
+    return law.gives(m.num, m.turn)
+
+
+@njit(error_model="numpy", **INNER)
+def rest(m):
+    """Take the last digits of the speed of a slide that has stopped from the rates."""
+    n, v, size = m.rows.shape[1], steps.slide_of(m, m.y)[1], 0.0
+    for i in range(n):
+        size += m.rows[steps.SLIDE, i] * m.rows[steps.SLIDE, i]
+    for i in range(n):
+        m.y[n + i] = 0.0 if n == 1 else m.y[n + i] - m.rows[steps.SLIDE, i] * v / size
 
 
 @njit(error_model="numpy", **INNER)
@@ -252,6 +303,8 @@ def accept(m, h, k):
     for c in range(m.y.size):
         m.y[c] = m.work[steps.TRIAL, c]
         m.work[0, c] = m.work[12, c]
+    if law.SET_VALUED and m.turn[0] == 0:
+        rest(m)
     for i in range(n):
         m.now[CREST] = max(m.now[CREST], abs(m.y[i]))
         m.now[CREST_SPEED] = max(m.now[CREST_SPEED], abs(m.y[n + i]))
@@ -261,6 +314,8 @@ def accept(m, h, k):
 @njit(error_model="numpy", forceinline=True, **INNER)
 def try_step(m, h, tolerance, k):
     """Take a step of at most h [s] whose error meets the tolerance: (its length, the next length)."""
+    if law.SET_VALUED:
+        h = min(h, law.longest(m.num, m.turn), STUCK * k.tally[PERIOD] if m.turn[0] == 0 else np.inf)
     for _ in range(60):
         steps.step(m, h)
         error = steps.missed(m, h, tolerance)
@@ -280,7 +335,15 @@ def try_step(m, h, tolerance, k):
 def pass_end(m, k, what):
     """Go on beyond the end of a step: turn around, or into the next part of the law."""
     n = m.rows.shape[1]
-    if what == STOP:
+    if law.SET_VALUED and what in (STOP, RELEASE):
+        rest(m)
+        leave(m, k)
+        way = lets_go(m)
+        enter(m, way)
+        if way != 0 or what == STOP:
+            watching.write(m, m.now[TIME], m.y, k.turns[int(k.tally[TURNS])])
+            k.tally[TURNS] += 1
+    elif what == STOP:
         if n == 1:
             m.y[1] = 0.0  # to the last digit
         leave(m, k)
@@ -363,7 +426,7 @@ def advance(m, k, until, edge, tolerance, travel):
             fresh = FLIPPED
             continue
         while what != NOTHING:
-            taken = located(m, taken, what, share, travel)
+            taken = located(m, taken, what, share, travel) if what < RELEASE else let_go(m, taken, what, travel)
             other, share = first_end(m, taken, travel, what)
             if other == NOTHING:
                 break
@@ -384,11 +447,11 @@ def advance(m, k, until, edge, tolerance, travel):
         fresh = 0
         if not np.isfinite(m.y[0]):
             return WILD
-        if what == TRAVEL:
-            return TRAVELLED
+        if what == TRAVEL or what == LIFT:
+            return TRAVELLED if what == TRAVEL else LIFTED
         if what != NOTHING:
             pass_end(m, k, what)
-            if what == STOP:
+            if what == STOP or what == RELEASE:
                 fresh = STANDS
                 m.now[STEP] = min(m.now[TURNED], m.now[STEP])
     sampled(m, k)

@@ -51,7 +51,7 @@ TAIL = 8  # windows whose phasors are kept: a steady amplitude takes five (`resp
 FIRST = 1e-3  # length of the first step over the shortest time of the rig
 APART = 4  # cycles after which a motion is first looked at whether it repeats; then twice as many each time
 REPEATS = 10.0  # tolerances of a step by which a motion that repeats may still change in all that is left of it
-FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED = range(6)  # how a call ends
+FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED, LIFTED = range(7)  # how a call ends
 HERE = "dynamics.smooth"
 
 
@@ -90,7 +90,7 @@ def started(modes: ModalBasis, drive, wave, element, cycles: float, start=None) 
     now[[KIND, MOVES]], tally[PERIOD] = (wave.kind, drive.moving), drive.period
     work[24, 2 * n:-3] = element.sizes
     rows = np.stack([modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output])
-    law = element.numbers[None], element.memory[None], [1.0, np.inf, 1.0]
+    law = element.numbers[None], element.memory[None], [1.0, np.inf, 1.0, *np.zeros(6)]
     own = (rows, damping, wave.pieces, *law, state, work, now)
     moving = Moving(*(np.array(part, float, order="C") for part in own))
     cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))
@@ -262,6 +262,8 @@ class Run:
         self.kept.tally[[TURNS, PARTS]] = 0
         if status == TRAVELLED:
             self.outcome = Outcome.EXCEEDS_TRAVEL
+        elif status == LIFTED:
+            self.outcome = Outcome.LEAVES_GROOVES
         elif status in (WILD, ENDLESS):
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (f"no step meets the tolerance at {self.time:.6g} s; use accuracy.method = \"march\"")

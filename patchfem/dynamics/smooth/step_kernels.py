@@ -13,7 +13,7 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, INNER
 from ...friction.laws import stretch_kernels as law
 from ..tableau_kernels import BEFORE, FIFTH, INSIDE, PLACES, SHARES, STAGES, THIRD
-from .arrays import CREST, CREST_SPEED, KIND, MASS, ORIGIN, PIECE, STIFF, TIME
+from .arrays import CLOCK, CREST, CREST_SPEED, EASE, FREE, KIND, MASS, ORIGIN, PIECE, PLACE, STIFF, TIME
 
 OMEGA, DAMP, SLIDE, BASE, OUTPUT = range(5)  # of Moving.rows
 EXTENSION, SIZES, TRIAL = 16, 24, 25  # of Moving.work, whose first rows are the slopes
@@ -67,6 +67,22 @@ def of_mode(m, i, y, out, drive, pull):
     return -m.rows[BASE, i] * rate, damped * rate
 
 
+@njit(error_model="numpy", **INNER)
+def offered(m, t, q, y, drive):
+    """Write what a law that holds has to know into m.turn: time [s], acceleration [m s-2] that the slide has without
+    the force and what a newton takes of it [1/kg], slide [m]."""
+    n, free, ease = m.rows.shape[1], 0.0, 0.0
+    for i in range(n):
+        damped = m.rows[DAMP, i] * y[n + i]
+        if m.damping.size > 0:
+            damped = 0.0
+            for j in range(n):
+                damped += m.damping[i, j] * y[n + j]
+        free -= m.rows[SLIDE, i] * (damped + m.rows[OMEGA, i] * m.rows[OMEGA, i] * y[i] + m.rows[BASE, i] * drive)
+        ease += m.rows[SLIDE, i] * m.rows[SLIDE, i] / m.now[MASS]
+    m.turn[CLOCK], m.turn[FREE], m.turn[EASE], m.turn[PLACE] = t, free, ease, q
+
+
 @njit(error_model="numpy", forceinline=True, **INNER)
 def slope(m, t, y, out):
     """Write the slopes of the state y at the time t [s] into out: eq. 3.4 and the rates of the law.
@@ -77,6 +93,8 @@ def slope(m, t, y, out):
     n, energies = m.rows.shape[1], y.size - 3
     drive, mass = push(m, t), m.now[MASS]
     q, v = slide_of(m, y)
+    if law.SET_VALUED:
+        offered(m, t, q, y, drive)
     force = law.rate(m.num, m.mem, m.turn, q - m.now[ORIGIN], v, y[2 * n:energies], out[2 * n:energies])
     work, lost = of_mode(m, 0, y, out, drive, force / mass)
     for i in range(1, n):
@@ -121,7 +139,7 @@ def missed(m, h, tolerance):
         for j in range(12):
             high += FIFTH[j] * m.work[j, c]
             low += THIRD[j] * m.work[j, c]
-        top = max(abs(m.y[c]), abs(m.work[TRIAL, c])) if c < 2 * n else 0.0
+        top = max(abs(m.y[c]), abs(m.work[TRIAL, c]), m.work[SIZES, c]) if c < 2 * n else 0.0
         if n <= c < 2 * n:
             felt = abs(m.y[c - n]) * m.rows[OMEGA, c - n]**2 + abs(m.rows[SLIDE, c - n]) * pull
             top = max(top, NOISE * abs(h) * felt / tolerance)

@@ -32,6 +32,8 @@ def state_of(m, y):
 def write(m, t, y, row):
     """Write the sample of a state at the time t [s] into a row of `Kept.samples`."""
     n = m.rows.shape[1]
+    if law.SET_VALUED:
+        steps.slope(m, t, y, m.work[13])
     row[0] = t
     for i in range(2 * n):
         row[1 + i] = y[i]

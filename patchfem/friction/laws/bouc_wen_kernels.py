@@ -10,9 +10,10 @@ from math import exp, expm1, inf, log, log1p, nan
 import numpy as np
 
 from ...compiled.inner import njit
-from ..flags_kernels import LEAN, closed, knee, middle
+from ..flags_kernels import LEAN, SET_VALUED, closed, gives, knee, longest, middle
 
-__all__ = ["begin", "closed", "commit", "finish", "flow", "knee", "mean", "middle", "pull", "rate", "shown", "state"]
+__all__ = ["SET_VALUED", "begin", "closed", "commit", "finish", "flow", "gives", "knee", "longest", "mean", "middle",
+           "pull", "rate", "shown", "state"]
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 PIECE = 0.25  # longest piece of a Gauss rule, in -y or w

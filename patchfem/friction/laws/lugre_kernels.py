@@ -8,9 +8,10 @@ from math import exp, inf, nan
 
 from ...compiled.inner import njit
 from ..bonds.point_kernels import shape
-from ..flags_kernels import LEAN, closed, middle
+from ..flags_kernels import LEAN, SET_VALUED, closed, gives, longest, middle
 
-__all__ = ["begin", "closed", "commit", "finish", "flow", "knee", "mean", "middle", "pull", "rate", "shown", "state"]
+__all__ = ["SET_VALUED", "begin", "closed", "commit", "finish", "flow", "gives", "knee", "longest", "mean", "middle",
+           "pull", "rate", "shown", "state"]
 
 
 FADED = 6.0  # times v_s: beyond it the limit is the kinetic one to the last digit, e^-36

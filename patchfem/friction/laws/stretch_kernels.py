@@ -11,9 +11,10 @@ from math import exp, expm1, inf, nan
 
 from ...compiled.inner import njit
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
-from ..flags_kernels import LEAN, closed
+from ..flags_kernels import LEAN, SET_VALUED, closed, gives, longest
 
-__all__ = ["begin", "closed", "commit", "finish", "flow", "knee", "mean", "middle", "pull", "rate", "shown", "state"]
+__all__ = ["SET_VALUED", "begin", "closed", "commit", "finish", "flow", "gives", "knee", "longest", "mean", "middle",
+           "pull", "rate", "shown", "state"]
 
 GROWTH, WEIGHT = 2, 8  # of num: where the growth and the weights begin
 FREE = 7  # of num: share of the bond length that stretches without damage

@@ -6,9 +6,10 @@ num: limit [N], v_0 [m/s]; no memory.
 from math import inf, nan, tanh
 
 from ...compiled.inner import njit
-from ..flags_kernels import LEAN, closed, knee, middle
+from ..flags_kernels import LEAN, SET_VALUED, closed, gives, knee, longest, middle
 
-__all__ = ["at_end", "begin", "closed", "commit", "finish", "knee", "mean", "middle", "rate", "shown", "state"]
+__all__ = ["SET_VALUED", "at_end", "begin", "closed", "commit", "finish", "gives", "knee", "longest", "mean",
+           "middle", "rate", "shown", "state"]
 
 
 @njit(error_model="numpy", **LEAN)
