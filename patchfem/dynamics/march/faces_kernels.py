@@ -239,14 +239,17 @@ def still(motion, plant, table, at, j):
     """Whether all set-valued elements rest through the step and at its end, held by static friction."""
     if not stops.stays(j.stops):
         return False
-    taken(j)
     end, accel = j.modal[ROOM:ROOM + 2], plant.room[0]
     pushed(plant, j, accel)
+    for i in range(j.stops.names.size):
+        e = j.stops.element[i]
+        for k in range(accel.size):
+            accel[k] -= j.rows[j.of[PORT, e], k] * (j.stops.field[MEAN, i] - j.each[PULL, e]) / plant.mass
     ended(motion, plant.free, plant.push, plant.dense, table, at, accel, end)
     for i in range(j.stops.names.size):
         e = j.stops.element[i]
         for k in range(accel.size):
-            accel[k] += j.rows[j.of[PORT, e], k] * j.each[PULL, e] / plant.mass
+            accel[k] += j.rows[j.of[PORT, e], k] * j.stops.field[MEAN, i] / plant.mass
     return stops.stays_to_the_end(end, plant, table[at, 8 * accel.size + 2], accel, plant.room[1:], j.stops)
 
 
