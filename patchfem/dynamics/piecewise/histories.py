@@ -10,7 +10,7 @@ from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, 
 from ..events.event_list import BORDER, RELEASE, REVERSAL, ROOM, STOP, EventLog
 from .elements import stretches, table_of, virgin
 from .names_kernels import OF_FACE, OF_RUN
-from .plant import books_of, clock_of, into, past_of, place, plant_of, room_of
+from .plant import books_of, cleared, clock_of, into, past_of, place, plant_of, room_of
 from .reading import Reading, ring_of
 
 HERE = "dynamics.piecewise"
@@ -115,7 +115,7 @@ class _Run:
     def __init__(self, modes, drive, groups, cycles, window, travel, start, memory, like=None):
         self.modes, self.drive, self.groups, self.window = modes, drive, tuple(groups), window
         self.kernels, self.dense, self.reader = warm_up()
-        self.plant, old = plant_of(modes), like.arrays if like is not None else (None,) * 7
+        self.plant, old = plant_of(modes), like.arrays if like is not None else (None,) * 5
         n, count, table = modes.omega.size, max(1, ceil(cycles - 1e-9)), table_of(self.groups)
         if np.any(~self.plant.faces.any(axis=1) & (table.static > 0)):
             raise PatchfemError("structure.mode.slide: no mode moves the interface, so friction cannot act")
@@ -125,9 +125,13 @@ class _Run:
         wanted = np.zeros(count)
         wanted[max(0, int(cycles + 1e-9)) - 1::-window] = 1.0  # the last whole cycle of every window
         new = (table, memory, past_of(self.plant, table), clock_of(drive, len(self.groups)),
-               books_of(count, wanted, travel), room_of(self.plant), room_of(self.plant))
+               books_of(count, wanted, travel))
         self.arrays = tuple(map(into, old, new))
-        self.table, self.memory, self.past, self.clock, self.books, self.room, self.spare = self.arrays
+        self.table, self.memory, self.past, self.clock, self.books = self.arrays
+        if like is not None and like.plant.faces.shape == self.plant.faces.shape:
+            self.room, self.spare = cleared(like.room), like.spare
+        else:
+            self.room, self.spare = room_of(self.plant), room_of(self.plant)
         self.motion, self.cycles, self.period = motion, cycles, drive.period
         self.width = self.kernels.HEAD + 2 * n + self.kernels.EACH * len(self.groups)
         self.early, self.kept, self.events, self.count = [], 0, [], 0

@@ -196,8 +196,14 @@ def room_of(plant: Plant) -> Room:
               "hulls": (series.DEEP + 2, series.WIDE), "held": (2,), "react": (faces, n), "reactions": (faces, wide),
               "orders": (faces, 2), "scales": (wide, n), "spans": (faces, wide), "turned": (faces, n),
               "mix": (faces, faces), "gram": (faces, faces), "row": (8, faces)}
-    room = Room(*(np.zeros(fields.get(name, (faces,))) for name in Room._fields))
-    room.orders[:] = -1.0
+    return cleared(Room(*(np.empty(fields.get(name, (faces,))) for name in Room._fields)))
+
+
+def cleared(room: Room) -> Room:
+    """A Room as it is before a run."""
+    for part in room:
+        part.fill(0.0)
+    room.orders.fill(-1.0)
     return room
 
 
