@@ -46,8 +46,8 @@ def test_exact_an_effect_brings_its_own_module(scene, table, module):
 def test_exact_a_rubbing_point_needs_no_patch(scene):
     modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE))
     absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
-           "dynamics.march.loop_kernels", "compiled")
-    assert {"patchfem.dynamics.one_mode.sdof", "patchfem.structure.modes"} <= modules
+           "dynamics.march.loop_kernels")
+    assert {"patchfem.dynamics.piecewise.histories", "patchfem.structure.modes"} <= modules
 
 
 def test_exact_a_rubbing_point_needs_no_other_rig(scene):
@@ -57,7 +57,7 @@ def test_exact_a_rubbing_point_needs_no_other_rig(scene):
            "structure.bonded", "structure.identify", "structure.drives", "dynamics.comparison.duhamel",
            "dynamics.comparison.newmark",
            "dynamics.comparison.euler", "dynamics.comparison.comparison", "dynamics.harmonic.harmonic",
-           "dynamics.one_mode.steady", "dynamics.events.steady_events",
+           "dynamics.one_mode.steady", "dynamics.piecewise.stick_steady",
            "dynamics.harmonic.continuation", "dynamics.propagator", "dynamics.march.joints",
            "dynamics.march.varying_load", "runs.rig.comparison",
            "runs.rig.steady", "dynamics.harmonic.balance", "contact.contact_sets", "inputs.signals")
@@ -69,28 +69,28 @@ def test_exact_a_rubbing_point_needs_no_other_rig(scene):
     ('[structure.stiffening]\ncubic = "1e12 N/m^3"\n', "dynamics.march.joints"),
     ('[structure.bonded]\nstiffness = "1e6 N/m"\n', "structure.bonded"),
     ('[accuracy]\nmethod = "newmark"\nstick_speed = "10 um/s"\n', "dynamics.comparison.newmark"),
-    ('[accuracy]\nmethod = "harmonic"\n', "dynamics.events.steady_events"),
+    ('[accuracy]\nmethod = "harmonic"\n', "dynamics.piecewise.stick_steady"),
 ], ids=["stiffening", "bonded", "newmark", "harmonic"])
 def test_exact_a_rig_brings_what_it_names(scene, lines, module):
     modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE + lines))
     assert f"patchfem.{module}" in modules
     others = {"dynamics.march.joints", "structure.bonded", "dynamics.comparison.newmark",
-              "dynamics.events.steady_events"} - {module}
+              "dynamics.piecewise.stick_steady"} - {module}
     assert not {f"patchfem.{name}" for name in others} & modules
 
 
-def test_exact_a_linear_structure_needs_no_patch_and_no_loop(scene):
+def test_exact_a_linear_structure_needs_no_patch_and_no_march(scene):
     modules = loaded(FROM_PYTHON, scene(STRUCTURE))
     absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
-           "dynamics.march.loop_kernels", "compiled")
-    assert "patchfem.dynamics.one_mode.sdof" in modules
+           "dynamics.march.loop_kernels")
+    assert "patchfem.dynamics.piecewise.histories" in modules
 
 
 def test_exact_a_bench_needs_no_structure(scene):
     modules = loaded(FROM_PYTHON, scene(BENCH))
     absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
            "dynamics.march.loop_kernels", "compiled",
-           "dynamics.events.events", "dynamics.events.histories")
+           "dynamics.piecewise.march_kernels", "dynamics.piecewise.histories")
     assert "patchfem.friction.laws.coulomb" in modules
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from event_run import steady
 
 import patchfem as pf
-from patchfem.dynamics.events.steady_events import steady
 
 RIG = """
 [structure]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from patchfem.dynamics.piecewise import histories
+from patchfem.dynamics.piecewise import histories, stick_steady
 from patchfem.dynamics.piecewise.elements import coulomb
 
 
@@ -19,6 +19,16 @@ def simulate(modes, drive, static, kinetic, cycles, window=10, travel=np.inf, pr
     """`histories.simulate` of Coulomb friction."""
     groups = groups_of(modes, static, kinetic)
     return histories.simulate(modes, drive, groups, cycles, window, travel, 0, progress, start)
+
+
+def steady(modes, drive, static, kinetic, start=None, cycles=30, periods=1):
+    """`stick_steady.steady` of Coulomb friction."""
+    return stick_steady.steady(modes, drive, groups_of(modes, static, kinetic), start, cycles, periods)
+
+
+def period_map(modes, drive, static, kinetic, state, periods=1):
+    """`stick_steady.period_map` of Coulomb friction."""
+    return stick_steady.period_map(modes, drive, groups_of(modes, static, kinetic), state, periods)
 
 
 @dataclass(frozen=True)

@@ -185,6 +185,8 @@ class _Run:
     def _keep(self, rows) -> None:
         """Keep the turning points and slips of rows from before the window."""
         self.marked = self._note(rows) | (rows[:, 4] == self.kernels.TURNED)
+        if self.rigid and not self.kept and len(rows):
+            self.marked[0] = True  # the start
         if self.kept < CORNERS:
             self.early.append(rows[self.marked])
             self.kept += int(self.marked.sum())
@@ -303,7 +305,10 @@ class _Run:
         row[0, head:head + n], row[0, head + n:head + 2 * n] = self.motion
         for k, part in ((0, memory.force), (4, memory.slip), (5, memory.worked), (6, memory.lost), (8, memory.place)):
             row[0, head + 2 * n + k::each] = part
-        return np.concatenate([*late, row])
+        rows = np.concatenate([*late, row])
+        if self.rigid:  # an event at the beginning of the window, to the last digits, is before it
+            rows = rows[min(int(np.argmax(rows[:, 1] > 1e-12 * self.period)), len(rows) - 2):]
+        return rows
 
     @property
     def now(self) -> float:

@@ -288,8 +288,8 @@ def _smooth_in_time(model: Model, numerics, patch) -> list:
     return [Rung((wider,), lambda *values: tolerance_error(*values, model.rig.displacement))]
 
 
-EXACT = Engine("exact", "exact", "exact run_exact", _no_rungs, _exact_in_space, "plan events_cost", dearer=too_long,
-               refuse="plan refuse_events")
+EXACT = Engine("exact", "exact", "pieces.run run_exact", _no_rungs, _exact_in_space, "plan events_cost",
+               dearer=too_long, refuse="plan refuse_events")
 PIECES = Engine("piecewise", "exact", "pieces.run run_piecewise", _no_rungs, _pieces_in_space, "plan pieces_cost",
                 dearer=dear_pieces, chosen="numerics by_pieces")
 SMOOTH = Engine("smooth", "", "smooth.solve run_smooth", _smooth_in_time, _own_errors, "plan smooth_cost",

@@ -5,11 +5,10 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 from event_reference import basis_of, random_basis
+from event_run import period_map, simulate, steady
 
 from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
 from patchfem.core import BaseSine, PatchfemError, Start
-from patchfem.dynamics.events.histories import simulate
-from patchfem.dynamics.events.steady_events import period_map, steady
 from patchfem.structure import drives
 
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from event_run import simulate
 from grooves_reference import case_of, flank, forces, run
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Start
-from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.grooves.run import model_of
 from patchfem.dynamics.march.march import fresh, march
 from patchfem.friction.grooves import Grooves, Swing

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from event_run import steady
 
 from patchfem.core import BaseSine, ModalBasis
-from patchfem.dynamics.events.steady_events import steady
 from patchfem.dynamics.grooves.run import model_of
 from patchfem.dynamics.harmonic import orbits
 from patchfem.dynamics.march.march import fresh

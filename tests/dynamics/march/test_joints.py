@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from event_run import simulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from march_paths import ALL
@@ -9,7 +10,6 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from patchfem.core import BaseSine, ModalBasis, Start
-from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.march.joints import Joint, JointsModel, cubic, interlock
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model, list_model, points_model, rate_model

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from event_run import simulate
 from scipy.integrate import solve_ivp
 
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.contacts.arrays import Stops
-from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.march import stops_kernels as stops
 from patchfem.dynamics.march import varying_load
 from patchfem.dynamics.march.march import march, plant_of

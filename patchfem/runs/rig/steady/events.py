@@ -8,16 +8,15 @@ import numpy as np
 
 from ....compiled import load
 from ....core import Outcome, PatchfemError, Start
-from ....dynamics.events.histories import simulate
-from ....dynamics.events.steady_events import steady
-from ....dynamics.one_mode import sdof
 from ....dynamics.one_mode.steady import response
 from ....dynamics.periodic import is_stable
+from ....dynamics.piecewise.histories import simulate
+from ....dynamics.piecewise.stick_steady import steady
 from ....response.measures import half_swing
 from ....response.spectrum import wave_measures
 from ....structure.drive_sizes import largest
 from ....structure.response import receptance
-from ..exact import forces_of, run_exact
+from ..pieces.run import Limits, run_exact
 from .curves import SHOWN, Shown, exact_errors, traced, unlasting
 
 OUTCOMES = {"unbounded": Outcome.GROWS, "stuck": Outcome.STUCK}
@@ -30,14 +29,15 @@ class Events:
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         self.model, self.numerics, self.modes, self.patch, self.say = model, numerics, model.rig.modes, patch, say
-        self.forces = forces_of(model, patch)
+        self.groups = Limits(model, numerics, patch).groups
+        self.forces = np.array([(one.static, one.kinetic) for one in self.groups]).T
         self.alone = self.modes.omega.size == 1 and len(self.modes.interfaces) == 1
         self.falls = bool(np.any(self.forces[0] > self.forces[1]))
 
     def _found(self, drive, near):
         """Steady motion by shooting: where friction falls with the first slip there are several, and one starts from
         the state `near`."""
-        return steady(self.modes, drive, *self.forces, start=near if self.falls else None)
+        return steady(self.modes, drive, self.groups, start=near if self.falls else None)
 
     def point(self, drive, near=None) -> tuple:
         """The steady motion as a run of the exact engine that begins in it, and its start."""
@@ -105,17 +105,13 @@ class Events:
         outcome = OUTCOMES.get(regime, Outcome.STEADY)
         if regime in ("unbounded", "unsettled"):
             return Shown(drive, {}, {}, regime, multiplier, False, outcome)
-        if self.alone:
-            forces = (float(one[0]) for one in self.forces)
-            done = sdof.simulate(self.modes, drive, *forces, periods, periods, start=start)
-        else:
-            done = simulate(self.modes, drive, *self.forces, periods, periods, start=start)
+        done = simulate(self.modes, drive, self.groups, periods, periods, start=start)
         window, gauge = done.window, self.modes.gauge
         extremes = done.amplitudes
         amplitude = float(extremes[:, 1].max() - extremes[:, 0].min()) / 2 if gauge is None else \
             half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge)
         values = {SHOWN["amplitude"]: amplitude, SHOWN["acceleration_peak"]: done.acceleration,
-                  **wave_measures(*np.abs(done.waves), largest(drive))}
+                  **wave_measures(*done.reading.waves, largest(drive))}
         values = {name: value for name, value in values.items() if value is not None}
         return Shown(drive, values, exact_errors(values, residual), regime, multiplier, True, outcome, start)
 

@@ -1,0 +1,220 @@
+"""Periodic motion behind rigid elements (Coulomb friction), or none, by Newton's method on the map from event to event.
+
+Between two events the motion is linear, so its derivative is the exponential of its system with the held slides taken
+out. A perturbation dx moves an event by dt = -(grad e . dx)/e', so dx+ = R (dx + f- dt) - f+ dt with the motions f
+before and after and R taking the rates of stopped slides out (saltation; Leine and Nijmeijer 2004, ch. 7). The
+eigenvalues of the product are the Floquet multipliers.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import expm
+
+from ...core import ModalBasis, PatchfemError, Start, frozen_array
+from ..periodic import Grows, Lap, Shooting
+from . import histories
+
+LONGEST = 400  # cycles of a run where Newton's method leads away
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Steady:
+    """A motion that repeats from period to period.
+
+    start: state at phase 0 of the drive; residual: |state after a period - start| over the size of the motion;
+    multipliers (2n,) complex, largest first: stable where all are < 1 in magnitude (a stuck slide that may rest
+    anywhere in a range keeps a 1); amplitude [m]: half the peak-to-peak output; regime: "stuck", "sliding" (no stop
+    lasts), "n stops" per period of the interface with the most, or "unbounded"; stops (i,) that last, per period;
+    alone: no two events coincide, else the multipliers hold for one order of them; iterations of Newton's method.
+    Unbounded: start is the last state of the run, residual and multipliers are those there.
+    """
+
+    start: Start
+    residual: float
+    multipliers: np.ndarray
+    amplitude: float
+    regime: str
+    stops: tuple
+    alone: bool
+    iterations: int
+
+
+class Map(NamedTuple):
+    """Map of the state x = (z, v) (2n,) over some periods: its end, its derivative slope (2n, 2n), signs of slip (k, i)
+    in its pieces, which of them rub (i,), half the peak-to-peak output [m], sizes (2n,) of the state on the way, first
+    (n, n): projector of its first piece, and alone as in Steady."""
+
+    end: np.ndarray
+    slope: np.ndarray
+    signs: np.ndarray
+    rubs: np.ndarray
+    swing: float
+    sizes: np.ndarray
+    first: np.ndarray
+    alone: bool
+
+
+class Stretch:
+    """Motion from one event to the next: the slides that are held, and the forces of the others.
+
+    run: the run; row, after: its first row and the first one behind it, None at the end; span [s].
+    """
+
+    def __init__(self, run, row, after, span: float):
+        modes, plant, n = run.modes, run.plant, run.modes.omega.size
+        self.run, self.row, self.after, self.span = run, row, after, span
+        at = run._at(0, 0)
+        columns = row[at:].reshape(len(run.groups), run.kernels.EACH)
+        self.held, self.signs = np.isinf(columns[:, 1]), columns[:, 7]
+        rows = plant.faces[self.held]
+        self.pinv = np.linalg.pinv(rows, rcond=1e-10)
+        self.project = np.eye(n) - self.pinv @ rows
+        if len(rows) and np.abs(self.project).max() < 1e-9:
+            self.project = np.zeros((n, n))
+        self.given = np.where(self.held, 0.0, columns[:, 0]) @ plant.faces / modes.mass
+        self.square, self.dampers = np.diag(modes.omega**2), np.asarray(modes.dampers, float)
+
+    def slope(self) -> np.ndarray:
+        """Derivative (2n, 2n) of the state at the end to that at the start."""
+        n, p = len(self.square), self.project
+        left = np.block([[np.zeros((n, n)), p], [-p @ self.square, -p @ self.dampers]])
+        return expm(left * self.span) @ self.taken_out()
+
+    def taken_out(self) -> np.ndarray:
+        """Derivative (2n, 2n) of a state whose held slides come to rest to what it was."""
+        out = np.eye(2 * len(self.square))
+        out[len(self.square):, len(self.square):] = self.project
+        return out
+
+    def acceleration(self, z, v, push: float) -> tuple:
+        """(acceleration (n,) [m s-2], that without the reactions) at a state under a drive [m s-2]."""
+        pull = -self.square @ z - self.dampers @ v - self.run.modes.base * push - self.given
+        return self.project @ pull, pull
+
+    def saltation(self, later: "Stretch") -> tuple:
+        """(derivative (2n, 2n) of the state after the event at the end to that before it, whether only one slide
+        changed by itself)."""
+        run, modes, n = self.run, self.run.modes, len(self.square)
+        row = later.row
+        z, v = row[run.kernels.HEAD:run.kernels.HEAD + n], row[run.kernels.HEAD + n:run.kernels.HEAD + 2 * n]
+        part = run.drive.segments[0]
+        push = part.constant + part.amplitude * np.sin(row[2])
+        rise = part.amplitude * part.omega * np.cos(row[2])
+        before, pull = self.acceleration(z, v, push)
+        changed = self.signs != later.signs
+        face, stops = _what_happened(self, later, changed, modes.mass * pull @ self.pinv)
+        gradient, static, kinetic = np.zeros(2 * n), run.table.static[face], run.table.kinetic[face]
+        if stops:
+            gradient[n:] = run.plant.faces[face]
+            speed = float(run.plant.faces[face] @ before)
+        else:
+            react = self.pinv[:, np.flatnonzero(self.held) == face][:, 0]
+            gradient[:n], gradient[n:] = -react @ self.square, -react @ self.dampers
+            speed = float(gradient[:n] @ v + gradient[n:] @ before - react @ modes.base * rise)
+        jump = np.zeros(2 * n)
+        if stops or static != kinetic:  # else nothing jumps at a release
+            jump[n:] = before - later.acceleration(z, v, push)[0]
+        out = later.taken_out()
+        if speed != 0:
+            out -= np.outer(out @ jump, gradient) / speed
+        others = [a not in (0, b) for f, (a, b) in enumerate(zip(self.signs, later.signs)) if f != face]
+        return out, not any(others)
+
+
+def _what_happened(one: Stretch, later: Stretch, changed, reactions) -> tuple:
+    """(interface of the event between two stretches, whether its slip came to rest); reactions (h,) [N] of the held
+    ones."""
+    turned = np.flatnonzero(changed & (one.signs != 0))
+    if turned.size:
+        return int(turned[0]), True
+    limits = one.run.table.static[one.held]
+    near = np.abs(np.abs(reactions) / np.maximum(limits, 1e-300) - 1)
+    near[~changed[one.held]] = np.inf
+    return int(np.flatnonzero(one.held)[int(np.argmin(near))]), False
+
+
+def period_map(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Map:
+    """The map of a state (2n,) over whole drive periods; groups: Elements of every interface, rigid ones alone."""
+    n = modes.omega.size
+    run = histories._Run(modes, drive, groups, periods, periods, np.inf, Start(state[:n], state[n:]), None)
+    kept = []
+    run.until(periods, lambda done: kept.append(done.copy()))
+    rows = np.concatenate(kept)
+    begins = [0, *(k for k in np.flatnonzero(rows[:, 4] >= run.kernels.SWITCHED) if k)]
+    parts = [Stretch(run, rows[a], None, float(rows[a:b, 1].sum())) for a, b in zip(begins, [*begins[1:], len(rows)])]
+    slope, alone = parts[0].slope(), True
+    for before, after in pairwise(parts):
+        if np.any(before.signs != after.signs):
+            jump, own = before.saltation(after)
+            slope, alone = jump @ slope, alone and own
+        slope = after.slope() @ slope
+    owner = np.repeat(np.arange(len(rows)), 3)
+    dense = run.dense_values(rows, owner, np.tile([0.0, 0.5, 1.0], len(rows)) * rows[owner, 1])
+    sizes = [max(float(np.abs(part).max()), 1e-300) for part in (dense[:, :n], dense[:, n:2 * n])]
+    low, high = run.books.extremes[:, 0].min(), run.books.extremes[:, 1].max()
+    return Map(run.motion.ravel().copy(), slope, np.array([part.signs for part in parts]), run.table.static > 0,
+               float(high - low) / 2, np.repeat(sizes, n), parts[0].project, alone)
+
+
+def steady(modes: ModalBasis, drive, groups, start: Start | None = None, cycles: int = 30, periods: int = 1) -> Steady:
+    """Periodic response to a sine from rest or `start`, after `cycles` of a run that bring it near.
+
+    drive: one Segment of a sine; groups: as of `period_map`. NotConverged as `periodic.Shooting.repeating`,
+    PatchfemError for a drive that does not repeat.
+    """
+    if len(drive.segments) != 1:
+        raise PatchfemError("drive: a periodic response needs one sine that goes on; march this one")
+    n = modes.omega.size
+    begin = np.zeros(2 * n) if start is None else np.concatenate([start.z, start.v])
+    shooting = Slips(modes, drive, groups, periods)
+    try:
+        lap, used = shooting.repeating(shooting.run(begin, cycles), (2 * cycles, LONGEST))
+    except Grows as found:
+        return _result(found.lap, n, "unbounded", found.steps)
+    return _result(lap, n, None, used)
+
+
+class Slips(Shooting):
+    """The map from event to event over whole periods of a drive; arguments as `steady`."""
+
+    def __init__(self, modes: ModalBasis, drive, groups, periods: int = 1):
+        self.modes, self.drive, self.groups, self.periods = modes, drive, groups, periods
+        part = drive.segments[0]
+        self.moved_by = max(abs(part.amplitude) / part.omega**2 * float(np.abs(modes.base).max()), 1e-300)
+
+    def lap(self, point) -> Lap:
+        """The Lap of a state (2n,)."""
+        found = period_map(self.modes, self.drive, self.groups, point, self.periods)
+        return Lap(point, found, found.slope, found.sizes, (point - found.end) / found.sizes,
+                   found.sizes[0] / self.moved_by)
+
+    def moved(self, lap: Lap, step):
+        """The state a step away, whose held slides stay at rest."""
+        n, out = self.modes.omega.size, lap.point + step
+        out[n:] = lap.found.first @ out[n:]
+        return out
+
+    def after(self, lap: Lap, periods: int):
+        """The state after some periods of the run from that of a Lap."""
+        return self.run(lap.point, periods)
+
+    def run(self, state, periods: int):
+        """The state after some periods of the run."""
+        n = self.modes.omega.size
+        run = histories._Run(self.modes, self.drive, self.groups, periods, 1, np.inf, Start(state[:n], state[n:]), None)
+        run.until(periods)
+        return run.motion.ravel().copy()
+
+
+def _result(lap: Lap, n: int, regime, used: int) -> Steady:
+    one, state = lap.found, lap.point
+    stops = tuple(int(k) for k in np.count_nonzero((one.signs[:-1] != 0) & (one.signs[1:] == 0), axis=0))
+    if regime is None:
+        signs, most = one.signs[:, one.rubs], max(stops)
+        slips, rests = bool(np.any(signs != 0)) or signs.shape[1] == 0, bool(np.any(signs == 0))
+        regime = "stuck" if not slips else "sliding" if not rests else f"{most} stop{'s' if most != 1 else ''}"
+    return Steady(Start(frozen_array(state[:n]), frozen_array(state[n:])), lap.miss,
+                  frozen_array(lap.multipliers(), complex), one.swing, regime, stops, one.alone, used)
