@@ -18,6 +18,7 @@ SAMPLES = 400  # per drive cycle in the kept window
 LEAST = 101  # of a run that has no cycles
 CHUNK = 4096  # rows held at once
 CORNERS = 400_000  # turning points kept from before the window
+SHOWN = 1000  # cycles among those that repeat whose turning points are kept
 NOISE = 64 * 2.0**-52  # of what a speed is added from, below which it rests
 REPEATS = 2  # of `Past.about`
 LARGEST, SLIPPED = 5, 7  # of the ledger, no sums
@@ -218,14 +219,19 @@ class _Run:
         books.phasors[begin:end] *= books.wanted[begin:end, None]
         self.clock.now[0] = end
         if len(rows):
-            self._again(done, many, *noted)
+            gained = self.memory.worked - before[1], self.memory.lost - before[2]
+            self._again(done, many, *noted, [part / (many + 1) for part in gained])
 
-    def _again(self, rows, many: int, first: int, count: int) -> None:
-        """Keep the rows (k, w) of a cycle, and its events from the list's number `first` on, `many` times more."""
-        turned = rows[self.marked]
-        few = max(0, min(many, -(-(CORNERS - self.kept) // max(len(turned), 1))))
-        self.early.append(_later(turned, self.period * np.arange(1, few + 1)))
-        self.kept += few * len(turned)
+    def _again(self, rows, many: int, first: int, count: int, gained) -> None:
+        """Keep the rows (k, w) of a cycle, of at most SHOWN of them, and its events from the list's number `first` on
+        for `many` cycles more; gained: work and loss (i,) [J] of the elements in a cycle."""
+        turned, cycles = rows[self.marked], np.unique(np.linspace(1, many, min(many, SHOWN)).round())
+        again = _later(turned, self.period * cycles)
+        for column, each in zip((5, 6), gained):
+            for f, part in enumerate(each):
+                again[:, self._at(f, column)] += np.repeat(cycles * part, len(turned))
+        self.early.append(again)
+        self.kept += len(again)
         found = np.concatenate([np.empty((0, 5)), *self.events[first:]])
         few = min(many, -(-ROOM // max(len(found), 1)))
         self.events.append(_later(found, self.period * np.arange(many - few + 1, many + 1)))

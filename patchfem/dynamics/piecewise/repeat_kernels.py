@@ -14,7 +14,7 @@ from ...friction.flags_kernels import FAST, LEAN
 from .drive_kernels import KIND, SINE
 
 NEAR, FAR = 1e-14, 1e-10  # of the size of the motion
-SOON = 90.0  # cycles from FAR to NEAR at most: what is left is then below 10 NEAR
+SOON = 9000.0  # cycles from FAR to NEAR at most: what is left is then below 1000 NEAR, 1e-11 of the motion
 SEGMENT, APART, REPEATS = range(3)  # of `Past.about`
 
 

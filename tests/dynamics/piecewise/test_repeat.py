@@ -64,6 +64,10 @@ def test_exact_a_motion_that_repeats_is_counted_on(shape, monkeypatch):
     np.testing.assert_allclose(np.diff(run.log.time[late], n=1).sum(), run.log.time[-1] - run.log.time[late][0])
     assert late.sum() == pytest.approx(1000 * each, abs=1)
     assert np.all(np.diff(run.response.time) >= -1e-9 * drive.period)
+    lost, time = run.response.extra["ledger"][2], run.response.time / drive.period
+    assert np.all(np.diff(lost) >= -1e-12 * lost[-1])
+    of_cycle = sum(one.ledger["friction"] for one in parts[-10:]) / 40
+    assert np.ptp(np.interp([1000, 3000], time, lost)) == pytest.approx(2000 * of_cycle, rel=2e-3)
 
 
 def test_exact_a_level_that_follows_ends_the_repeating():
@@ -90,7 +94,7 @@ def test_exact_states_a_last_digit_apart_are_one_and_others_not():
     modes, drive, _ = case(1, 1, 1)
     plant, table = plant_of(modes), table_of([elements_of([1.0, 2.0], [0.1, 0.3])])
     for apart, fell, place, same in ((1e-15, 50, 0.0, True), (1e-15, 50, 1e-13, False), (1e-13, 50, 0.0, False),
-                                     (1e-15, 120, 0.0, False), (1e-15, 50, 1e-15, True)):
+                                     (1e-15, 9200, 0.0, False), (1e-15, 50, 1e-15, True)):
         memory, clock, past = virgin(table, np.array([0.5])), clock_of(drive, 1), past_of(plant, table)
         motion = np.array([[1.0], [0.3]])
         assert not come_back(motion, plant, memory, clock, past)  # the first state of all
