@@ -4,8 +4,8 @@ import numpy as np
 
 from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, frozen_array
-from patchfem.dynamics.events.batches import gather, sample
-from patchfem.dynamics.events.engine import Engine
+from patchfem.dynamics.piecewise.elements import coulomb
+from patchfem.dynamics.piecewise.histories import at_times
 
 load("dynamics.comparison.comparison_kernels")  # compiled loops come from the hashed cache
 
@@ -29,8 +29,7 @@ TWO, TWO_DRIVE, TWO_LIMIT = (basis([0.0, np.sqrt(2.0)], [0.0, 0.0], [HALF, -HALF
 
 def sampled(modes, drive, limit, cycles: float, times, start=None):
     """Response at `times` (k,) of `cycles` by the event engine of any modes."""
-    engine = Engine(modes, drive, limit, limit, cycles, start)
-    return sample(gather(list(engine.pieces())), np.asarray(times, float), modes, drive, engine.live)
+    return at_times(modes, drive, [coulomb(limit, limit)], cycles, times, start)
 
 
 def exact(name: str, times):

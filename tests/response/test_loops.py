@@ -195,15 +195,12 @@ def test_exact_drift_of_less_than_two_cycles():
 
 def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
     """Slide (k,) [m] at the middles of equal parts of the cycle that begins at `begin` cycles, by the event engine."""
-    from patchfem.dynamics.events import batches
-    from patchfem.dynamics.events.engine import Engine
+    from patchfem.dynamics.piecewise.elements import coulomb
+    from patchfem.dynamics.piecewise.histories import at_times
 
-    model, cycles = done.plan.model, done.plan.model.rig.cycles
-    limits = [np.array([limit]) for limit in model.limits(model.point.load)]
-    engine = Engine(model.rig.modes, model.rig.drive, *limits, cycles, None)
-    pieces = batches.gather(list(engine.pieces()))
+    model, rig = done.plan.model, done.plan.model.rig
     times = (begin + (np.arange(samples) + 0.5) / samples) * PERIOD
-    return batches.sample(pieces, times, model.rig.modes, model.rig.drive, engine.live).slide
+    return at_times(rig.modes, rig.drive, [coulomb(*model.limits(model.point.load))], rig.cycles, times).slide
 
 
 @pytest.mark.parametrize("more, drive", [("", "7 g"), ("", "5 g"), ("kinetic = 0.2", "5 g")])

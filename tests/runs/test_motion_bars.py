@@ -11,7 +11,7 @@ from motion_read import measures
 from motion_reference import Motion
 from motion_scenes import spec, text
 
-from patchfem.dynamics.events.event_list import EventLog
+from patchfem.dynamics.piecewise.event_list import EventLog
 from patchfem.dynamics.piecewise.histories import _starts
 from patchfem.scene.scene import loads
 

@@ -1,16 +1,16 @@
-"""One mode with one Coulomb interface in closed form: the fast way of `histories.simulate`, for any drive in segments.
+"""One mode with one Coulomb interface in closed form: the fast way of `piecewise.histories`, for any drive in segments.
 
 Short blocks run as plain Python, so no compiled code is loaded; long ones run compiled.
 """
 
+from dataclasses import dataclass
 from itertools import pairwise
 from math import inf, pi
 
 import numpy as np
 
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
-from ..events.event_list import ROOM, EventLog
-from ..events.histories import LEAST, SAMPLES, EventRun
+from ..piecewise.event_list import ROOM, EventLog
 from . import sdof_kernels, window_kernels
 from .sdof_keep import keep
 from .sdof_samples import (
@@ -31,6 +31,40 @@ COMPILED_FROM = 2000  # cycles: loading the compiled code takes 0.07 s, plain Py
 CHUNK = 4096  # events held at once beside those of the window
 CORNERS = 400_000  # corners kept from before the window
 ENDS = 5  # last windows whose phasors tell a steady motion (response.settling)
+SAMPLES = 400  # per drive cycle in the kept window
+LEAST = 101  # of a run that has no cycles
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class EventRun:
+    """An event-driven run. window: uniform samples of the last cycles and both sides of every event.
+
+    amplitudes (c, 2): extremes of the output per cycle; phasors (c,): its drive-frequency part; ledger: energies [J]
+    over all interfaces; events: how many stretches between events; loop: quadrature arrays (time, weight, slide, rate,
+    force) over the window; stick: time stuck in the window [s]; starts: phases of release, mod pi; acceleration:
+    largest |absolute acceleration| at the output in the window, both sides of every jump; log: the events;
+    force_peaks (i,): largest friction force [N] of each interface in the window; waves (2,): first and third harmonic
+    of the absolute acceleration at the output over the window; means (2,): time means [m] of the first slide in the
+    window's first and last cycle, None where it holds none or ends inside one. loop, stick and starts are the first
+    interface's; those of all are in Response.extra.
+    """
+
+    response: Response
+    window: Response
+    amplitudes: np.ndarray
+    phasors: np.ndarray
+    ledger: dict
+    outcome: Outcome | None
+    events: int
+    loop: tuple
+    stick: float
+    starts: np.ndarray
+    acceleration: float
+    cycles_done: float
+    log: EventLog | None = None
+    force_peaks: np.ndarray | None = None
+    waves: np.ndarray | None = None
+    means: tuple | None = None
 
 
 def scene_of(modes: ModalBasis, drive, static: float, kinetic: float, duration: float) -> OneMode:

@@ -7,8 +7,8 @@ import numpy as np
 
 from ...compiled import load
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
-from ..events.event_list import BORDER, RELEASE, REVERSAL, ROOM, STOP, EventLog
 from .elements import stretches, table_of, virgin
+from .event_list import BORDER, RELEASE, REVERSAL, ROOM, STOP, EventLog
 from .names_kernels import OF_FACE, OF_RUN
 from .plant import books_of, cleared, clock_of, into, past_of, place, plant_of, room_of
 from .reading import Reading, ring_of
@@ -107,6 +107,15 @@ def briefly(cases, cycles: int, window: int) -> list:
     return out
 
 
+def at_times(modes: ModalBasis, drive, groups, cycles: float, times, start: Start | None = None) -> Response:
+    """The motion at any times (k,) [s] of `cycles` drive cycles from rest or `start`, off the series of its pieces."""
+    run, rows, times = _Run(modes, drive, groups, cycles, 1, np.inf, start, None), [], np.asarray(times, float)
+    run.until(cycles, run._into(rows))
+    rows = np.concatenate(rows)
+    owner = np.clip(np.searchsorted(rows[:, 0], times, side="right") - 1, 0, len(rows) - 1)
+    return run._rows_as(rows, owner, np.clip(times - rows[owner, 0], 0.0, rows[owner, 1]), times)
+
+
 class _Run:
     """Rows as they come: what is summed is summed, all but turning points and slips is forgotten before the window.
 
@@ -140,6 +149,8 @@ class _Run:
         self.before = self._ways(self.plant.faces @ self.motion[1], np.abs(self.plant.faces) @ np.abs(self.motion[1]))
         self.passed, self.repeats, self.marked = False, False, np.zeros(0, bool)
         self.begun = self.kernels.stored(self.motion, self.plant, self.table, self.memory)
+        still = self.kernels.stored(np.zeros_like(self.motion), self.plant, self.table, self.memory)
+        self.stretched = still - float(np.sum(self.memory.worked - self.memory.lost))  # [J] before the books began
         self.rows = np.empty((CHUNK, self.width)) if like is None or like.width != self.width else like.rows
 
     def until(self, cycles: float, keep=None, progress=None) -> None:
@@ -270,9 +281,7 @@ class _Run:
 
     def go(self, frames: int, progress) -> PieceRun | None:
         """The whole run; None where its output passed the travel."""
-        end, wide, late, memory = self.cycles, [], [], self.memory
-        still = self.kernels.stored(np.zeros_like(self.motion), self.plant, self.table, memory)
-        self.stretched = still - float(np.sum(memory.worked - memory.lost))  # [J] from before the books began
+        end, wide, late = self.cycles, [], []
         first, last = max(0.0, end - self.window), max(0.0, end - 1)
         begin = max(0.0, min(first, end - 2))
         if begin > 0:

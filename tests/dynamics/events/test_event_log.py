@@ -1,5 +1,6 @@
 """Lists of events: of the fast engine against the general one, of levels against one run, the last ones kept."""
 
+import event_run
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,8 +8,8 @@ from hypothesis import strategies as st
 from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import BaseSine, ModalBasis, Start
-from patchfem.dynamics.events import event_list, histories
 from patchfem.dynamics.one_mode import sdof
+from patchfem.dynamics.piecewise import event_list, histories
 from patchfem.response.run_events import of_log
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -43,14 +44,14 @@ def test_always_the_fast_engine_lists_what_the_general_one_does(zeta, limit, rat
     modes, drive = one_mode(zeta, slide), BaseSine(1.0, omega)
     force, start = limit / abs(slide), Start(np.array([0.3]), np.array([speed]))
     fast = sdof.simulate(modes, drive, force, ratio * force, 12, 2, start=start).log
-    slow = histories.simulate(modes, drive, force, ratio * force, 12, 2, start=start).log
+    slow = event_run.simulate(modes, drive, force, ratio * force, 12, 2, start=start).log
     assert fast.count > 5
     alike(fast, slow, 1e-7)
 
 
 def test_exact_borders_of_levels_are_listed_by_both():
     modes, drive = one_mode(0.05), levels([1.0, 2.0, 0.5, 1.5], 0.9, 3)
-    fast, slow = (engine.simulate(modes, drive, 0.6, 0.6, 12, 2).log for engine in (sdof, histories))
+    fast, slow = (engine.simulate(modes, drive, 0.6, 0.6, 12, 2).log for engine in (sdof, event_run))
     alike(fast, slow, 1e-8)
     border = fast.what == event_list.BORDER
     assert fast.time[border] == pytest.approx(2 * np.pi / 0.9 * np.array([3, 6, 9]))
@@ -74,8 +75,8 @@ def test_exact_the_last_events_are_kept_and_all_counted(monkeypatch):
     every = sdof.simulate(modes, drive, 0.8, 0.8, 40, 2).log
     monkeypatch.setattr(sdof, "CHUNK", 16)
     monkeypatch.setattr(sdof, "ROOM", 50)
-    monkeypatch.setattr(event_list, "ROOM", 50)
-    for engine in (sdof, histories):
+    monkeypatch.setattr(histories, "ROOM", 50)
+    for engine in (sdof, event_run):
         few = engine.simulate(modes, drive, 0.8, 0.8, 40, 2).log
         assert few.count == every.count > 150 and len(few.time) == 50
         assert few.time == pytest.approx(every.time[-50:]) and few.what.tolist() == every.what[-50:].tolist()
@@ -83,7 +84,7 @@ def test_exact_the_last_events_are_kept_and_all_counted(monkeypatch):
 
 def test_exact_the_list_ends_where_the_travel_does():
     modes, drive = one_mode(0.0), BaseSine(1.0, 1.0)
-    for engine in (sdof, histories):
+    for engine in (sdof, event_run):
         done = engine.simulate(modes, drive, 0.3, 0.3, 100, 2, travel=5.0)
         assert done.log.time[-1] <= done.response.time[-1] and done.log.count == len(done.log.time) > 4
 

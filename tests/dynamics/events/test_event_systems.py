@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patchfem.core import BaseSine, Outcome, PatchfemError, Segment, Start
-from patchfem.dynamics.events.event_list import BORDER, RELEASE, REVERSAL, STOP
+from patchfem.dynamics.piecewise.event_list import BORDER, RELEASE, REVERSAL, STOP
 from patchfem.response.measures import energy_balance
 from patchfem.structure import drives
 
