@@ -11,8 +11,6 @@ from motion_read import measures
 from motion_reference import Motion
 from motion_scenes import spec, text
 
-from patchfem.dynamics.piecewise.event_list import EventLog
-from patchfem.dynamics.piecewise.histories import _starts
 from patchfem.scene.scene import loads
 
 FEW = (11, 21, 30, 111)  # exact, in pieces, exact, a march
@@ -94,12 +92,3 @@ def test_exact_the_printed_sum_of_the_independent_program(order):
         total = float(np.sum(rho**order * np.exp(-rho) * np.sign(u) * steps)) / max(1.0, order)
         assert law.force(np.array([q, path]), 0.0, 0.0) == pytest.approx(2 * total, abs=1e-3)
         law.turned(0, np.array([q, path]), 0.0, -law.mode)
-
-
-def test_exact_a_slip_that_turns_at_its_limit_starts_no_slip():
-    """Two slips a cycle start at one phase modulo pi. Stop, release and stop again at one time are no start: they moved
-    the phase of seed 5021 by 0.035."""
-    time = np.array([1.0, 1.4, 1.5, 1.9, 1.9, 1.9, 2.0])
-    what, phase = np.array([1, 0, -1, 0, 1, 0, 1]), 2 * np.pi * time
-    log = EventLog(time, phase, np.zeros(7, int), what, time, 7)
-    assert _starts(log, 0.5, 1.0) == pytest.approx(np.array([0.0, 0.0, 0.0]), abs=1e-12)

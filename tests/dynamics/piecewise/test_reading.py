@@ -1,7 +1,10 @@
 """What the last cycles show, against the same series sampled at Gauss points, closed forms and fits to samples."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from plain import plain
 
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.piecewise import histories, reading
@@ -10,6 +13,7 @@ from patchfem.dynamics.piecewise.elements import elements_of
 from patchfem.response.loops import half_range, secant_stiffness, turns_of
 from patchfem.response.run_events import rings
 
+read = plain("dynamics.piecewise.read_kernels")
 PLACE, WEIGHT = np.polynomial.legendre.leggauss(16)
 
 
@@ -83,6 +87,21 @@ def test_exact_releases_are_those_of_the_log():
     assert late.sum() == done.reading.run[at.STARTS] > 4
     wanted = np.angle(np.mean(np.exp(2j * done.log.phase[late]))) / 2 % np.pi
     assert done.reading.start == pytest.approx(wanted, abs=1e-12)
+
+
+def test_exact_a_slip_that_turns_at_its_limit_starts_no_slip():
+    """Two slips a cycle start at one phase modulo pi. Stop, release and stop again at one time are no start: they moved
+    the phase of a random rig by 0.035."""
+    time, way = np.array([0.5, 1.0, 1.4, 1.5, 1.9, 1.9, 1.9, 2.0]), np.array([0, 1, 0, -1, 0, 1, 0, 1])
+    plant = SimpleNamespace(square=np.zeros((1, 1)), reach=np.zeros(1))
+    at_face, out = read.first_of(0, plant), np.zeros(at.OF_RUN)
+    rows = np.zeros((len(time) + 1, at_face + read.EACH))
+    rows[:-1, 0], rows[:-1, 2], rows[:-1, at_face + read.WAY], rows[:, at_face + read.SHARE] = (
+        time, 2 * np.pi * time, way, 1.0)
+    rows[-1, 0], rows[:, at_face + read.SPRING] = 2.5, read.RIGID
+    read.changes(rows, len(time), plant, SimpleNamespace(period=np.ones(1), segments=np.zeros((1, 1))), out)
+    assert out[at.STARTS] == 3 and out[at.START_COS] == pytest.approx(3.0, abs=1e-12)
+    assert out[at.START_SIN] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_exact_a_run_in_brief_shows_what_the_run_shows():
