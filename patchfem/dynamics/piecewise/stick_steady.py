@@ -11,7 +11,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from ...core import ModalBasis, PatchfemError, Start, frozen_array
 from ..periodic import Grows, Lap, Shooting
@@ -81,7 +80,7 @@ class Stretch:
         """Derivative (2n, 2n) of the state at the end to that at the start."""
         n, p = len(self.square), self.project
         left = np.block([[np.zeros((n, n)), p], [-p @ self.square, -p @ self.dampers]])
-        return expm(left * self.span) @ self.taken_out()
+        return exponential(left * self.span) @ self.taken_out()
 
     def taken_out(self) -> np.ndarray:
         """Derivative (2n, 2n) of a state whose held slides come to rest to what it was."""
@@ -122,6 +121,24 @@ class Stretch:
             out -= np.outer(out @ jump, gradient) / speed
         others = [a not in (0, b) for f, (a, b) in enumerate(zip(self.signs, later.signs)) if f != face]
         return out, not any(others)
+
+
+def exponential(left) -> np.ndarray:
+    """Exponential of a small matrix (2n, 2n) of coordinates and rates: Taylor's series of 2^-s of it, squared s times.
+
+    That of SciPy wakes the threads of its linear algebra, which takes up to milliseconds for two rows.
+    """
+    half, sizes = len(left) // 2, np.abs(left)
+    scale = np.sqrt(max(float(sizes.max()), 1e-300) / max(float(sizes[:half].max()), 1e-300))  # of rates
+    weight = np.repeat([scale, 1.0], half)
+    even = left * (weight[:, None] / weight)
+    times = max(0, int(np.ceil(np.log2(max(float(np.abs(even).sum(axis=0).max()), 1e-300)))) + 1)
+    even, out = even / 2.0**times, np.eye(len(left))
+    for k in range(16, 0, -1):
+        out = np.eye(len(left)) + even @ out / k
+    for _ in range(times):
+        out = out @ out
+    return out * (weight / weight[:, None])
 
 
 def _what_happened(one: Stretch, later: Stretch, changed, reactions) -> tuple:

@@ -97,27 +97,9 @@ def test_always_parts_make_up_the_cases(monkeypatch):
         assert len(seen) == max(1, min(4, count // 32))
 
 
-def test_exact_a_case_beyond_the_room_is_run_by_itself(monkeypatch):
-    """A block that stops twice a cycle has twice the phases of one that slides, in the same call."""
-    from patchfem.runs.many.lumped import coulomb
-
-    base = base_of(load(SCENE.format(law=LAWS["coulomb"], kind="base", kind_size=SIZES["base"])))
-    shared = ["drive.frequency=100 Hz", "drive.cycles=80", "structure.mode.axial.damping=0.05"]
-    cases = [build(base.changed([*shared, one])) for one in ("normal.load=5 N", "normal.load=125 N")]
-    monkeypatch.setattr(coulomb, "PHASES", 0)  # 256 in all
-    seen, real = [], one_by_one.solve
-    monkeypatch.setattr(one_by_one, "solve", lambda models, say: seen.extend(models) or real(models, say))
-    many = batch(cases)
-    assert seen == cases[1:]
-    monkeypatch.undo()
-    held_against(cases, one_by_one.solve(cases), many)
-
-
 def test_exact_what_is_extrapolated_far_is_that_of_a_single_run(monkeypatch):
     """Of two Coulomb cases one still changes; its steady estimate, beyond its tolerance, shows the last bits of the
     extremes and phasors it is made of: the batch has those bits without a run by itself, and the same words."""
-    from patchfem.runs.many.lumped import coulomb
-
     base = base_of(load(SCENE.format(law=LAWS["coulomb"], kind="base", kind_size=SIZES["base"])))
     shared = ["drive.frequency=143 Hz", "structure.mode.axial.frequency=143 Hz", "structure.moving_mass=0.884 kg",
               "drive.cycles=200", "structure.mode.axial.damping=0.003"]
@@ -125,7 +107,7 @@ def test_exact_what_is_extrapolated_far_is_that_of_a_single_run(monkeypatch):
              for load, push in (("69.0969899665552", 30), ("100", 60))]
     ones = one_by_one.solve(cases)
     assert "relative_displacement_amplitude_steady is known" in ones.warnings[0][-1] and 1 not in ones.warnings
-    assert not coulomb.refuses(cases[0])
+    assert not lumped.refuses(cases[0])
     monkeypatch.setattr(one_by_one, "solve", None)
     held_against(cases, ones, batch(cases))
 

@@ -9,11 +9,12 @@ import numpy as np
 
 from ....core import BaseSine
 from ....model.model import Model
+from ...rig.engines import engine_of
 from .. import one_by_one
 from ..answers import Answers
 from .columns import answered
 
-KINDS = "coulomb", "pieces", "smooth"  # modules of this folder, each imported when the ones before it refuse a model
+KINDS = "pieces", "smooth"  # modules of this folder, each imported when the ones before it refuse a model
 TOGETHER = 1024  # cases of one compiled call, so that their histories of cycles stay small
 
 
@@ -71,7 +72,7 @@ def _solved(models, say, pairs: int) -> Answers:
     window = min(10, cycles // 10)
     kind = _kind(models[0])
     runs = kind.runs_of(models, cycles, window, say, pairs)
-    found, alone, resolved = answered(models, runs, kind.NUMERICS | {"window_cycles": window})
+    found, alone, resolved = answered(models, runs, {"engine": engine_of(models[0]).name, "window_cycles": window})
     found.seconds[:] = (perf_counter() - begin) / len(models)
     finer = ~resolved & ~runs.lost if pairs else np.zeros(len(models), bool)
     for cases, solve_again in ((np.flatnonzero(alone & ~finer).tolist(), lambda these: one_by_one.solve(these, say)),

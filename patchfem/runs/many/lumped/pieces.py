@@ -1,5 +1,5 @@
-"""Elastic-plastic elements, one or many, on one mode under a sine: runs from yield to yield without histories, their
-numbers read off as one array."""
+"""Coulomb friction and elastic-plastic elements, one or many, on one mode under a sine: runs from event to event
+without histories, their numbers read off as one array."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,7 @@ import numpy as np
 
 from ....dynamics.piecewise import histories
 from ....dynamics.piecewise.elements import paired
-from ....dynamics.piecewise.names_kernels import FORCE, REACH
+from ....dynamics.piecewise.names_kernels import FORCE, HIGH, LOW, REACH
 from ....dynamics.piecewise.reading import joined
 from ....effects import has
 from ....friction.record import law_from
@@ -16,16 +16,15 @@ from ....response.errors import cells_error
 from ....response.measures import ROUND, energy_balance, window_amplitudes
 from ....response.ringing import held_ring
 from ....structure.drive_sizes import largest
-from ...rig.engines import PIECES, engine_of
+from ...rig.engines import EXACT, PIECES, engine_of
 from ...rig.pieces.costs import pairs_of
-from ...rig.pieces.run import changes, group_of, settles
+from ...rig.pieces.run import Limits, changes, group_of, settles
 from ...rig.pieces.values import read_off
 from .columns import ENDS, MAIN, Runs
 from .threads import in_threads
 
 CYCLES = 3  # that hold every stick of a cycle whole
 SHORTEST, LONGEST = 20, 4000  # cycles of a run whose extremes are all held
-NUMERICS = {"engine": "piecewise"}
 
 
 class Case(NamedTuple):
@@ -39,20 +38,30 @@ class Case(NamedTuple):
 
 def refuses(model) -> str:
     """Why the cases of this kind do not take a model; "" where they do."""
-    if not has(model.friction.law, "cells") and model.friction.law != "elastic-plastic":
+    f = model.friction
+    if not _holds(model) and not has(f.law, "cells") and f.law != "elastic-plastic":
         return "its law is not made of elements"
     if not SHORTEST <= model.rig.cycles <= LONGEST:
         return "its cycles are too few or too many"
-    return "" if engine_of(model) is PIECES else "its engine is not that of pieces"
+    if _holds(model) and not f.static > 0:
+        return "nothing rubs"
+    return "" if engine_of(model) is (EXACT if _holds(model) else PIECES) else "its engine is not that of pieces"
+
+
+def _holds(model) -> bool:
+    """Whether the law of a model is Coulomb's: a rigid element."""
+    return has(model.friction.law, "set-valued") and not has(model.friction.law, "averaged")
 
 
 def coarsened(model) -> int:
     """How often each two elements count as one in a first run."""
-    return pairs_of(model)
+    return 0 if _holds(model) else pairs_of(model)
 
 
 def case_of(model, pairs: int = 0) -> Case:
     """The Case of a model of one point; pairs: as `Numerics` has it."""
+    if _holds(model):
+        return Case(model, Limits(model, None, None).groups, 0.0, model.point.load)
     element = law_from(model.friction, model.point.load).element(model.point.load)
     group = group_of(element)
     for _ in range(pairs):
@@ -86,37 +95,42 @@ def moved(cases: list, cycles: int, window: int, say=None, least: int = 0, stead
 
 
 def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Runs:
-    """Measures of runs that came to their end."""
+    """Measures of runs that came to their end. All are of rigid elements, or none is: what goes into these is lost,
+    they hold one mode whole, so that nothing rings, and their drift is known to the round-off of its two means."""
     reading, models = joined([one.reading for one in done]), [case.model for case in cases]
     book = {name: np.array([one.ledger[name] for one in done]) for name in done[0].ledger}
     stiffness, size, held, load, tolerance = (np.array(column) for column in zip(*(
         (model.rig.stiffness, largest(model.rig.drive), case.held, case.load, model.accuracy.tolerance)
         for model, case in zip(models, cases))))
-    loop = reading.loop()
+    loop, rigid = reading.loop(), cases[0].groups[0].static > 0
     stuck = loop.slip / 2 <= np.maximum(held, ROUND * reading.run[:, REACH])
     lost, rings = np.zeros(len(done), bool), {name: np.full(len(done), np.nan) for name in ("ring_frequency",
                                                                                           "ring_damping")}
     known = np.full((2, len(done)), np.nan)
     for k, (model, one) in enumerate(zip(models, done)):
-        ring = held_ring(*one.ring, one.acceleration) if one.ring is not None else _rings(cases[k], one)
+        ring = {} if rigid else held_ring(*one.ring, one.acceleration) if one.ring is not None \
+            else _rings(cases[k], one)
         lost[k] = ring is None
         for name, value in (ring or {}).items():
             rings[name][k] = value
-        if steady and not stuck[k] and changes(window_amplitudes(one.amplitudes, window), tolerance[k]):
+        if steady and not rigid and not stuck[k] and changes(window_amplitudes(one.amplitudes, window), tolerance[k]):
             found = settles(model.rig.modes, model.rig.drive, cases[k].groups, one)
             lost[k] |= found is None
             known[:, k] = (np.nan, np.nan) if found is None else found
     with np.errstate(all="ignore"):
         values = read_off(reading, book, True, True, stiffness, size) | rings
-    memory = [one.end[1] for one in done]
+    worked, lost_in = (np.array([getattr(one.end[1], name).sum() for one in done]) for name in ("worked", "lost"))
     values |= {"normal_load": load, "energy_created": np.zeros(len(done)),
-               "friction_work": np.array([one.worked.sum() for one in memory]),
-               "energy_dissipated": np.array([one.lost.sum() for one in memory])}
+               "friction_work": book["friction"] if rigid else worked,
+               "energy_dissipated": book["friction"] if rigid else lost_in}
+    errors = {name: np.zeros(len(done)) for name in values}
+    if rigid:
+        errors["drift_per_cycle"] = 1e-14 * np.maximum(np.abs(reading.of(LOW)), np.abs(reading.of(HIGH)))
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
     loads = stuck & (reading.rise > tolerance * reading.of(FORCE))
     return Runs(cycles, window, values, book, np.array([one.amplitudes for one in done]),
                 np.array([one.phasors[ends] for one in done]), stuck, lost,
-                {name: np.zeros(len(done)) for name in values}, PIECES.least, PIECES.closes, loads, tuple(known))
+                errors, PIECES.least, PIECES.closes, loads, tuple(known))
 
 
 def _rings(case: Case, one) -> dict | None:

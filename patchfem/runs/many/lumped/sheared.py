@@ -133,7 +133,7 @@ def _moved(models, held: list, say) -> tuple:
     chosen = tuple({"elements": int(one.fine.contact.reduction.stiffness.size),
                     "interface_nodes": int(one.patch.x.size)} for one in held)
     runs = replace(pieces.with_errors(fine, coarse, pieces_error), chosen=chosen, again=False)
-    found, alone, _ = answered(models, runs, pieces.NUMERICS | {"window_cycles": window})
+    found, alone, _ = answered(models, runs, {"engine": PIECES.name, "window_cycles": window})
     alone = alone | runs.stuck | coarse.lost
     for case in np.flatnonzero(~alone).tolist():
         _tell(found, case, models[case], held[case], runs.extremes[case])

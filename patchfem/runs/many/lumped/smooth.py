@@ -4,18 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from ....dynamics.one_mode.sdof import ENDS
 from ....dynamics.smooth import run as hub
 from ....response.errors import tolerance_error
 from ...rig.engines import COARSER, SMOOTH, engine_of
 from ...rig.numerics import choose
 from ...rig.smooth.choice import element_of
 from ...rig.smooth.solve import moved
-from .columns import Runs
+from .columns import ENDS, Runs
 from .threads import in_threads
 
 LONGEST = 4000  # cycles of a run whose extremes are all held
-NUMERICS = {"engine": "smooth"}
 
 
 def refuses(model) -> str:

@@ -92,7 +92,6 @@ class Pieces(Reader):
             return {"known": {name: known[name] for name in (*OF_MOTION, "drift_per_cycle")}}
         if not self.rigid:
             return {"known": known}
-        known.pop("secant_stiffness", None)  # of a force that jumps where the slide turns samples have both sides
         if self.apart:
             known = {name: known[name] for name in (*OF_MOTION, "slip_start_phase")}
         lost = run.ledger["friction"]

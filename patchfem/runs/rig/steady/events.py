@@ -6,11 +6,9 @@ from time import perf_counter
 
 import numpy as np
 
-from ....compiled import load
-from ....core import Outcome, PatchfemError, Start
-from ....dynamics.one_mode.steady import response
+from ....core import Outcome, PatchfemError
 from ....dynamics.periodic import is_stable
-from ....dynamics.piecewise.histories import simulate
+from ....dynamics.piecewise.histories import simulate, warm_up
 from ....dynamics.piecewise.stick_steady import steady
 from ....response.measures import half_swing
 from ....response.spectrum import wave_measures
@@ -31,7 +29,6 @@ class Events:
         self.model, self.numerics, self.modes, self.patch, self.say = model, numerics, model.rig.modes, patch, say
         self.groups = Limits(model, numerics, patch).groups
         self.forces = np.array([(one.static, one.kinetic) for one in self.groups]).T
-        self.alone = self.modes.omega.size == 1 and len(self.modes.interfaces) == 1
         self.falls = bool(np.any(self.forces[0] > self.forces[1]))
 
     def _found(self, drive, near):
@@ -63,12 +60,8 @@ class Events:
 
     def curve(self, drive) -> tuple:
         """(points of the curve over the frequency, no folds)."""
-        find = self.shown
-        if not any(limit.any() for limit in self.forces):
-            find = self._linear
-        elif self.alone:
-            load("dynamics.one_mode.steady_kernels", self.say)
-            find = self._single
+        warm_up(self.say)
+        find = self.shown if any(limit.any() for limit in self.forces) else self._linear
         return traced(self.modes, drive, find), ()
 
     def _linear(self, drive, near=None) -> Shown:
@@ -91,14 +84,6 @@ class Events:
         n = self.modes.omega.size
         state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(self.modes.omega**2), -self.modes.dampers]])
         return float(np.linalg.eigvals(state).real.max())
-
-    def _single(self, drive, near=None) -> Shown:
-        """A point of the curve of one mode by its own map, compiled."""
-        found = response(self.modes, [drive], float(self.forces[0][0]), float(self.forces[1][0]))
-        regime = str(found.regime[0])
-        return self._shown(drive, f"{found.stops[0]:g} stops" if regime == "stops" else regime,
-                           float(abs(found.multiplier[0])), Start(found.place, found.rate), int(found.periods[0]),
-                           float(found.residual[0]))
 
     def _shown(self, drive, regime: str, multiplier: float, start, periods: int, residual: float) -> Shown:
         """What a run of the periods after which a motion repeats shows of it; nothing where it is not bounded."""
