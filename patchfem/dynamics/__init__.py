@@ -1,12 +1,31 @@
 """Engines that move modes under friction.
 
-In: `core.ModalBasis`, a drive, a contact. Out: histories, events, energies. `events/` is exact for Coulomb and linear
-rigs, `march/` steps any law, `harmonic/` finds steady motions, `comparison/` has the report's own methods (Duhamel,
-Newmark, Euler). `periodic` finds a motion that repeats on the map that an engine gives over a period. Read `propagator`
-first: exact modal steps that all of them share.
+In: `core.ModalBasis`, a drive, a contact. Out: histories, events, energies. A module imports its own entry of this list
+and the entries before it:
+
+1. `plant`             the modes of a rig as the arrays that compiled loops take
+2. `modal_kernels`     motion of the modes over a step of a march and the energy it moves
+3. `dense_kernels`     small dense systems of the step solves
+4. `tableau_kernels`   coefficients of the Runge-Kutta step of order 8
+5. `doubling`          a step of stiff modes from a short one
+6. `propagator`        exact modal steps under any drive
+7. `resume`            a long march goes on from its state on disk
+8. `integrated`        what an engine integrated over the last cycles itself
+9. `second_book`       friction work off the samples alone, against the ledger
+10. `cycles`           extremes and phasors of a cycle of samples
+11. `curve_points`     places of a curve as close as its bends want
+12. `periodic`         Newton's method on the map of an engine over a period
+13. `contacts`         what one interface is to the loop of a march: solve, given, commit, state
+14. `piecewise`        exact from event to event: rigid and elastic-plastic elements, or no friction
+15. `march`            any law in time, under the path-mean forces of each step
+16. `smooth`           smooth laws by a method of high order from reversal to reversal
+17. `comparison`       the report's own methods: Duhamel, Newmark, Euler
+18. `harmonic`         steady motions by harmonic balance, branches and stability
+19. `grooves`          a load that climbs the flanks of matched grooves
+20. `one_mode`         one mode with one Coulomb interface in closed form
 
 The friction force of a patch over a step comes from `contacts/`, called by the loop of `march/`: for rigid pieces
 `element_kernels.solve` (one point stands for all in the law, `friction.laws.stretch_kernels.mean`), for elastic ones
 `shear_solve_kernels.descend`, whether the load stays or changes, for lists of bonds `list_kernels.pulled`;
-`runs/rig/interface` chooses among them.
+`runs/rig/interface` chooses among them. Read `piecewise` first for motion from event to event, `propagator` for steps.
 """
