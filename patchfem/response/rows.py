@@ -200,11 +200,13 @@ ROWS = (
         "share of the time of the last cycles in which the interface as a whole sticks: less than half of its slide is "
         "irreversible, in the mean of slip_amplitude; part of a patch, or some sliders of law 'iwan', may slip "
         "meanwhile",
-        lambda s: s.slip.get("stick_fraction"), group="friction", term=("1", lambda _: 1.0), halves=(2.5, 0.5)),
+        lambda s: s.slip.get("stick_fraction"), 0.35, group="friction", term=("1", lambda _: 1.0),
+        halves=(2.5, 0.5)),
     Row("slip_start_phase", "rad", 1e-3,
         "phase of the base displacement at which slip of the interface as a whole, in the mean of slip_amplitude, "
         "starts after a stick, modulo pi",
-        lambda s: s.slip.get("slip_start_phase"), group="friction", term=("pi", lambda _: np.pi), halves=(2.5, 1.0)),
+        lambda s: s.slip.get("slip_start_phase"), 1.0, group="friction", term=("pi", lambda _: np.pi),
+        halves=(2.5, 1.0)),
     Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together", lambda s: s.load,
         group="friction"),
     Row("loop_area", "J", 1e-10,

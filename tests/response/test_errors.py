@@ -7,12 +7,10 @@ import pytest
 
 from patchfem.model.model import build
 from patchfem.response.errors import (
-    BETWEEN,
     MAIN,
     SURE,
     cells_error,
     change,
-    jumps_error,
     orders,
     pieces_error,
     step_error,
@@ -118,6 +116,12 @@ def test_exact_runs_that_show_their_order_have_the_error_of_richardson(order, si
     assert step_error(fine, half, quarter, 400)[NAME] == pytest.approx(SURE * 1e-3, rel=1e-9)
 
 
+def test_always_a_measure_without_an_order_errs_by_less_than_its_larger_change():
+    """Changes of either sign: errors that alternate and fall like h^2, of 1e-3, 4e-3 and 16e-3, are held fourfold."""
+    fine, half, quarter = ({NAME: 1 + gap} for gap in (1e-3, -4e-3, 16e-3))
+    assert 1e-3 <= step_error(fine, half, quarter, 400)[NAME] <= 5e-3
+
+
 @pytest.mark.parametrize("order", [0.5, 1.0, 1.5, 3.0, 4.0])
 def test_always_runs_of_another_order_have_a_bar_that_holds(order):
     """From first order on; below it three runs can only say that nothing converges yet."""
@@ -184,11 +188,19 @@ def test_exact_a_small_drive_is_met_as_a_large_one():
 
 
 def test_exact_a_release_lies_between_two_samples():
-    """Runs of Coulomb friction that agree still leave the release open by a share of their step."""
-    same = {"slip_start_phase": 0.6, NAME: 1.0}
-    found = jumps_error(same, same, same, 128)
-    assert found["slip_start_phase"] == pytest.approx(BETWEEN["slip_start_phase"] / 128)
-    assert found[NAME] == step_error(same, same, same, 128)[NAME]
+    """Runs that agree still leave the release open by a share of their step, whatever the law; all else not."""
+    same = {"slip_start_phase": 0.6, "stick_fraction": 0.2, NAME: 1.0}
+    found = step_error(same, same, same, 128)
+    assert found == {"slip_start_phase": pytest.approx(1 / 128), "stick_fraction": pytest.approx(0.35 / 128), NAME: 0.0}
+
+
+PHASES = [{"slip_start_phase": phase} for phase in (0.9929833, 0.9917635, 0.9939987)]  # at 128, 64 and 32 steps
+
+
+def test_always_a_march_on_few_steps_knows_when_its_slip_starts():
+    """Seed 500011 of `motion_scenes`, elastic-plastic on 128 steps, and the independent program's phase."""
+    found = step_error(*PHASES, 128)
+    assert 0.0038122 <= found["slip_start_phase"] <= 0.0314
 
 
 def test_always_runs_with_half_the_cells_hold_an_error_of_second_order():

@@ -16,7 +16,7 @@ import numpy as np
 from ...effects import has
 from ...model.model import Model
 from ...response.coarser import Rung, space_rung
-from ...response.errors import cells_error, change, jumps_error, pieces_error, step_error, tolerance_error
+from ...response.errors import cells_error, change, pieces_error, step_error, tolerance_error
 from ...scene.rules import methods
 from ...scene.rules.draft import acts, pinned
 from ..effort import too_long
@@ -156,13 +156,6 @@ def dear_pieces(model: Model) -> str:
     return "its yields cost more than steps" if dear else ""
 
 
-def set_valued(model: Model) -> bool:
-    """Whether a march meets Coulomb's law as it stands, without a compliance of pieces, skin or holder in series."""
-    laws, patch = [one.numbers.law for one in model.rig.interfaces], model.patch
-    gives = patch is not None and bool(patch.gives_way or patch.slide_spring)
-    return not gives and any(has(law, "set-valued") for law in laws)
-
-
 def _no_rungs(*_) -> list:
     return []
 
@@ -201,14 +194,6 @@ def _fewer(numerics, share: int):
 
 def _march_in_time(model: Model, numerics, patch) -> list:
     """Rungs of the march in time: half and a quarter of the steps."""
-    if not set_valued(model):
-        return _halves_in_time(model, numerics, patch)
-    size = model.rig.displacement
-    return [Rung(_halves(numerics, patch), lambda *values: jumps_error(*values, numerics.steps, size), of="steps")]
-
-
-def _halves_in_time(model: Model, numerics, patch) -> list:
-    """Rungs of steps that meet no jump of the friction: half and a quarter of them."""
     size, f = model.rig.displacement, model.friction
     turn = f.bond_length if f is not None and has(f.law, "bonds") else 0.0
     return [Rung(_halves(numerics, patch), lambda *values: step_error(*values, numerics.steps, size, turn), of="steps")]
@@ -300,7 +285,7 @@ MARCH = Engine("march", "march", "march run_march", _march_in_time, _march_in_sp
 HARMONIC = Engine("harmonic", "harmonic", "steady.steady run_steady", _no_rungs, _steady_in_space, "plan steady_cost",
                   words="plan steady_words", notes="remarks unmoved_elements", least=0.0, closes=None, steady=True)
 ENGINES = {one.name: one for one in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC, *(
-    Engine(name, name, "comparison run_comparison", _halves_in_time, _march_in_space, "plan march_cost",
+    Engine(name, name, "comparison run_comparison", _march_in_time, _march_in_space, "plan march_cost",
            chosen="numerics by_named_steps", closes=inf, tells=("steps_per_cycle", "iterations"), keeps=True)
     for name in ("duhamel", "newmark", "euler")))}
 AUTOMATIC = (EXACT, PIECES, SMOOTH, MARCH)  # in the order in which they are tried
