@@ -57,7 +57,7 @@ def test_exact_a_rubbing_point_needs_no_other_rig(scene):
            "structure.bonded", "structure.identify", "structure.drives", "dynamics.comparison.duhamel",
            "dynamics.comparison.newmark",
            "dynamics.comparison.euler", "dynamics.comparison.comparison", "dynamics.harmonic.harmonic",
-           "dynamics.one_mode.steady", "dynamics.piecewise.stick_steady",
+           "dynamics.piecewise.stick_steady",
            "dynamics.harmonic.continuation", "dynamics.propagator", "dynamics.march.joints",
            "dynamics.march.varying_load", "runs.rig.comparison",
            "runs.rig.steady", "dynamics.harmonic.balance", "contact.contact_sets", "inputs.signals")

@@ -207,9 +207,9 @@ def test_exact_constants_are_read_without_the_module(tmp_path):
 
 
 def test_exact_a_function_is_one_of_its_module():
-    kernels = load("dynamics.one_mode.event_kernels")
-    assert kernels is load("dynamics.one_mode.event_kernels")
-    assert isinstance(kernels.batch, Entry) and kernels.batch.py_func is kernels.module().batch.py_func
+    kernels = load("dynamics.piecewise.read_kernels")
+    assert kernels is load("dynamics.piecewise.read_kernels")
+    assert isinstance(kernels.read, Entry) and kernels.read.py_func is kernels.module().read.py_func
     with pytest.raises(AttributeError, match="no_such"):
         kernels.no_such  # noqa: B018
 

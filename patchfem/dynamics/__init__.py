@@ -22,7 +22,6 @@ and the entries before it:
 17. `comparison`       the report's own methods: Duhamel, Newmark, Euler
 18. `harmonic`         steady motions by harmonic balance, branches and stability
 19. `grooves`          a load that climbs the flanks of matched grooves
-20. `one_mode`         one mode with one Coulomb interface in closed form
 
 The friction force of a patch over a step comes from `contacts/`, called by the loop of `march/`: for rigid pieces
 `element_kernels.solve` (one point stands for all in the law, `friction.laws.stretch_kernels.mean`), for elastic ones

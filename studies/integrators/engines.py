@@ -14,30 +14,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 from engine_problems import ALL, KIND, POINT, POINTS, Problem, exact, march
 from switched import PROBLEMS, follow
 
-from patchfem.compiled import load
-from patchfem.core import NotConverged
 from patchfem.dynamics.comparison import duhamel, euler, newmark
 from patchfem.dynamics.comparison.point_laws import Coulomb, Smooth
-from patchfem.dynamics.one_mode import sdof, sdof_kernels
-from patchfem.dynamics.one_mode.sdof_samples import position
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.tanh import Rate
-
-
-def one_mode(one: Problem, _, kernels=None) -> np.ndarray:
-    """The compiled event engine of one mode."""
-    kernels = kernels or load("dynamics.one_mode.event_kernels")
-    made = sdof.scene_of(one.modes, one.drive, one.limit, one.limit, one.cycles * one.drive.period)
-    rows, state, none = np.zeros((16 * one.cycles, sdof_kernels.ROW)), np.zeros(9), np.empty((0, 2))
-    z, v = (0.0, 0.0) if one.start is None else (float(one.start.z[0]), float(one.start.v[0]))
-    kernels.enter(state, made.segments, 0, 0.0, 0.0, z, v, 1.0, *made.friction, made.w**2)
-    code, used = kernels.march((made.w, made.decay), made.friction, made.segments, (one.drive.period, np.inf, 0.0, 0.0),
-                               state, rows, none, np.zeros(10))
-    if code != 1:
-        raise NotConverged(f"the event engine ended with code {code}")
-    times = one.times
-    owner = np.searchsorted(rows[:used, 0], times, side="right") - 1
-    return made.slide * position(np.clip(times - rows[owner, 0], 0.0, rows[owner, 2]), rows, owner, made)
 
 
 def _compared(method, one: Problem, steps: int, law, **how) -> np.ndarray:
@@ -111,7 +91,6 @@ COARSE = (100, 200, 400, 800, 1600, 3200, 6400)
 FINE = (1000, 2000, 4000, 8000, 16000, 32000)
 OURS = {  # name: (callable, knobs, problems); one entry more for an engine more
     "exact": (exact, (0,), POINT),
-    "exact, one mode": (one_mode, (0,), ("decay", "block")),
     "march": (march, (*COARSE, 12800, 25600), ALL),
     "duhamel, report": (duhamel_report, COARSE, POINT),
     "duhamel, static branch": (duhamel_cured, COARSE, ALL),

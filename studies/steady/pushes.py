@@ -6,7 +6,8 @@ import numpy as np
 
 from patchfem.core import Start
 from patchfem.dynamics.march import march as marching
-from patchfem.dynamics.one_mode.sdof import simulate as simulate_sdof
+from patchfem.dynamics.piecewise.elements import coulomb
+from patchfem.dynamics.piecewise.histories import simulate
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import model_of
 from patchfem.runs.rig.numerics import choose
@@ -57,7 +58,7 @@ def exact(model, start: Start, cycles: int, size: float) -> np.ndarray:
     def states(push):
         out, now = [], Start(start.z + push[0], start.v + push[1])
         for _ in range(cycles):
-            seen = simulate_sdof(modes, drive, limit, limit, 1, 1, start=now).response
+            seen = simulate(modes, drive, [coulomb(limit)], 1, 1, start=now).response
             now = Start(seen.modal[-1], seen.modal_rate[-1])
             out.append([now.z, now.v])
         return np.array(out)

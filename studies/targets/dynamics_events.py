@@ -8,8 +8,6 @@ from math import inf
 from pathlib import Path
 from time import process_time
 
-import numpy as np
-
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "integrators"))
 from engine_peers import PEERS, cvode
@@ -17,12 +15,12 @@ from engine_problems import exact, problem
 from engines import dop853
 from peer import Peer
 
-from patchfem.compiled import load
-from patchfem.dynamics.one_mode import orbit_kernels, sdof
+from patchfem.dynamics.piecewise import histories, stick_steady
+from patchfem.dynamics.piecewise.elements import coulomb
 
 PEAK = 0.28704671337871602595  # of stick-slip at resonance, by a 40-digit computation
 CYCLES = 200
-BATCH = 500  # runs of the compiled batch
+BATCH = 50  # runs of a batch
 
 
 def least(work, repeats: int = 5, inside: int = 1) -> float:
@@ -45,13 +43,12 @@ def block():
 
 @cache
 def cycle_of_events() -> tuple:
-    """(seconds per drive cycle of the compiled event engine in a batch of long runs, relative error of the peak)."""
-    kernels = load("dynamics.one_mode.event_kernels")
-    table = np.tile([1.0, 0.003, 0.8, 0.8, -1.0, 1.0, 0.0, 0.0, 0.0], (BATCH, 1))
-    room = np.zeros((0, 10)), np.zeros(9), np.zeros((1, 6)), np.zeros((CYCLES, 2))
-    size, books, ends = np.zeros((BATCH, 2)), np.zeros((BATCH, 10)), np.zeros((BATCH, 2))
-    seconds = least(lambda: kernels.batch(table, float(CYCLES), 10, room, size, books, ends)) / (BATCH * CYCLES)
-    return seconds, float(abs(np.abs(size[0]).max() / PEAK - 1))
+    """(seconds per drive cycle of the event engine in a batch of long runs, relative error of the peak)."""
+    one = problem("block")
+    cases = [(one.modes, one.drive, [coulomb(one.limit)], one.start)] * BATCH
+    seconds = least(lambda: histories.briefly(cases, CYCLES, 10)) / (BATCH * CYCLES)
+    done, = histories.briefly(cases[:1], CYCLES, 10)
+    return seconds, abs(done.swing / PEAK - 1)
 
 
 @cache
@@ -74,20 +71,10 @@ def cycle_of_peer(name: str) -> float:
     return best / CYCLES
 
 
-def twin() -> float:
-    """200 cycles by the plain Python of the event engine, histories and measures included [s]."""
-    one = problem("block")
-    return least(lambda: sdof.simulate(one.modes, one.drive, one.limit, one.limit, CYCLES))
-
-
 @cache
 def steady_point() -> tuple:
-    """(seconds of a steady point by the event map, residual of its periodicity, seconds of the plain form)."""
-    kernels = load("dynamics.one_mode.steady_kernels")
-    row = [1.0, 0.003, 0.8, 0.8, -1.0, 1.0, 0.0, 0.0]
-    count = 200
-    table, found, phases = np.tile(row, (count, 1)), np.zeros((count, orbit_kernels.FOUND)), np.zeros((count, 16))
-    room, answer = np.empty(orbit_kernels.OUT), np.zeros(orbit_kernels.FOUND)
-    seconds = least(lambda: kernels.points(table, 4000, room, found, phases)) / count
-    plain = least(lambda: orbit_kernels.point(*row, 4000, room, phases[0], answer), 3, 5)
-    return seconds, float(max(found[0, 9], abs(found[0, 2] / PEAK - 1))), plain
+    """(seconds of a steady point by the event map, the larger of its residual and the relative error of its peak)."""
+    one = problem("block")
+    given = one.modes, one.drive, [coulomb(one.limit)]
+    found = stick_steady.steady(*given)
+    return least(lambda: stick_steady.steady(*given)), max(found.residual, abs(found.amplitude / PEAK - 1))

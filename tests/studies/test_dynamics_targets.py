@@ -20,9 +20,6 @@ def test_exact_what_is_timed_is_right(targets):
 
 @pytest.mark.slow
 def test_always_many_times_faster_than_others(targets):
-    """Measured 80 and 1400 times."""
-    seconds, _, plain = targets.steady_point()
-    assert plain > 10 * seconds
     assert targets.cycle_of_peer("DOP853") > 300 * targets.cycle_of_events()[0]
 
 
@@ -55,6 +52,6 @@ def test_always_the_table_says_what_is_missed(targets, capsys):
 
 
 def test_always_every_row_names_its_limit(targets):
-    assert len({(t.text, t.beside) for t in targets.TARGETS}) == len(targets.TARGETS) == 12
+    assert len({(t.text, t.beside) for t in targets.TARGETS}) == len(targets.TARGETS) == 11
     for one in targets.TARGETS:
         assert one.limit > 0 and one.unit in ("s", "") and bool(one.beside) == (one.other is not None)

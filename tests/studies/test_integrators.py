@@ -91,25 +91,11 @@ def test_exact_dop853_from_event_to_event(engines, problem, where):
     assert one.error(engines.dop853(one, 1e-10)) < 5e-9
 
 
-@pytest.mark.parametrize("name, where", [("exact", "decay"), ("exact, one mode", "decay"),
-                                         ("exact, one mode", "block")])
-def test_exact_event_engines_of_one_and_of_any_modes(engines, problem, name, where):
-    """Free decay has a closed form; stick-slip at resonance by two engines that share no code."""
-    run, knobs, places = engines.OURS[name]
-    one = problem(where)
-    assert where in places and one.error(run(one, knobs[0])) < 1e-12
-
-
-def test_refuses_an_event_engine_that_does_not_end(engines, problem):
-    class Lost:
-        def enter(self, *_):
-            pass
-
-        def march(self, *_):
-            return 3, 0
-
-    with pytest.raises(engines.NotConverged, match="code 3"):
-        engines.one_mode(problem("block"), 0, Lost())
+def test_exact_free_decay_by_the_event_engine(engines, problem):
+    """Free decay has a closed form."""
+    run, knobs, places = engines.OURS["exact"]
+    one = problem("decay")
+    assert "decay" in places and one.error(run(one, knobs[0])) < 1e-12
 
 
 def test_exact_without_a_longest_step_dop853_passes_over_releases(engines, problem):

@@ -1,14 +1,11 @@
-"""Lists of events: of the fast engine against the general one, of levels against one run, the last ones kept."""
+"""Lists of events: borders of levels, of levels against one run, the last ones kept."""
 
 import event_run
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scene_texts import COULOMB, MODE, POINT
 
-from patchfem.core import BaseSine, ModalBasis, Start
-from patchfem.dynamics.one_mode import sdof
+from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.piecewise import event_list, histories
 from patchfem.response.run_events import of_log
 from patchfem.runs.plan import plan
@@ -30,31 +27,10 @@ def one_mode(zeta=0.003, slide=1.0):
     return ModalBasis(("a",), np.array([1.0]), np.array([zeta]), np.array([slide]), np.ones(1), np.ones(1), 1.0)
 
 
-def alike(a, b, near=1e-9):
-    assert a.count == b.count and len(a.time) == len(b.time)
-    assert a.what.tolist() == b.what.tolist() and a.interface.tolist() == b.interface.tolist()
-    assert a.time == pytest.approx(b.time, abs=near) and a.slide == pytest.approx(b.slide, abs=near)
-    assert np.abs(np.exp(1j * a.phase) - np.exp(1j * b.phase)).max(initial=0.0) < 10 * near
-
-
-@settings(max_examples=12)
-@given(st.sampled_from([0.003, 0.3]), st.floats(0.3, 0.95), st.sampled_from([1.0, 0.6]), st.sampled_from([1.0, -0.7]),
-       st.floats(0.4, 1.6), st.sampled_from([0.0, 1.3, -0.4]))
-def test_always_the_fast_engine_lists_what_the_general_one_does(zeta, limit, ratio, slide, omega, speed):
-    modes, drive = one_mode(zeta, slide), BaseSine(1.0, omega)
-    force, start = limit / abs(slide), Start(np.array([0.3]), np.array([speed]))
-    fast = sdof.simulate(modes, drive, force, ratio * force, 12, 2, start=start).log
-    slow = event_run.simulate(modes, drive, force, ratio * force, 12, 2, start=start).log
-    assert fast.count > 5
-    alike(fast, slow, 1e-7)
-
-
-def test_exact_borders_of_levels_are_listed_by_both():
+def test_exact_borders_of_levels_are_listed():
     modes, drive = one_mode(0.05), levels([1.0, 2.0, 0.5, 1.5], 0.9, 3)
-    fast, slow = (engine.simulate(modes, drive, 0.6, 0.6, 12, 2).log for engine in (sdof, event_run))
-    alike(fast, slow, 1e-8)
-    border = fast.what == event_list.BORDER
-    assert fast.time[border] == pytest.approx(2 * np.pi / 0.9 * np.array([3, 6, 9]))
+    log = event_run.simulate(modes, drive, 0.6, 0.6, 12, 2).log
+    assert log.time[log.what == event_list.BORDER] == pytest.approx(2 * np.pi / 0.9 * np.array([3, 6, 9]))
 
 
 def test_exact_levels_of_a_scene_are_those_of_one_run():
@@ -64,7 +40,7 @@ def test_exact_levels_of_a_scene_are_those_of_one_run():
     drive = model.rig.drive
     assert isinstance(drive, Piecewise)
     limit = 0.3 * model.point.load
-    whole = of_log(sdof.simulate(model.rig.modes, drive, limit, limit, 100, 10).log)
+    whole = of_log(event_run.simulate(model.rig.modes, drive, limit, limit, 100, 10).log)
     assert found.count == whole.count and found.kind.tolist() == whole.kind.tolist()
     assert found.time == pytest.approx(whole.time, abs=1e-10)
     assert found.slide == pytest.approx(whole.slide, abs=1e-12, nan_ok=True)
@@ -72,26 +48,22 @@ def test_exact_levels_of_a_scene_are_those_of_one_run():
 
 def test_exact_the_last_events_are_kept_and_all_counted(monkeypatch):
     modes, drive = one_mode(), BaseSine(1.0, 1.0)
-    every = sdof.simulate(modes, drive, 0.8, 0.8, 40, 2).log
-    monkeypatch.setattr(sdof, "CHUNK", 16)
-    monkeypatch.setattr(sdof, "ROOM", 50)
+    every = event_run.simulate(modes, drive, 0.8, 0.8, 40, 2).log
     monkeypatch.setattr(histories, "ROOM", 50)
-    for engine in (sdof, event_run):
-        few = engine.simulate(modes, drive, 0.8, 0.8, 40, 2).log
-        assert few.count == every.count > 150 and len(few.time) == 50
-        assert few.time == pytest.approx(every.time[-50:]) and few.what.tolist() == every.what[-50:].tolist()
+    few = event_run.simulate(modes, drive, 0.8, 0.8, 40, 2).log
+    assert few.count == every.count > 150 and len(few.time) == 50
+    assert few.time == pytest.approx(every.time[-50:]) and few.what.tolist() == every.what[-50:].tolist()
 
 
 def test_exact_the_list_ends_where_the_travel_does():
     modes, drive = one_mode(0.0), BaseSine(1.0, 1.0)
-    for engine in (sdof, event_run):
-        done = engine.simulate(modes, drive, 0.3, 0.3, 100, 2, travel=5.0)
-        assert done.log.time[-1] <= done.response.time[-1] and done.log.count == len(done.log.time) > 4
+    done = event_run.simulate(modes, drive, 0.3, 0.3, 100, 2, travel=5.0)
+    assert done.log.time[-1] <= done.response.time[-1] and done.log.count == len(done.log.time) > 4
 
 
 def test_exact_events_of_the_drive_at_the_onset():
     """phase 0.538622 of the release and 2.472613 of the slip at D = 0.8 and damping 0.003."""
-    log = sdof.simulate(one_mode(), BaseSine(1.0, 1.0), 0.8, 0.8, 200, 2).log
+    log = event_run.simulate(one_mode(), BaseSine(1.0, 1.0), 0.8, 0.8, 200, 2).log
     found = of_log(log)
     release, stop = (found.kind == 1) | (found.kind == 2), found.kind == 0
     assert log.phase[np.flatnonzero(release)[-10:]] % np.pi == pytest.approx(0.538622, abs=1e-6)
