@@ -31,12 +31,11 @@ class Code(NamedTuple):
 
 
 NONE = Code(0.0, 0.0)
-FEW, EVENTS = Code(6e6, 0.05), Code(28e6, 0.25, 3.0)  # exact: of one mode under sines or no friction; of any
 STEPS, FOLLOWED = Code(58e6, 0.4, 8.0), Code(58e6, 0.4, 3.0)  # a march; a slide or a method of few kernels
-SMOOTH, PIECES, BALANCE = Code(74e6, 0.4, 13.0), Code(82e6, 0.4, 15.0), Code(1e8, 0.55, 3.0)
+SMOOTH, PIECES, BALANCE = Code(74e6, 0.4, 13.0), Code(82e6, 0.4, 22.0), Code(1e8, 0.55, 3.0)
 CODES = {"static": NONE, "bench, closed form": NONE, "bench, law step by step": NONE, "bench, two directions": NONE,
          "bench, parallel elements": FOLLOWED, "duhamel": FOLLOWED, "newmark": FOLLOWED, "euler": FOLLOWED,
-         "smooth": SMOOTH, "piecewise": PIECES, "harmonic": BALANCE}
+         "smooth": SMOOTH, "exact": PIECES, "piecewise": PIECES, "harmonic": BALANCE}
 
 
 def code(model: Model, engine: str) -> Code:
@@ -44,12 +43,9 @@ def code(model: Model, engine: str) -> Code:
     rig = model.rig
     if rig is None:
         return CODES.get(engine, STEPS)
-    from .rig.engines import ENGINES, EXACT, steady_by
+    from .rig.engines import ENGINES, steady_by
 
-    by = steady_by(model).like if ENGINES[engine].steady else engine
-    if by == EXACT.name:
-        return FEW if not rig.interfaces or (len(rig.frequencies) == 1 and rig.drive.segments) else EVENTS
-    return CODES.get(by, STEPS)
+    return CODES.get(steady_by(model).like if ENGINES[engine].steady else engine, STEPS)
 
 
 def kind_of(model: Model, engine: str, unknowns: dict) -> str:

@@ -44,7 +44,7 @@ def seen(result) -> tuple:
     histories = [] if response is None else [np.asarray(getattr(response, name)).tobytes()
                                              for name in ("time", "slide", "force", "slip")]
     measured = {name: repr(astuple(measure)) for name, measure in result.measures.items()}
-    stated = result.plan.as_json() | {"seconds": None}
+    stated = result.plan.as_json() | {"seconds": None, "compile_seconds": None}
     return result.outcome, measured, result.warnings, histories, stated
 
 

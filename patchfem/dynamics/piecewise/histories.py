@@ -197,7 +197,7 @@ class _Run:
     def _keep(self, rows) -> None:
         """Keep the turning points and slips of rows from before the window."""
         self.marked = self._note(rows) | (rows[:, 4] == self.kernels.TURNED)
-        if self.rigid and not self.kept and len(rows):
+        if not self.kept and len(rows):
             self.marked[0] = True  # the start
         if self.kept < CORNERS:
             self.early.append(rows[self.marked])

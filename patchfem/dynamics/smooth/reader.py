@@ -91,7 +91,7 @@ class Parts:
         return getattr(self.response, name).reshape(-1, NODES)
 
     def largest(self, values) -> tuple:
-        """(largest of values (k, NODES) between the places, what the last terms of its polynomial are)."""
+        """(largest of values (k, NODES) between the places, what the last terms of its polynomial leave open)."""
         top, least = values.max(axis=1), values.min(axis=1)
         steps = np.flatnonzero(top + RISES * (top - least) >= top.max())
         if steps.size > BEST:

@@ -286,7 +286,11 @@ class Run:
         return row, kept.tally, twin.mem[0], stored
 
     def response(self, rows) -> Response:
-        """Histories of sample rows (k, 2 n + 7)."""
+        """Histories of sample rows (k, 2 n + 7). No force passes the limit of its law; the extension of a step may.
+        """
+        if self.element.bounded:
+            rows, force = rows.copy(), 2 * self.modes.omega.size + 3
+            np.clip(rows[:, force], -self.element.limit, self.element.limit, out=rows[:, force])
         return response_of(self.modes, self.drive, rows, float(self.kept.tally[STORED]))
 
     def ends(self) -> np.ndarray:
