@@ -122,7 +122,8 @@ class Parts:
 
     def mean(self, name: str, begin: float, end: float) -> float:
         """Time mean of a number from `begin` to `end` [s]."""
-        low, high = (np.clip((edge - self.begin) / self.length, 0.0, 1.0) for edge in (begin, end))
+        length = np.maximum(self.length, 1e-300)  # of a step at an event, 0
+        low, high = (np.clip((edge - self.begin) / length, 0.0, 1.0) for edge in (begin, end))
         part, total = np.flatnonzero(high > low), 0.0
         cut = part[(low[part] > 0) | (high[part] < 1)]
         whole = np.setdiff1d(part, cut)

@@ -1,5 +1,7 @@
 """What the last cycles show: steps read off as polynomials against closed forms, and motions seen closely."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from march_paths import OMEGA, one_mode
@@ -92,3 +94,11 @@ def test_exact_peaks_are_those_of_the_motion_seen_closely(name):
         least, most = within(values)
         assert least <= found <= most * (1 + 1e-9)
     assert fine.slip == pytest.approx(np.ptp(seen.slip) / 2, rel=1e-7)  # (2 pi/1e4)^2/8 between samples
+
+
+def test_exact_a_step_of_no_length_adds_nothing_to_a_mean(recwarn):
+    """As an event at the end of a step leaves one: the mean of x = t over [0.5, 1.5] is 1, and nothing is warned of."""
+    edges = [(0.0, 1.0), (1.0, 1.0), (1.0, 2.0)]
+    time = np.concatenate([begin + (end - begin) * ENDS for begin, end in edges])
+    found = Parts(SimpleNamespace(time=time, slide=time), 1.0)
+    assert found.mean("slide", 0.5, 1.5) == pytest.approx(1.0, rel=1e-14) and not recwarn.list
