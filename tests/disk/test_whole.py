@@ -49,7 +49,7 @@ def test_exact_a_process_without_room_ends_with_4_and_not_by_a_signal(tmp_path):
     (tmp_path / "scene.toml").write_text(COATED, "utf-8")
     code = "import resource, threading; resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536)); " \
            "threading.Thread(target=threading.main_thread().join).start(); from patchfem.__main__ import main; main()"
-    done = subprocess.run([sys.executable, "-c", code, "run", tmp_path / "scene.toml", "-o", tmp_path / "out"],
+    done = subprocess.run([sys.executable, "-B", "-c", code, "run", tmp_path / "scene.toml", "-o", tmp_path / "out"],
                           text=True, capture_output=True, timeout=120)
     assert done.returncode == 4 and "no room" in done.stderr and "Traceback" not in done.stderr, done.stderr
     assert [one.name for one in tmp_path.iterdir()] == ["scene.toml"]

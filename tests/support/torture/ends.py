@@ -104,7 +104,8 @@ def disks(trial: Trial) -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 
     cache = trial.folder / "cache"
-    options = {"env": {"PATCHFEM_CACHE": str(cache)}, "seconds": 600.0} if trial.chance(0.1) else {}
+    plain = {"PYTHONDONTWRITEBYTECODE": "1"}  # the limit would cut short the bytecode that later processes load
+    options = {"env": plain | {"PATCHFEM_CACHE": str(cache)}, "seconds": 600.0} if trial.chance(0.1) else {"env": plain}
     if trial.chance(0.2):
         limited = None
         device("full", 7)

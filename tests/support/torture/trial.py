@@ -92,7 +92,7 @@ class Trial:
 
 def process(*words) -> list:
     """The command line that runs these words in a fresh interpreter."""
-    return [sys.executable, "-m", __name__.partition(".")[0], *map(str, words)]
+    return [sys.executable, "-m", "patchfem", *map(str, words)]
 
 
 def captured(command: Callable, words: list) -> Ended:
