@@ -134,7 +134,7 @@ EFFECTS = {
                                    "steady endless"),
     "drive.waveform=file": _wave("a(t) straight between the rows of a table", ("file", "")),
     "structure.stiffening": Effect("patchfem.dynamics.march.joints", "F = k_3 x^3 at the output"),
-    "accuracy.method=exact": Effect("patchfem.dynamics.piecewise.histories", "closed form or series between events"),
+    "accuracy.method=exact": Effect("patchfem.dynamics.events.histories", "closed form or series between events"),
     "accuracy.method=march": Effect("patchfem.dynamics.march.loop_kernels",
                                     "exact propagator, path-mean force, Newton on the "
                                     "force residual"),

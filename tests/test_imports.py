@@ -47,7 +47,7 @@ def test_exact_a_rubbing_point_needs_no_patch(scene):
     modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE))
     absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
            "dynamics.march.loop_kernels")
-    assert {"patchfem.dynamics.piecewise.histories", "patchfem.structure.modes"} <= modules
+    assert {"patchfem.dynamics.events.histories", "patchfem.structure.modes"} <= modules
 
 
 def test_exact_a_rubbing_point_needs_no_other_rig(scene):
@@ -57,7 +57,7 @@ def test_exact_a_rubbing_point_needs_no_other_rig(scene):
            "structure.bonded", "structure.identify", "structure.drives", "dynamics.comparison.duhamel",
            "dynamics.comparison.newmark",
            "dynamics.comparison.euler", "dynamics.comparison.comparison", "dynamics.harmonic.harmonic",
-           "dynamics.piecewise.stick_steady",
+           "dynamics.events.stick_steady",
            "dynamics.harmonic.continuation", "dynamics.propagator", "dynamics.march.joints",
            "dynamics.march.varying_load", "runs.rig.comparison",
            "runs.rig.steady", "dynamics.harmonic.balance", "contact.contact_sets", "inputs.signals")
@@ -69,13 +69,13 @@ def test_exact_a_rubbing_point_needs_no_other_rig(scene):
     ('[structure.stiffening]\ncubic = "1e12 N/m^3"\n', "dynamics.march.joints"),
     ('[structure.bonded]\nstiffness = "1e6 N/m"\n', "structure.bonded"),
     ('[accuracy]\nmethod = "newmark"\nstick_speed = "10 um/s"\n', "dynamics.comparison.newmark"),
-    ('[accuracy]\nmethod = "harmonic"\n', "dynamics.piecewise.stick_steady"),
+    ('[accuracy]\nmethod = "harmonic"\n', "dynamics.events.stick_steady"),
 ], ids=["stiffening", "bonded", "newmark", "harmonic"])
 def test_exact_a_rig_brings_what_it_names(scene, lines, module):
     modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE + lines))
     assert f"patchfem.{module}" in modules
     others = {"dynamics.march.joints", "structure.bonded", "dynamics.comparison.newmark",
-              "dynamics.piecewise.stick_steady"} - {module}
+              "dynamics.events.stick_steady"} - {module}
     assert not {f"patchfem.{name}" for name in others} & modules
 
 
@@ -83,14 +83,14 @@ def test_exact_a_linear_structure_needs_no_patch_and_no_march(scene):
     modules = loaded(FROM_PYTHON, scene(STRUCTURE))
     absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
            "dynamics.march.loop_kernels")
-    assert "patchfem.dynamics.piecewise.histories" in modules
+    assert "patchfem.dynamics.events.histories" in modules
 
 
 def test_exact_a_bench_needs_no_structure(scene):
     modules = loaded(FROM_PYTHON, scene(BENCH))
     absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
            "dynamics.march.loop_kernels", "compiled",
-           "dynamics.piecewise.march_kernels", "dynamics.piecewise.histories")
+           "dynamics.events.march_kernels", "dynamics.events.histories")
     assert "patchfem.friction.laws.coulomb" in modules
 
 

@@ -99,7 +99,7 @@ def test_always_tuples_of_numbers_push_no_arrays_out():
 
 def test_exact_last_arguments_held_for_many_calls(monkeypatch):
     """Their words are made once and what their arrays hold is read anew; what has no words is called as ever."""
-    powers, eliminate = (load(f"dynamics.{name}") for name in ("piecewise.series_kernels", "dense_kernels"))
+    powers, eliminate = (load(f"dynamics.{name}") for name in ("events.series_kernels", "dense_kernels"))
     right = np.zeros(2)
     held = eliminate.eliminate.held(right)
     for target in ([1.0, 2.0], [3.0, -1.0]):
@@ -207,8 +207,8 @@ def test_exact_constants_are_read_without_the_module(tmp_path):
 
 
 def test_exact_a_function_is_one_of_its_module():
-    kernels = load("dynamics.piecewise.read_kernels")
-    assert kernels is load("dynamics.piecewise.read_kernels")
+    kernels = load("dynamics.events.read_kernels")
+    assert kernels is load("dynamics.events.read_kernels")
     assert isinstance(kernels.read, Entry) and kernels.read.py_func is kernels.module().read.py_func
     with pytest.raises(AttributeError, match="no_such"):
         kernels.no_such  # noqa: B018

@@ -16,7 +16,7 @@ and the entries before it:
 11. `curve_points`     places of a curve as close as its bends want
 12. `periodic`         Newton's method on the map of an engine over a period
 13. `contacts`         what one interface is to the loop of a march: solve, given, commit, state
-14. `piecewise`        exact from event to event: rigid and elastic-plastic elements, or no friction
+14. `events`           exact from event to event: rigid and elastic-plastic elements, or no friction
 15. `march`            any law in time, under the path-mean forces of each step
 16. `smooth`           smooth laws by a method of high order from reversal to reversal
 17. `comparison`       the report's own methods: Duhamel, Newmark, Euler
@@ -26,5 +26,5 @@ and the entries before it:
 The friction force of a patch over a step comes from `contacts/`, called by the loop of `march/`: for rigid pieces
 `element_kernels.solve` (one point stands for all in the law, `friction.laws.stretch_kernels.mean`), for elastic ones
 `shear_solve_kernels.descend`, whether the load stays or changes, for lists of bonds `list_kernels.pulled`;
-`runs/rig/interface` chooses among them. Read `piecewise` first for motion from event to event, `propagator` for steps.
+`runs/rig/interface` chooses among them. Read `events` first for motion from event to event, `propagator` for steps.
 """

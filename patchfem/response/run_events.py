@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..dynamics.piecewise import event_list as listed
+from ..dynamics.events import event_list as listed
 from .events import BORDER, MOST, RELEASE_UP, REVERSAL_UP, STOP, Events, detected, states, sticks, table
 from .measures import slip_noise
 from .ringing import ringing

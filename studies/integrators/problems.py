@@ -4,8 +4,8 @@ import numpy as np
 
 from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, frozen_array
-from patchfem.dynamics.piecewise.elements import coulomb
-from patchfem.dynamics.piecewise.histories import at_times
+from patchfem.dynamics.events.elements import coulomb
+from patchfem.dynamics.events.histories import at_times
 
 load("dynamics.comparison.comparison_kernels")  # compiled loops come from the hashed cache
 

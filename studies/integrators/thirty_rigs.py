@@ -3,7 +3,7 @@
 Thirty random rigs of 1 to 5 modes, half of them with elements (1 to 100), half with Iwan's law in cells (5 to 100),
 three cycles of a sine from rest, CPU time of one core of a shared machine. The engine of events takes 1.8 to 5.8 ms
 and is exact: DOP853 at 1e-12 from reversal to reversal differs by 5e-9 at most, which is its own error where it steps
-over the bends of yields (restarted at every yield it agrees to 1e-9: tests/dynamics/piecewise). For 1e-6 of the slide
+over the bends of yields (restarted at every yield it agrees to 1e-9: tests/dynamics/events). For 1e-6 of the slide
 the march takes 2.5 times as long (1.1 to 6.5), DOP853 14 to 40 times and CVODE 5 to 17 times, where they come so near:
 at a tolerance of 1e-8 and steps of a hundredth of a cycle DOP853 does not in 4 rigs, CVODE not in 12. For 1e-4 it is
 1.3, 20 and 4 times; there the march is faster on 2 of the 30 (0.6 and 0.97 times as long).
@@ -26,8 +26,8 @@ from engines import dop853
 from peer import Peer, run, seconds_at
 
 from patchfem.core import BaseSine, Missing, ModalBasis
-from patchfem.dynamics.piecewise.elements import elements_of
-from patchfem.dynamics.piecewise.histories import simulate
+from patchfem.dynamics.events.elements import elements_of
+from patchfem.dynamics.events.histories import simulate
 
 RIGS, CYCLES, EQUAL = 30, 3, (1e-4, 1e-6)  # errors at which times are compared
 STEPS, TOLERANCES, TRUTH = (100, 400, 1600, 6400), (1e-4, 1e-6, 1e-8), 1e-12

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from patchfem.core import Start
+from patchfem.dynamics.events.elements import coulomb
+from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.march import march as marching
-from patchfem.dynamics.piecewise.elements import coulomb
-from patchfem.dynamics.piecewise.histories import simulate
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import model_of
 from patchfem.runs.rig.numerics import choose

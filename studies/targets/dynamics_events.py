@@ -15,8 +15,8 @@ from engine_problems import exact, problem
 from engines import dop853
 from peer import Peer
 
-from patchfem.dynamics.piecewise import histories, stick_steady
-from patchfem.dynamics.piecewise.elements import coulomb
+from patchfem.dynamics.events import histories, stick_steady
+from patchfem.dynamics.events.elements import coulomb
 
 PEAK = 0.28704671337871602595  # of stick-slip at resonance, by a 40-digit computation
 CYCLES = 200

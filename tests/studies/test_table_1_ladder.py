@@ -42,7 +42,7 @@ def test_exact_what_a_protocol_fits_and_what_it_predicts(fitting):
 
 def test_always_a_motion_found_by_harmonics_is_no_start_for_the_map_of_yields(fitting, monkeypatch):
     """Where the map finds no motion, the balance answers, and the next numbers nearby are asked as from rest."""
-    from patchfem.dynamics.piecewise import steady
+    from patchfem.dynamics.events import steady
 
     whole, asked = steady.steady, fitting.RUNGS["second path"].question("peak").asked([(143.0, 49.03)])
     values = np.array([0.4, 3.5e6, 1400.0, 0.09])

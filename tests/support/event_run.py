@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from patchfem.dynamics.piecewise import histories, stick_steady
-from patchfem.dynamics.piecewise.elements import coulomb
+from patchfem.dynamics.events import histories, stick_steady
+from patchfem.dynamics.events.elements import coulomb
 
 
 def groups_of(modes, static, kinetic) -> list:

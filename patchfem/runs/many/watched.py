@@ -103,7 +103,7 @@ class Watcher:
         return Watched(window, seen.acceleration, seen.displacement, seen.point, seen.fundamental)
 
     def _orbits(self):
-        from ...dynamics.piecewise.orbits import Orbits
+        from ...dynamics.events.orbits import Orbits
         from ..rig.pieces.run import Interfaces
 
         modes, groups = self.model.rig.modes, Interfaces(self.model, self.numerics, self.patch).groups

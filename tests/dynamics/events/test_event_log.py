@@ -6,7 +6,7 @@ import pytest
 from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import BaseSine, ModalBasis
-from patchfem.dynamics.piecewise import event_list, histories
+from patchfem.dynamics.events import event_list, histories
 from patchfem.response.run_events import of_log
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patchfem.core import BaseSine, Outcome, PatchfemError, Segment, Start
-from patchfem.dynamics.piecewise.event_list import BORDER, RELEASE, REVERSAL, STOP
+from patchfem.dynamics.events.event_list import BORDER, RELEASE, REVERSAL, STOP
 from patchfem.response.measures import energy_balance
 from patchfem.structure import drives
 
@@ -501,7 +501,7 @@ def test_exact_interface_without_friction_among_others():
 
 
 def test_exact_log_has_a_limit(monkeypatch):
-    monkeypatch.setattr("patchfem.dynamics.piecewise.histories.ROOM", 30)
+    monkeypatch.setattr("patchfem.dynamics.events.histories.ROOM", 30)
     log = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.8, 0.8, 20).log
     assert log.time.size == log.slide.size == 30 and log.count == 80
     assert not log.time.flags.writeable

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patchfem.core import BaseSine, Outcome, Start
-from patchfem.dynamics.piecewise.event_list import BORDER
+from patchfem.dynamics.events.event_list import BORDER
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import Recorded, Sweep
 

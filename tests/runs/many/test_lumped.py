@@ -116,7 +116,7 @@ def test_exact_what_is_extrapolated_far_is_that_of_a_single_run(monkeypatch):
 def test_exact_cycles_that_repeat_are_counted_at_once(law, monkeypatch):
     """Damped cases that settle long before their last cycles: one cycle stands for all that are left, with the bits of
     single runs, which move through every one of them."""
-    from patchfem.dynamics.piecewise import histories
+    from patchfem.dynamics.events import histories
 
     base = base_of(load(SCENE.format(law=LAWS[law], kind="base", kind_size=SIZES["base"])))
     shared = ["drive.cycles=120", "structure.mode.axial.damping=0.1"]

@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....dynamics.piecewise import histories
-from ....dynamics.piecewise.elements import paired
-from ....dynamics.piecewise.names_kernels import FORCE, HIGH, LOW, REACH
-from ....dynamics.piecewise.reading import joined
+from ....dynamics.events import histories
+from ....dynamics.events.elements import paired
+from ....dynamics.events.names_kernels import FORCE, HIGH, LOW, REACH
+from ....dynamics.events.reading import joined
 from ....effects import has
 from ....friction.record import law_from
 from ....response import run_events

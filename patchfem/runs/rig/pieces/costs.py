@@ -24,7 +24,7 @@ MOST_PIECE = 1e-6  # of one at most
 HELD = 6  # power of the limit over the push that gives the share of the time in which an element holds (measured .01)
 CYCLE, STEP, STEP_ELEMENT = 3e-4, 4.3e-7, 9e-10  # seconds of a cycle of the march, of a step, of each element in it
 MOST_PAIRS, AT = 4, 1e-3  # 49 of 769 cells at this tolerance and above: 2e-4 of the motion behind a joint that slips
-REACH = 2.0  # of `dynamics.piecewise.series_kernels`
+REACH = 2.0  # of `dynamics.events.series_kernels`
 
 
 def pairs_of(model: Model) -> int:

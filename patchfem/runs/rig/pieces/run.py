@@ -1,4 +1,4 @@
-"""The engines that are exact from event to event (`dynamics.piecewise`): Coulomb friction, or none at all, and
+"""The engines that are exact from event to event (`dynamics.events`): Coulomb friction, or none at all, and
 elastic-plastic elements."""
 
 from dataclasses import replace
@@ -7,8 +7,8 @@ from time import perf_counter
 import numpy as np
 
 from ....core import BaseSine, NotConverged
+from ....dynamics.events import elements, histories
 from ....dynamics.integrated import Integrated, Loop
-from ....dynamics.piecewise import elements, histories
 from ....effects import has
 from ....friction.record import law_from
 from ....response import run_events
@@ -157,7 +157,7 @@ def settles(modes, drive, groups, done) -> tuple | None:
 
     None where the run does not end with a period of a sine, or where no such motion was found.
     """
-    from ....dynamics.piecewise.steady import settled  # scipy's linear algebra, which few runs want
+    from ....dynamics.events.steady import settled  # scipy's linear algebra, which few runs want
 
     last = drive.segments[-1] if drive.segments else None
     if last is None or not sinusoidal(drive) or last.constant != 0 \

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ....dynamics.piecewise import names_kernels as at
-from ....dynamics.piecewise.reading import Reading
+from ....dynamics.events import names_kernels as at
+from ....dynamics.events.reading import Reading
 from ....dynamics.second_book import gap
 from ....response.loops import interface_loops
 from ....response.measures import REST

@@ -7,9 +7,9 @@ from time import perf_counter
 import numpy as np
 
 from ....core import Outcome, PatchfemError
+from ....dynamics.events.histories import simulate, warm_up
+from ....dynamics.events.stick_steady import steady
 from ....dynamics.periodic import is_stable
-from ....dynamics.piecewise.histories import simulate, warm_up
-from ....dynamics.piecewise.stick_steady import steady
 from ....response.measures import half_swing
 from ....response.spectrum import wave_measures
 from ....structure.drive_sizes import largest

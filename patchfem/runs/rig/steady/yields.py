@@ -10,10 +10,10 @@ from time import perf_counter
 import numpy as np
 
 from ....core import Outcome
+from ....dynamics.events import histories
+from ....dynamics.events.elements import books_begin
+from ....dynamics.events.steady import steady
 from ....dynamics.periodic import is_stable
-from ....dynamics.piecewise import histories
-from ....dynamics.piecewise.elements import books_begin
-from ....dynamics.piecewise.steady import steady
 from ....response.measures import half_swing
 from ....response.spectrum import wave_measures
 from ..pieces.run import Interfaces, Pieces

@@ -5,9 +5,9 @@ import pytest
 
 from patchfem.compiled.inner import Inner
 from patchfem.core import PatchfemError
-from patchfem.dynamics.piecewise import march_kernels
-from patchfem.dynamics.piecewise import memory_kernels as kernels
-from patchfem.dynamics.piecewise.elements import elements_of, stretches, table_of, virgin
+from patchfem.dynamics.events import march_kernels
+from patchfem.dynamics.events import memory_kernels as kernels
+from patchfem.dynamics.events.elements import elements_of, stretches, table_of, virgin
 from patchfem.slip.shear_modes import jenkins_set
 
 

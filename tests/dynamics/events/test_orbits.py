@@ -7,11 +7,11 @@ import pytest
 from test_piecewise import basis, random_rig
 
 from patchfem.core import BaseSine, NotConverged
+from patchfem.dynamics.events.elements import elements_of
+from patchfem.dynamics.events.histories import simulate
+from patchfem.dynamics.events.orbits import Orbits
+from patchfem.dynamics.events.steady import steady
 from patchfem.dynamics.periodic import solved
-from patchfem.dynamics.piecewise.elements import elements_of
-from patchfem.dynamics.piecewise.histories import simulate
-from patchfem.dynamics.piecewise.orbits import Orbits
-from patchfem.dynamics.piecewise.steady import steady
 
 MODES = basis([1.0, 2.3], [0.01, 0.02], [1.0, 0.4], [1.0, 0.5], [1.0, 0.2])
 GROUP = [elements_of([2.0, 1.0], [0.1, 0.3])]

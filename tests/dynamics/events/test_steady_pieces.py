@@ -9,10 +9,10 @@ from scipy.optimize import fsolve
 from test_piecewise import ONE, basis, random_rig
 
 from patchfem.core import BaseSine, NotConverged, PatchfemError, Start
-from patchfem.dynamics.piecewise.elements import elements_of
-from patchfem.dynamics.piecewise.histories import simulate
-from patchfem.dynamics.piecewise.period import PeriodMap, Point
-from patchfem.dynamics.piecewise.steady import settled, steady
+from patchfem.dynamics.events.elements import elements_of
+from patchfem.dynamics.events.histories import simulate
+from patchfem.dynamics.events.period import PeriodMap, Point
+from patchfem.dynamics.events.steady import settled, steady
 from patchfem.structure.drives import levels
 
 FACES = np.array([[1.0, 0.4], [0.3, -1.0]])

@@ -8,7 +8,7 @@ from ...compiled import kernels
 from ...core import ModalBasis, PatchfemError
 from .elements import Memory, Table, virgin
 
-kinds, series = kernels("dynamics.piecewise.drive_kernels"), kernels("dynamics.piecewise.series_kernels")
+kinds, series = kernels("dynamics.events.drive_kernels"), kernels("dynamics.events.series_kernels")
 
 
 class Plant(NamedTuple):

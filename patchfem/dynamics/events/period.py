@@ -76,7 +76,7 @@ class PeriodMap:
     """
 
     def __init__(self, modes: ModalBasis, groups):
-        self.follow, self.n = load("dynamics.piecewise.slope_kernels").follow, modes.omega.size
+        self.follow, self.n = load("dynamics.events.slope_kernels").follow, modes.omega.size
         self._given(modes, groups)
         faces = len(self.groups)
         self.room, self.books = room_of(self.plant), books_of(2, np.zeros(2))

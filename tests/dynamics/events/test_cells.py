@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.dynamics.piecewise.elements import elements_of, paired
+from patchfem.dynamics.events.elements import elements_of, paired
 from patchfem.friction.laws.iwan import sliders
 
 

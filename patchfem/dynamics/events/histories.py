@@ -13,7 +13,7 @@ from .names_kernels import OF_FACE, OF_RUN
 from .plant import books_of, cleared, clock_of, into, past_of, place, plant_of, room_of
 from .reading import Reading, ring_of
 
-HERE = "dynamics.piecewise"
+HERE = "dynamics.events"
 SAMPLES = 400  # per drive cycle in the kept window
 LEAST = 101  # of a run that has no cycles
 CHUNK = 4096  # rows held at once

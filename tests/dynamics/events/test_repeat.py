@@ -5,9 +5,9 @@ import pytest
 
 from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis
-from patchfem.dynamics.piecewise import histories
-from patchfem.dynamics.piecewise.elements import elements_of, table_of, virgin
-from patchfem.dynamics.piecewise.plant import clock_of, past_of, plant_of
+from patchfem.dynamics.events import histories
+from patchfem.dynamics.events.elements import elements_of, table_of, virgin
+from patchfem.dynamics.events.plant import clock_of, past_of, plant_of
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import levels
 
@@ -90,7 +90,7 @@ def test_exact_a_push_that_grows_by_a_billionth_ends_it():
 
 def test_exact_states_a_last_digit_apart_are_one_and_others_not():
     """By the distance of a state from that a cycle before, and by how fast it fell; so does a turning place."""
-    come_back = load("dynamics.piecewise.repeat_kernels").come_back
+    come_back = load("dynamics.events.repeat_kernels").come_back
     modes, drive, _ = case(1, 1, 1)
     plant, table = plant_of(modes), table_of([elements_of([1.0, 2.0], [0.1, 0.3])])
     for apart, fell, place, same in ((1e-15, 50, 0.0, True), (1e-15, 50, 1e-13, False), (1e-13, 50, 0.0, False),

@@ -7,10 +7,10 @@ from scipy.linalg import expm
 
 from patchfem.compiled import load
 from patchfem.core import ModalBasis
-from patchfem.dynamics.piecewise.plant import plant_of, room_of
+from patchfem.dynamics.events.plant import plant_of, room_of
 
-series, drives = plain("dynamics.piecewise.series_kernels"), plain("dynamics.piecewise.drive_kernels")
-COMPILED = pytest.param(load("dynamics.piecewise.series_kernels"), marks=pytest.mark.slow, id="compiled")
+series, drives = plain("dynamics.events.series_kernels"), plain("dynamics.events.drive_kernels")
+COMPILED = pytest.param(load("dynamics.events.series_kernels"), marks=pytest.mark.slow, id="compiled")
 
 
 def chain(random, count, coupled):

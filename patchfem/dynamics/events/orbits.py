@@ -35,8 +35,8 @@ class Orbits:
     """
 
     def __init__(self, modes: ModalBasis, groups):
-        self.kernels, self.one = load("dynamics.piecewise.march_kernels"), PeriodMap(modes, groups)
-        self.march, self.peak = self.kernels.march, load("dynamics.piecewise.dense_kernels").peak
+        self.kernels, self.one = load("dynamics.events.march_kernels"), PeriodMap(modes, groups)
+        self.march, self.peak = self.kernels.march, load("dynamics.events.dense_kernels").peak
         self.wide = self.kernels.HEAD + 2 * modes.omega.size + self.kernels.EACH * len(groups)
         self.rows, self.books = np.zeros((ROWS, self.wide)), books_of(1, np.ones(1))
         self.forces = np.zeros(len(groups))

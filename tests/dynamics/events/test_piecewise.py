@@ -5,8 +5,8 @@ import pytest
 from support.jenkins_reference import Reference
 
 from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Start
-from patchfem.dynamics.piecewise.elements import elements_of
-from patchfem.dynamics.piecewise.histories import simulate
+from patchfem.dynamics.events.elements import elements_of
+from patchfem.dynamics.events.histories import simulate
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import Recorded, Sweep, levels, release
 

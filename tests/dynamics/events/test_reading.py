@@ -7,13 +7,13 @@ import pytest
 from plain import plain
 
 from patchfem.core import BaseSine, ModalBasis
-from patchfem.dynamics.piecewise import histories, reading
-from patchfem.dynamics.piecewise import names_kernels as at
-from patchfem.dynamics.piecewise.elements import elements_of
+from patchfem.dynamics.events import histories, reading
+from patchfem.dynamics.events import names_kernels as at
+from patchfem.dynamics.events.elements import elements_of
 from patchfem.response.loops import half_range, secant_stiffness, turns_of
 from patchfem.response.run_events import rings
 
-read = plain("dynamics.piecewise.read_kernels")
+read = plain("dynamics.events.read_kernels")
 PLACE, WEIGHT = np.polynomial.legendre.leggauss(16)
 
 
