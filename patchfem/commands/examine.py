@@ -17,8 +17,9 @@ assert plotter.screenshot(None, return_img=True).std() > 0
 SECONDS = 60  # for a first picture on a slow disk
 # what pyproject.toml names: an installation that was made from an older one does not say so itself
 NEEDED = ("numpy", "scipy", "scikit-fem", "meshio", "pyvista", "numba", "matplotlib", "pydantic", "cyclopts", "rich",
-          "xarray", "h5netcdf", "h5py", "bokeh", "pyuff", "threadpoolctl")
-EXTRAS = {"SurfaceTopography": ("profiles", "files of more instruments"),
+          "xarray", "h5netcdf", "h5py", "threadpoolctl")
+EXTRAS = {"pyuff": ("lab", "universal files"), "nbclient": ("notebook", "the notebooks of studies/notebooks"),
+          "SurfaceTopography": ("profiles", "files of more instruments"),
           "distributed": ("cluster", "sweeps over several machines"), "trame": ("web", "fields in a browser"),
           "gmsh": ("gmsh", "meshes by gmsh"), "scikit-sparse": ("cholmod", "another factorisation"),
           "pypardiso": ("pardiso", "another factorisation")}

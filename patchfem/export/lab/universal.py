@@ -48,7 +48,7 @@ def write_sets(path: Path, sets: list) -> None:
     try:
         import pyuff
     except ImportError:
-        raise Missing("universal files: the package pyuff writes them; pip install pyuff") from None
+        raise Missing("universal files: the package pyuff writes them; pip install 'patchfem[lab]'") from None
     path = Path(path)
     path.write_bytes(b"")
     file = pyuff.UFF(str(path))

@@ -1,11 +1,8 @@
-"""The drawing library that a page carries: BokehJS, as the Python package `bokeh` ships it, read and never imported."""
+"""The drawing library that a page carries: BokehJS 3.9.2, which lies in `bokehjs` with its licence (BSD)."""
 
 import re
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
-
-from ...core import Missing
 
 FILES = ("bokeh.min.js", "bokeh-api.min.js")
 HERE = Path(__file__).parent
@@ -13,12 +10,8 @@ HERE = Path(__file__).parent
 
 @cache
 def bokeh() -> str:
-    """BokehJS as one text of JavaScript, safe inside a script element; Missing with the remedy where it is not."""
-    found = find_spec("bokeh")
-    folder = Path(found.origin).parent / "server" / "static" / "js" if found and found.origin else None
-    if folder is None or not all((folder / name).is_file() for name in FILES):
-        raise Missing("the page is drawn by BokehJS, which the package bokeh brings; pip install bokeh")
-    return "\n".join(inert((folder / name).read_text(encoding="utf-8")) for name in FILES)
+    """BokehJS as one text of JavaScript, safe inside a script element."""
+    return "\n".join(inert(own(f"bokehjs/{name}")) for name in FILES)
 
 
 @cache

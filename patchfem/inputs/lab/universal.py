@@ -24,7 +24,7 @@ def sets_of(path: Path) -> list:
     try:
         import pyuff
     except ImportError:
-        raise Missing("universal files: the package pyuff reads them; pip install pyuff") from None
+        raise Missing("universal files: the package pyuff reads them; pip install 'patchfem[lab]'") from None
     path = Path(path)
     if not path.is_file():
         raise Missing(f"{path}: there is no such file")
