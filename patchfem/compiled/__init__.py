@@ -32,7 +32,7 @@ from . import bounded, machine
 
 HERE = Path(__file__).parents[1]  # the package
 # tuples that kernels take: numba's cache would not notice two of their fields that change places
-TUPLES = "plant.py", "contacts/arrays.py", "smooth/arrays.py", "events/plant.py", "events/elements.py"
+TUPLES = "contacts/arrays.py", "smooth/arrays.py", "events/plant.py", "events/elements.py"
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # numba's own switch: all runs as the Python it is
 LEAST = 1 << 21  # bytes of the machine code of a run
 UNKEPT = set()  # functions called here whose machine code cannot be kept: every process brings up numba for them

@@ -4,10 +4,37 @@ state (2, n): coordinates and rates; row: one line of `propagator.Propagator.tab
 modal accelerations that are constant over the step.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..compiled.inner import njit
 from ..friction.flags_kernels import FAST, LEAN
+
+
+class ModalArrays(NamedTuple):
+    """The modes as the compiled loops of a march take them.
+
+    omega, damp = 2 zeta omega, slide, base, output: (n,); damping: (n, n) where it couples, else (0, 0); their steps,
+    arrays of `propagator.Propagator`, dt [s] and the beta [m/N] of the first interface; mass [kg]; room: (3, n).
+    """
+
+    omega: np.ndarray
+    damp: np.ndarray
+    slide: np.ndarray
+    base: np.ndarray
+    output: np.ndarray
+    damping: np.ndarray
+    free: np.ndarray
+    push: np.ndarray
+    dense: np.ndarray
+    reach: np.ndarray
+    loss: np.ndarray
+    dense_loss: np.ndarray
+    dt: float
+    beta: float
+    mass: float
+    room: np.ndarray
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
@@ -33,19 +60,6 @@ def free_rate(state, row, free, dense, table, at):
                 end += dense[n + i, k] * state[0, k] + dense[n + i, n + k] * state[1, k]
         out += row[i] * end
     return out
-
-
-@njit(error_model="numpy", **LEAN)
-def rate_given(row, other, push, dense, mass):
-    """Rate [m/(s N)] that a constant force along `other` (n,) gives the slide `row` (n,) by the end of a step."""
-    n, out = row.size, 0.0
-    for i in range(n):
-        if dense.size == 0:
-            out += row[i] * push[1, i] * other[i]
-        else:
-            for k in range(n):
-                out += row[i] * dense[n + i, 2 * n + k] * other[k]
-    return out / mass
 
 
 @njit(error_model="numpy", **LEAN)

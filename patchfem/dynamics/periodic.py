@@ -28,8 +28,8 @@ ROUNDING = 1e-5  # of a multiplier on the unit circle
 
 
 @dataclass(eq=False, slots=True)
-class Lap:
-    """A point and what a period makes of it.
+class Mapped:
+    """A point and what the map of a period makes of it.
 
     point and found are the engine's own; slope (m, m): derivative of the numbers at the end to those at the start;
     scale (m,): size of every number; gap (m,): start less end over it. size: of the motion over what the drive moves a
@@ -77,74 +77,74 @@ class Lap:
 
 
 class Grows(NotConverged):
-    """A motion that gains as much in every period, so that none repeats; lap: the last one."""
+    """A motion that gains as much in every period, so that none repeats; mapped: the last one."""
 
-    def __init__(self, lap: Lap, steps: int):
+    def __init__(self, mapped: Mapped, steps: int):
         super().__init__("dynamics: the motion grows from period to period, so none repeats")
-        self.lap, self.steps = lap, steps
+        self.mapped, self.steps = mapped, steps
 
 
 class Shooting:
     """The map of an engine over a period; `repeating` finds its fixed point."""
 
-    def lap(self, point) -> Lap:
-        """The Lap of a point of the engine. NotConverged where the engine does not reach its end."""
+    def mapped(self, point) -> Mapped:
+        """The map of a point of the engine. NotConverged where the engine does not reach its end."""
         raise NotImplementedError
 
-    def moved(self, lap: Lap, step):
-        """The point that lies a step (m,) from that of a Lap."""
+    def moved(self, mapped: Mapped, step):
+        """The point that lies a step (m,) from that of a map."""
         raise NotImplementedError
 
-    def after(self, lap: Lap, periods: int):
-        """The point to which a run from the end of a Lap comes in some periods."""
+    def after(self, mapped: Mapped, periods: int):
+        """The point to which a run from the end of a map comes in some periods."""
         raise NotImplementedError
 
-    def grows(self, lap: Lap) -> bool:
+    def grows(self, mapped: Mapped) -> bool:
         """Whether no disturbance dies out, and the motion gains as much in the second of two runs of WATCHED periods
         as in the first."""
-        if not lap.alike or np.abs(lap.multipliers()).max(initial=0.0) < 1 - UNDAMPED:
+        if not mapped.alike or np.abs(mapped.multipliers()).max(initial=0.0) < 1 - UNDAMPED:
             return False
-        sizes = [lap.size]
+        sizes = [mapped.size]
         for _ in range(2):
-            lap = self.lap(self.after(lap, WATCHED))
-            sizes.append(lap.size)
+            mapped = self.mapped(self.after(mapped, WATCHED))
+            sizes.append(mapped.size)
         first, second = np.diff(sizes)
         return bool(first > 1e-6 * sizes[0] and second > 0.99 * first)
 
     def repeating(self, point, periods: tuple = (10, 160), tolerance: float = 1e-12) -> tuple:
-        """(Lap of the motion that repeats, steps of Newton's method) from a point near it.
+        """(the map of the motion that repeats, steps of Newton's method) from a point near it.
 
         periods: of the run where Newton's method leads away, at first and at most. Grows where that run does;
         NotConverged where MOST steps and the runs between them do not settle.
         """
-        lap = self.lap(point)
+        mapped = self.mapped(point)
         for used in range(MOST):
-            closed = lap.closed(tolerance)
-            if closed and lap.miss <= ROUND:
-                return lap, used
-            better = self._newton(lap, SHARES[:1] if closed else SHARES)
+            closed = mapped.closed(tolerance)
+            if closed and mapped.miss <= ROUND:
+                return mapped, used
+            better = self._newton(mapped, SHARES[:1] if closed else SHARES)
             if closed:  # the last step squares what is left, where it keeps the numbers
-                return (better if better is not None and better.alike else lap), used
+                return (better if better is not None and better.alike else mapped), used
             if better is not None:
-                lap = better
+                mapped = better
                 continue
-            lap, periods = self.lap(self.after(lap, periods[0])), (min(2 * periods[0], periods[1]), periods[1])
-            if self.grows(lap):
-                raise Grows(lap, used + 1)
+            mapped, periods = self.mapped(self.after(mapped, periods[0])), (min(2 * periods[0], periods[1]), periods[1])
+            if self.grows(mapped):
+                raise Grows(mapped, used + 1)
         raise NotConverged(f"dynamics: no motion repeats after {MOST} steps of Newton's method; start nearer, or march")
 
-    def _newton(self, lap: Lap, shares) -> Lap | None:
-        """A better Lap by the first of some shares of Newton's step that leads to one, None where none does."""
-        if not lap.alike:
+    def _newton(self, mapped: Mapped, shares) -> Mapped | None:
+        """A better Mapped by the first of some shares of Newton's step that leads to one, None where none does."""
+        if not mapped.alike:
             return None
-        step = lap.step()
+        step = mapped.step()
         for share in shares:
             try:
-                other = self.lap(self.moved(lap, share * step))
+                other = self.mapped(self.moved(mapped, share * step))
             except NotConverged:
                 continue
             # what nothing bounds misses ever less of its size, the farther a step leads
-            if other.miss < (1 - 0.4 * share) * lap.miss and other.size <= FAR:
+            if other.miss < (1 - 0.4 * share) * mapped.miss and other.size <= FAR:
                 return other
         return None
 

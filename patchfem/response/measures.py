@@ -6,7 +6,7 @@ Everything works on samples: values of an exact run and of a march differ only i
 import numpy as np
 
 from ..core import Response
-from ..dynamics.second_book import gap, sampled_work, share
+from ..dynamics.work_check import gap, sampled_work, share
 
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate

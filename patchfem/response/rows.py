@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core import Response, Row
 from ..dynamics.integrated import Integrated
-from ..dynamics.second_book import gap
+from ..dynamics.work_check import gap
 from ..structure.drive_sizes import largest, whole
 from .loops import Turn, drift, half_range, interface_loop, secant_stiffness, turns_of
 from .measures import REST, acceleration_peak, circular_mean, energy_balance, ledger_measures, slip_measures

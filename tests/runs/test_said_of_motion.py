@@ -7,7 +7,7 @@ import pytest
 
 import patchfem as pf
 from patchfem.core import Measure, Outcome
-from patchfem.dynamics.second_book import gap
+from patchfem.dynamics.work_check import gap
 from patchfem.export.pages.words import table_of
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.response.errors import cells_error, tolerance_error

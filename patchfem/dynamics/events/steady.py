@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import ModalBasis, Start, frozen_array
-from ..periodic import Lap, Shooting, bound
+from ..periodic import Mapped, Shooting, bound
 from .elements import Memory
 from .period import Map, PeriodMap, Point, copied
 
@@ -68,7 +68,7 @@ def settled(modes: ModalBasis, drive, groups, start: Start, memory: Memory) -> S
 
 
 def turning(one: PeriodMap, drive, near: Point | None = None) -> tuple:
-    """(Lap of the motion that turns over, steps of Newton's method); arguments and errors as `steady`."""
+    """(the map of the motion that turns over, steps of Newton's method); arguments and errors as `steady`."""
     shooting = Yields(one, drive, True)
     return shooting.repeating(near or shooting.run(one.rest(), EARLY))
 
@@ -86,8 +86,8 @@ class Yields(Shooting):
         self.one, self.drive, self.half, self.moved_by = one, drive, half, max(moved, 1e-300)
         self.rows = np.maximum(np.abs(one.faces).sum(axis=1), 1e-300)
 
-    def lap(self, point: Point) -> Lap:
-        """The Lap of a Point. NotConverged where events pile up."""
+    def mapped(self, point: Point) -> Mapped:
+        """The map of a Point. NotConverged where events pile up."""
         found, n, omega = self.one(self.drive, point, self.half), self.one.n, self.drive.segments[0].omega
         a, b = point.motion, found.end.motion
         both = np.abs([a, b])
@@ -96,16 +96,16 @@ class Yields(Shooting):
         if alike:
             scale = np.concatenate([scale, width * self.rows[point.turned[0]]])
             a, b = point.numbers, found.end.numbers
-        return Lap(point, found, found.slope, scale, (a - b) / scale, width / self.moved_by, alike,
+        return Mapped(point, found, found.slope, scale, (a - b) / scale, width / self.moved_by, alike,
                    alike and _same(point, found.end), found.kept)
 
-    def moved(self, lap: Lap, step) -> Point:
-        """The Point that lies a step from that of a Lap, with the elements of its end in every group."""
-        return lap.found.end.moved(lap.point.numbers + step)
+    def moved(self, mapped: Mapped, step) -> Point:
+        """The Point that lies a step from that of a map, with the elements of its end in every group."""
+        return mapped.found.end.moved(mapped.point.numbers + step)
 
-    def after(self, lap: Lap, periods: int) -> Point:
-        """The Point after some periods of the run from the end of a Lap."""
-        return self.run(self._next(lap.found), periods)
+    def after(self, mapped: Mapped, periods: int) -> Point:
+        """The Point after some periods of the run from the end of a map."""
+        return self.run(self._next(mapped.found), periods)
 
     def run(self, point: Point, periods: int) -> Point:
         """The Point after some periods of the run."""
@@ -142,11 +142,11 @@ def _same(point: Point, end: Point) -> bool:
         x[:d].tolist() == y[:d].tolist() for x, y, d in zip(a.upto, b.upto, a.depth.tolist()))
 
 
-def _result(one: PeriodMap, lap: Lap, used: int, half: bool) -> Steady:
-    point, found, values = lap.point, lap.found, lap.multipliers()
+def _result(one: PeriodMap, mapped: Mapped, used: int, half: bool) -> Steady:
+    point, found, values = mapped.point, mapped.found, mapped.multipliers()
     low, high = found.extremes
     limit, n = one.table.limit, one.n
     share = sum(row[k] for row, k in zip(limit, found.most)) / max(limit[:, -1].sum(), 1e-300)
     start = Start(frozen_array(point.motion[:n]), frozen_array(point.motion[n:]))
-    return Steady(point, start, one.placed(point), lap.miss, frozen_array(values**2 if half else values, complex),
+    return Steady(point, start, one.placed(point), mapped.miss, frozen_array(values**2 if half else values, complex),
                   float(max(high, -low) if half else (high - low) / 2), float(share), half, used)

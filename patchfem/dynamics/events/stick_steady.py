@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import ModalBasis, PatchfemError, Start, frozen_array
-from ..periodic import Grows, Lap, Shooting
+from ..periodic import Grows, Mapped, Shooting
 from . import histories
 
 LONGEST = 400  # cycles of a run where Newton's method leads away
@@ -188,10 +188,10 @@ def steady(modes: ModalBasis, drive, groups, start: Start | None = None, cycles:
     begin = np.zeros(2 * n) if start is None else np.concatenate([start.z, start.v])
     shooting = Slips(modes, drive, groups, periods)
     try:
-        lap, used = shooting.repeating(shooting.run(begin, cycles), (2 * cycles, LONGEST))
+        mapped, used = shooting.repeating(shooting.run(begin, cycles), (2 * cycles, LONGEST))
     except Grows as found:
-        return _result(found.lap, n, "unbounded", found.steps)
-    return _result(lap, n, None, used)
+        return _result(found.mapped, n, "unbounded", found.steps)
+    return _result(mapped, n, None, used)
 
 
 class Slips(Shooting):
@@ -202,21 +202,21 @@ class Slips(Shooting):
         part = drive.segments[0]
         self.moved_by = max(abs(part.amplitude) / part.omega**2 * float(np.abs(modes.base).max()), 1e-300)
 
-    def lap(self, point) -> Lap:
-        """The Lap of a state (2n,)."""
+    def mapped(self, point) -> Mapped:
+        """The map of a state (2n,)."""
         found = period_map(self.modes, self.drive, self.groups, point, self.periods)
-        return Lap(point, found, found.slope, found.sizes, (point - found.end) / found.sizes,
+        return Mapped(point, found, found.slope, found.sizes, (point - found.end) / found.sizes,
                    found.sizes[0] / self.moved_by)
 
-    def moved(self, lap: Lap, step):
+    def moved(self, mapped: Mapped, step):
         """The state a step away, whose held slides stay at rest."""
-        n, out = self.modes.omega.size, lap.point + step
-        out[n:] = lap.found.first @ out[n:]
+        n, out = self.modes.omega.size, mapped.point + step
+        out[n:] = mapped.found.first @ out[n:]
         return out
 
-    def after(self, lap: Lap, periods: int):
-        """The state after some periods of the run from that of a Lap."""
-        return self.run(lap.point, periods)
+    def after(self, mapped: Mapped, periods: int):
+        """The state after some periods of the run from that of a map."""
+        return self.run(mapped.point, periods)
 
     def run(self, state, periods: int):
         """The state after some periods of the run."""
@@ -226,12 +226,12 @@ class Slips(Shooting):
         return run.motion.ravel().copy()
 
 
-def _result(lap: Lap, n: int, regime, used: int) -> Steady:
-    one, state = lap.found, lap.point
+def _result(mapped: Mapped, n: int, regime, used: int) -> Steady:
+    one, state = mapped.found, mapped.point
     stops = tuple(int(k) for k in np.count_nonzero((one.signs[:-1] != 0) & (one.signs[1:] == 0), axis=0))
     if regime is None:
         signs, most = one.signs[:, one.rubs], max(stops)
         slips, rests = bool(np.any(signs != 0)) or signs.shape[1] == 0, bool(np.any(signs == 0))
         regime = "stuck" if not slips else "sliding" if not rests else f"{most} stop{'s' if most != 1 else ''}"
-    return Steady(Start(frozen_array(state[:n]), frozen_array(state[n:])), lap.miss,
-                  frozen_array(lap.multipliers(), complex), one.swing, regime, stops, one.alone, used)
+    return Steady(Start(frozen_array(state[:n]), frozen_array(state[n:])), mapped.miss,
+                  frozen_array(mapped.multipliers(), complex), one.swing, regime, stops, one.alone, used)

@@ -10,9 +10,9 @@ from ...friction.grooves import STEADY, Grooves, Swing
 from ...friction.protocol import Element
 from ..march.march import Run
 from ..march.models import coulomb_model
-from ..second_book import sampled_work
 from ..smooth import run as smooth
 from ..smooth.arrays import DONE, PACE, POWER, STORED
+from ..work_check import sampled_work
 
 TOLERANCE = 1e-11  # relative error of a step
 REST = 1e-6  # of wavelength/(2 pi), below which a motion is at rest to the choice of the step

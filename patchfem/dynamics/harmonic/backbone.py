@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import ModalBasis, NotConverged, say
-from .harmonic import Balance, Plant, System, damped, pack, unpack
+from .harmonic import Balance, LinearPart, System, damped, pack, unpack
 
 
 class Free(NamedTuple):
@@ -50,7 +50,7 @@ class FreeBalance:
     def __init__(self, balance: Balance, mode: int, harmonics: int, scale: float):
         self.balance, self.mode, self.h, self.scale = balance, mode, harmonics, scale
 
-    def plant(self, omega: float, zeta: float) -> Plant:
+    def linear(self, omega: float, zeta: float) -> LinearPart:
         """The modes at omega [rad/s] with the damping -2 zeta omega besides, the given coordinate free."""
         m, k = self.balance.modes, np.arange(self.h + 1)[:, None, None]
         eye, keep = np.eye(m.omega.size), np.arange(m.omega.size) != self.mode
@@ -61,14 +61,14 @@ class FreeBalance:
         right -= inverse[1] @ p[1][:, self.mode]
         left -= p[1][self.mode] @ inverse[1]
         slope = -2 * k**2 * omega * eye + 1j * k * (m.dampers - 4 * zeta * omega * eye)
-        return Plant(inverse, slope, ((1, right, left, left @ p[1][:, self.mode]),))
+        return LinearPart(inverse, slope, ((1, right, left, left @ p[1][:, self.mode]),))
 
     def system(self, x, amplitude: float) -> System:
         """The equations at unknowns x (N,) and the amplitude of the mode's coordinate [m], lengths over it."""
         omega, zeta, balance = x[-2] * self.scale, x[-1], self.balance
         if not omega > 0:
             return System(np.full(x.size, np.inf), np.eye(x.size), None, None, None)
-        here = self.plant(omega, zeta)
+        here = self.linear(omega, zeta)
         one = balance.system(np.append(x[:-2] * amplitude, [amplitude, 0.0]), omega, 0.0, self.h, here)
         by_zeta = -2j * np.arange(self.h + 1)[:, None] * omega**2 * one.modal  # of the linear part, times the motion
         turned = balance.faces @ np.einsum("kab,kb->ak", here.inverse, by_zeta)

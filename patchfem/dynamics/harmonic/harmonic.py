@@ -55,7 +55,7 @@ def _real(c) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Plant:
+class LinearPart:
     """The modes at one frequency. inverse, slope (H + 1, n, n): R_k and d(R_k^-1)/d omega; free: for every coordinate
     without receptance (k, right (n,), left (n,), stiffness)."""
 
@@ -64,8 +64,8 @@ class Plant:
     free: tuple
 
 
-def plant(modes: ModalBasis, omega: float, harmonics: int) -> Plant:
-    """The linear part (Omega^2 - k^2 omega^2 + i k omega D)^-1 for k = 0..harmonics at omega [rad/s], as a Plant."""
+def linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearPart:
+    """The linear part (Omega^2 - k^2 omega^2 + i k omega D)^-1 for k = 0..harmonics at omega [rad/s]."""
     n, k = modes.omega.size, np.arange(harmonics + 1)
     around = k * omega
     slope = (-2 * k * around)[:, None, None] * np.eye(n) + 1j * k[:, None, None] * modes.dampers
@@ -76,13 +76,13 @@ def plant(modes: ModalBasis, omega: float, harmonics: int) -> Plant:
         inverse = np.zeros((k.size, n, n), complex)
         inverse[:, np.arange(n), np.arange(n)] = np.where(bad, 0.0, 1 / np.where(bad, 1.0, along))
         unit = np.eye(n)
-        return Plant(inverse, slope, tuple((int(h), unit[j], unit[j], along[h, j]) for h, j in np.argwhere(bad)))
+        return LinearPart(inverse, slope, tuple((int(h), unit[j], unit[j], along[h, j]) for h, j in np.argwhere(bad)))
     p = np.diag(modes.omega**2) - (around**2)[:, None, None] * np.eye(n) + 1j * around[:, None, None] * modes.dampers
     u, s, vh = np.linalg.svd(p)
     bad = s < SINGULAR * np.maximum(np.max(modes.omega)**2 + around[:, None]**2, omega**2)
     inverse = (vh.conj().transpose(0, 2, 1) * np.where(bad, 0.0, 1 / np.where(bad, 1.0, s))[:, None, :]) \
         @ u.conj().transpose(0, 2, 1)
-    return Plant(inverse, slope, tuple((int(h), vh[h, j].conj(), u[h, :, j].conj(), s[h, j])
+    return LinearPart(inverse, slope, tuple((int(h), vh[h, j].conj(), u[h, :, j].conj(), s[h, j])
                                        for h, j in np.argwhere(bad)))
 
 
@@ -120,7 +120,7 @@ class Balance:
         self.modes, self.rows, self.contact = modes, rows, contact
         self.lift = np.eye(rank) if full else u[:, :rank]
         self.faces = rows if full else s[:rank, None] * vt[:rank]
-        self._plants = {}
+        self._linear = {}
 
     def on(self, contact) -> "Balance":
         """The same rows and modes with another contact on them."""
@@ -128,18 +128,18 @@ class Balance:
         other.__dict__.update(self.__dict__, contact=contact)
         return other
 
-    def plant(self, omega: float, harmonics: int) -> Plant:
-        """`plant` at omega [rad/s], kept for up to nine frequencies, then all forgotten."""
+    def linear(self, omega: float, harmonics: int) -> LinearPart:
+        """`linear_part` at omega [rad/s], kept for up to nine frequencies, then all forgotten."""
         key = (omega, harmonics)
-        if key not in self._plants:
-            if len(self._plants) > 8:
-                self._plants.clear()
-            self._plants[key] = plant(self.modes, omega, harmonics)
-        return self._plants[key]
+        if key not in self._linear:
+            if len(self._linear) > 8:
+                self._linear.clear()
+            self._linear[key] = linear_part(self.modes, omega, harmonics)
+        return self._linear[key]
 
     def size(self, omega: float, harmonics: int) -> int:
         """Number N of real unknowns at omega [rad/s]."""
-        free = self.plant(omega, harmonics).free
+        free = self.linear(omega, harmonics).free
         return self.lift.shape[1] * (2 * harmonics + 1) + sum(1 if k == 0 else 2 for k, *_ in free)
 
     def slides(self, x, omega: float, harmonics: int) -> np.ndarray:
@@ -153,10 +153,10 @@ class Balance:
         K may exceed H: what the balance leaves out then takes part.
         """
         top = force.shape[1] - 1
-        return self._motion(self.plant(omega, top), self._coordinates(x, self.plant(omega, harmonics), harmonics),
+        return self._motion(self.linear(omega, top), self._coordinates(x, self.linear(omega, harmonics), harmonics),
                             level, force)
 
-    def _coordinates(self, x, here: Plant, harmonics) -> list:
+    def _coordinates(self, x, here: LinearPart, harmonics) -> list:
         rest = x[self.lift.shape[1] * (2 * harmonics + 1):]
         out, at = [], 0
         for k, *_ in here.free:
@@ -173,11 +173,11 @@ class Balance:
             z[k] += right * c
         return z
 
-    def system(self, x, omega: float, level: float, harmonics: int, here: Plant | None = None) -> System:
+    def system(self, x, omega: float, level: float, harmonics: int, here: LinearPart | None = None) -> System:
         """Residual [m] and derivatives at unknowns x, frequency omega [rad/s] and drive amplitude level [m s-2]; here:
         a linear part other than that of the modes."""
         h, r, mass = harmonics, self.lift.shape[1], self.modes.mass
-        here = here or self.plant(omega, h)
+        here = here or self.linear(omega, h)
         coordinates = self._coordinates(x, here, h)
         y = unpack(x[:r * (2 * h + 1)], r)
         fold = self.contact(self.lift @ y, omega)

@@ -194,7 +194,7 @@ def _starts(balance, x, omega, level, h: int):
     """Unknowns from which Newton's method may lead to a motion, the likeliest first."""
     r = balance.lift.shape[1]
     if x is not None:
-        free = sum(1 if k == 0 else 2 for k, *_ in balance.plant(omega, h).free)
+        free = sum(1 if k == 0 else 2 for k, *_ in balance.linear(omega, h).free)
         have, rest = divmod(x.size - free - r, 2 * r)
         if have >= 0 and not rest:
             yield cut(balance, balance.lift @ unpack(x[:r * (2 * have + 1)], r), x, have, h)
@@ -221,7 +221,7 @@ def _along_levels(balance, omega, level, h: int) -> np.ndarray:
     path = follow(lambda v, p: by_level(balance, v, omega, p, h), _held(balance, omega, level, h) * 1e-3, 1e-3 * level,
                   (0.0, level), True, 0.05, 0.5, 1000, 1e-6)
     if path.ended != "end":
-        bare = any(k for k, *_ in balance.plant(omega, h).free)
+        bare = any(k for k, *_ in balance.linear(omega, h).free)
         why = "; an undamped mode driven at its own frequency has a bounded motion only where friction can hold it: " \
             "give it damping" if bare else ", neither from the held contact nor along weaker drives"
         raise (_Unbounded if bare else NotConverged)(
@@ -316,7 +316,7 @@ def _missed(balance, x, omega, level, h, force, z) -> np.ndarray:
     low, at = balance.lift.shape[1] * (2 * h + 1), 0
     y = unpack(x[:low], balance.lift.shape[1])
     out = [pack(y - (z[:h + 1] @ balance.faces.T).T)]
-    for k, _, left, stiffness in balance.plant(omega, h).free:
+    for k, _, left, stiffness in balance.linear(omega, h).free:
         parts = x[low + at:low + at + (2 if k else 1)]
         miss = balance.free_miss((k, left, stiffness), complex(*parts), omega, level, force)
         out.append(np.array([miss.real, miss.imag])[:parts.size])

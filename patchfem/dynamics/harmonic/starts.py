@@ -14,7 +14,7 @@ def one_harmonic(balance, omega: float, level: float, count: int = 240) -> list:
     The balance is scanned over the amplitude along the free linear motion: exact for one row, a start for more. None is
     found where a mode without receptance is driven at its own frequency.
     """
-    here = balance.plant(omega, 1)
+    here = balance.linear(omega, 1)
     if any(k == 1 for k, *_ in here.free):
         return []
     through = balance.faces @ here.inverse[1]

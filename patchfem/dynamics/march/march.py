@@ -9,10 +9,10 @@ import numpy as np
 from ...core import BaseSine, ModalBasis, Outcome, Response
 from ..contacts import arrays
 from ..cycles import extremes_of, phasor, thinned
-from ..plant import Plant
+from ..modal_kernels import ModalArrays
 from ..propagator import propagator
 from ..resume import Samples, slot_of
-from ..second_book import sampled_work
+from ..work_check import sampled_work
 from .faces import GOAL, faces_of
 from .models import ContactModel, load_kernels
 from .room import keep, lengthened
@@ -69,13 +69,14 @@ def _response(rows, number, dt, modes, drive) -> Response:
                     {"ledger": rows[:, [2 * n + 6, 2 * n + 5, 2 * n + 7, 2 * n + 8]].T})
 
 
-def plant_of(modes: ModalBasis, prop):
-    """The Plant of a basis and its Propagator."""
+def modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
+    """The ModalArrays of a basis and its Propagator."""
     damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
     own = (modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output, damping, prop.free,
            prop.push, prop.dense, prop.reach, prop.loss, prop.dense_loss)
     arrays = [np.array(v, float, order="C") for v in own]
-    return Plant(*arrays, float(prop.dt), float(prop.beta[0, 0]), float(modes.mass), np.zeros((3, modes.omega.size)))
+    numbers = float(prop.dt), float(prop.beta[0, 0]), float(modes.mass)
+    return ModalArrays(*arrays, *numbers, np.zeros((3, modes.omega.size)))
 
 
 def _runner(model):
@@ -180,7 +181,7 @@ class Run:
         self.totals = np.zeros(3)
         self.second = np.zeros(2)  # friction work off the samples, and what went to and fro [J]
         self.ledger[0] = self.motion()  # what is released at the start counts as work in
-        self.plant = plant_of(modes, self.prop)
+        self.plant = modal_arrays(modes, self.prop)
         self.faces, self.load = faces_of(model, self.prop, self.plant, modes.mass), self._pressing()
         self.width = 2 * modes.omega.size + 7 + EACH * len(model.joints) + 5 * bool(model.loading)
         if model.joints or model.loading:

@@ -11,7 +11,7 @@ from ... import compiled
 from ...core import ModalBasis, Outcome, Response
 from ...friction.laws.stretch import bonds_of
 from ..march.march import MarchResult
-from ..second_book import sampled_work
+from ..work_check import sampled_work
 from .arrays import (
     CREST,
     CREST_SPEED,
@@ -359,13 +359,13 @@ def simulate(modes: ModalBasis, drive, element, cycles: float, tolerance: float,
     rows = np.concatenate([*_early(run, kept[0][0, 0] if kept else rows[0, 0]), *kept, rows])
     done = max(1, ceil(run.time / period - 1e-9))
     phasors = np.array([1, 1j]) @ run.kept.cycles[2:, :done]
-    book = run.book() | _second(turned)
+    book = run.book() | _work_check(turned)
     return SmoothResult(run.response(rows), last, np.zeros(0), run.extremes(done), phasors, book, run.outcome,
                         shots, fine.work, run.time / period, run.message, (), fine, turned, run.unlike, tolerance)
 
 
-def _second(turned) -> dict:
-    """The second book of energy: friction work [J] off samples, that of the ledger between them, and its sizes."""
+def _work_check(turned) -> dict:
+    """Friction work [J] off samples, that of the ledger between them, and the sum of its sizes."""
     parts = np.diff(turned.extra["ledger"][0])
     return {"sampled": float(sampled_work(turned.slide, turned.force).sum()), "booked": float(parts.sum()),
             "passed": float(np.abs(parts).sum())}

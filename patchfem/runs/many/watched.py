@@ -74,10 +74,10 @@ class Watcher:
 
     def _line(self, drive, near) -> Watched | None:
         """Without friction: z = (Omega^2 - omega^2 + i omega D)^-1 (i a base)."""
-        from ...dynamics.harmonic.harmonic import plant
+        from ...dynamics.harmonic.harmonic import linear_part
 
         modes, omega = self.model.rig.modes, drive.omega
-        found = plant(modes, omega, 1)
+        found = linear_part(modes, omega, 1)
         if any(k == 1 for k, *_ in found.free):
             return None
         z = found.inverse[1] @ (1j * drive.acceleration * modes.base)

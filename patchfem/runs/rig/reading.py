@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core import Outcome
 from ...dynamics.integrated import Integrated
-from ...dynamics.second_book import sampled_work
+from ...dynamics.work_check import sampled_work
 from ...effects import has
 from ...response import run_events
 from ...response.errors import GAPS, change

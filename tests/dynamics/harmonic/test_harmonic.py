@@ -270,7 +270,7 @@ def test_exact_both_rows_of_a_group():
         a = a + np.outer(row, row) * k / modes.mass
     assert found.modal[1] == pytest.approx(np.linalg.solve(a, 1j * modes.base), rel=1e-10)
     balance = balance_of(modes, group_of(modes, laws), 64)
-    receptance = balance.faces @ balance.plant(1.9, 3).inverse @ balance.faces.T
+    receptance = balance.faces @ balance.linear(1.9, 3).inverse @ balance.faces.T
     assert receptance == pytest.approx(receptance.transpose(0, 2, 1), abs=1e-14)
 
 

@@ -60,7 +60,7 @@ def test_always_both_books_on_100_random_paths(reading, order, engine):
 @pytest.mark.share(0, 3, 6, 9, 11, 14, 17, 20)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("reading, order", LAWS)
-def test_order_of_the_second_book_of_a_list_is_two(reading, order, engine):
+def test_order_of_the_work_check_of_a_list_is_two(reading, order, engine):
     """Trapezoid of the force against the work of the path means, with growth; order -0.5 is steep at every turn."""
     tail, merge = ENGINES[engine]
     law = Bonds(1.0, 1.0, order, reading, 0.6, 0.3, 0.4, 1e-2, 0.0)

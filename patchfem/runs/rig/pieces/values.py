@@ -4,7 +4,7 @@ import numpy as np
 
 from ....dynamics.events import names_kernels as at
 from ....dynamics.events.reading import Reading
-from ....dynamics.second_book import gap
+from ....dynamics.work_check import gap
 from ....response.loops import interface_loops
 from ....response.measures import REST
 from ....response.rows import stuck_share
@@ -23,7 +23,7 @@ def read_off(reading: Reading, book: dict, sine: bool, whole: bool, stiffness, s
            "absolute_acceleration_fundamental": first if sine and whole else none,
            "acceleration_distortion": distorted(first, third, size) if sine and whole else none,
            "drift_per_cycle": reading.drift, "slip_start_phase": reading.start if sine else none,
-           "work_check": _second_book(reading, book)}
+           "work_check": _work_check(reading, book)}
     one = reading.loop()
     out |= {"slip_amplitude": one.slip / 2, "friction_force_peak": one.force,
             "stick_fraction": stuck_share(one.stuck, reading.span)}
@@ -40,7 +40,7 @@ def _loop(reading: Reading, sine: bool, stiffness) -> dict:
     return interface_loops(half, one.first, one.pull, work, stiffness) | {"secant_stiffness": secant}
 
 
-def _second_book(reading: Reading, book: dict):
+def _work_check(reading: Reading, book: dict):
     """Gap [1] of the friction work of the cycles that were read: by the trapezoidal rule on the ends of the pieces
     against the ledger's."""
     turned, booked, passed = (reading.faces[..., place].sum(axis=-1) for place in (at.TURNED, at.WORK, at.PASSED))

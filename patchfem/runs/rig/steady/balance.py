@@ -85,7 +85,7 @@ class Balance:
             raise NotConverged(done.message)
         slides = analysis(done.window.slide[None, -STEPS - 1:-1], FEW)
         balance = balance_of(self.modes, self.group, 0)
-        held = sum(1 if k == 0 else 2 for k, *_ in balance.plant(drive.omega, FEW).free)
+        held = sum(1 if k == 0 else 2 for k, *_ in balance.linear(drive.omega, FEW).free)
         return np.concatenate([pack(balance.lift.T @ slides), np.zeros(held)])
 
     def point(self, drive, near=None) -> tuple:

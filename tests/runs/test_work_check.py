@@ -1,4 +1,4 @@
-"""The second book of energy of rigs: the trapezoidal rule on the samples against the ledger, in every engine."""
+"""The check of the friction work of rigs: the trapezoidal rule on the samples against the ledger, in every engine."""
 
 import re
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from march_paths import share_one_loop
 
-from patchfem.dynamics.second_book import gap, sampled_work
+from patchfem.dynamics.work_check import gap, sampled_work
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -33,7 +33,7 @@ def checked(text, *sets):
 
 @pytest.mark.share(0, 1, 2, 4)
 @pytest.mark.parametrize("law", LAWS)
-def test_order_of_the_second_book_of_a_march_is_two(law):
+def test_order_of_the_work_check_of_a_march_is_two(law):
     """A ledger whose path mean were off by a constant share would stay off by it at any step."""
     steps = (400, 1600) if law != "list" else (300, 900)
     coarse, fine = (checked(POINT + LAWS[law] + RIG, f"accuracy.steps_per_cycle={n}")[0] for n in steps)

@@ -1,4 +1,4 @@
-"""The second book of energy: friction work off the samples alone, which the ledger of an engine must agree with.
+"""A check of the friction work: that off the samples alone, with which the ledger of an engine must agree.
 
 A ledger and the energy balance built from it share one path mean, so neither shows a mean that is wrong. The
 trapezoidal rule on slide and force as they are sampled knows nothing of it.
@@ -26,7 +26,7 @@ def sampled_work(slide, force, after=None) -> np.ndarray:
 
 
 def gap(sampled, booked, passed, energy=0.0):
-    """Relative gap [1] of the two books: |sampled - booked| over the work that went to and fro; 0 where none did.
+    """Relative gap [1] of samples and ledger: |sampled - booked| over the work that went to and fro; 0 where none did.
 
     sampled, booked: friction work [J]; passed: sum of its sizes [J]; energy [J] that passed through the whole run, of
     which ROUND counts besides, so that a stuck interface shows no round-off. Numbers of one run, or (n,) of many.
