@@ -6,10 +6,10 @@ attributes of the arrays and in the field arrays `units` and `codes` of every bl
 VTK 9.6 and 9.7 stay at the first time without `Steps` beside the blocks; 9.4 takes whatever stands there for a block.
 So `Steps` is a whole mesh too, an empty one that the assembly leaves out.
 
-A series of more than LARGE bytes is packed, component by component, and written frame after frame: what a killed
-process leaves (`.fields.*.vtkhdf`) holds every frame that its `NSteps` count. Its numbers are rounded, to a multiple of
-a step or to so many bits, and every array says what that changes: at most `rounding_error` in its unit, or the share
-2^-(significant_bits + 1) of each value.
+The changing arrays of a series of more than PACKED bytes are packed, component by component. Their numbers are rounded,
+to a multiple of a step or to so many bits, and every array says what that changes: at most `rounding_error` in its
+unit, or the share 2^-(significant_bits + 1) of each value. A series of more than LARGE bytes is written frame after
+frame as well: what a killed process leaves (`.fields.*.vtkhdf`) holds every frame that its `NSteps` count.
 """
 
 import math
@@ -24,8 +24,9 @@ from .blocks import CODES, MEANINGS, Block
 
 NAME = "fields.vtkhdf"
 VERSION = np.array([2, 2], np.int64)  # of the format; later ones add nothing that stands here
-LARGE = 1 << 28  # bytes of all arrays; below it gzip saves a third of the bytes and doubles the time of all fields
-BITS = {"stress_error": 5}  # kept of 23 behind the leading one, in a large series: an estimate is good to some 10 %
+PACKED = 1 << 22  # bytes of all arrays: the shipped rig keeps 2.6 of 9.6 MB for .1 s more
+LARGE = 1 << 28  # bytes of all arrays
+BITS = {"stress_error": 5}  # kept of 23 behind the leading one, where packed: an estimate is good to some 10 %
 MOST_BITS = 14  # of every other array without a step: 3e-5 of a value, far below what the elements err by
 EMPTY = Block(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.uint8), {}, {})
 
@@ -34,13 +35,14 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
     """Write a series of fields on fixed meshes.
 
     blocks: name -> Block whose data are (f or 1, n or c, ...), 1 if constant; times: (f,) [s]; units: name -> unit;
-    steps: block -> array -> largest step [its unit] that a large series may round it to. The file is written whole
+    steps: block -> array -> largest step [its unit] that a packed series may round it to. The file is written whole
     beside `path` and then renamed; it is of an HDF5 version that VTK's reader knows.
     """
     path = Path(path)
     size = sum(values.nbytes for one in blocks.values() for data in (one.point_data, one.cell_data)
                for values in data.values())
     large, later = size > LARGE, []
+    packed = large or size > PACKED
     with whole(path, None if large else size) as partial, sturdy(partial) as kept, \
             h5py.File(kept, "w", libver=("earliest", "v110")) as file:
         root = _group(file, "VTKHDF")
@@ -49,8 +51,8 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
         text = _text(blocks, units)
         assembly = _group(root, "Assembly")
         for name, one in blocks.items():
-            _block(_group(root, name), one, times, (units, text, later if large else None,
-                                                         (steps or {}).get(name, {})))
+            rounding = (steps or {}).get(name, {}) if packed else None
+            _block(_group(root, name), one, times, (units, text, later if large else None, rounding))
             assembly[name] = h5py.SoftLink(f"/VTKHDF/{name}")
         all_steps = _steps(root, times)
         _mesh(all_steps, EMPTY)
@@ -68,11 +70,15 @@ def _frames(file, steps: list, later: list, count: int) -> None:
     times = [one["Values"][:] for one in steps]
     for number in range(count):
         _counted(steps, times, number)
-        for dataset, values, nearest in later:
-            size = values.shape[1]
-            dataset[number * size:(number + 1) * size] = nearest(values[number])
+        for one in later:
+            _frame(*one, number)
         file.flush()
     _counted(steps, times, count)
+
+
+def _frame(dataset, values, nearest, number: int) -> None:
+    size = values.shape[1]
+    dataset[number * size:(number + 1) * size] = nearest(values[number])
 
 
 def _counted(steps: list, times: list, count: int) -> None:
@@ -157,7 +163,7 @@ def _mesh(group, one: Block) -> None:
 
 def _block(group, one: Block, times, about: tuple) -> None:
     """about: units by name, the field arrays of text, the list that takes what is written frame after frame, None where
-    all is written at once, and the steps of rounding by name."""
+    all is written at once, and the steps of rounding by name, None where nothing is packed."""
     units, text, later, rounding = about
     _mesh(group, one)
     steps, count = _steps(group, times), len(times)
@@ -176,12 +182,17 @@ def _arrays(group, steps, kind: str, data: dict, about: tuple) -> None:
     count = int(steps.attrs["NSteps"])
     for name, values in data.items():
         size = values.shape[1]
-        if later is not None and values.dtype == np.float32 and len(values) == count:
+        if rounding is not None and values.dtype == np.float32 and len(values) == count:
             # a chunk holds one component: neighbours in it are neighbours in space, which pack to three quarters
             one = into.create_dataset(name, (count * size, *values.shape[2:]), values.dtype, shuffle=True,
                                       chunks=(max(size, 1), *(1 for _ in values.shape[2:])), compression="gzip",
                                       compression_opts=1)
-            later.append((one, values, _nearest(one, rounding.get(name, 0.0), BITS.get(name, MOST_BITS))))
+            nearest = _nearest(one, rounding.get(name, 0.0), BITS.get(name, MOST_BITS))
+            if later is None:
+                for number in range(count):
+                    _frame(one, values, nearest, number)
+            else:
+                later.append((one, values, nearest))
         else:
             one = into.create_dataset(name, data=values.reshape(-1, *values.shape[2:]))
         one.attrs["units"] = units.get(name, "1")
