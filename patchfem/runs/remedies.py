@@ -203,7 +203,7 @@ def _unproven(model, steps: int, name: str, wide: dict) -> str:
 
     Steps that are left out are doubled until the displacement is met.
     """
-    from .effort import MOST_STEPS
+    from .rig.costs import MOST_STEPS
 
     seen = f"the change of {name} did not fall from {steps // 4} to {steps} steps per cycle"
     if exact := _stepless(model):

@@ -6,7 +6,8 @@ import pytest
 from patchfem.dynamics.march import march
 from patchfem.model.patch import turned
 from patchfem.runs.plan import plan
-from patchfem.runs.rig.numerics import bonds_cost, choose, halvings
+from patchfem.runs.rig.lists import bonds_cost, halvings
+from patchfem.runs.rig.numerics import choose
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 

@@ -10,7 +10,7 @@ from patchfem.dynamics.march import march
 from patchfem.response.levels import Level
 from patchfem.runs.plan import plan
 from patchfem.runs.rig.levels import measures, onset
-from patchfem.runs.rig.numerics import chatters, holding, lists_grow, stalls
+from patchfem.runs.rig.lists import chatters, holding, lists_grow, stalls
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 

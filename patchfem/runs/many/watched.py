@@ -104,7 +104,7 @@ class Watcher:
 
     def _orbits(self):
         from ...dynamics.events.orbits import Orbits
-        from ..rig.pieces.run import Interfaces
+        from ..rig.pieces import Interfaces
 
         modes, groups = self.model.rig.modes, Interfaces(self.model, self.numerics, self.patch).groups
         found = self.before.pop("yields", None)

@@ -4,6 +4,6 @@ In: a Model with a rig, its pressed patch. Out: a Result. Read `rig` first: the 
 it. `engines` has a record per engine, and nothing else asks for one by its name; what each takes stands in
 `scene.rules.methods.TAKES`. An engine's module (`march`, `pieces`, `smooth`, `comparison`, `steady`) runs it and
 says what it knows of the last cycles; `reading` makes the Solution of that, `levels` goes from level to level.
-`interface` makes the friction of a patch the contact that an engine moves, `numerics` and `plan` say how and at what
-cost.
+`interface` makes the friction of a patch the contact that an engine moves, `numerics` says how, `costs` at what cost:
+what the choice of an engine, a plan and a refusal read; `lists` the same of a list of bonds.
 """

@@ -19,15 +19,12 @@ from ...response.coarser import Rung, space_rung
 from ...response.errors import cells_error, change, pieces_error, step_error, tolerance_error
 from ...scene.rules import methods
 from ...scene.rules.draft import acts, pinned
-from ..effort import too_long
-from .pieces.costs import pieces, seconds_of_pieces, seconds_of_steps
-from .smooth.choice import not_smooth
+from .costs import dear_elements, dear_events, not_smooth, pieces
 from .solution import gauged
 
 FINER, MERGED = 0.5, 2.0  # merge width of the run that shows what merging does, and times its change
 LOOSE = 1e-2  # tail over the tolerance from which it is checked by a run with less; unpinned it is a tenth of that
 LESS = 0.1  # tail of that run
-WORTH = 5.0  # seconds that an exact motion may take where steps would take less, and be off by their bars
 MOST_PIECES = 1e5  # of a period, up to which a steady motion is found by the map of its yields
 
 
@@ -147,15 +144,6 @@ def steady_by(model: Model) -> Finder:
     return FINDERS["balance" if named or PIECES.lacks(model) or pieces(model) > MOST_PIECES else "yields"]
 
 
-def dear_pieces(model: Model) -> str:
-    """Why the march is to run elements that stick or slip: the scene names its steps, or their yields cost more than
-    steps and more than WORTH."""
-    if model.accuracy.steps_per_cycle is not None:
-        return "its steps are named"
-    dear = seconds_of_pieces(model) > max(seconds_of_steps(model), WORTH)
-    return "its yields cost more than steps" if dear else ""
-
-
 def _no_rungs(*_) -> list:
     return []
 
@@ -273,16 +261,16 @@ def _smooth_in_time(model: Model, numerics, patch) -> list:
     return [Rung((wider,), lambda *values: tolerance_error(*values, model.rig.displacement))]
 
 
-EXACT = Engine("exact", "exact", "pieces.run run_exact", _no_rungs, _exact_in_space, "plan events_cost",
-               dearer=too_long, refuse="plan refuse_events")
-PIECES = Engine("piecewise", "exact", "pieces.run run_piecewise", _no_rungs, _pieces_in_space, "plan pieces_cost",
-                dearer=dear_pieces, chosen="numerics by_pieces")
-SMOOTH = Engine("smooth", "", "smooth.solve run_smooth", _smooth_in_time, _own_errors, "plan smooth_cost",
+EXACT = Engine("exact", "exact", "pieces run_exact", _no_rungs, _exact_in_space, "costs exact_cost",
+               dearer=dear_events, refuse="costs refuse_endless")
+PIECES = Engine("piecewise", "exact", "pieces run_piecewise", _no_rungs, _pieces_in_space, "costs exact_cost",
+                dearer=dear_elements, chosen="numerics by_pieces", refuse="costs refuse_endless")
+SMOOTH = Engine("smooth", "", "smooth run_smooth", _smooth_in_time, _own_errors, "costs smooth_cost",
                 dearer=not_smooth, chosen="numerics by_error", least=3e-8, closes=None, tells=("iterations",))
 MARCH = Engine("march", "march", "march run_march", _march_in_time, _march_in_space, "plan march_cost",
-               chosen="numerics by_steps", refuse="numerics refuse_costly",
+               chosen="numerics by_steps", refuse="lists refuse_costly",
                notes="remarks marched_elements", tells=("steps_per_cycle", "iterations"), resumes=True)
-HARMONIC = Engine("harmonic", "harmonic", "steady.steady run_steady", _no_rungs, _steady_in_space, "plan steady_cost",
+HARMONIC = Engine("harmonic", "harmonic", "steady.steady run_steady", _no_rungs, _steady_in_space, "costs steady_cost",
                   words="plan steady_words", notes="remarks unmoved_elements", least=0.0, closes=None, steady=True)
 ENGINES = {one.name: one for one in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC, *(
     Engine(name, name, "comparison run_comparison", _march_in_time, _march_in_space, "plan march_cost",

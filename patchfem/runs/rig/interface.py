@@ -17,7 +17,8 @@ from ...slip.fields import shear_of
 from ...structure.drive_sizes import omega_of
 from ..bench.averaged import limit_share
 from ..patch.kept import elements, strip_elements
-from .numerics import Numerics, quadrature_of
+from .lists import quadrature_of
+from .numerics import Numerics
 from .strips import strip_loads
 
 

@@ -13,7 +13,7 @@ from ...response.spectrum import friction_harmonic, motion_harmonic
 from ...structure.drive_sizes import omega_of, peak_speed, sinusoidal, whole
 from . import levels as rig_levels
 from .interface import model_of
-from .numerics import quadrature_of
+from .lists import quadrature_of
 from .reading import Reader
 from .solution import Solution, sampled_loop
 from .strips import joined, mark_as_one

@@ -8,11 +8,10 @@ from ...effects import has
 from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
 from ...structure.drive_sizes import largest, omega_of
-from ..effort import exact_effort, refuse_endless
+from .costs import exact_words
 from .engines import ENGINES, PIECES, steady_by
-from .numerics import bonds_cost, chatters, choose, halvings, limp, lists_grow, quadrature_of, stalls
-from .pieces.costs import expected_seconds, pieces, words
-from .smooth import choice
+from .lists import bonds_cost, chatters, halvings, limp, lists_grow, quadrature_of, stalls
+from .numerics import choose
 
 STEP, STEP_MODE = 7e-7, 1e-7  # seconds of a step of one mode, and of each further one
 STIFF = 10.0  # times the stiffness of the mode, from which a link holds the block
@@ -29,33 +28,6 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
     """Engine, steps of all passes and seconds of a coupled run; sizes that are foreseen go into `unknowns`."""
     numerics = choose(model, per_point)
     return numerics.engine, *ENGINES[numerics.engine].ask("cost", model, numerics, unknowns)
-
-
-def events_cost(model: Model, numerics, unknowns: dict) -> tuple:
-    """Steps and seconds of a run from event to event."""
-    return exact_effort(model)
-
-
-def refuse_events(model: Model, numerics) -> None:
-    """Raise Missing where a run from event to event would not end."""
-    refuse_endless(model)
-
-
-def pieces_cost(model: Model, numerics, unknowns: dict) -> tuple:
-    """Pieces and seconds of a run from yield to yield."""
-    return int(pieces(model) * numerics.cycles), expected_seconds(model)
-
-
-def smooth_cost(model: Model, numerics, unknowns: dict) -> tuple:
-    """Steps and seconds of a run of high order."""
-    return choice.smooth_cost(model)
-
-
-def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:
-    """Points of a curve of steady motions and the seconds that they take."""
-    points = 1 if model.rig.waveform == "sine" else 120
-    sizes = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(model.rig.interfaces))
-    return points, 0.1 + 0.05 * points + 8e-10 * sizes**3
 
 
 def march_cost(model: Model, numerics, unknowns: dict) -> tuple:
@@ -161,23 +133,26 @@ def steady_words(model: Model, numerics) -> list:
 def summed_words(model: Model, numerics) -> list:
     """Sentences on how the bonds of law 'nonlocal' are summed, or on which engine takes elements that stick or slip."""
     if not has(model.friction.law, "bonds"):
-        return [] if PIECES.lacks(model) else words(model, numerics.engine)
+        return [] if PIECES.lacks(model) else exact_words(model, numerics.engine)
     found = quadrature_of(model, numerics)
-    seconds = 0.0 if found.engine == "recursion" else bonds_cost(model, numerics)[1]
     out = ["sum over bonds by " + found.said()]
-    if found.engine != "recursion" and stalls(model):
-        out.append("the printed law holds the block from its release on: it swings on its bonds, or turns back in "
-                   "almost every step, which takes longest and is counted here; reading = \"stretch\" gives it a "
-                   "stiffness")
-    if found.engine != "recursion" and limp(model):
-        out.append("bonds of order 0 hold the block, but give it no stiffness: it turns back in almost every step, and "
-                   "the list grows by a strip with each; an order above 0 gives it one")
-    elif found.engine != "recursion" and lists_grow(model) and not chatters(model) and not stalls(model):
-        out.append("the printed law holds the block at some level, or just: the list grows with every step; "
-                   "reading = \"stretch\" gives it a stiffness")
-    if found.engine != "recursion" and chatters(model):
-        out.append("the printed law holds the block, however small its stroke: it turns back in almost every step, and "
-                   "the list grows by a strip with each; reading = \"stretch\" gives it a stiffness")
-    if seconds > LONGEST:
+    if found.engine == "recursion":
+        return out
+    if lists_grow(model):
+        stiff = "an order above 0 gives it one" if limp(model) else "reading = \"stretch\" gives it a stiffness"
+        out.append(f"{_held_words(model)}; {stiff}")
+    if (seconds := bonds_cost(model, numerics)[1]) > LONGEST:
         out.append(f"run will refuse: the bond list would take about {seconds:.0f} s, more than {LONGEST:.0f} s")
     return out
+
+
+def _held_words(model: Model) -> str:
+    """How bonds hold the block whose list of them grows."""
+    turns = "it turns back in almost every step, and the list grows by a strip with each"
+    if stalls(model):
+        return "the printed law holds the block from its release on: it swings on its bonds, or turns back in almost " \
+            "every step, which takes longest and is counted here"
+    if limp(model):
+        return f"bonds of order 0 hold the block, but give it no stiffness: {turns}"
+    return f"the printed law holds the block, however small its stroke: {turns}" if chatters(model) else \
+        "the printed law holds the block at some level, or just: the list grows with every step"

@@ -8,7 +8,8 @@ from ...effects import has
 from ...response.outcome import changing_note
 from ..results.notes import climbing_as_one, creeping, of_growth, two_books, unbounded, unripe, warming
 from ..results.travel import travelled
-from .engines import ENGINES, PIECES, dear_pieces
+from .costs import dear_elements
+from .engines import ENGINES, PIECES
 from .solution import borne
 
 
@@ -76,7 +77,7 @@ def marched_elements(model, numerics, patch, raw) -> list:
     if PIECES.lacks(model) or model.accuracy.method != "auto" or "steps_per_cycle" in numerics.pinned:
         return []
     pinned = patch is not None and not model.patch.chosen
-    return [f"the motion is marched in steps, as {dear_pieces(model)}; {'on a coarser mesh, or ' * pinned}by "
+    return [f"the motion is marched in steps, as {dear_elements(model)}; {'on a coarser mesh, or ' * pinned}by "
             "accuracy.method = \"exact\" it is exact"]
 
 
@@ -84,7 +85,7 @@ def unmoved_elements(model, numerics, patch, raw) -> list:
     """The note of a steady motion on elements that it never moves."""
     if PIECES.lacks(model) or raw.outcome not in (Outcome.STEADY, Outcome.STUCK):
         return []
-    from .pieces.run import Interfaces
+    from .pieces import Interfaces
 
     slides = raw.window.extra.get("slides", raw.window.slide[:, None])
     for group, slide in zip(Interfaces(model, numerics, patch).groups, slides.T):

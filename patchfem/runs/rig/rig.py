@@ -14,13 +14,14 @@ from ...response.rows import judged
 from ...response.run_events import events_of, with_own
 from ...response.settling import slip_period
 from ...structure.drive_sizes import sinusoidal, slowest
-from ..effort import MOST_STEPS
 from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_errors
 from ..results.travel import ended
 from . import levels, remarks
+from .costs import MOST_STEPS
 from .engines import ENGINES, Variant, unbalanced
 from .fields import fields_of
-from .numerics import choose, crowded
+from .lists import crowded
+from .numerics import choose
 from .solution import Solution, curve_measures
 from .start_ring import StartRing, start_ring
 

@@ -17,8 +17,8 @@ from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.model.model import build
 from patchfem.runs.plan import plan
 from patchfem.runs.rig.interface import contact_model
+from patchfem.runs.rig.lists import quadrature_of
 from patchfem.runs.rig.numerics import choose as settings_of
-from patchfem.runs.rig.numerics import quadrature_of
 from patchfem.runs.rig.remarks import created_warning
 from patchfem.scene import scene
 from patchfem.scene.keys.tables import Accuracy

@@ -16,10 +16,9 @@ from ....response.errors import cells_error
 from ....response.measures import ROUND, energy_balance, window_amplitudes
 from ....response.ringing import held_ring
 from ....structure.drive_sizes import largest
+from ...rig.costs import pairs_of
 from ...rig.engines import EXACT, PIECES, engine_of
-from ...rig.pieces.costs import pairs_of
-from ...rig.pieces.run import Limits, changes, group_of, settles
-from ...rig.pieces.values import read_off
+from ...rig.pieces import Limits, changes, group_of, read_off, settles
 from .columns import ENDS, MAIN, Runs
 from .threads import in_threads
 

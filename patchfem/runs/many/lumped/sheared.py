@@ -22,7 +22,7 @@ from ...results.result import placeless
 from ...results.travel import ended, travelled
 from ...rig.engines import PIECES, engine_of
 from ...rig.numerics import choose
-from ...rig.pieces.run import Interfaces
+from ...rig.pieces import Interfaces
 from .. import one_by_one
 from ..answers import Answers
 from . import pieces

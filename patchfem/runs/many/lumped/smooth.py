@@ -6,10 +6,10 @@ import numpy as np
 
 from ....dynamics.smooth import run as hub
 from ....response.errors import tolerance_error
+from ...rig.costs import smooth_element
 from ...rig.engines import COARSER, SMOOTH, engine_of
 from ...rig.numerics import choose
-from ...rig.smooth.choice import element_of
-from ...rig.smooth.solve import moved
+from ...rig.smooth import moved
 from .columns import ENDS, Runs
 from .threads import in_threads
 
@@ -32,7 +32,7 @@ def coarsened(model) -> int:
 
 def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     """Runs of models of this kind, all of `cycles` cycles from their starts."""
-    hub.loops_of(element_of(models[0]).kernels, say)
+    hub.loops_of(smooth_element(models[0]).kernels, say)
     solved = [None] * len(models)
 
     def go(part: slice) -> None:

@@ -14,7 +14,7 @@ from ....response.measures import half_swing
 from ....response.spectrum import wave_measures
 from ....structure.drive_sizes import largest
 from ....structure.response import receptance
-from ..pieces.run import Limits, run_exact
+from ..pieces import Limits, run_exact
 from .curves import SHOWN, Shown, exact_errors, traced, unlasting
 
 OUTCOMES = {"unbounded": Outcome.GROWS, "stuck": Outcome.STUCK}

@@ -16,7 +16,7 @@ from ....dynamics.events.steady import steady
 from ....dynamics.periodic import is_stable
 from ....response.measures import half_swing
 from ....response.spectrum import wave_measures
-from ..pieces.run import Interfaces, Pieces
+from ..pieces import Interfaces, Pieces
 from .curves import SHOWN, Shown, exact_errors, traced, unlasting
 
 

@@ -5,14 +5,14 @@ from time import perf_counter
 
 import numpy as np
 
-from ....dynamics.integrated import Integrated, Loop
-from ....dynamics.smooth import run as hub
-from ....response.measures import slip_noise
-from ....response.rows import row_of
-from ....structure.drive_sizes import sinusoidal
-from ..interface import model_of
-from ..reading import Reader, thinned
-from ..solution import Solution
+from ...dynamics.integrated import Integrated, Loop
+from ...dynamics.smooth import run as hub
+from ...response.measures import slip_noise
+from ...response.rows import row_of
+from ...structure.drive_sizes import sinusoidal
+from .interface import model_of
+from .reading import Reader, thinned
+from .solution import Solution
 
 CLEAR = 1e3  # times the round-off of the slip, beyond which its share of the slide is known inside a step
 LOCATED = 1e-7  # what a crossing of that share may be off: the extension of a step errs more than its end

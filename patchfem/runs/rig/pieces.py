@@ -6,22 +6,26 @@ from time import perf_counter
 
 import numpy as np
 
-from ....core import BaseSine, NotConverged
-from ....dynamics.events import elements, histories
-from ....dynamics.integrated import Integrated, Loop
-from ....effects import has
-from ....friction.record import law_from
-from ....response import run_events
-from ....response.measures import harmonic, window_amplitudes
-from ....response.ringing import held_ring
-from ....structure.drive_sizes import largest, omega_of, sinusoidal, whole
-from ...bench.averaged import limit_share
-from ..levels import by_levels, whole_cycles
-from ..reading import Reader
-from ..solution import Solution, borne, stiffness_of
-from ..strips import as_one, strip_loads
-from .costs import refuse_endless
-from .values import read_off
+from ...core import BaseSine, NotConverged
+from ...dynamics.events import elements, histories
+from ...dynamics.events import names_kernels as at
+from ...dynamics.events.reading import Reading
+from ...dynamics.integrated import Integrated, Loop
+from ...dynamics.work_check import gap
+from ...effects import has
+from ...friction.record import law_from
+from ...response import run_events
+from ...response.loops import interface_loops
+from ...response.measures import REST, harmonic, window_amplitudes
+from ...response.ringing import held_ring
+from ...response.rows import stuck_share
+from ...response.spectrum import distorted
+from ...structure.drive_sizes import largest, omega_of, sinusoidal, whole
+from ..bench.averaged import limit_share
+from .levels import by_levels, whole_cycles
+from .reading import Reader
+from .solution import Solution, borne, stiffness_of
+from .strips import as_one, strip_loads
 
 OF_MOTION = ("relative_displacement_amplitude", "absolute_acceleration_peak", "absolute_acceleration_fundamental",
              "acceleration_distortion")  # what is known without an interface
@@ -36,7 +40,6 @@ def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) 
 
 def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """Solution of a rig behind elastic-plastic elements; patch: the solved Patch, or None."""
-    refuse_endless(model)
     return _run(Pieces(model, numerics, patch, Interfaces(model, numerics, patch)), frames, say, progress)
 
 
@@ -157,7 +160,7 @@ def settles(modes, drive, groups, done) -> tuple | None:
 
     None where the run does not end with a period of a sine, or where no such motion was found.
     """
-    from ....dynamics.events.steady import settled  # scipy's linear algebra, which few runs want
+    from ...dynamics.events.steady import settled  # scipy's linear algebra, which few runs want
 
     last = drive.segments[-1] if drive.segments else None
     if last is None or not sinusoidal(drive) or last.constant != 0 \
@@ -191,7 +194,7 @@ class Interfaces:
     rigid = False
 
     def __init__(self, model, numerics, patch):
-        from ..interface import contact_model  # brings patches, which Coulomb friction does not want
+        from .interface import contact_model  # brings patches, which Coulomb friction does not want
 
         rig, self.contact, begin = model.rig, None, perf_counter()
         if len(rig.modes.interfaces) > 1:
@@ -234,3 +237,39 @@ def group_of(element) -> elements.Elements:
     """Elements of an Element of form "parallel"."""
     count = int(element.numbers[1])
     return elements.elements_of(element.numbers[2:2 + count], element.numbers[2 + count:2 + 2 * count])
+
+
+def read_off(reading: Reading, book: dict, sine: bool, whole: bool, stiffness, size) -> dict:
+    """Measures of the first interface and of the motion by name, numbers or (n,) of n runs, NaN where a run has none.
+
+    book: energies of the run [J]; sine: the drive ends as one; whole: the cycles that were read are whole ones;
+    stiffness [N/m]: of the first mode as the contact meets it, 0 where no damping ratio refers to it; size [m s-2]: of
+    the drive.
+    """
+    none, (first, third) = np.full(np.shape(reading.swing), np.nan)[()], reading.waves
+    out = {"relative_displacement_amplitude": reading.swing, "absolute_acceleration_peak": reading.acceleration,
+           "absolute_acceleration_fundamental": first if sine and whole else none,
+           "acceleration_distortion": distorted(first, third, size) if sine and whole else none,
+           "drift_per_cycle": reading.drift, "slip_start_phase": reading.start if sine else none,
+           "work_check": _work_check(reading, book)}
+    one = reading.loop()
+    out |= {"slip_amplitude": one.slip / 2, "friction_force_peak": one.force,
+            "stick_fraction": stuck_share(one.stuck, reading.span)}
+    return out | (_loop(reading, sine, stiffness) if whole else {})
+
+
+def _loop(reading: Reading, sine: bool, stiffness) -> dict:
+    """Measures of the loop of the first interface."""
+    one = reading.loop()
+    moves = (reading.of(at.HIGH) - reading.of(at.LOW) > REST) & sine
+    half = np.where(moves, reading.of(at.RANGE) / 2, 0.0)[()]
+    work = one.work * reading.period / reading.span
+    secant = np.where(moves, reading.of(at.SECANT), np.nan)[()]
+    return interface_loops(half, one.first, one.pull, work, stiffness) | {"secant_stiffness": secant}
+
+
+def _work_check(reading: Reading, book: dict):
+    """Gap [1] of the friction work of the cycles that were read: by the trapezoidal rule on the ends of the pieces
+    against the ledger's."""
+    turned, booked, passed = (reading.faces[..., place].sum(axis=-1) for place in (at.TURNED, at.WORK, at.PASSED))
+    return gap(turned, booked, passed, book["power"] + book["peak_stored"])

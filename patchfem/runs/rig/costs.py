@@ -1,0 +1,246 @@
+"""What the engines of a rig cost, before anything runs: one table for the choice of an engine, a plan and a refusal.
+
+A run from event to event counts its pieces, one of high order and a march their steps; the seconds of each were
+measured on one core. A spring that an element holds by rings on, which costs pieces only while it holds: all the time
+where the friction limit exceeds the push of the drive, hardly any where it is half of it.
+"""
+
+from functools import lru_cache
+from math import inf, log2, pi, sqrt
+
+import numpy as np
+
+from ...core import Missing
+from ...effects import has
+from ...friction.bonds.engines import impossible
+from ...friction.bonds.parameters import LONGEST
+from ...friction.laws.stretch import points_element
+from ...friction.protocol import Element
+from ...friction.record import law_from
+from ...model.model import Model
+from ...structure.drive_sizes import fastest, largest, omega_of, sinusoidal, slowest
+
+# seconds of a piece of the motion, of each further mode and interface in it, of each element
+PIECE, PIECE_MODE, PIECE_FACE, PIECE_ELEMENT = 2.5e-7, 1.5e-7, 3e-7, 3e-9
+MOST_PIECE, READ = 1e-6, 4e-6  # of one at most, and of one of the last cycles, which are kept whole
+CYCLE, STEP, STEP_ELEMENT = 3e-4, 4.3e-7, 9e-10  # of a cycle of a march, of a step of it, of each element in that
+SMOOTH_STEP, SMOOTH = 2e-6, 0.02  # of a step of high order, and of such a run besides
+CURVE, POINT, BALANCE = 0.1, 0.05, 8e-10  # of steady motions: of all, of a point, per cubed number of its unknowns
+WORTH = 5.0  # that an exact motion may take where steps would take less, and be off by their bars
+PATIENCE = 60.0  # that it may take where the finest march does not resolve the modes
+MOST_STEPS = 6400  # finest automatic march, steps per cycle
+HELD = 6  # power of the limit over the push that gives the share of the time in which an element holds (measured .01)
+MOST_PAIRS, AT = 4, 1e-3  # 49 of 769 cells at this tolerance and above: 2e-4 of the motion behind a joint that slips
+REACH = 2.0  # radians of the fastest rate in a piece, of `dynamics.events.series_kernels`
+PINNED = ("steps_per_cycle", "tail", "merge", "shear_modes")  # knobs of the march
+REPEATS = 30.0  # times of decay of the slowest mode, after which a motion is seen to repeat to its digits
+MORE = 3.5  # times the steps of a march, of which more are not worth their digits: a step costs less than one of it
+EASES = 9.0  # steps of a stiff law of the speed per cycle, over those of one that holds: .5 at r = 1.07, .1 at 1.26
+STABLE = 3.0  # times the length over which a state of a law relaxes, in a step
+
+
+def steps_wanted(model: Model) -> int:
+    """Steps per cycle that the tolerance asks of a march, however many."""
+    accuracy, rig = model.accuracy, model.rig
+    quickest = max(fastest(rig.drive), float(rig.frequencies.max()) * rig.drive.period)
+    if model.load_varies:
+        quickest = max(quickest, model.point.frequency * rig.drive.period)
+    # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
+    return 2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * quickest)
+
+
+def steps_per_cycle(model: Model) -> int:
+    """Steps per cycle of a march: those of the scene, else what the tolerance asks for, within its bounds."""
+    return model.accuracy.steps_per_cycle or min(max(steps_wanted(model), 100), MOST_STEPS)
+
+
+def pairs_of(model: Model) -> int:
+    """How often each two cells of a density count as one at first: what cells leave open falls with their square, and
+    where the error of a run shows too much it is made again with more (`Numerics.finer`)."""
+    laws = [one.numbers.law for one in model.rig.interfaces]
+    if model.soft or not all(has(law, "cells") for law in laws):
+        return 0
+    return int(min(max(MOST_PAIRS + log2(model.accuracy.tolerance / AT) / 2, 0), MOST_PAIRS))
+
+
+@lru_cache(8)
+def elements_of(model: Model) -> tuple:
+    """(elements, stiffness [N/m] of those of the stiffest interface) that the interfaces of a rig have, estimated; a
+    rigid element has no spring to ring on."""
+    count, stiff = 0, 0.0
+    for one in model.rig.interfaces:
+        load = model.nominal_load if one.load is None else one.load
+        if has(one.numbers.law, "set-valued"):
+            most, mine = inf, 1
+        else:
+            element = law_from(one.numbers, load).element(load)
+            mine = int(element.numbers[1]) >> pairs_of(model)
+            most = float(element.numbers[2:2 + int(element.numbers[1])].sum())
+        if model.soft:
+            from ...model.patch import CHOSEN_POINTS, block_shear
+
+            patch = model.patch
+            most = 1 / (1 / most + 1 / block_shear(patch))
+            mine = CHOSEN_POINTS if patch.chosen else round(patch.length / patch.size) + 1
+        count, stiff = count + mine, max(stiff, most if most < inf else 0.0)
+    return count, stiff
+
+
+def pieces(model: Model) -> float:
+    """Pieces of the motion per cycle of the drive at most: of its fastest rate while all holds, and of every event."""
+    return sum(_ringing_and_events(model))
+
+
+def _ringing_and_events(model: Model) -> tuple:
+    """Pieces per cycle of a motion whose elements hold all the time, and those of every event and row."""
+    modes, drive = model.rig.modes, model.rig.drive
+    count, stiff = elements_of(model)
+    faces = np.asarray(modes.interfaces)
+    reach = float((faces**2).sum(axis=1).max(initial=0.0)) / modes.mass
+    damping = float(np.linalg.norm(modes.dampers, 2))
+    rate = damping / 2 + sqrt(damping**2 / 4 + float(modes.omega.max())**2 + stiff * reach)
+    rows = 0 if drive.segments else len(drive.breaks) / model.rig.cycles
+    return max(rate * drive.period, 2 * pi * fastest(drive)) / REACH, \
+        2 * max(count, len(faces)) * fastest(drive) + 2 + rows
+
+
+def seconds_of_pieces(model: Model) -> float:
+    """Seconds of a run from event to event at most, by which its engine is chosen: all holds all the time."""
+    cycles = model.rig.cycles
+    return ((MOST_PIECE + _of_size(model)) * cycles + READ * min(cycles, 10.0)) * pieces(model)
+
+
+def _of_size(model: Model) -> float:
+    """Seconds of a piece of several modes and interfaces besides that of one."""
+    modes = model.rig.modes
+    return PIECE_MODE * (modes.omega.size - 1) + PIECE_FACE * max(0, len(modes.interfaces) - 1)
+
+
+def expected_seconds(model: Model) -> float:
+    """Seconds of a run from event to event as a plan counts them: what rings while an element holds is passed in the
+    share of the time in which it does."""
+    rig, (count, stiff) = model.rig, elements_of(model)
+    limit = sum(one.numbers.static * (model.nominal_load if one.load is None else one.load) for one in rig.interfaces)
+    push = rig.force or rig.mass * largest(rig.drive)
+    ringing, events = _ringing_and_events(model)
+    share = min(1.0, limit / push)**HELD if stiff and push else 1.0
+    return (PIECE + _of_size(model) + PIECE_ELEMENT * count) * (ringing * share + events) * rig.cycles
+
+
+def seconds_of_steps(model: Model) -> float:
+    """Estimated seconds of a march with the coarser runs of its error, which has none of the exactness."""
+    count, many = elements_of(model)[0], len(model.rig.interfaces)
+    return 1.75 * model.rig.cycles * (CYCLE + steps_per_cycle(model) * many * (STEP + STEP_ELEMENT * count))
+
+
+def dear_events(model: Model) -> str:
+    """Why the march is to run what the engine of events takes: its events cost more than steps and more than an exact
+    motion is worth."""
+    worth = PATIENCE if steps_wanted(model) > MOST_STEPS else max(WORTH, seconds_of_steps(model))
+    return "its yields cost more than steps" if seconds_of_pieces(model) > worth else ""
+
+
+def dear_elements(model: Model) -> str:
+    """Why the march is to run elements that stick or slip: the scene names its steps, or as of `dear_events`."""
+    return "its steps are named" if model.accuracy.steps_per_cycle is not None else dear_events(model)
+
+
+def refuse_endless(model: Model, numerics=None) -> None:
+    """Raise Missing when a run from event to event would take longer than LONGEST seconds."""
+    seconds = seconds_of_pieces(model)
+    if seconds > LONGEST:
+        raise Missing(f"the exact motion (about {pieces(model):.2g} pieces per cycle, between events, rows of the "
+                      f"drive and the fastest ringing) would take about {seconds:.0f} s, more than {LONGEST:.0f} s; "
+                      "lower drive.cycles or the frequency of the fastest mode, or use accuracy.method = \"march\"", "")
+
+
+def exact_cost(model: Model, numerics, unknowns: dict) -> tuple:
+    """Pieces and seconds of a run from event to event."""
+    return int(pieces(model) * numerics.cycles), expected_seconds(model)
+
+
+def exact_words(model: Model, engine: str) -> list:
+    """The sentence of a plan on which engine takes the elements, and why."""
+    count, exact, march = elements_of(model)[0], expected_seconds(model), seconds_of_steps(model)
+    return [f"{count} element{'s' * (count > 1)} by engine {engine}: about {exact:.2g} s from yield to yield, exact, "
+            f"about {march:.2g} s by steps at this tolerance"]
+
+
+def not_smooth(model: Model) -> str:
+    """Why a rig that the smooth engine may take is marched rather than integrated at high order; empty where it is not.
+    """
+    rig, accuracy = model.rig, model.accuracy
+    pinned = next((f"accuracy.{key}" for key in PINNED if getattr(accuracy, key) is not None), "")
+    if pinned or accuracy.quadrature not in ("auto", "recursion"):
+        return f"with {pinned or 'accuracy.quadrature'}"
+    if len(rig.modes.interfaces) > 1:
+        return "beside other forces"
+    if model.side == "lower" and has(model.friction.law, "bonds"):
+        return "under a pressure that stays"
+    element = smooth_element(model)
+    if element is None or element.sizes is None:
+        return f"for law '{model.friction.law}'"
+    return "in so many steps" if smooth_steps(model, element) > MORE * max(steps_per_cycle(model), 400) else ""
+
+
+def smooth_element(model: Model) -> Element | None:
+    """The law of the interface as compiled code takes it, None where its bonds have no state or it asks for the
+    pressure behind each point."""
+    f = model.friction
+    load = model.nominal_load
+    if has(f.law, "averaged"):
+        return None
+    if not has(f.law, "bonds"):
+        return law_from(f, load).element(load)
+    if impossible("recursion", f.reading, 1.0 if f.order is None else f.order):
+        return None
+    return points_element(model.bonds, [1.0], [load])
+
+
+def smooth_steps(model: Model, element: Element) -> float:
+    """Steps per cycle to expect: some per radian of the fastest motion, some at every reversal, and those that keep a
+    state of the law which relaxes over a short path or time stable."""
+    rig, modes = model.rig, model.rig.modes
+    omega, period = omega_of(rig.drive), rig.drive.period
+    damper = modes.damping if modes.damping is not None else np.diag(2 * modes.zeta * modes.omega)
+    pace = max(float(modes.omega.max()), float(np.abs(damper).sum(axis=1).max()), omega * fastest(rig.drive))
+    ease = float((modes.slide**2).sum()) / modes.mass
+    rigid = 0.0 if element.length else element.limit / model.friction.reference_speed * ease * clings(model, element)
+    path = 4 * model.speed / omega
+    states = path / element.length if element.sizes and element.length else 0.0
+    grown = model.friction.slip_growth if has(model.friction.law, "bonds") else None
+    if grown:
+        states = max(states, path / grown)
+    return 24 + 1.2 * pace * period + (states + rigid * period) / STABLE
+
+
+def clings(model: Model, element: Element) -> float:
+    """Share [1] of the time that a law of the speed spends at speeds over which it turns, where it is stiff.
+
+    One mode is held all the time by a force r of the limit up to 1, and less of the time the more is left to slide.
+    """
+    rig, modes = model.rig, model.rig.modes
+    if modes.omega.size > 1 or not modes.slide[0]:
+        return 1.0
+    if not element.limit:
+        return 0.0
+    r = modes.mass * largest(rig.drive) * abs(modes.base[0] / modes.slide[0]) / element.limit
+    return min(1.0, float(np.exp(EASES * (1 - r))))
+
+
+def smooth_cost(model: Model, numerics, unknowns: dict) -> tuple:
+    """Steps of all runs of high order, and their seconds."""
+    rig, cycles = model.rig, model.rig.cycles
+    if sinusoidal(rig.drive) and (decay := slowest(rig.modes) * rig.drive.period) > 0:  # then it repeats
+        cycles = min(cycles, 20 + REPEATS / decay)
+    steps = 2 * cycles * smooth_steps(model, smooth_element(model))
+    return int(steps), SMOOTH + SMOOTH_STEP * steps
+
+
+
+
+def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:
+    """Points of a curve of steady motions and the seconds that they take."""
+    points = 1 if model.rig.waveform == "sine" else 120
+    size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(model.rig.interfaces))
+    return points, CURVE + POINT * points + BALANCE * size**3

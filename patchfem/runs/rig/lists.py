@@ -1,0 +1,260 @@
+"""How the bonds of a rig are summed, and what a list of them costs: of a block that moves, or that its bonds hold.
+
+A law without stiffness, the printed one and that of order 0, holds a block by turning back in almost every step, and
+each turn leaves a strip in the list: its cost grows with the square of the steps.
+"""
+
+from math import ceil, inf, log2, pi, sqrt
+
+import numpy as np
+
+from ...core import Missing
+from ...effects import has
+from ...friction.bonds.list_numbers import AGED, SHARES, form_of
+from ...friction.bonds.parameters import LONGEST
+from ...model.model import Model
+from ...structure.drive_sizes import fastest, largest, omega_of
+from .numerics import Numerics
+
+DECAYED = 1e-2  # share of the first stroke of a motion that is released, by which its bonds are summed
+HELD = 1e-4  # share of the drive's stroke that a block makes which the printed law holds (measured: 1e-2 to 1e-4)
+# seconds of a step of a held block per step before it, each of which left a strip: of the printed law half of them, in
+# 4 to 30 trial increments, by the form of the list (measured: 3e-8 to 4e-7, 1e-6 to 1e-5); of constant length with an
+# order other than 0, 1, 2; of a released block, 10 to 50 increments; of order 0, 50; and of growing bonds that hold the
+# block, but not fast, so that it turns back with its drive alone, in 2 or 3
+HELD_STEP = {SHARES: 8e-8, AGED: 1.5e-6}
+ANY_ORDER_STEP, STALLED_STEP, LIMP_STEP, LEANING_STEP = 2e-6, 4e-6, 2.7e-6, 2e-7
+FAST = 2.0  # D from which a block is held fast: 0.6 and more strips per step, against 0.06 at 1.06 and 0.28 at 1.4
+TURNING = 0.1  # strokes per step from which they are those of the steps
+MOST_CROWDED = 500  # strips of its list, about one per step, from which steps are not halved again: four times the cost
+MOVES, MOST_HALVINGS = 1e-3, 2  # bond lengths of slip from which a block moves; of the steps that were seen: 0 to 3
+MOST_SWING = 2.0  # radians of the block on its bonds in a step
+
+
+def quadrature_of(model: Model, numerics: Numerics):
+    """How the bonds of a nonlocal law are summed, as a Choice of `friction.bonds.engines`.
+
+    The stroke is taken as four times the amplitude that the drive's speed over its frequency gives, or that the bonds
+    of a block give which they hold. That of a motion which is released, or pushed once, shrinks, and a list of all its
+    bonds would outgrow any room: it is taken as DECAYED times that of its start. That of a block which the printed law
+    holds is HELD times what the drive would give.
+    """
+    return numerics.choice or _summed_by(model, numerics, _stretch(model), model.accuracy.quadrature)
+
+
+def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
+    """The Choice of `quadrature_of` by an engine, or "auto", for a block that bonds let move by `stretch` lengths."""
+    from ...friction.bonds.engines import choose as engine_for
+
+    law, accuracy = model.bonds, model.accuracy
+    once = model.rig.kind == "free" or model.rig.waveform == "step"
+    left = HELD if chatters(model) else DECAYED if once else 1.0
+    stroke = max(4 * left * min(model.speed / omega_of(model.rig.drive) / law.length, stretch), 1e-9)
+    tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
+    return engine_for(law, accuracy.tolerance, stroke, numerics.steps / 2, engine, tail, accuracy.merge)
+
+
+def _stretch(model: Model, least: float = FAST) -> float:
+    """Bond lengths by which a drive moves a block that its bonds hold by their stiffness mu_s N/eps_0; inf where they
+    do not hold it, their limit `least` times what that takes, or the printed law gives them no stiffness."""
+    f, rig = model.friction, model.rig
+    if f.reading == "report" or rig.kind == "free":
+        return inf
+    needed, limit = holding(rig), f.static * model.nominal_load
+    return needed / limit if limit >= least * needed else inf
+
+
+def halvings(model: Model) -> int:
+    """How often steps that the scene leaves open will be halved for a block that its bonds hold, which then swings on
+    them faster than its modes and its drive do: until that swing has as many steps as those would get, MOST_HALVINGS
+    times at most. A stretch that is elastic but for a share below MOVES, half of its square, is met at once."""
+    rig, f = model.rig, model.friction
+    if f is None or not has(f.law, "bonds") or model.accuracy.steps_per_cycle is not None:
+        return 0
+    stretch = _stretch(model)
+    if stretch == inf or stretch**2 / 2 < MOVES:
+        return 0
+    quickest = max(fastest(rig.drive) / rig.drive.period, float(rig.frequencies.max()))
+    return min(max(0, ceil(log2(_bond_swing(model) / (2 * pi * quickest)))), MOST_HALVINGS)
+
+
+def _bond_swing(model: Model) -> float:
+    """Circular frequency [rad/s] of the block on its bonds, sqrt(k_t/m)."""
+    f, modes = model.friction, model.rig.modes
+    return sqrt(f.static * model.nominal_load / f.bond_length * float((modes.slide**2).sum()) / modes.mass)
+
+
+def held(model: Model, push: float | None = None) -> float:
+    """Limit of the bonds of a law without stiffness over the force that holds the block; 0 of other laws.
+
+    The printed law reaches its limit however small the stroke, so that its stiffness mu_s N/stroke has no bound; bonds
+    of order 0 pull alike at any stretch. A block of a list of growing bonds that is released is held by its spring
+    alone: it then swings on its bonds, or turns back in almost every step, which of both the length of the step decides
+    by chance (at 232 steps per cycle the one, at 230 and 234 the other). push [m s-2]: of the drive, None: its largest.
+    """
+    f, rig = model.friction, model.rig
+    if f is None or not has(f.law, "bonds"):
+        return 0.0
+    released, printed = rig.kind == "free", f.reading == "report"
+    if (released and (not printed or rig.start is None or form_of(model.bonds) != AGED)) or \
+            (not printed and model.bonds.order != 0):
+        return 0.0
+    needed = _held_with(rig, 0.0, np.zeros(rig.modes.omega.size), rig.modes.interfaces @ rig.start.z) if released else \
+        holding(rig, push)
+    return f.static * model.nominal_load / needed if needed else inf
+
+
+def least_held(model: Model) -> float:
+    """What `held` is at least where a list grows with every step: FAST; 1 of a driven block where each step leaves a
+    strip, which no path wears away: bonds that grow, or have no stiffness by their order."""
+    leaves = form_of(model.bonds) == AGED or model.friction.reading != "report"
+    return 1.0 if leaves and model.rig.kind != "free" else FAST
+
+
+def chatters(model: Model) -> bool:
+    """Whether the printed law holds a driven block fast: it turns back in almost every step, and its list grows by a
+    strip with each."""
+    return model.rig.kind != "free" and model.friction is not None and model.friction.reading == "report" \
+        and held(model) >= FAST
+
+
+def stalls(model: Model) -> bool:
+    """Whether growing bonds of the printed law hold a released block fast from its start on."""
+    return model.rig.kind == "free" and held(model) >= FAST
+
+
+def limp(model: Model) -> bool:
+    """Whether bonds of order 0 hold the block."""
+    return lists_grow(model) and model.friction.reading != "report"
+
+
+def lists_grow(model: Model) -> bool:
+    """Whether a law without stiffness holds the block at some time of the run, so that its list grows with every
+    step."""
+    most = held(model, gentlest(model.rig))
+    return most > 0 and most >= least_held(model)
+
+
+def gentlest(rig) -> float:
+    """Least push [m s-2] that the drive of a Rig stays at: of levels half the first one, where the search of the onset
+    begins, or the least of them."""
+    return min(rig.levels[0] / 2, *rig.levels) if rig.levels else largest(rig.drive)
+
+
+def holding(rig, push: float | None = None) -> float:
+    """Peak force [N] on the first interface that keeps all interfaces of a Rig still under a sine of its drive, of its
+    largest push [m s-2] unless one is given.
+
+    Of one mode it is mass times acceleration times base/slide, whatever the frequency; modes that go on moving behind
+    the interfaces bring their own. inf where nothing holds them: an interface that no mode slides, or an undamped
+    resonance behind it.
+    """
+    modes = rig.modes
+    size = largest(rig.drive) if push is None else push
+    return _held_with(rig, omega_of(rig.drive), modes.base * size, np.zeros(len(modes.interfaces)))
+
+
+def _held_with(rig, omega: float, push, slides) -> float:
+    """Size of the force [N] on the first interface that keeps the slides (i,) [m] of all of them, beside a push (n,)
+    [m s-2] on the modes that goes as exp(i omega t); inf where no forces do."""
+    modes, n = rig.modes, rig.modes.omega.size
+    faces = modes.interfaces
+    moves = np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.dampers
+    whole = np.block([[moves, faces.T / modes.mass], [faces, np.zeros((len(faces), len(faces)))]])
+    try:
+        return float(abs(np.linalg.solve(whole, np.append(push, slides))[n]))
+    except np.linalg.LinAlgError:
+        return inf
+
+
+def crowded(model: Model, numerics: Numerics, book: dict) -> bool:
+    """Whether the list of bonds of the printed law has grown too long for steps half as long: by a strip in every few
+    steps. Where bonds grow each step leaves a strip, however long the strokes: there the block has to be held."""
+    strips = book.get("strips", 0.0)
+    if strips <= MOST_CROWDED or model.bonds.reading != "report":
+        return False
+    return lists_grow(model) if form_of(model.bonds) == AGED else strips > TURNING * numerics.cycles * numerics.steps
+
+
+def held_cost(model: Model, numerics: Numerics) -> tuple:
+    """Strips at the end of the list of a block that the printed law holds, and the seconds of the run with it: of one
+    that was released the most of both."""
+    steps = numerics.cycles * numerics.steps
+    if stalls(model):
+        return steps, STALLED_STEP * steps**2 / 2
+    moving = list_cost(model, numerics)[1] / steps
+    if not model.rig.levels:
+        return steps, _held_seconds(model, largest(model.rig.drive), 0.0, steps, moving)
+    sizes, size = model.rig.levels, model.rig.level_cycles * numerics.steps
+    seconds = sum(_held_seconds(model, push, k * size, (k + 1) * size, moving) for k, push in enumerate(sizes))
+    # the search of the onset begins from nought, with a list of its own
+    return steps, seconds + sum(_held_seconds(model, sizes[0] / 2**k, 0.0, size, moving)
+                                for k in range(1, 1 + _probes(model)))
+
+
+def _held_seconds(model: Model, push: float, first: float, last: float, moving: float) -> float:
+    """Seconds of the steps from number `first` to `last` under a sine of this push [m s-2], each of which counts the
+    strips that those before it have left; moving: seconds of a step of a block that moves, which leaves none."""
+    ratio = held(model, push)
+    if ratio < least_held(model):
+        return moving * (last - first)
+    return _held_step(model, ratio) * (last**2 - first**2) / 2
+
+
+def _held_step(model: Model, ratio: float) -> float:
+    """Seconds of a step of a held block per strip of its list; ratio: of `held`."""
+    law = model.bonds
+    if model.friction.reading != "report":
+        return LIMP_STEP
+    if ratio < FAST:
+        return LEANING_STEP
+    return ANY_ORDER_STEP if form_of(law) == SHARES and law.order not in (0, 1, 2) else HELD_STEP[form_of(law)]
+
+
+def bonds_cost(model: Model, numerics: Numerics) -> tuple:
+    """Strips of a shared list of bonds and the seconds of the run with it, of a block that is held or moves."""
+    return (held_cost if lists_grow(model) else list_cost)(model, numerics)
+
+
+def _probes(model: Model) -> int:
+    """Runs of a level that halve the bracket of the onset from nought down to the tolerance."""
+    return max(0, ceil(log2(1 / model.accuracy.tolerance)))
+
+
+def list_cost(model: Model, numerics: Numerics) -> tuple:
+    """Expected strips of a shared list of bonds and the seconds of the run with it; a block that its bonds just hold
+    leaves a list as long as one that they hold fast."""
+    found = quadrature_of(model, numerics)
+    if found.engine != "recursion" and numerics.choice is None:
+        found = _summed_by(model, numerics, _stretch(model, 1.0), found.engine)
+    steps = numerics.cycles * numerics.steps
+    strips = min(found.strips, 2 * steps * max(1.0, found.strips)) if found.tail else min(found.strips, 8 * steps)
+    return strips, steps * found.seconds * (strips / found.strips if found.strips else 1.0)
+
+
+def refuse_unresolved(model: Model, numerics: Numerics) -> None:
+    """Raise Missing when a step is longer than the block's own swing on its bonds, sqrt(k_t/m) dt > MOST_SWING.
+
+    The motion has nothing to do with the block's then, and every step makes bonds that outlast it: the list grows, and
+    the run with its square.
+    """
+    drive, pace = model.rig.drive, _bond_swing(model)
+    swing = pace * drive.period / numerics.steps
+    if swing > MOST_SWING:
+        wanted = ceil(pace * drive.period)
+        raise Missing(f"a step of {drive.period / numerics.steps:.2g} s does not resolve the block on its bonds, which "
+                      f"swings at {pace / (2 * pi):.3g} Hz; set accuracy.steps_per_cycle = {wanted}, raise "
+                      "structure.moving_mass or friction.bond_length, or use reading = \"stretch\" with order = 1", "")
+
+
+def refuse_costly(model: Model, numerics: Numerics, limit: float = LONGEST) -> None:
+    """Raise Missing when the shared bond list of a coupled run would take longer than `limit` seconds."""
+    f = model.friction
+    if f is None or not has(f.law, "bonds") or quadrature_of(model, numerics).engine == "recursion":
+        return
+    refuse_unresolved(model, numerics)
+    entries, seconds = bonds_cost(model, numerics)
+    if seconds > limit:
+        raise Missing(f"the bond list (about {entries:.0f} entries) would take about {seconds:.0f} s, "
+                      f"more than {limit:.0f} s; lower drive.cycles or accuracy.steps_per_cycle, loosen accuracy.tail "
+                      "or accuracy.merge, or use reading = \"stretch\" with order = 1", "")

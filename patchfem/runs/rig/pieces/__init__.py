@@ -1,4 +1,0 @@
-"""Rigs behind elastic-plastic elements, exactly from yield to yield.
-
-In: a Model, its Numerics and its solved patch. Out: the Solution of `run`; `costs` has where the march is cheaper.
-"""
