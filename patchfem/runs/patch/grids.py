@@ -1,22 +1,22 @@
 """The grids of a patch: graded to where its own pressure ends, to its corners, its coating and the waves of its gap.
 
 The coarsest grid follows from the patch alone: its contact is searched on columns that are graded to what the search
-before found. A plan and a run have the same. Every next grid splits all cells in two, so the grids of a tighter
-tolerance are those of a wider one and more. How far the ladder is climbed a run decides in `ladder`, a plan expects in
-`sizes`. Read `base_grids` first, then `layout_of`.
+before found. A plan, which presses nothing, lays it out by the same rules for the contact of springs. Every next grid
+splits all cells in two, so the grids of a tighter tolerance are those of a wider one and more. How far the ladder is
+climbed a run decides in `ladder`, a plan expects in `sizes`. Read `base_grids` first, then `layout_of`.
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from ...core import NotConverged, frozen_array
+from ...core import frozen_array
 from ...elasticity.grid_fronts import predicted_bytes, predicted_seconds
 from ...mesh.grading import Layout, columns, rows
 from ...mesh.nested import coarser, finer, plan_of
 from ...mesh.tensor import TensorGrid
+from ...model.patch import bars
 from ...model.pieces import grid_of, outlined, rounded_edges
 from .condensed import condensed
 from .press import Patch, pressed
@@ -39,6 +39,8 @@ SEARCHES = 8  # of the contact, each on columns graded to what the one before fo
 LEAST_LEVELS = 3  # nested meshes that show an order
 SPENT = {True: 3.0, False: 0.4}  # predicted seconds of the finest mesh: of a static patch, of one that moves
 OTHER = 4.0  # time of condensing a grid that is not a tensor grid over that of one that is
+# of the interface, by which a plan expects the contact; times that they are cut; of the slope at which a piece rests
+SPRINGS, SHORTENED, HALVINGS = 801, 3, 30
 ONE_MORE = 2e-3  # tolerance below which a contact that ends inside, or over a jump, is expected to take a level more
 
 
@@ -69,12 +71,6 @@ def base_grids(asked) -> list:
     Where a load that varies moves the edges of the contact, the columns are fine over the bands that they sweep between
     SWING of the load; where wear does, no column is longer than WORN of the interface.
     """
-    return list(_searched(asked)[0])
-
-
-@lru_cache(maxsize=4)  # a plan and its run ask for the same patch
-def _searched(asked) -> tuple:
-    """(the grids of `base_grids`, how often the contact ends inside the interface)."""
     sweep = [replace(asked, load=share * asked.load) for share in SWING
              if asked.sweeps == "load" and asked.load is not None]
     layout = search_layout(asked)
@@ -86,7 +82,7 @@ def _searched(asked) -> tuple:
         cells = max(one.cell / one.wide for one in seen)
         if cells <= 1 / (EDGE[asked.still] - 1) and _shows_crests(asked, grids[0].x, layout):
             break
-    return tuple(grids_of(asked, layout)), len(seen[0].places)
+    return grids_of(asked, layout)
 
 
 def _shows_crests(asked, x, layout: Layout) -> bool:
@@ -242,13 +238,15 @@ class Sizes(NamedTuple):
 
 
 def sizes(asked, tolerance: float) -> Sizes:
-    """The grids that a `PatchModel` is solved on at a tolerance: the first as a run has it, the number of levels as it
-    is expected. A mesh file counts as one that is as fine as the automatic grid: it is not read."""
+    """The grids that a `PatchModel` is solved on at a tolerance, as the rules that make them lay them out for the
+    contact that is expected, which is not solved. A mesh file counts as one as fine as the automatic grid: it is not
+    read."""
     ends, plain = 0, asked.mesh is None
     if asked.meshes is not None:
         ladder = [[body for body in level if body is not None] for level in asked.meshes.levels]
     elif asked.chosen:
-        bodies, ends = _expected(asked)
+        seen = expected_contact(asked)
+        bodies, ends = grids_of(asked, layout_of(asked, [seen])), len(seen.places)
         more = tolerance < ONE_MORE and bool(ends or asked.gap.jumps)
         ladder = [bodies]
         while len(ladder) < LEAST_LEVELS + more:
@@ -268,12 +266,46 @@ def sizes(asked, tolerance: float) -> Sizes:
                  asked.outlined or not plain, ends)
 
 
-def _expected(asked) -> tuple:
-    """`_searched`, or even columns where the contact is not found, which the run tells."""
-    try:
-        return _searched(asked)
-    except NotConverged:
-        return grids_of(asked, search_layout(asked)), 0
+def expected_contact(asked) -> Found:
+    """The contact of a `PatchModel` as springs beside each other have it, each as soft as a bar of the pieces.
+
+    A contact shorter than the pieces are high strains them about as deep as it is long, so that its springs are bars of
+    that height. A profile is left out. Columns are laid out by the logarithm of its lengths, for which that serves.
+    """
+    x = np.linspace(-asked.length / 2, asked.length / 2, SPRINGS)
+    gap = replace(asked.gap, profile=None).at(x)[0]
+    # the integral of the depth over x [m2] under the load, of bars as high as the pieces
+    depth = asked.nominal_load * asked.length * bars(asked, lambda m: (1 - m.poisson**2) / m.young)
+    height, share = (asked.lower.height + asked.upper.height) / 2, 1.0
+    free = asked.rotates and not asked.spring > 0 and asked.load
+    for _ in range(SHORTENED):
+        bears = _bearing(x, gap, depth * share, asked.moment / asked.load if free else None)
+        share = min(1.0, np.count_nonzero(bears) * (x[1] - x[0]) / height)
+    index, change = np.flatnonzero(bears), np.flatnonzero(bears[1:] != bears[:-1])
+    places = ((x[change] + x[change + 1]) / 2).tolist()
+    return Found((places[0] if index[0] else float(x[0]), places[-1] if index[-1] < x.size - 1 else float(x[-1])),
+                 tuple(places), tuple(float(x[at]) for at in (0, -1) if bears[at]), 0.0)
+
+
+def _bearing(x, gap, depth: float, arm: float | None) -> np.ndarray:
+    """Springs at x (k,) [m] under `gap` (k,) [m] that bear: of depths with this integral [m2] and, where the piece
+    turns, their middle at `arm` [m]."""
+    def closed(theta: float) -> np.ndarray:
+        rising = np.sort(gap + theta * x)
+        filled = np.arange(1, x.size + 1) * rising - np.cumsum(rising)  # below each of them, in springs
+        k = max(int(np.searchsorted(filled * (x[1] - x[0]), depth)), 1)
+        return (depth / (x[1] - x[0]) + rising[:k].sum()) / k - gap - theta * x
+
+    theta = 0.0
+    if arm is not None:
+        end = max(x[-1] - abs(arm), x[1] - x[0])  # from the load to the nearer end
+        high = 2 * (float(np.ptp(gap)) + depth / end) / end  # beyond it all that bear lie between the load and that end
+        low = -high
+        for _ in range(HALVINGS):
+            theta = (low + high) / 2
+            low, high = (theta, high) if np.maximum(closed(theta), 0.0) @ (x - arm) > 0 else (low, theta)
+    deep = closed(theta)
+    return (deep > 0) | (deep == deep.max())
 
 
 def _nodes(body) -> tuple:
