@@ -75,7 +75,7 @@ class Rub(namedtuple("Rub", ("force", "memory", "before", "now", "modes", "under
 
 
 class Climbing(namedtuple("Climbing", ("flank", "now_at", "share", *Rub._fields))):
-    """A law with memory along flanks, `grooves.contact_kernels`.
+    """A law with memory along flanks, `grooves.points_kernels`.
 
     flank (9,): load [N], wave number [rad/m], amplitude [m], phase [rad], lifted mass [kg], kind of the law as in
     `shear_points_kernels`, amplitude [N], pace [rad/s] and phase [rad] of the load's

@@ -1,16 +1,17 @@
-"""The contact of a law with memory along the flanks of grooves, for marches and for slides that are given."""
+"""Contacts along the flanks of grooves, for marches and for slides that are given: of laws with memory, as under a load
+that changes, and of laws of constant load, `friction.protocol.Element`."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core import Outcome, Response
+from ...core import Outcome, PatchfemError, Response
 from ...friction.grooves import STEADY, Grooves, Swing
+from ...friction.protocol import Element
 from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes, tangential_stiffness
-from ..contacts.arrays import Climbing
+from ..contacts.arrays import Climbing, Flanked
 from ..march.march import Run
-from ..march.varying_load import PLASTIC, Rubbing, bonds, plastic, rub_of
-from .run import lifts, refuse_heavy
+from ..march.varying_load import PLASTIC, Rubbing, plastic, rub_of
 
 HERE = "dynamics.grooves.contact_kernels"
 STIFF = 0.1  # of tolerance times the slide at which pieces let go: a bond length that is 1.7 of it off in force at most
@@ -18,15 +19,33 @@ SHORT = 1e-3  # of that slide: the shortest bonds by which shear modes are chose
 RISE, VERTICAL, LIFTS, BEFORE, NORMAL, RAISED = 0, 1, 4, 12, 13, 15  # of Climbing.now_at
 
 
-def model_of(grooves: Grooves, load: float, static: float, length: float, law, modes) -> "ClimbingModel":
-    """The model of the elastic-plastic law of a length [m], or of the bonds `law` (friction.bonds.parameters.Bonds).
+def refuse_heavy(grooves: Grooves, static: float, modes) -> None:
+    """Raise PatchfemError where friction under the lifted mass takes all of the mass that slides, 1 + m s t (t - mu)/(1
+    + mu t) <= 0 on some flank, s [1/kg] the slide's acceleration per newton."""
+    own = modes.mass / float(modes.slide @ modes.slide)
+    taken = -grooves.lifted_mass * grooves.least_mass(static)
+    if taken >= own:
+        raise PatchfemError(f"{grooves.lifted_mass:.6g} kg press so hard while they are let down a flank that friction "
+                            f"takes more than the {own:.6g} kg that slide, and no motion follows from the forces; less "
+                            f"than {own / -grooves.least_mass(static):.6g} kg is wanted", f"{grooves.key}.lifted_mass")
 
-    length 0: Coulomb's law at the points of pieces that give way, which `giving` makes.
-    modes: of the rig, None of a bench; PatchfemError as of `run.refuse_heavy`.
+
+def lifts(grooves: Grooves, time: float) -> str:
+    """The sentence on a lifted mass that leaves its grooves at a time [s]."""
+    return (f"the lifted mass of {grooves.lifted_mass:.3g} kg leaves the grooves at {time:.6g} s: its inertia takes "
+            f"all of the load; lower {grooves.key}.lifted_mass or the drive, or raise the load")
+
+
+def model_of(grooves: Grooves, load: float, static: float, law, modes) -> "FlankModel":
+    """The model of a `law` under a load [N]: a Rubbing (`march.varying_load.plastic` or `bonds`), or the Element of a
+    law of constant load.
+
+    Coulomb's law at the points of pieces that give way is plastic of the length 0, which `giving` makes anew.
+    modes: of the rig, None of a bench; PatchfemError as of `refuse_heavy`.
     """
     if modes is not None:
         refuse_heavy(grooves, static, modes)
-    return ClimbingModel(grooves, load, plastic(static, length) if law is None else bonds(law))
+    return ElementsModel(grooves, load, static, law) if isinstance(law, Element) else ClimbingModel(grooves, load, law)
 
 
 def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -> "ClimbingModel":
@@ -51,7 +70,8 @@ def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -
 
 class FlankModel:
     """What `march.march` asks of a contact along flanks: of `grooves`, under a `load` [N] with its `swing`, of the
-    coefficient `static` [1]."""
+    coefficient `static` [1]. Under a load that swings the books count the work done against it, int N dz, for what its
+    height stores."""
 
     __slots__ = ()
     joints, laws, loading = (), (), ""  # nothing beside it, and the loop knows of a load that stays
@@ -70,20 +90,28 @@ class FlankModel:
         """Whether the law holds without any stretch: it stretches."""
         return False
 
-    @property
-    def runner(self):
-        """The class that marches it."""
-        return FlankRun
+    def shown(self, contact) -> dict:
+        """Nothing: all points share its stretch, if it has any."""
+        return {}
+
+    def flank(self, kind: float) -> tuple:
+        """(`Climbing.flank`, `Climbing.now_at`) at rest at the slide 0, the normal force there [N]; kind: of the
+        law."""
+        g, swing, at = self.grooves, self.swing, np.zeros(16)
+        begin = float(swing.about(self.load, 0.0))
+        normal = begin * np.hypot(1.0, float(g.slope(0.0)))
+        at[[VERTICAL, BEFORE, NORMAL, RAISED]] = begin, normal, normal, begin * g.height(0.0)
+        swings = swing.amplitude, swing.omega, swing.phase
+        return np.array([self.load, g.wave, g.amplitude, g.phase, g.lifted_mass, kind, *swings]), at, normal
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ClimbingModel(FlankModel):
-    """What `march.march` needs to know: grooves under a load [N], and the law as under a load that changes.
+    """A law with memory, as under a load that changes.
 
     shear: ShearModes on the points under load where the pieces give way, share (a,): those of the points in the load.
     The pieces climb as one: the height and the slope are those at the slide of the holder, and the points share the
-    normal force as they share the load. swing: of the load about its mean; the books then count the work done against
-    it, int N dz, for what its height stores.
+    normal force as they share the load.
     """
 
     grooves: Grooves
@@ -115,13 +143,8 @@ class ClimbingModel(FlankModel):
 
     def build(self, hub=None) -> tuple:
         """(Climbing, None) with arrays of their own, at rest at the slide 0."""
-        g, law, share = self.grooves, self.law, np.array(self.share, float)
-        begin = float(self.swing.about(self.load, 0.0))
-        whole, at = begin * np.hypot(1.0, float(g.slope(0.0))), np.zeros(16)
-        at[[VERTICAL, BEFORE, NORMAL, RAISED]] = begin, whole, whole, begin * g.height(0.0)
-        swing = self.swing.amplitude, self.swing.omega, self.swing.phase
-        flank = np.array([self.load, g.wave, g.amplitude, g.phase, g.lifted_mass, law.kind, *swing])
-        return Climbing(flank, at, share, *rub_of(law, whole * share, self.shear, self.limit)), None
+        law, share, (flank, at, normal) = self.law, np.array(self.share, float), self.flank(self.law.kind)
+        return Climbing(flank, at, share, *rub_of(law, normal * share, self.shear, self.limit)), None
 
     def shown(self, contact) -> dict:
         """Of pieces that give way the points' friction along the flank [N], what is elastic there [m] and their share
@@ -138,7 +161,62 @@ class ClimbingModel(FlankModel):
         return {"nodes": np.stack([force, over + contact.b @ contact.modes, contact.share * contact.now_at[VERTICAL]])}
 
 
-class FlankRun(Run):
+@dataclass(frozen=True, eq=False, slots=True)
+class ElementsModel(FlankModel):
+    """A law of constant load: the element of a contact under that load, taken to the normal force of the flank."""
+
+    grooves: Grooves
+    load: float
+    static: float
+    element: Element
+    swing: Swing = STEADY
+
+    @property
+    def kind(self) -> tuple:
+        """(contact, law): what the hub takes an instance of its loop for."""
+        return HERE, self.element.kernels
+
+    @property
+    def length(self) -> float:
+        """Slide over which the law stretches before it slips [m]."""
+        return self.element.length
+
+    @property
+    def runner(self):
+        """The class that marches it."""
+        return FlankRun
+
+    def build(self, hub=None) -> tuple:
+        """(Flanked, None) with arrays of their own, at rest at the slide 0."""
+        law, (flank, at, _) = self.element, self.flank(-1.0)
+        bound = law.limit if law.bounded else np.inf
+        return Flanked(flank, at, np.array(law.numbers[None]), np.array(law.memory[None]),
+                       np.array(law.memory[None]), np.array([bound])), None
+
+
+class GroovesRun(Run):
+    """The arrays of a march over grooves, and its clock."""
+
+    def response(self, rows, number) -> Response:
+        """Histories; with a lifted mass or a load that swings `extra` has normal_load [N], the vertical force
+        N + m (t q'' + t' q'^2)."""
+        out, g, modes, swing = super().response(rows, number), self.model.grooves, self.modes, self.model.swing
+        if not g.lifted_mass and not swing.amplitude:
+            return out
+        push, springs = np.outer(self.drive.values(out.time), modes.base), out.modal * modes.omega**2
+        pull = np.outer(out.force, modes.slide) / modes.mass
+        along = -(push + out.modal_rate @ modes.dampers.T + springs + pull) @ modes.slide
+        lift = g.slope(out.slide) * along + g.bend(out.slide) * out.slide_rate**2
+        return replace(out, extra=out.extra | {"normal_load": swing.about(self.model.load, out.time)
+                                               + g.lifted_mass * lift})
+
+    def _leaves(self) -> None:
+        """Mark the run as one whose lifted mass has left the grooves."""
+        self.outcome = Outcome.LEAVES_GROOVES
+        self.message = lifts(self.model.grooves, self.done * self.prop.dt)
+
+
+class FlankRun(GroovesRun):
     """The arrays of a march of a contact along flanks, and its clock."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
@@ -159,24 +237,10 @@ class FlankRun(Run):
     def _pressed(self, share: float) -> None:
         """Bring the memory to a normal force that is `share` of that at the slide 0, for which it was built."""
 
-    def response(self, rows, number) -> Response:
-        """Histories; with a lifted mass or a load that swings `extra` has normal_load [N], the vertical force
-        N + m (t q'' + t' q'^2)."""
-        out, g, modes, swing = super().response(rows, number), self.model.grooves, self.modes, self.model.swing
-        if not g.lifted_mass and not swing.amplitude:
-            return out
-        push, springs = np.outer(self.drive.values(out.time), modes.base), out.modal * modes.omega**2
-        pull = np.outer(out.force, modes.slide) / modes.mass
-        along = -(push + out.modal_rate @ modes.dampers.T + springs + pull) @ modes.slide
-        lift = g.slope(out.slide) * along + g.bend(out.slide) * out.slide_rate**2
-        return replace(out, extra=out.extra | {"normal_load": swing.about(self.model.load, out.time)
-                                               + g.lifted_mass * lift})
-
     def _judge(self, status: int) -> None:
         super()._judge(status)
         if self.contact.now_at[LIFTS] and self.outcome is None:
-            self.outcome = Outcome.LEAVES_GROOVES
-            self.message = lifts(self.model.grooves, self.done * self.prop.dt)
+            self._leaves()
 
 
 class ClimbingRun(FlankRun):

@@ -1,12 +1,12 @@
-"""A contact that climbs flanks under a law with memory along them, for the loops of `march.hub`.
+"""A contact that climbs flanks under a law along them, for the loops of `march.hub`.
 
 Over a step of dq the path ds = int sqrt(1 + t^2) dq runs along the flank and the height rises by dz. The law acts over
 ds under a normal force that goes from R0 to R1, R = V sqrt(1 + t^2) + f t, and pulls with f on the mean; then the force
 against the slide is U = (V dz + f ds)/dq, which does exactly the work that height, lifted mass and law take. What rises
 keeps its own speed w, dz = dt (w0 + w1)/2, so V = N + m (w1 - w0)/dt takes exactly what its kinetic energy gains.
-Where the pieces give way the points share R and slide along the flank behind their shear modes, as in
-`contacts.shear_solve_kernels`; the path ds is that of the holder. The functions are those that `march.loop_kernels`
-asks of every contact.
+Where the pieces give way the path ds is that of the holder. The functions are those that `march.loop_kernels` asks of
+every contact; the text runs with the points of a law with memory, `points_kernels`, or a law of constant load,
+`element_kernels`, as what is inside.
 """
 
 from math import cos, sin, sqrt
@@ -15,18 +15,12 @@ import numpy as np
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
-from ..contacts.pressed_points_kernels import press_all, rub_commit, rub_force, rub_state, spring_back
-from ..contacts.shear_points_kernels import SLOPE
-from ..contacts.shear_solve_kernels import GRADIENT, STEP, descend, halfway, hessian
-from ..contacts.shear_solve_kernels import pulled as drawn
-from ..dense_kernels import factor
-from ..dense_kernels import solve as solve_factored
 from ..modal_kernels import narrowed
+from . import points_kernels as inside
 
 LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, KIND, SWING, PACE, LAG = range(9)  # of contacts.arrays.Climbing.flank
 RISE, VERTICAL, LAST, LAST_BUT_ONE, LIFTS, PULL, PULL_SLOPE, ALONG, MEAN_SLOPE, PATH, HELD, PLACE, BEFORE, NORMAL, \
     CLOCK, RAISED = range(16)  # of now_at
-TINY = 1e-13  # of the friction limit, to which pieces that give way are solved
 INNER = sqrt(0.6)  # outer points of Gauss's rule of three
 STEEP = 1e-4  # radians of a groove below which sines are series
 
@@ -75,67 +69,6 @@ def over(flank, q, dq):
 
 
 @njit(error_model="numpy", **LEAN)
-def drag(ds, flat, end, dt, c):
-    """(mean force [N] along the flank over the path ds [m] in dt [s], its slope [N/m]); c.now become the shares of the
-    normal force flat + f end at the end, on a slope `end`, where f is the force there."""
-    kind, pulled, gain, at, gives = int(c.flank[KIND]), 0.0, 0.0, c.now_at, c.kappa.size > 0
-    close = (1e-12 if gives else 1e-14) * c.flank[LOAD]
-    tried, missed = 0.0, 0.0
-    for count in range(60):
-        before = at[NORMAL]
-        press_all(kind, c)
-        if gives:
-            c.y[0, 0] = ds
-            pulled = descend(ds, 0.0, kind, False, c, TINY * c.force[0] * c.flank[LOAD])[0]
-        else:
-            pulled, gain = rub_force(ds, kind, c)
-        bound = c.force[0] * before
-        after = min(max(2 * pulled - at[PLACE], -bound), bound)
-        now = max(flat + after * end, 0.0)
-        miss = now - before
-        if gives and count > 0 and abs(miss) > close and abs(missed - miss) > 0.1 * abs(before - tried):
-            load(c, max(before - miss * (before - tried) / (miss - missed), 0.0))  # secant: a solve is dear
-        else:
-            load(c, now)
-        tried, missed = before, miss
-        if abs(miss) <= close:
-            break
-    return pulled, stiff(c) if gives else gain
-
-
-@njit(error_model="numpy", **LEAN)
-def load(c, normal):
-    """Put the normal force [N] on the points."""
-    c.now_at[NORMAL] = normal
-    for j in range(c.now.size):
-        c.now[j] = c.share[j] * normal
-
-
-@njit(error_model="numpy", **LEAN)
-def stiff(c):
-    """Slope [N/m] of the force over the slide of the holder, of points behind shear modes that have been solved for."""
-    hess, p, total = c.hess[0], c.room[STEP], 0.0
-    for j in range(int(c.count[0])):
-        total += c.points[SLOPE, j]
-    if c.ready[0] == 0.0:
-        hessian(0.0, False, c, hess)
-        if not factor(hess):
-            return total
-        c.ready[0] = 1.0
-    drawn(SLOPE, c.psi, c.points, int(c.count[0]), p)
-    p[0] = 0.0
-    return max(total - bent(hess, p, c.room[GRADIENT]), 0.01 * total)
-
-
-@njit(error_model="numpy", **LEAN)
-def bent(hess, p, room):
-    """p . hess^-1 p (n,) of a factor."""
-    for k in range(p.size):
-        room[k] = p[k]
-    return solve_factored(hess, room)
-
-
-@njit(error_model="numpy", **LEAN)
 def climb(dq, q, dt, flank, at):
     """(path [m] along the flank, normal force [N] at its end without friction, slope [1] there) of a slide dq [m] in dt
     [s]; mean slope, path over slide and mean vertical force [N] go into `at`."""
@@ -160,10 +93,10 @@ def resist(pulled, gain, middle, dt, flank, at):
 
 @njit(error_model="numpy", **LEAN)
 def pull(dq, q, dt, c):
-    """Write the mean force over the slide dq [m] in dt [s], and what belongs to it, into c.now_at; c.now is the normal
-    force at its end. c.before is that at its start, and the force of the law there stands in c.now_at[PLACE]."""
+    """Write the mean force over the slide dq [m] in dt [s], and what belongs to it, into c.now_at: NORMAL is then the
+    normal force at its end; BEFORE is that at its start, PLACE the force of the law there."""
     ds, flat, end = climb(dq, q, dt, c.flank, c.now_at)
-    pulled, gain = drag(ds, flat, end, dt, c)
+    pulled, gain = inside.drag(ds, flat, end, dt, c)
     resist(pulled, gain, q + 0.5 * dq, dt, c.flank, c.now_at)
 
 
@@ -172,7 +105,7 @@ def solve(free, beta, q, v, dt, c, goal):
     """(dq [m], mean force [N], iterations) of a step with dq = free - beta force, as of `contacts.element_kernels`."""
     at, low, high = c.now_at, -np.inf, np.inf
     t = steep(c.flank, q)
-    halfway(v * sqrt(1 + t * t), dt, c)
+    inside.begun(c, v * sqrt(1 + t * t), dt)
     dq = 2 * at[LAST] - at[LAST_BUT_ONE]
     for count in range(1, 200):
         pull(dq, q, dt, c)
@@ -191,7 +124,7 @@ def solve(free, beta, q, v, dt, c, goal):
 def given(dq, q, v, dt, c, goal):
     """(mean force [N], True) over a slide dq [m] in dt [s] that is prescribed."""
     t = steep(c.flank, q)
-    halfway(v * sqrt(1 + t * t), dt, c)
+    inside.begun(c, v * sqrt(1 + t * t), dt)
     pull(dq, q, dt, c)
     return c.now_at[PULL], True
 
@@ -199,20 +132,16 @@ def given(dq, q, v, dt, c, goal):
 @njit(error_model="numpy", **LEAN)
 def commit(dq, force, q, v0, v1, dt, c):
     """Keep the solved step of mean force [N]; (energy dissipated along the flank [J], True)."""
-    at, kind = c.now_at, int(c.flank[KIND])
+    at = c.now_at
     t0, t1 = steep(c.flank, q), steep(c.flank, q + dq)
+    v0, v1 = v0 * sqrt(1 + t0 * t0), v1 * sqrt(1 + t1 * t1)
     along = (force - at[HELD] * at[MEAN_SLOPE]) / at[PATH]
-    lost, fine = rub_commit(at[PATH] * dq, along, v0 * sqrt(1 + t0 * t0), v1 * sqrt(1 + t1 * t1), dt, kind, c), True
-    if c.kappa.size:
-        more, count = spring_back(kind, c, c.force[0] * c.flank[LOAD] * 1e-11)
-        lost, fine = lost + more, count > 0
+    lost, fine = inside.commit(at[PATH] * dq, along, v0, v1, dt, c)
     if c.flank[LIFTED] > 0.0:
         at[RISE] = 2 * at[MEAN_SLOPE] * dq / dt - at[RISE]
         at[LIFTS] = max(at[LIFTS], 0.0 if at[HELD] > 0.0 else 1.0)
     raised(dq, dt, c.flank, at)
-    for j in range(c.now.size):
-        c.before[j] = c.now[j]
-    at[BEFORE], at[PLACE] = at[NORMAL], rub_state(kind, c, 0.0)[0]
+    at[BEFORE], at[PLACE] = at[NORMAL], inside.state(c, 0.0, v1)[0]
     return lost, fine
 
 
@@ -220,8 +149,8 @@ def commit(dq, force, q, v0, v1, dt, c):
 def state(c, q, v):
     """(force against the slide [N], energy stored in height, lifted mass and law [J], irreversible slip [m]) at the
     slide q [m] and the speed v [m/s]."""
-    flank, at, t = c.flank, c.now_at, steep(c.flank, q)
-    along, energy, kept = rub_state(int(flank[KIND]), c, q)
-    energy += of_height(c, q) + 0.5 * flank[LIFTED] * at[RISE] * at[RISE]
+    at, t = c.now_at, steep(c.flank, q)
     length = sqrt(1 + t * t)
+    along, energy, kept = inside.state(c, q, v * length)
+    energy += of_height(c, q) + 0.5 * c.flank[LIFTED] * at[RISE] * at[RISE]
     return at[VERTICAL] * t + along * length, energy, q - (q - kept) / length

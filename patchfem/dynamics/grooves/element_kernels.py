@@ -1,44 +1,23 @@
-"""A contact that climbs flanks under a law of constant load along them, for the loops of `march.hub`.
+"""A law of constant load along flanks, as what `contact_kernels` runs with: `contacts.arrays.Flanked`.
 
 The law is that of a contact under the load N of the scene; under another normal force R it has R/N of its elements or
 bristles. Those that a falling force lays off take their stretch with them, and those that a rising one brings come
 without any, so that a force that only rises leaves the friction as it is: the stretch of all becomes R0/R1 of itself.
-Either loses some of the energy stored, R k z^2/(2 N), and neither gives any. Path, height, lifted mass and the books of
-a step are those of `contact_kernels`: half of the change of the normal force, the slide, the other half.
+Either loses some of the energy stored, R k z^2/(2 N), and neither gives any. A step is half of the change of the normal
+force, the slide, the other half.
 """
-
-from math import sqrt
-
-import numpy as np
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import lugre_kernels as law
-from ..modal_kernels import narrowed
-from .contact_kernels import (
-    BEFORE,
-    HELD,
-    LAST,
-    LAST_BUT_ONE,
-    LIFTED,
-    LIFTS,
-    LOAD,
-    MEAN_SLOPE,
-    NORMAL,
-    PATH,
-    PLACE,
-    PULL,
-    PULL_SLOPE,
-    RISE,
-    VERTICAL,
-    climb,
-    of_height,
-    raised,
-    resist,
-    steep,
-)
 
-__all__ = ["commit", "given", "solve", "state"]
+LOAD = 0  # of contacts.arrays.Climbing.flank, as in `contact_kernels`
+PLACE, BEFORE, NORMAL = 11, 12, 13  # of now_at
+
+
+@njit(error_model="numpy", **LEAN)
+def begun(c, v, dt):
+    """Nothing: a step needs no beginning."""
 
 
 @njit(error_model="numpy", **LEAN)
@@ -78,66 +57,22 @@ def drag(ds, flat, end, dt, c):
 
 
 @njit(error_model="numpy", **LEAN)
-def pull(dq, q, dt, c):
-    """Write the mean force over the slide dq [m] in dt [s], and what belongs to it, into c.now_at, as
-    `contact_kernels.pull`."""
-    ds, flat, end = climb(dq, q, dt, c.flank, c.now_at)
-    pulled, gain = drag(ds, flat, end, dt, c)
-    resist(pulled, gain, q + 0.5 * dq, dt, c.flank, c.now_at)
-
-
-@njit(error_model="numpy", **LEAN)
-def solve(free, beta, q, v, dt, c, goal):
-    """(dq [m], mean force [N], iterations) of a step with dq = free - beta force, as of `contacts.element_kernels`."""
-    at, low, high = c.now_at, -np.inf, np.inf
-    dq = 2 * at[LAST] - at[LAST_BUT_ONE]
-    for count in range(1, 200):
-        pull(dq, q, dt, c)
-        miss = dq - free + beta * at[PULL]
-        digit = 4e-16 * (abs(free) + abs(dq) + beta * abs(at[PULL]))
-        if abs(miss) <= 0.01 * goal * beta + digit:
-            return dq, at[PULL], count
-        gain, here = max(1 + beta * at[PULL_SLOPE], 0.1), dq
-        low, high, dq = narrowed(low, high, dq, miss, gain, count - 40)
-        if high - low <= digit:
-            return here, at[PULL], count if abs(miss) <= goal * beta + 8 * gain * digit else -count
-    return dq, at[PULL], -200
-
-
-@njit(error_model="numpy", **LEAN)
-def given(dq, q, v, dt, c, goal):
-    """(mean force [N], True) over a slide dq [m] in dt [s] that is prescribed."""
-    pull(dq, q, dt, c)
-    return c.now_at[PULL], True
-
-
-@njit(error_model="numpy", **LEAN)
-def commit(dq, force, q, v0, v1, dt, c):
-    """Keep the solved step of mean force [N]; (energy dissipated along the flank [J], True)."""
-    at, load = c.now_at, c.flank[LOAD]
-    t0, t1 = steep(c.flank, q), steep(c.flank, q + dq)
-    v0, v1 = v0 * sqrt(1 + t0 * t0), v1 * sqrt(1 + t1 * t1)
-    along, mean = (force - at[HELD] * at[MEAN_SLOPE]) / at[PATH], 0.5 * (at[BEFORE] + at[NORMAL])
+def commit(ds, along, v0, v1, dt, c):
+    """Keep the step over the path ds [m] under the mean force `along` [N] between the speeds v0, v1 [m/s] along the
+    flank; (energy dissipated [J], True)."""
+    at = c.now_at
+    mean = 0.5 * (at[BEFORE] + at[NORMAL])
     lost = pressed(c, c.mem, at[BEFORE], mean, c.tried)
     if mean > 0.0:
-        part = mean / load
-        lost += part * law.commit(c.num, c.tried, 0, at[PATH] * dq, along / part, v0, v1, dt, 0.0)
-    lost += pressed(c, c.tried, mean, at[NORMAL], c.mem)
-    if c.flank[LIFTED] > 0.0:
-        at[RISE] = 2 * at[MEAN_SLOPE] * dq / dt - at[RISE]
-        at[LIFTS] = max(at[LIFTS], 0.0 if at[HELD] > 0.0 else 1.0)
-    raised(dq, dt, c.flank, at)
-    at[BEFORE] = at[NORMAL]
-    at[PLACE] = at[NORMAL] / load * law.state(c.num, c.mem, 0, 0.0, v1)[0]
-    return lost, True
+        part = mean / c.flank[LOAD]
+        lost += part * law.commit(c.num, c.tried, 0, ds, along / part, v0, v1, dt, 0.0)
+    return lost + pressed(c, c.tried, mean, at[NORMAL], c.mem), True
 
 
 @njit(error_model="numpy", **LEAN)
 def state(c, q, v):
-    """(force against the slide [N], energy stored in height, lifted mass and law [J], irreversible slip [m]) at the
-    slide q [m] and the speed v [m/s]."""
-    flank, at, t = c.flank, c.now_at, steep(c.flank, q)
-    length, part = sqrt(1 + t * t), at[NORMAL] / flank[LOAD]
-    along, energy, kept = law.state(c.num, c.mem, 0, q, v * length)
-    energy = part * energy + of_height(c, q) + 0.5 * flank[LIFTED] * at[RISE] * at[RISE]
-    return at[VERTICAL] * t + part * along * length, energy, q - (q - kept) / length
+    """(force along the flank [N], energy stored in the law [J], irreversible slip [m]) at the slide q [m] and the speed
+    v [m/s] along the flank."""
+    part = c.now_at[NORMAL] / c.flank[LOAD]
+    along, energy, kept = law.state(c.num, c.mem, 0, q, v)
+    return part * along, part * energy, kept

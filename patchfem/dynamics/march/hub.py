@@ -10,7 +10,7 @@ from ... import compiled
 from ..contacts.dispatch import COULOMB, law_of
 
 HERE = "dynamics.march"
-SOLVES = "dynamics.grooves.element_kernels",  # contacts of any law that solve their step themselves
+SOLVES = {"dynamics.grooves.contact_kernels": "dynamics.grooves.element_kernels"}  # contacts that solve their step
 STEADY, WHOLE, POINTS = "", "whole", "points"  # loads: that stays; that changes, borne as a whole or point by point
 
 
@@ -22,7 +22,7 @@ def contact_of(kind: tuple):
         return compiled.load(contact)
     law = compiled.load(law)
     if contact in SOLVES:
-        return compiled.instance(contact, {"law": law})
+        return compiled.instance(contact, {"inside": compiled.instance(SOLVES[contact], {"law": law})})
     solver = compiled.instance("dynamics.contacts.element_solve_kernels", {"law": law})
     return compiled.instance(contact, {"law": law, "solver": solver})
 

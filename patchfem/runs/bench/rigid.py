@@ -43,17 +43,15 @@ def climbing(model, load: float, patch=None, count: int | None = None):
     tolerance.
     """
     from ...dynamics.grooves.climbing import giving, model_of
+    from ...dynamics.march.varying_load import bonds, plastic
 
     f, modes = model.friction, model.rig.modes if model.rig is not None else None
     grooves = model.grooves if modes is not None else replace(model.grooves, lifted_mass=0.0)
-    if not carries(f, "varying-load"):
-        from ...dynamics.grooves import elements
-
-        found = elements.model_of(grooves, load, f.static, law_from(f, load).element(load), modes)
-        return replace(found, swing=swing_of(model))
-    law = model.bonds if has(f.law, "bonds") else None
-    found = replace(model_of(grooves, load, f.static, f.bond_length or 0.0, law, modes), swing=swing_of(model))
-    return giving(found, patch, count, model.accuracy.tolerance) if model.soft else found
+    varies = carries(f, "varying-load")
+    law = law_from(f, load).element(load) if not varies else \
+        bonds(model.bonds) if has(f.law, "bonds") else plastic(f.static, f.bond_length or 0.0)
+    found = replace(model_of(grooves, load, f.static, law, modes), swing=swing_of(model))
+    return giving(found, patch, count, model.accuracy.tolerance) if model.soft and varies else found
 
 
 def swing_of(model):

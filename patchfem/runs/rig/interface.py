@@ -72,8 +72,8 @@ def _climbing(model: Model, patch, count: int | None = None):
 
 def flank_of(model: Model, patch):
     """The law along the flanks of grooves of a harmonic balance."""
+    from ...dynamics.grooves.climbing import refuse_heavy
     from ...dynamics.grooves.periodic import ElasticFlank, PacedFlank
-    from ...dynamics.grooves.run import refuse_heavy
 
     f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
     if has(f.law, "memoryless"):

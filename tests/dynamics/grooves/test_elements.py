@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from patchfem.core import BaseSine, ModalBasis, Outcome, Start
-from patchfem.dynamics.grooves.elements import ElementsModel
+from patchfem.dynamics.grooves.climbing import ElementsModel
 from patchfem.dynamics.grooves.run import model_of
 from patchfem.dynamics.march.hub import follow_path
 from patchfem.dynamics.march.march import march

@@ -119,7 +119,7 @@ class Balance:
         elif not stable.stable:
             outcome, message = Outcome.NOT_CONVERGED, unlasting(stable.multipliers)
         if load is not None and load.min() <= 0:
-            from ....dynamics.grooves.run import lifts
+            from ....dynamics.grooves.climbing import lifts
 
             if (gone := self._left(drive, Start(response.modal[0], response.modal_rate[0]))) is not None:
                 return gone, None

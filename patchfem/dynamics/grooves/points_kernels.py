@@ -1,0 +1,106 @@
+"""The points of a contact that climbs flanks under a law with memory, loaded by the normal force of the flank.
+
+`contact_kernels` runs with this text for points under a load that changes, of `contacts.arrays.Climbing`: one of rigid
+pieces, or those behind shear modes, which share the normal force and slide along the flank, as in
+`contacts.shear_solve_kernels`. It asks for begun, drag, commit and state.
+"""
+
+from ...compiled.inner import njit
+from ...friction.flags_kernels import LEAN
+from ..contacts.pressed_points_kernels import press_all, rub_commit, rub_force, rub_state, spring_back
+from ..contacts.shear_points_kernels import SLOPE
+from ..contacts.shear_solve_kernels import GRADIENT, STEP, descend, halfway, hessian
+from ..contacts.shear_solve_kernels import pulled as drawn
+from ..dense_kernels import factor
+from ..dense_kernels import solve as solve_factored
+
+LOAD, KIND = 0, 5  # of contacts.arrays.Climbing.flank, as in `contact_kernels`
+PLACE, NORMAL = 11, 13  # of now_at
+TINY = 1e-13  # of the friction limit, to which pieces that give way are solved
+
+
+@njit(error_model="numpy", **LEAN)
+def begun(c, v, dt):
+    """Begin a step of dt [s] at the speed v [m/s] along the flank."""
+    halfway(v, dt, c)
+
+
+@njit(error_model="numpy", **LEAN)
+def drag(ds, flat, end, dt, c):
+    """(mean force [N] along the flank over the path ds [m] in dt [s], its slope [N/m]); c.now become the shares of the
+    normal force flat + f end at the end, on a slope `end`, where f is the force there."""
+    kind, pulled, gain, at, gives = int(c.flank[KIND]), 0.0, 0.0, c.now_at, c.kappa.size > 0
+    close = (1e-12 if gives else 1e-14) * c.flank[LOAD]
+    tried, missed = 0.0, 0.0
+    for count in range(60):
+        before = at[NORMAL]
+        press_all(kind, c)
+        if gives:
+            c.y[0, 0] = ds
+            pulled = descend(ds, 0.0, kind, False, c, TINY * c.force[0] * c.flank[LOAD])[0]
+        else:
+            pulled, gain = rub_force(ds, kind, c)
+        bound = c.force[0] * before
+        after = min(max(2 * pulled - at[PLACE], -bound), bound)
+        now = max(flat + after * end, 0.0)
+        miss = now - before
+        if gives and count > 0 and abs(miss) > close and abs(missed - miss) > 0.1 * abs(before - tried):
+            load(c, max(before - miss * (before - tried) / (miss - missed), 0.0))  # secant: a solve is dear
+        else:
+            load(c, now)
+        tried, missed = before, miss
+        if abs(miss) <= close:
+            break
+    return pulled, stiff(c) if gives else gain
+
+
+@njit(error_model="numpy", **LEAN)
+def load(c, normal):
+    """Put the normal force [N] on the points."""
+    c.now_at[NORMAL] = normal
+    for j in range(c.now.size):
+        c.now[j] = c.share[j] * normal
+
+
+@njit(error_model="numpy", **LEAN)
+def stiff(c):
+    """Slope [N/m] of the force over the slide of the holder, of points behind shear modes that have been solved for."""
+    hess, p, total = c.hess[0], c.room[STEP], 0.0
+    for j in range(int(c.count[0])):
+        total += c.points[SLOPE, j]
+    if c.ready[0] == 0.0:
+        hessian(0.0, False, c, hess)
+        if not factor(hess):
+            return total
+        c.ready[0] = 1.0
+    drawn(SLOPE, c.psi, c.points, int(c.count[0]), p)
+    p[0] = 0.0
+    return max(total - bent(hess, p, c.room[GRADIENT]), 0.01 * total)
+
+
+@njit(error_model="numpy", **LEAN)
+def bent(hess, p, room):
+    """p . hess^-1 p (n,) of a factor."""
+    for k in range(p.size):
+        room[k] = p[k]
+    return solve_factored(hess, room)
+
+
+@njit(error_model="numpy", **LEAN)
+def commit(ds, along, v0, v1, dt, c):
+    """Keep the step over the path ds [m] under the mean force `along` [N] between the speeds v0, v1 [m/s] along the
+    flank; (energy dissipated [J], whether points and pieces agree)."""
+    kind, fine = int(c.flank[KIND]), True
+    lost = rub_commit(ds, along, v0, v1, dt, kind, c)
+    if c.kappa.size:
+        more, count = spring_back(kind, c, c.force[0] * c.flank[LOAD] * 1e-11)
+        lost, fine = lost + more, count > 0
+    for j in range(c.now.size):
+        c.before[j] = c.now[j]
+    return lost, fine
+
+
+@njit(error_model="numpy", **LEAN)
+def state(c, q, v):
+    """(force along the flank [N], energy stored in the law [J], irreversible slip [m]) at the slide q [m]."""
+    return rub_state(int(c.flank[KIND]), c, q)
