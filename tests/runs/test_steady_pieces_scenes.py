@@ -128,7 +128,7 @@ def test_exact_a_rise_to_a_motion_that_exists_is_no_growth(monkeypatch):
     rig, limit = run.plan.model.rig, run.measures["friction_force_peak"].value
     push = 8 * 9.80665 - 4 / np.pi * limit / rig.modes.mass
     assert told.value == pytest.approx(push / (2 * 1e-6 * rig.modes.omega[0]**2), rel=1e-4)
-    monkeypatch.setattr("patchfem.runs.rig.pieces.run.settles", lambda *_: None)
+    monkeypatch.setattr("patchfem.runs.rig.pieces.settles", lambda *_: None)
     assert pf.run(RIG, **keys, **{"accuracy.method": "exact"}).outcome == "grows"
 
 

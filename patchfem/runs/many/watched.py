@@ -122,7 +122,7 @@ class Watcher:
         return Watched(window, acceleration_peak(window), found.amplitude(one.modes.output), found)
 
     def _events(self, drive, near) -> Watched | None:
-        from ..rig.steady.events import Events
+        from ..rig.steady.maps import Events
 
         raw = self._once("events", lambda: Events(self.model, self.numerics, self.patch, 0, self.say)).point(drive)[0]
         return _seen(raw)

@@ -124,8 +124,8 @@ class Finder(NamedTuple):
 
 
 FINDERS = {one.name: one for one in (
-    Finder("events", "the map from event to event, exact", "steady.events Events", "exact"),
-    Finder("yields", "the map from yield to yield, exact", "steady.yields Yields", "piecewise"),
+    Finder("events", "the map from event to event, exact", "steady.maps Events", "exact"),
+    Finder("yields", "the map from yield to yield, exact", "steady.maps Yields", "piecewise"),
     Finder("march", "a march that is brought to repeat", "steady.marched Marched", "march"),
     Finder("balance", "harmonic balance", "steady.balance Balance", "harmonic"))}
 

@@ -1,0 +1,180 @@
+"""The steady motion of what is linear between events, by the map from event to event over a period: of Coulomb
+interfaces or none at all (`Events`), of elastic-plastic elements (`Yields`); its curve over frequency or level.
+
+Nothing is left open but round-off: what the interfaces do is followed from event to event, and the period closes to the
+residual that is stated.
+"""
+
+from dataclasses import replace
+from functools import cached_property
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ....core import Outcome, PatchfemError, Start
+from ....dynamics.events import histories
+from ....dynamics.periodic import is_stable
+from ....response.measures import half_swing
+from ....response.spectrum import wave_measures
+from ....structure.drive_sizes import largest
+from ....structure.response import receptance
+from ..pieces import Interfaces, Limits, Pieces
+from .curves import SHOWN, Shown, exact_errors, traced, unlasting
+
+
+class Repeating(NamedTuple):
+    """A motion that a map finds: its state and memory at phase 0 of the drive; near: a start for a motion nearby;
+    regime, multipliers (m,), residual; error: relative, that the residual leaves; iterations; bounded, lasting."""
+
+    start: Start
+    memory: Any
+    near: Any
+    regime: str
+    multipliers: np.ndarray
+    residual: float
+    error: float
+    iterations: int
+    bounded: bool
+    lasting: bool
+
+    @property
+    def words(self) -> str:
+        """The regime, and whether a disturbance of it grows."""
+        return self.regime if self.lasting else f"{self.regime}, unstable"
+
+    @property
+    def size(self) -> float:
+        """The largest |multiplier|."""
+        return float(np.abs(self.multipliers).max(initial=0.0))
+
+
+class Maps:
+    """Steady motions by the map of a period; `repeating` finds one, from `near` where there are several."""
+
+    name, elements, tries_another = "", None, False
+
+    def __init__(self, model, numerics, patch, frames: int = 0, say=None):
+        histories.warm_up(say)
+        self.model, self.numerics, self.modes, self.patch, self.frames = model, numerics, model.rig.modes, patch, frames
+        self.found = self.elements(model, numerics, patch)
+        self.groups = self.found.groups
+
+    def repeating(self, drive, near) -> Repeating:
+        """The motion that repeats with a sine."""
+        raise NotImplementedError
+
+    def point(self, drive, near=None) -> tuple:
+        """The steady motion as a run of two cycles that begins in it, and a start for a motion nearby."""
+        begin, one = perf_counter(), self.repeating(drive, near)
+        reader = Pieces(self.model, replace(self.numerics, cycles=2.0, window=1), self.patch, self.found)
+        done = reader.over_strips(histories.simulate(self.modes, drive, self.groups, 2.0, 1, np.inf, self.frames, None,
+                                                     one.start, self.begun(one.memory)))
+        raw = reader.solution(done, perf_counter() - begin, drive)
+        beyond = float(np.abs(done.amplitudes).max()) > self.model.rig.travel
+        outcome = Outcome.GROWS if not one.bounded else Outcome.EXCEEDS_TRAVEL if beyond else \
+            raw.outcome or Outcome.STEADY
+        message = raw.message
+        if not one.lasting:
+            outcome, message = Outcome.NOT_CONVERGED, unlasting(one.multipliers)
+        extra = {"regime": one.words, "multipliers": one.multipliers, "residual": one.residual, "map": self.name}
+        return replace(raw, outcome=outcome, message=message, steady=(None, None), extra=extra,
+                       errors=exact_errors(raw.values, one.error),
+                       book=raw.book | {"iterations": float(one.iterations)}), one.near
+
+    def begun(self, memory):
+        """The memory of elements that a run begins with, whose energies count from there."""
+        return memory
+
+    def shown(self, drive, near=None) -> Shown:
+        """A point of a curve."""
+        one = self.repeating(drive, near)
+        if not one.bounded:
+            return Shown(drive, {}, {}, one.words, one.size, False, Outcome.GROWS)
+        done = histories.simulate(self.modes, drive, self.groups, 1, 1, start=one.start, memory=one.memory)
+        window, gauge, extremes = done.window, self.modes.gauge, done.amplitudes
+        amplitude = float(extremes[:, 1].max() - extremes[:, 0].min()) / 2 if gauge is None else \
+            half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge)
+        values = _of_curve(amplitude, done.acceleration, wave_measures(*map(float, done.reading.waves), largest(drive)))
+        holds = Pieces(self.model, self.numerics, self.patch, self.found).sticks(done)
+        return Shown(drive, values, exact_errors(values, one.error), one.words, one.size, one.lasting,
+                     Outcome.STUCK if holds else Outcome.STEADY, one.near)
+
+    def curve(self, drive) -> tuple:
+        """(points of the curve over the frequency, each found from the one before it, no folds)."""
+        return traced(self.modes, drive, self.shown), ()
+
+
+def _of_curve(amplitude: float, acceleration: float, waves: dict) -> dict:
+    """The measures that a curve shows, by name."""
+    values = {SHOWN["amplitude"]: amplitude, SHOWN["acceleration_peak"]: acceleration, **waves}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+class Yields(Maps):
+    """Elastic-plastic elements, by the map from yield to yield."""
+
+    name, elements = "yields", Interfaces
+
+    def __init__(self, model, *given):
+        super().__init__(model, *given)
+        self.tries_another = len(model.rig.interfaces) == 1
+
+    def begun(self, memory):
+        """As of `Maps.begun`."""
+        from ....dynamics.events.elements import books_begin
+
+        return books_begin(memory)
+
+    def repeating(self, drive, near) -> Repeating:
+        """The motion that repeats, from the Point `near` it or from rest."""
+        from ....dynamics.events.steady import steady
+
+        one = steady(self.modes, drive, self.groups, near)
+        return Repeating(one.start, one.memory, one.point, one.regime, one.multipliers, one.residual, one.error,
+                         one.iterations, True, is_stable(one.multipliers))
+
+
+class Events(Maps):
+    """Coulomb interfaces, or none at all, by the event map."""
+
+    name, elements = "events", Limits
+
+    @cached_property
+    def forces(self) -> np.ndarray:
+        """Static and kinetic limits (2, i) [N]."""
+        return np.array([(one.static, one.kinetic) for one in self.groups]).T
+
+    def repeating(self, drive, near) -> Repeating:
+        """The motion that repeats: where friction falls with the first slip there are several, and one starts from the
+        state `near`. Multipliers of two events at once hold for one order of them, so they tell nothing."""
+        from ....dynamics.events.stick_steady import steady
+
+        falls = bool(np.any(self.forces[0] > self.forces[1]))
+        one = steady(self.modes, drive, self.groups, start=near if falls else None)
+        bounded = one.regime != "unbounded"
+        return Repeating(one.start, None, one.start, one.regime, one.multipliers, one.residual, one.residual,
+                         one.iterations, bounded, not bounded or not one.alone or is_stable(one.multipliers))
+
+    def curve(self, drive) -> tuple:
+        """As of `Maps.curve`, without friction in closed form."""
+        return traced(self.modes, drive, self.shown if self.forces.any() else self._linear), ()
+
+    def _linear(self, drive, near=None) -> Shown:
+        """A point of a curve without friction, in closed form; on a resonance that nothing damps as `shown`."""
+        modes, gauge = self.modes, self.modes.output if self.modes.gauge is None else self.modes.gauge
+        try:
+            seen, felt = receptance(modes, drive.omega, [gauge, modes.output], modes.base)[0, :, 0] * modes.mass
+        except PatchfemError:
+            return self.shown(drive)
+        size = drive.acceleration * float(abs(drive.moving + drive.omega**2 * felt))
+        values = _of_curve(drive.acceleration * float(abs(seen)), size, wave_measures(size, 0.0))
+        return Shown(drive, values, exact_errors(values, 0.0), "sliding", float(np.exp(self.decay * drive.period)),
+                     True, Outcome.STEADY)
+
+    @cached_property
+    def decay(self) -> float:
+        """Rate [1/s] at which the slowest free motion of the modes alone dies out, <= 0."""
+        n = self.modes.omega.size
+        state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(self.modes.omega**2), -self.modes.dampers]])
+        return float(np.linalg.eigvals(state).real.max())
