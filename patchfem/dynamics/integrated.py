@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Outcome, Response
+from ..core import ModalBasis, Outcome, Response
 
 
 class Loop(NamedTuple):
@@ -58,3 +58,23 @@ class Run:
     outcome: Outcome | None = None
     message: str = ""
     snapshots: list = field(default_factory=list)
+
+
+def accelerations(modes: ModalBasis, push, z, rate, pull) -> np.ndarray:
+    """Modal accelerations (k, n) [m s-2] relative to the base, eq. 3.4.
+
+    push (k,) [m s-2]: the drive; z, rate (k, n) [m], [m/s]; pull (k, n) [N]: what the interfaces resist the coordinates
+    with.
+    """
+    damped = rate * (2 * modes.zeta * modes.omega) if modes.damping is None else rate @ modes.damping.T
+    return -np.outer(push, modes.base) - damped - z * modes.omega**2 - pull / modes.mass
+
+
+def histories(modes: ModalBasis, drive, time, motion: tuple, face: tuple, extra: dict) -> Response:
+    """The Response at times (k,) [s] of motion (z, rate), (k, n) each, and of the first interface: face (slide, its
+    speed, force, slip), (k,) each."""
+    (z, rate), (slide, speed, force, slip), push = motion, face, drive.values(time)
+    base = push if drive.moving else np.zeros_like(push)
+    accel = accelerations(modes, push, z, rate, np.outer(force, modes.slide))
+    return Response(time, z, rate, slide, speed, z @ modes.output, rate @ modes.output, accel @ modes.output + base,
+                    base, force, slip, extra)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.linalg.lapack import dgesv
+from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ..core import NotConverged
 
@@ -60,9 +60,9 @@ class Mapped:
         scale, out = self.scale, np.zeros(self.scale.size)
         left = (self.slope - np.eye(scale.size)) * scale / scale[:, None]
         if not len(self.kept):
-            return solved(left, self.gap) * scale
+            return solve_linear(left)(self.gap) * scale
         free = self._free()
-        out[free] = solved(left[np.ix_(free, free)], self.gap[free])
+        out[free] = solve_linear(left[np.ix_(free, free)])(self.gap[free])
         return out * scale
 
     def multipliers(self) -> np.ndarray:
@@ -149,13 +149,16 @@ class Shooting:
         return None
 
 
-def solved(left, right) -> np.ndarray:
-    """x (n,) of left x = right; least squares where the matrix is singular to round-off."""
-    factors, _, out, info = dgesv(left, right)
+def solve_linear(matrix):
+    """A function b -> matrix^-1 b; least squares where the matrix (n, n) is singular to round-off, as by a mean or a
+    place at rest that nothing holds."""
+    factors, pivots, _ = dgetrf(matrix)
     sizes = np.abs(factors.diagonal())
-    if info == 0 and sizes.min(initial=np.inf) > 1e-13 * sizes.max(initial=0.0):
-        return out
-    return np.linalg.lstsq(left, right, rcond=1e-13)[0]
+    if np.isfinite(sizes).all() and sizes.min(initial=np.inf) > 1e-13 * sizes.max(initial=0.0):
+        return lambda b: dgetrs(factors, pivots, b)[0]
+    if not np.isfinite(matrix).all():
+        return lambda b: np.full(b.shape, np.nan)
+    return lambda b: np.linalg.lstsq(matrix, b, rcond=1e-12)[0]
 
 
 def bound(residual: float, found) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...core import ModalBasis, PatchfemError, Response, Start
+from ..integrated import accelerations
 from .point_laws import loops, rows
 
 MOST_NUMBERS = 2e8  # kept by a run: 1.6 GB
@@ -39,8 +40,7 @@ class Comparison:
 
     def accelerations(self, modes: ModalBasis) -> np.ndarray:
         """Modal accelerations (k, n) [m s-2] from the equation of motion, relative to the base."""
-        return -np.outer(self.drive, modes.base) - self.v @ modes.dampers.T - self.z * modes.omega**2 \
-            - self.force.T @ modes.interfaces / modes.mass
+        return accelerations(modes, self.drive, self.z, self.v, self.force.T @ modes.interfaces)
 
     def response(self, modes: ModalBasis, moving: bool = True) -> Response:
         """Histories of every step, slide and force of the first interface; moving: the drive is that of the base.

@@ -10,6 +10,7 @@ from ...friction.grooves import STEADY, Grooves, Swing
 from ...friction.protocol import Element
 from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes, tangential_stiffness
 from ..contacts.arrays import Climbing, Flanked
+from ..integrated import accelerations
 from ..march.march import Run
 from ..march.varying_load import PLASTIC, Rubbing, plastic, rub_of
 
@@ -203,9 +204,8 @@ class GroovesRun(Run):
         out, g, modes, swing = super().response(rows, number), self.model.grooves, self.modes, self.model.swing
         if not g.lifted_mass and not swing.amplitude:
             return out
-        push, springs = np.outer(self.drive.values(out.time), modes.base), out.modal * modes.omega**2
-        pull = np.outer(out.force, modes.slide) / modes.mass
-        along = -(push + out.modal_rate @ modes.dampers.T + springs + pull) @ modes.slide
+        along = accelerations(modes, self.drive.values(out.time), out.modal, out.modal_rate,
+                              np.outer(out.force, modes.slide)) @ modes.slide
         lift = g.slope(out.slide) * along + g.bend(out.slide) * out.slide_rate**2
         return replace(out, extra=out.extra | {"normal_load": swing.about(self.model.load, out.time)
                                                + g.lifted_mass * lift})

@@ -7,6 +7,7 @@ folds, `with_stability` the multipliers, `backbone` frequency and damping over a
 import numpy as np
 
 from ...core import Response
+from ..integrated import accelerations
 from .branch import Backbone, Branch, backbone, branches, levels, response
 from .forces import Group
 from .laws import Flow, Interlock, Jenkins, OfSpeed, Spring, Track, law_of_model, synthesis
@@ -76,8 +77,7 @@ def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> 
     z, rate = (synthesis((periodic.modal * f).T, inner) for f in (1.0, 1j * k * omega))
     forces = group.forces(periodic.coefficients, omega, inner)
     base = periodic.level * np.sin(2 * np.pi * np.arange(inner) / inner)
-    accel = -modes.base[:, None] * base - modes.dampers @ rate - modes.omega[:, None]**2 * z \
-        - group.rows.T @ forces / modes.mass
+    accel = accelerations(modes, base, z.T, rate.T, forces.T @ group.rows).T
     track = Track(periodic.coefficients[0], omega, inner)
     found = [law.sample(track) for law in group.laws[0]]
     floor = base if drive.moving else 0 * base

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import ModalBasis
+from ..propagator import exponentials
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -68,23 +69,6 @@ def monodromy(modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), f
         across[:n] = rows[mark.row]
         steps[mark.cell, k] = (1 - mark.share) * across + mark.share * (across @ steps[mark.cell])
     return product(steps)
-
-
-def exponentials(a) -> np.ndarray:
-    """Matrix exponentials (N, s, s) of a (N, s, s), by Taylor's series to order 10.
-
-    Matrices are halved before to a norm below 1/4 and squared back, which leaves (1/4)^11/11! = 6e-15.
-    """
-    norm = float(np.abs(a).sum(axis=2).max()) if a.size else 0.0
-    halvings = max(0, int(np.ceil(np.log2(max(4 * norm, 1e-300)))))
-    a = a / 2.0**halvings
-    out = term = np.broadcast_to(np.eye(a.shape[1]), a.shape)
-    for k in range(1, 11):
-        term = term @ a / k
-        out = out + term
-    for _ in range(halvings):
-        out = out @ out
-    return out
 
 
 def product(steps) -> np.ndarray:

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ...core import ModalBasis, NotConverged, PatchfemError
+from ..periodic import solve_linear
 
 SINGULAR = 1e-10  # stiffness of a mode over its scale below which a harmonic finds nothing that holds it
 
@@ -252,17 +252,6 @@ class Balance:
             for part, value in zip(parts, (miss, by_omega, -1j * drive)):
                 part.append(np.array([value.real, value.imag][:count]))
             at += count
-
-
-def solve_linear(matrix):
-    """A function b -> matrix^-1 b; least squares where the matrix (N, N) is singular (a mean that nothing holds)."""
-    factors, pivots, _ = dgetrf(matrix)
-    sizes = np.abs(np.diag(factors))
-    if np.isfinite(sizes).all() and sizes.min() > 1e-13 * sizes.max():  # else singular to round-off
-        return lambda b: dgetrs(factors, pivots, b)[0]
-    if not np.isfinite(matrix).all():
-        return lambda b: np.full(b.shape, np.nan)
-    return lambda b: np.linalg.lstsq(matrix, b, rcond=1e-12)[0]
 
 
 def damped(system, x, met, goal: float = 1e-10, most: int = 40) -> tuple | None:

@@ -9,6 +9,7 @@ import numpy as np
 from ...core import BaseSine, ModalBasis, Outcome, Response
 from ..contacts import arrays
 from ..cycles import extremes_of, phasor, thinned
+from ..integrated import histories
 from ..modal_kernels import ModalArrays
 from ..propagator import propagator
 from ..resume import Samples, slot_of
@@ -58,15 +59,8 @@ class Mark:
 def _response(rows, number, dt, modes, drive) -> Response:
     """Histories of the samples with step numbers `number` (k,)."""
     n = modes.omega.size
-    z, rate, time = rows[:, :n], rows[:, n:2 * n], number * dt
-    push = drive.values(time)
-    base = push if drive.moving else np.zeros_like(push)
-    damped = rate * (2 * modes.zeta * modes.omega) if modes.damping is None else rate @ modes.damping.T
-    accel = -np.outer(push, modes.base) - damped - z * modes.omega**2 \
-        - np.outer(rows[:, 2 * n + 2], modes.slide) / modes.mass
-    return Response(time, z, rate, rows[:, 2 * n], rows[:, 2 * n + 1], z @ modes.output, rate @ modes.output,
-                    accel @ modes.output + base, base, rows[:, 2 * n + 2], rows[:, 2 * n + 3],
-                    {"ledger": rows[:, [2 * n + 6, 2 * n + 5, 2 * n + 7, 2 * n + 8]].T})
+    return histories(modes, drive, number * dt, (rows[:, :n], rows[:, n:2 * n]), rows[:, 2 * n:2 * n + 4].T,
+                     {"ledger": rows[:, [2 * n + 6, 2 * n + 5, 2 * n + 7, 2 * n + 8]].T})
 
 
 def modal_arrays(modes: ModalBasis, prop) -> ModalArrays:

@@ -10,6 +10,7 @@ import numpy as np
 from ... import compiled
 from ...core import ModalBasis, Outcome, Response
 from ...friction.laws.stretch import bonds_of
+from ..integrated import histories
 from ..march.march import MarchResult
 from ..work_check import sampled_work
 from .arrays import (
@@ -103,17 +104,12 @@ def response_of(modes, drive, rows, stored: float) -> Response:
     """Histories of sample rows (k, 2 n + 7) of a motion; stored: its largest stored energy [J]."""
     n = modes.omega.size
     time, z, rate = rows[:, 0], rows[:, 1:1 + n], rows[:, 1 + n:1 + 2 * n]
-    slide, speed, force, slip, held, work = rows[:, 1 + 2 * n:].T
-    push = drive.values(time)
-    base = push if drive.moving else np.zeros_like(push)
-    damped = rate * (2 * modes.zeta * modes.omega) if modes.damping is None else rate @ modes.damping.T
-    accel = -np.outer(push, modes.base) - damped - z * modes.omega**2 - np.outer(force, modes.slide) / modes.mass
+    held, work = rows[:, 5 + 2 * n:].T
     lost = np.diff(work - held, prepend=0.0)
     noise = 1e-8 * max(stored, float(np.abs(work).max(initial=0.0)))
     ledger = np.stack([work, held, np.cumsum(np.maximum(lost, 0.0)),
                        np.cumsum(np.where(lost < -noise, -lost, 0.0))])
-    return Response(time, z, rate, slide, speed, z @ modes.output, rate @ modes.output,
-                    accel @ modes.output + base, base, force, slip, {"ledger": ledger})
+    return histories(modes, drive, time, (z, rate), rows[:, 1 + 2 * n:5 + 2 * n].T, {"ledger": ledger})
 
 
 def asked(count: int, window: int) -> np.ndarray:

@@ -11,7 +11,7 @@ from patchfem.dynamics.events.elements import elements_of
 from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.events.orbits import Orbits
 from patchfem.dynamics.events.steady import steady
-from patchfem.dynamics.periodic import solved
+from patchfem.dynamics.periodic import solve_linear
 
 MODES = basis([1.0, 2.3], [0.01, 0.02], [1.0, 0.4], [1.0, 0.5], [1.0, 0.2])
 GROUP = [elements_of([2.0, 1.0], [0.1, 0.3])]
@@ -86,6 +86,6 @@ def test_refuses_a_motion_that_nothing_bounds():
 
 def test_exact_a_step_that_is_not_determined_is_the_shortest():
     """x + y = 2 twice: the shortest answer is (1, 1); a matrix of full rank has its only one."""
-    assert solved(np.ones((2, 2)), np.array([2.0, 2.0])) == pytest.approx([1.0, 1.0])
+    assert solve_linear(np.ones((2, 2)))(np.array([2.0, 2.0])) == pytest.approx([1.0, 1.0])
     left = np.array([[4.0, 1.0], [2.0, 3.0]])
-    assert left @ solved(left, np.array([1.0, 2.0])) == pytest.approx([1.0, 2.0], rel=1e-14)
+    assert left @ solve_linear(left)(np.array([1.0, 2.0])) == pytest.approx([1.0, 2.0], rel=1e-14)

@@ -12,13 +12,14 @@ from patchfem.dynamics.harmonic.backbone import FreeBalance, stuck_mode, trace
 from patchfem.dynamics.harmonic.balance import periodic_response
 from patchfem.dynamics.harmonic.branch import backbone, branches, levels, response
 from patchfem.dynamics.harmonic.continuation import follow
-from patchfem.dynamics.harmonic.floquet import exponentials, product
+from patchfem.dynamics.harmonic.floquet import product
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.harmonic import Balance
 from patchfem.dynamics.harmonic.laws import Jenkins, OfSpeed, Spring, synthesis
 from patchfem.dynamics.harmonic.point import point
 from patchfem.dynamics.harmonic.stability import monodromy_of, with_stability
 from patchfem.dynamics.periodic import is_stable, multipliers
+from patchfem.dynamics.propagator import exponentials
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
