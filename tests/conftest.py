@@ -12,9 +12,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported, 
 import pytest
 from hypothesis import settings
 
+from patchfem import compiled
 from patchfem.compiled import UNKEPT, cache_folder
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))  # else an edited kernel runs as its old self
+
+compiled.PATIENCE = -1.0  # a test runs what is compiled, also where nothing is kept and little would have to run
 
 if sys.dont_write_bytecode:  # hundreds of child processes would each compile all that they import
     sys.dont_write_bytecode, sys.pycache_prefix = False, str(cache_folder() / "bytecode")

@@ -86,6 +86,16 @@ def test_exact_a_linear_structure_needs_no_patch_and_no_march(scene):
     assert "patchfem.dynamics.events.histories" in modules
 
 
+@pytest.mark.parametrize("text", [STRUCTURE, POINT + COULOMB + STRUCTURE, POINT + PLASTIC + STRUCTURE],
+                         ids=["linear", "coulomb", "plastic"])
+def test_exact_a_short_history_compiles_nothing(scene, tmp_path, monkeypatch, text):
+    """On a machine where nothing is compiled yet: neither numba nor what loads machine code is imported."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    modules = loaded(FROM_PYTHON, scene(text))
+    absent(modules, "compiled.inner", "compiled.kept", "dynamics.events.march_kernels")
+    assert "llvmlite" not in modules and not [*tmp_path.rglob("*.code"), *tmp_path.rglob("*.nbi")]
+
+
 def test_exact_a_bench_needs_no_structure(scene):
     modules = loaded(FROM_PYTHON, scene(BENCH))
     absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",

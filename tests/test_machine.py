@@ -217,6 +217,8 @@ def test_exact_a_function_is_one_of_its_module():
 MOTIONS = """
 import json, sys
 import patchfem as pf
+from patchfem import compiled
+compiled.PATIENCE = -1.0
 rig = '[normal]\\nload = "40 N"\\n[friction]\\nlaw = "LAW"\\nstatic = 0.3\\nMORE\\n' \\
     '[structure]\\nmoving_mass = "1 kg"\\n' \\
     '[[structure.mode]]\\nname = "a"\\nfrequency = "100 Hz"\\ndamping = 0.01\\nslide = 1.0\\n' \\

@@ -8,7 +8,9 @@ Numba's own switches are obeyed: NUMBA_DISABLE_JIT=1 runs every kernel as the Py
 or a measure of coverage sees each line), NUMBA_BOUNDSCHECK=1 compiles all anew and checks every index.
 
 `inner` has the `njit` of all kernels. `load` and `instance` give `Kernels`, which import the module of compiled code,
-and with it numba, only where a function of it is called whose machine code is not kept yet (`machine`).
+and with it numba, only where a function of it is called whose machine code is not kept yet (`machine`). A function
+whose caller says what its work would cost as Python (`Entry.expect`) runs as Python (`plain`) while that is little: a
+short history is over long before its loop would be compiled.
 """
 
 import ast
@@ -22,20 +24,26 @@ from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location, spec_from_loader
+from math import inf
 from operator import add, mul, neg, pos, sub, truediv
 from pathlib import Path
+
+import numpy as np
 
 from ..disk import own
 from ..disk.installed import version
 from ..disk.whole import short
 from . import bounded, machine
+from .plain import plain
 
 HERE = Path(__file__).parents[1]  # the package
 # tuples that kernels take: numba's cache would not notice two of their fields that change places
 TUPLES = "contacts/arrays.py", "smooth/arrays.py", "events/plant.py", "events/elements.py"
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # numba's own switch: all runs as the Python it is
 LEAST = 1 << 21  # bytes of the machine code of a run
+PATIENCE = 2.0  # CPU seconds of a function as Python in a process, from which on it is compiled: a tenth of that
 UNKEPT = set()  # functions called here whose machine code cannot be kept: every process brings up numba for them
+_LISTENERS = []  # who is told when something is compiled
 ARITHMETIC = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv, ast.Pow: pow, ast.USub: neg, ast.UAdd: pos}
 
 
@@ -104,14 +112,12 @@ class Kernels:
         if name.startswith("__"):
             raise AttributeError(f"{self.__name__} has no {name}")
         if name not in self._entries:
-            if name in _constants(self._text):
-                return _constants(self._text)[name]
-            kept = f"{self.__name__.removeprefix('patchfem.')}.{name}-"
-            if not any(one.startswith(kept) for one in _kept()):
-                here = getattr(self.module(), name)
-                if not hasattr(here, "overloads"):
-                    return here
-            self._entries[name] = Entry(self, name, kept)
+            constants, functions = _names(self._text)
+            if name in constants:
+                return constants[name]
+            if name not in functions:
+                return getattr(self.module(), name)
+            self._entries[name] = Entry(self, name, f"{self.__name__.removeprefix('patchfem.')}.{name}-")
         return self._entries[name]
 
     def module(self):
@@ -133,11 +139,17 @@ def tidied_later():
 
 
 class Entry:
-    """A function of a module of compiled code: its kept machine code where there is some, else by numba."""
+    """A function of a module of compiled code: its kept machine code where there is some, else by numba, or as Python
+    while that costs little."""
 
     def __init__(self, home: Kernels, name: str, kept: str):
         self.home, self.name, self.kept = home, name, kept
-        self.words, self.codes = machine.Words(), {}
+        self.words, self.codes, self.as_python = machine.Words(), {}, inf
+
+    def expect(self, seconds: float) -> None:
+        """Take note of calls that are to come and what they would take as Python [CPU s], an estimate that is the same
+        in every process: so is what runs as Python."""
+        self.as_python = seconds + (self.as_python if self.as_python < inf else 0.0)
 
     def held(self, *arguments) -> tuple:
         """(kinds, words, arguments) of last arguments that stay the same objects from call to call, for `held_call`:
@@ -171,7 +183,11 @@ class Entry:
         if code is None:
             path = _prepared() / "code" / f"{self.kept}{digest(','.join(kinds))}.code"
             code = machine.found(path)
+            if code is None and self.as_python <= PATIENCE:
+                with np.errstate(all="ignore"):
+                    return getattr(plain(self.home.__name__), self.name)(*arguments)
             if code is None:
+                _tell()
                 with tidied_later():
                     answer = self.function()(*arguments)
                     if not machine.keep(path, self.function(), arguments):
@@ -193,10 +209,13 @@ class Entry:
 
 
 @cache
-def _constants(text: Path | str) -> dict:
-    """Names of a module that stand for numbers or texts, read from its text or its file."""
-    out = {}
+def _names(text: Path | str) -> tuple:
+    """What a module names, read from its text or its file: its constants, numbers and texts, and its compiled
+    functions."""
+    out, functions = {}, set()
     for line in ast.parse(text.read_text("utf-8") if isinstance(text, Path) else text).body:
+        if isinstance(line, ast.FunctionDef) and any("njit" in ast.unparse(one) for one in line.decorator_list):
+            functions.add(line.name)
         if isinstance(line, ast.Assign) and len(line.targets) == 1:
             try:
                 value, target = _value(line.value, out), line.targets[0]
@@ -205,7 +224,7 @@ def _constants(text: Path | str) -> dict:
             names = target.elts if isinstance(target, ast.Tuple) else [target]
             values = value if isinstance(target, ast.Tuple) else [value]
             out |= {name.id: one for name, one in zip(names, values) if isinstance(name, ast.Name)}
-    return out
+    return out, functions
 
 
 def _value(node: ast.expr, names: dict):
@@ -222,15 +241,6 @@ def _value(node: ast.expr, names: dict):
         case ast.BinOp():
             return ARITHMETIC[type(node.op)](_value(node.left, names), _value(node.right, names))
     raise KeyError(ast.unparse(node))
-
-
-@cache
-def _kept() -> list:
-    """Names of the files of machine code that were there when the process began."""
-    try:
-        return os.listdir(_prepared() / "code")
-    except OSError:
-        return []
 
 
 def load(module: str, say=None):
@@ -331,6 +341,17 @@ def _folder() -> Path:
     if "numba" in sys.modules:
         sys.modules["numba"].config.CACHE_DIR = str(folder)
     return folder
+
+
+def when_compiling(say) -> None:
+    """Tell `say` what `load` tells it, but where something is compiled and not before."""
+    if say is not None:
+        _LISTENERS[:] = [say]
+
+
+def _tell() -> None:
+    for say in _LISTENERS:
+        _told(say)
 
 
 @cache

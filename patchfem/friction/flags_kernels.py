@@ -5,14 +5,8 @@ Fast-math is limited to what keeps NaN and infinity meaningful.
 
 from math import inf
 
-from numba.core.options import DefaultOptions
+from ..compiled.inner import INNER, LEAN, njit
 
-from ..compiled.inner import njit
-
-# no counting of references in functions that allocate nothing: 1.3 of the 1.6 us of a step of a march
-LEAN = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-# of functions that compiled code alone calls: their wrappers for Python take most of the time of compiling them
-INNER = LEAN | {flag: True for flag in ("no_cpython_wrapper", "no_cfunc_wrapper") if hasattr(DefaultOptions, flag)}
 FAST = {"reassoc", "contract", "arcp"}
 SET_VALUED = False  # whether a law holds without a stretch
 
@@ -45,3 +39,6 @@ def gives(num, turn):
 def longest(num, turn):
     """The `longest` of laws whose rates tell the error of a step: no bound [s]."""
     return inf
+
+
+__all__ = ["FAST", "INNER", "LEAN", "SET_VALUED", "closed", "gives", "knee", "longest", "middle"]

@@ -36,6 +36,7 @@ SMOOTH, PIECES, BALANCE = Code(74e6, 0.4, 13.0), Code(82e6, 0.4, 22.0), Code(1e8
 CODES = {"static": NONE, "bench, closed form": NONE, "bench, law step by step": NONE, "bench, two directions": NONE,
          "bench, parallel elements": FOLLOWED, "duhamel": FOLLOWED, "newmark": FOLLOWED, "euler": FOLLOWED,
          "smooth": SMOOTH, "exact": PIECES, "piecewise": PIECES, "harmonic": BALANCE}
+OF_EVENTS = "exact", "piecewise"  # engines whose loop runs as Python where it is over soon
 
 
 def code(model: Model, engine: str) -> Code:
@@ -64,10 +65,22 @@ def compile_seconds(model: Model, engine: str, unknowns: dict) -> float:
     """CPU seconds in which the first run of this kind compiles; 0 where one has run, or nothing of it is compiled."""
     seconds = code(model, engine).compile
     if seconds:
-        from ..compiled import has_run
+        from ..compiled import PATIENCE, has_run
 
-        return 0.0 if has_run(kind_of(model, engine, unknowns)) else seconds
+        short = engine in OF_EVENTS and _as_python(model) <= PATIENCE
+        return 0.0 if short or has_run(kind_of(model, engine, unknowns)) else seconds
     return 0.0
+
+
+def _as_python(model: Model) -> float:
+    """CPU seconds of a run from event to event as Python, which is not compiled where they are few; of a density all
+    its cells, which its error may ask for."""
+    from ..dynamics.events.cost import python_seconds
+    from .rig.costs import elements_of, pairs_of
+
+    count, stiffness = elements_of(model)
+    each = python_seconds(model.rig.modes, model.rig.drive, stiffness, count if stiffness else 0)
+    return model.rig.cycles * each * 2**pairs_of(model)
 
 
 class Need(NamedTuple):

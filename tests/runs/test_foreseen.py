@@ -7,7 +7,7 @@ import tracemalloc
 
 import plan_trial
 import pytest
-from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
+from scene_texts import BENCH, COULOMB, MODE, PATCH, PLASTIC, POINT, STRUCTURE
 
 from patchfem import compiled
 from patchfem.core import Missing
@@ -115,6 +115,15 @@ def test_exact_a_plan_tells_what_compiles_until_a_run_of_its_kind_has_come_to_it
     assert planned(RIG, MARCH, "drive.cycles=7").compile_seconds == 0 and "compile" not in repr(planned(RIG, MARCH))
     assert planned(PATCH).compile_seconds == 0 and other.compile_seconds == seconds
     assert memory.compile_seconds(other.model, other.engine, other.unknowns) == seconds
+
+
+def test_exact_a_plan_counts_no_compile_where_a_short_history_runs_as_python(tmp_path, monkeypatch):
+    monkeypatch.setattr(compiled, "_placed", lambda: (tmp_path, ""))
+    monkeypatch.setattr(compiled, "PLAIN", False)
+    monkeypatch.setattr(compiled, "PATIENCE", 2.0)
+    for law in COULOMB, PLASTIC:
+        short, long = (planned(POINT + law + STRUCTURE, f"drive.cycles={cycles}") for cycles in (30, 30000))
+        assert short.compile_seconds == 0 < long.compile_seconds
 
 
 @pytest.mark.slow

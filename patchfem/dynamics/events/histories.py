@@ -5,8 +5,9 @@ from math import ceil
 
 import numpy as np
 
-from ...compiled import load
+from ...compiled import load, when_compiling
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
+from .cost import READ, python_seconds, sample_seconds
 from .elements import stretches, table_of, virgin
 from .event_list import BORDER, RELEASE, REVERSAL, ROOM, STOP, EventLog
 from .names_kernels import OF_FACE, OF_RUN
@@ -72,8 +73,27 @@ class PieceRun:
 
 
 def warm_up(say=None) -> tuple:
-    """The compiled loop and what reads its rows; `say` is told where they have to be compiled first."""
-    return tuple(load(f"{HERE}.{name}_kernels", say) for name in ("march", "dense", "read"))
+    """The compiled loop and what reads its rows; `say` is told where they have to be compiled."""
+    when_compiling(say)
+    return tuple(load(f"{HERE}.{name}_kernels") for name in ("march", "dense", "read"))
+
+
+def expect(modes: ModalBasis, drive, groups, cycles: float, window: int, runs: int = 1) -> None:
+    """Tell the functions of the loop that as many runs like this one are to come: what is over soon is not compiled."""
+    march, dense, read = warm_up()
+    stiff, shown = max((float(one.stiffness.sum()) for one in groups), default=0.0), min(cycles, window)
+    each = python_seconds(modes, drive, stiff, sum(one.stiffness.size for one in groups))
+    march.march.expect(runs * cycles * each)
+    march.stored.expect(runs * each)
+    dense.evaluate.expect(runs * shown * SAMPLES * sample_seconds(modes))
+    read.read.expect(READ * runs * shown * each)
+
+
+def started(modes: ModalBasis, drive, groups, cycles: float, window: int = 1, travel: float = np.inf,
+            start: Start | None = None, memory=None) -> "_Run":
+    """A run of its own before its first piece; arguments as of `simulate`."""
+    expect(modes, drive, groups, cycles, window)
+    return _Run(modes, drive, groups, cycles, window, travel, start, memory)
 
 
 def simulate(modes: ModalBasis, drive, groups, cycles: float, window: int = 10, travel: float = np.inf,
@@ -86,10 +106,10 @@ def simulate(modes: ModalBasis, drive, groups, cycles: float, window: int = 10, 
     """
     if start is not None and abs(float(modes.output @ start.z)) > travel:
         raise PatchfemError("structure.travel: the start lies beyond it; raise travel or start nearer to the middle")
-    run = _Run(modes, drive, groups, cycles, window, travel, start, memory)
+    run = started(modes, drive, groups, cycles, window, travel, start, memory)
     done = run.go(frames, progress)
     if done is None:  # the travel ends the run: the same again to there, for the last cycles before it
-        again = _Run(modes, drive, groups, run.now / drive.period, window, np.inf, start, memory)
+        again = started(modes, drive, groups, run.now / drive.period, window, np.inf, start, memory)
         again.outcome = Outcome.EXCEEDS_TRAVEL
         done = again.go(frames, None)
     return done
@@ -109,7 +129,7 @@ def briefly(cases, cycles: int, window: int) -> list:
 
 def at_times(modes: ModalBasis, drive, groups, cycles: float, times, start: Start | None = None) -> Response:
     """The motion at any times (k,) [s] of `cycles` drive cycles from rest or `start`, off the series of its pieces."""
-    run, rows, times = _Run(modes, drive, groups, cycles, 1, np.inf, start, None), [], np.asarray(times, float)
+    run, rows, times = started(modes, drive, groups, cycles, start=start), [], np.asarray(times, float)
     run.until(cycles, run._into(rows))
     rows = np.concatenate(rows)
     owner = np.clip(np.searchsorted(rows[:, 0], times, side="right") - 1, 0, len(rows) - 1)

@@ -277,7 +277,7 @@ def march(stop, motion, plant, table, memory, past, clock, books, room, rows):
             root = passed(top, plant, motion, room, books.limits[0], u)
             if root <= u:
                 u, what = root, STOPS
-        switches, changes = table.static[face] > 0.0 and (what == TURNS or what == RELEASES), False
+        switches, changes = (what == TURNS or what == RELEASES) and table.static[face] > 0.0, False
         if switches or whole:
             at_rest(u, h, top, plant, table, memory, room)
         if u > 0:

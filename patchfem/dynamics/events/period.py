@@ -7,9 +7,11 @@ import numpy as np
 
 from ...compiled import load
 from ...core import ModalBasis, NotConverged, PatchfemError
+from .cost import python_seconds
 from .elements import Memory, sorted_stretches, table_of, virgin
 from .plant import Clock, books_of, clock_of, place, plant_of, room_of
 
+SLOPES = 2.0  # times as long a map takes as Python where it carries its slopes
 DRIVES = 256  # sines whose clocks are remembered
 SIGNED = "place", "way", "at", "side", "force", "slip"  # what of a memory turns over with the motion
 
@@ -83,11 +85,11 @@ class PeriodMap:
         self.spare = np.zeros((2, self.n)), np.zeros(faces), np.zeros_like(self.room.coefs)
         self.motion, self.memory = np.zeros((2, self.n)), copied(self.still)
         self.seen, self.carried = np.zeros((2, faces), np.int64), {}
-        self.drive, self.clock, self.clocks = None, None, {}
+        self.drive, self.clock, self.clocks, self.seconds = None, None, {}, 0.0
 
     def _given(self, modes: ModalBasis, groups) -> None:
         """Take modes and elements."""
-        self.groups, self.plant, self.table = tuple(groups), plant_of(modes), table_of(groups)
+        self.modes, self.groups, self.plant, self.table = modes, tuple(groups), plant_of(modes), table_of(groups)
         self.faces, self.held = self.plant.faces, {}
         self.still = virgin(self.table, np.zeros(len(self.groups)))
 
@@ -134,8 +136,10 @@ class PeriodMap:
                 raise PatchfemError("drive: a periodic motion needs one sine that goes on; march this one")
             if len(self.clocks) >= DRIVES:
                 self.clocks.clear()
-            self.clocks[id(drive)] = drive, clock_of(drive, len(self.groups))
-        clock = self.clocks[id(drive)][1]
+            stiff = max(float(one.stiffness.sum()) for one in self.groups)
+            seconds = python_seconds(self.modes, drive, stiff, int(self.table.count.sum()))
+            self.clocks[id(drive)] = drive, clock_of(drive, len(self.groups)), seconds
+        _, clock, self.seconds = self.clocks[id(drive)]
         if self.clock is None:
             self.clock = Clock(*(part.copy() for part in clock))
         self.drive = drive
@@ -153,6 +157,7 @@ class PeriodMap:
             slope[:], marks[:, :memory.depth.max(initial=0)] = unit, 0.0
             marks[face, group, np.arange(2 * n, size)] = 1.0
         seen[0], seen[1] = memory.slipping, memory.depth
+        self.follow.expect(self.seconds * (SLOPES if slopes else 1.0) / (1 + half))
         if size not in self.held:
             self.held[size] = self.follow.held(self.motion, slope, marks, self.plant, self.table, memory, self.clock,
                                                self.books, self.room, self.spare, seen)

@@ -156,7 +156,7 @@ def _what_happened(one: Stretch, later: Stretch, changed, reactions) -> tuple:
 def period_map(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Map:
     """The map of a state (2n,) over whole drive periods; groups: Elements of every interface, rigid ones alone."""
     n = modes.omega.size
-    run = histories._Run(modes, drive, groups, periods, periods, np.inf, Start(state[:n], state[n:]), None)
+    run = histories.started(modes, drive, groups, periods, periods, start=Start(state[:n], state[n:]))
     kept = []
     run.until(periods, lambda done: kept.append(done.copy()))
     rows = np.concatenate(kept)
@@ -221,7 +221,7 @@ class Slips(Shooting):
     def run(self, state, periods: int):
         """The state after some periods of the run."""
         n = self.modes.omega.size
-        run = histories._Run(self.modes, self.drive, self.groups, periods, 1, np.inf, Start(state[:n], state[n:]), None)
+        run = histories.started(self.modes, self.drive, self.groups, periods, start=Start(state[:n], state[n:]))
         run.until(periods)
         return run.motion.ravel().copy()
 

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from plain import plain
 
+from patchfem.compiled.plain import plain
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.events import histories, reading
 from patchfem.dynamics.events import names_kernels as at
@@ -13,7 +13,7 @@ from patchfem.dynamics.events.elements import elements_of
 from patchfem.response.loops import half_range, secant_stiffness, turns_of
 from patchfem.response.run_events import rings
 
-read = plain("dynamics.events.read_kernels")
+read = plain("patchfem.dynamics.events.read_kernels")
 PLACE, WEIGHT = np.polynomial.legendre.leggauss(16)
 
 

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from plain import plain
 from scipy.linalg import expm
 
 from patchfem.compiled import load
+from patchfem.compiled.plain import plain
 from patchfem.core import ModalBasis
 from patchfem.dynamics.events.plant import plant_of, room_of
 
-series, drives = plain("dynamics.events.series_kernels"), plain("dynamics.events.drive_kernels")
+series, drives = plain("patchfem.dynamics.events.series_kernels"), plain("patchfem.dynamics.events.drive_kernels")
 COMPILED = pytest.param(load("dynamics.events.series_kernels"), marks=pytest.mark.slow, id="compiled")
 
 

@@ -82,6 +82,8 @@ def moved(cases: list, cycles: int, window: int, say=None, least: int = 0, stead
     """Runs of cases; least: cases of a thread, as `in_threads` has it; steady: whether the motion is sought that a case
     settles to, as a run for an error does not."""
     histories.warm_up(say)
+    rig = cases[0].model.rig
+    histories.expect(rig.modes, rig.drive, cases[0].groups, cycles, window, len(cases))
     done = [None] * len(cases)
 
     def go(part: slice) -> None:

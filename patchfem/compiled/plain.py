@@ -1,0 +1,45 @@
+"""Modules of kernels as the Python that they are written in: nothing of numba is imported, nothing is compiled.
+
+The text is the one that is compiled. Alone its decorators are others, which leave a function as it is, and the modules
+of kernels that it imports are plain as well.
+"""
+
+import builtins
+from functools import cache
+from importlib.util import resolve_name
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+PACKAGE = __name__.partition(".")[0]
+ROOT = Path(__file__).parents[2]  # where the package lies
+
+
+def _untouched(function=None, **options):
+    """In place of `inner.njit`: the function itself."""
+    return function if function is not None else lambda one: one
+
+
+INNER = SimpleNamespace(njit=_untouched, LEAN={}, INNER={})  # in place of the module `inner`
+
+
+@cache
+def plain(name: str) -> ModuleType:
+    """The module of kernels of this full name, such as "patchfem.dynamics.modal_kernels", uncompiled."""
+    path = ROOT.joinpath(*name.split(".")).with_suffix(".py")
+    module = ModuleType(name)
+    module.__file__, module.__package__ = str(path), name.rpartition(".")[0]
+    module.__builtins__ = vars(builtins) | {"__import__": _bring}
+    exec(compile(path.read_text("utf-8"), str(path), "exec"), vars(module))
+    return module
+
+
+def _bring(name: str, names=None, locals=None, parts=(), level: int = 0):
+    """What an import of a plain module gives: plain kernels, else what Python's own import does."""
+    full = resolve_name("." * level + name, names["__package__"]) if level else name
+    if full == f"{PACKAGE}.compiled.inner":
+        return INNER
+    if full.startswith(PACKAGE) and full.endswith("kernels"):
+        return plain(full)
+    if parts and all(part.endswith("kernels") for part in parts):
+        return SimpleNamespace(**{part: plain(f"{full}.{part}") for part in parts})
+    return builtins.__import__(name, names, locals, parts, level)
