@@ -5,12 +5,13 @@ many digits as the step itself. Peaks are the extremes of the polynomials, integ
 Source: Trefethen, Approximation Theory and Approximation Practice (2013), ch. 5 and 19.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from ...structure.drive_sizes import sinusoidal
+from ..integrated import Integrated, Loop
 from .arrays import ENDS, NODES
 
 # places of a step between which slip may begin or end once: close to its ends, as a stick may last no longer
@@ -24,34 +25,6 @@ HALVINGS = 30  # of the stretch of a step in which slip begins or ends
 SHARE = 0.5  # irreversible part of the slide from which an interface slips, as `response.measures` has it
 ROUND = 1e-13  # of the largest slide: round-off of what it changes by in a step, off its polynomial
 STILL = 1e-7  # of the largest speed in a step, below which a slide turns: there slip and slide stand still together
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Fine:
-    """What the integrator knows of the last cycles better than their samples.
-
-    acceleration: largest |absolute acceleration| [m s-2], force: largest |force| [N], slip and swing: half the range
-    of the irreversible slip and of the output [m]; slide, pull: first Fourier coefficients of slide [m] and force [N];
-    work: of friction [J]; held: time [s] for which the interface sticks; start: mean phase [rad] modulo pi at which
-    slip starts after it, None where it never does; first, third: Fourier coefficients of the acceleration of the output
-    relative to the base [m s-2] at the drive's frequency and three times it; drift: time mean of the slide in the last
-    cycle less that in the first, per cycle between them [m], None of fewer than 1.5 cycles. unsure: by measure, what
-    the last terms of the polynomials make of a peak.
-    """
-
-    acceleration: float
-    force: float
-    slip: float
-    swing: float
-    slide: complex
-    pull: complex
-    work: float
-    held: float
-    start: float | None
-    first: complex
-    third: complex
-    drift: float | None
-    unsure: dict
 
 
 def onto(places) -> np.ndarray:
@@ -169,23 +142,40 @@ class Parts:
         return float((part.sum(axis=1) * self.length).sum()), np.append(times[below], self.begin[between + 1])
 
 
-def fine_of(response, period: float, ends) -> Fine:
-    """The Fine of steps whose places are those of a Response; ends (2, 4): time [s], output [m], its rate [m/s] and
-    friction work [J] where they begin and end.
+def integrated(response, drive, ends) -> tuple:
+    """(Integrated of the steps whose places are those of a Response, by measure what the last terms of the polynomials
+    make of a peak).
 
-    The harmonics of the acceleration are those of the motion by parts.
+    ends (2, 4): time [s], output [m], its rate [m/s] and friction work [J] where they begin and end. Of the starts of
+    slip their mean phase alone is told.
     """
+    period = drive.period
     parts, (before, after) = Parts(response, period), ends
     peaks = {name: [parts.largest(way * parts.of(name)) for way in (1, -1)]
              for name in ("acceleration", "force", "slip", "output")}
     (gain, unsure), (pull, loose) = max(peaks["acceleration"]), max(peaks["force"])
     slip, swing = ((up + down) / 2 for (up, _), (down, _) in (peaks["slip"], peaks["output"]))
+    held, starts = parts.holds()
+    start = [float(np.angle(np.exp(4j * np.pi * starts / period).sum()) / 2 % np.pi)] if starts.size else []
+    loop = Loop(parts.harmonic("slide"), parts.harmonic("force"), after[3] - before[3], 2 * slip,
+                min(held, parts.time[-1, -1] - parts.time[0, 0]), pull)
+    return Integrated(swing, gain, parts.drift(), _waves(parts, drive, ends), (loop,), np.array(start)), \
+        {"absolute_acceleration_peak": unsure, "friction_force_peak": loose}
+
+
+def _waves(parts: Parts, drive, ends) -> tuple | None:
+    """Sizes [m s-2] of the first and the third harmonic of the absolute acceleration at the output under a sine.
+
+    That of the output relative to the base is that of the motion by parts.
+    """
+    if not sinusoidal(drive):
+        return None
+    before, after = ends
     gains = []
     for n in (1, 3):
-        turn = 2j * np.pi * n / period
+        turn = 2j * np.pi * n / drive.period
         edge = [(one[2] + turn * one[1]) * np.exp(-turn * one[0]) for one in (before, after)]
         gains.append(2 / (after[0] - before[0]) * (edge[1] - edge[0]) + turn**2 * parts.harmonic("output", n))
-    held, starts = parts.holds()
-    start = float(np.angle(np.exp(4j * np.pi * starts / period).sum()) / 2 % np.pi) if starts.size else None
-    return Fine(gain, pull, slip, swing, parts.harmonic("slide"), parts.harmonic("force"), after[3] - before[3], held,
-                start, *gains, parts.drift(), {"absolute_acceleration_peak": unsure, "friction_force_peak": loose})
+    last = drive.segments[-1]
+    base = -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start)) if drive.moving else 0.0
+    return abs(gains[0] + base), abs(gains[1])

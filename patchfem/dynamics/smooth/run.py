@@ -1,7 +1,7 @@
 """A motion of modes under a smooth law from its start to its result, with what the kernels leave behind."""
 
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from math import ceil
 
@@ -10,7 +10,7 @@ import numpy as np
 from ... import compiled
 from ...core import ModalBasis, Outcome, Response
 from ...friction.laws.stretch import bonds_of
-from ..integrated import histories
+from ..integrated import Integrated, histories
 from ..march.march import MarchResult
 from ..work_check import sampled_work
 from .arrays import (
@@ -39,7 +39,7 @@ from .arrays import (
     Kept,
     Moving,
 )
-from .reader import Fine, fine_of
+from .reader import integrated
 from .waves import SINES, wave_of
 
 SAMPLES = 400  # per drive cycle in the kept window
@@ -69,9 +69,10 @@ def loops_of(law: str, say=None):
 class SmoothResult(MarchResult):
     """A MarchResult, what the integrator knows besides, the last cycles with the samples at reversals among the others
     (`turned`), and what the motion still changes by, over its size, where its last cycles stand for others
-    (`unlike`); tolerance: of its steps."""
+    (`unlike`); unsure: errors of peaks by measure; tolerance: of its steps."""
 
-    fine: Fine | None = None
+    fine: Integrated | None = None
+    unsure: dict = field(default_factory=dict)
     turned: Response | None = None
     unlike: float = 0.0
     tolerance: float = 0.0
@@ -295,7 +296,7 @@ class Run:
         return np.array([self.time, y[:n] @ output, y[n:2 * n] @ output, y[-1]])
 
     def last(self, end: float, window: float, shots=(), seen: list | None = None) -> tuple:
-        """Move on to the time `end` [s] and keep the last `window` [s]: (rows, Fine).
+        """Move on to the time `end` [s] and keep the last `window` [s]: (rows, what `reader.integrated` gives).
 
         shots: times [s] of snapshots of the interface, which are added to `seen`.
         """
@@ -315,10 +316,10 @@ class Run:
                 break
         self.tolerance, rows = tolerance, np.concatenate(rows)
         if not self.parts:
-            return rows, None
+            return rows, (None, {})
         places = np.concatenate(self.parts)
-        return rows, fine_of(self.response(places.reshape(-1, places.shape[2])), self.drive.period,
-                             np.array([since, self.ends()]))
+        return rows, integrated(self.response(places.reshape(-1, places.shape[2])), self.drive,
+                                np.array([since, self.ends()]))
 
     def _snapshot(self) -> dict:
         row, _, memory, _ = self.settled()
@@ -347,7 +348,7 @@ def simulate(modes: ModalBasis, drive, element, cycles: float, tolerance: float,
         count = max(2, round((whole - window * period) / period * SAMPLES) + 1)
         kept = [run.until(end - window * period, np.linspace(end - whole, end - window * period, count))[:-1]]
     at = end - np.linspace(min(1.0, cycles), 0.0, frames + 1)[1:] * period if frames else []
-    rows, fine = run.last(end, window * period, [float(min(t, end)) for t in at], shots)
+    rows, (fine, unsure) = run.last(end, window * period, [float(min(t, end)) for t in at], shots)
     if run.outcome is not None and run.time > 0:  # its last cycles were not known before: once more to where it ended
         done = simulate(modes, drive, element, run.time / period, tolerance, window, np.inf, frames, start)
         return replace(done, outcome=run.outcome, message=run.message)
@@ -357,7 +358,8 @@ def simulate(modes: ModalBasis, drive, element, cycles: float, tolerance: float,
     phasors = np.array([1, 1j]) @ run.kept.cycles[2:, :done]
     book = run.book() | _work_check(turned)
     return SmoothResult(run.response(rows), last, np.zeros(0), run.extremes(done), phasors, book, run.outcome,
-                        shots, fine.work, run.time / period, run.message, (), fine, turned, run.unlike, tolerance)
+                        shots, fine.loops[0].work, run.time / period, run.message, (), fine, unsure, turned,
+                        run.unlike, tolerance)
 
 
 def _work_check(turned) -> dict:

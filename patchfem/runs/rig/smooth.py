@@ -3,13 +3,10 @@
 from dataclasses import replace
 from time import perf_counter
 
-import numpy as np
-
-from ...dynamics.integrated import Integrated, Loop
+from ...dynamics.integrated import Integrated
 from ...dynamics.smooth import run as hub
 from ...response.measures import slip_noise
 from ...response.rows import row_of
-from ...structure.drive_sizes import sinusoidal
 from .interface import model_of
 from .reading import Reader, thinned
 from .solution import Solution
@@ -46,12 +43,10 @@ class Smooth(Reader):
 
     def integrated(self, run, drive) -> Integrated:
         """What the polynomials of the steps give."""
-        fine, book, clear = run.fine, run.ledger, _clear(run)
-        held = min(fine.held, run.window.time[-1] - run.window.time[0]) if clear else None
-        starts = np.array([] if fine.start is None else [fine.start]) if clear else None
-        return Integrated(fine.swing, fine.acceleration, fine.drift, _waves(fine, drive), (
-            Loop(fine.slide, fine.pull, fine.work, 2 * fine.slip, held, fine.force),), starts,
-            (book["sampled"], book["booked"], book["passed"]))
+        book, fine = run.ledger, run.fine
+        if not _clear(run):
+            fine = replace(fine, loops=(fine.loops[0]._replace(stuck=None),), starts=None)
+        return replace(fine, books=(book["sampled"], book["booked"], book["passed"]))
 
     def more(self, run, drive, stuck: bool) -> dict:
         """The samples with the reversals among them, and the evenly spaced ones where the spacing counts."""
@@ -68,19 +63,10 @@ class Smooth(Reader):
         size = values.get("relative_displacement_amplitude", 0.0)
         for name in ("stick_fraction", "slip_start_phase"):
             found[name] = LOCATED if _clear(run) else found.get(name, row_of(name).halves[1] / self.steps)
-        return {name: found.get(name, 0.0) + run.fine.unsure.get(name, 0.0)
+        return {name: found.get(name, 0.0) + run.unsure.get(name, 0.0)
                 + run.unlike * (size if name == "drift_per_cycle" else abs(value)) for name, value in values.items()}
-
-
-def _waves(fine, drive) -> tuple | None:
-    """Sizes [m s-2] of the first and the third harmonic of the absolute acceleration at the output under a sine."""
-    if not sinusoidal(drive):
-        return None
-    last = drive.segments[-1]
-    base = -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start)) if drive.moving else 0.0
-    return abs(fine.first + base), abs(fine.third)
 
 
 def _clear(run) -> bool:
     """Whether the slip of a SmoothResult is no round-off."""
-    return 2 * run.fine.slip > CLEAR * slip_noise(run.window)
+    return run.fine.loops[0].slip > CLEAR * slip_noise(run.window)

@@ -162,7 +162,7 @@ def test_exact_a_stuck_contact_is_a_spring():
     small = BaseSine(1e-4, OMEGA)
     done = simulate(ONE, small, element(SHORT), 40, 1e-10, 1)
     stiff = OMEGA**2 + 0.3 * LOAD / SHORT.length / MASS
-    ratio = done.fine.slide / done.fine.pull
+    ratio = done.fine.loops[0].first / done.fine.loops[0].pull
     assert ratio == pytest.approx(SHORT.length / (0.3 * LOAD), rel=1e-4)
     decay, time = ONE.zeta[0] * ONE.omega[0], done.response.time
     turn = np.sqrt(stiff - decay**2)
@@ -262,11 +262,11 @@ def test_exact_peaks_of_the_last_cycles_are_those_of_close_samples(law):
     """A force that stands at its limit for most of a cycle has its peaks looked for only where they may rise."""
     one, other = (Run(ONE, SINE, element(law), 12, 1e-9) for _ in range(2))
     period = SINE.period
-    _, fine = one.last(12 * period, 3 * period)
+    _, (fine, _) = one.last(12 * period, 3 * period)
     other.until(9 * period)
     other.tolerance *= 1e-2
     close = other.response(other.until(12 * period, np.linspace(9 * period, 12 * period, 30001)))
-    for peak, column in ((fine.acceleration, close.acceleration), (fine.force, close.force)):
+    for peak, column in ((fine.acceleration, close.acceleration), (fine.loops[0].force, close.force)):
         assert peak == pytest.approx(np.abs(column).max(), rel=1e-7)
-    for half, column in ((fine.slip, close.slip), (fine.swing, close.output)):
+    for half, column in ((fine.loops[0].slip / 2, close.slip), (fine.swing, close.output)):
         assert half == pytest.approx(np.ptp(column) / 2, rel=1e-7)
