@@ -3,8 +3,10 @@
 The step of a march meets reversals and sticks at irregular places. So its error falls like the square of the step on
 the whole, but often not at every halving. Three runs with a step of h, 2h and 4h tell which it is. Where the changes of
 a measure have one sign and a ratio between 2^1.7 and 2^2.3, they show their order p, and change/(2^p - 1) is the error
-of Richardson (Phil. Trans. A 210, 307, 1911) but for a safety factor. Where they do not, the error is of the size of
-the changes, and one of them can be small by chance. So the larger one counts, and a share of what the main measures of
+of Richardson (Phil. Trans. A 210, 307, 1911) but for a safety factor. Ratios between 2^1.3 and 2^3 show that the error
+falls, of which no more than the second order is believed: the error at 2h is then a third of the earlier change, and a
+quarter of that is left at h. Where changes turn their sign, grow, or fall by more, the error is of the size of the
+changes, and one of them can be small by chance. So the larger one counts, and a share of what the main measures of
 the same run typically change by. That share is left out for a force, which its limit bounds, and for energies over the
 whole run. Where the change of a main measure does not fall with the step, no other's order is believed, and that
 largest change counts for the typical one. The factors are those that held on 60 random scenes of nine laws at three
@@ -20,6 +22,7 @@ from ..core import Measure
 from .rows import first_harmonic, floor_of, of_first, row_of
 
 ORDERS = 2**1.7, 2**2.3  # ratios of two changes at halved steps that show second order
+WIDER = 2**1.3, 2**3  # ratios that show an error which falls by a lower or a higher order
 SURE = 2.2  # times the error that follows from the order: 95 % of these are below 1.5 to 2 times it
 LOOSE = 1.3  # times the larger change: 95 % of the errors of irregular measures lie below 0.4 to 1.1 of it
 GROWS = 1.5  # times that where the later change is the larger one: nothing converges yet
@@ -80,12 +83,16 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int, size: float = 
         earlier, value = before.get(name, 0.0), _size(fine, name)
         if sizes[name] <= ROUND * value:  # a limit or a given load: it does not hang on the step
             out[name] = sizes[name]
-        elif orderly and gap and ORDERS[0] <= earlier / gap <= ORDERS[1]:
-            out[name] = max(SURE * abs(gap) / (earlier / gap - 1), LEAST * typical * value)
         else:
-            kind, grows = of_first(name), GROWS if missed or abs(earlier) < abs(gap) else 1.0
+            kind, ratio = of_first(name), earlier / gap if gap else 0.0
             least = 0.0 if kind in APART else (1.0 if missed else SHARE) * typical * value
-            out[name] = grows * LOOSE * LOOSER.get(kind, 1.0) * max(sizes[name], least)
+            if orderly and ORDERS[0] <= ratio <= ORDERS[1]:
+                out[name] = max(SURE * abs(gap) / (ratio - 1), LEAST * typical * value)
+            elif orderly and WIDER[0] <= ratio <= WIDER[1]:  # a twelfth: h^2 over the (4^2 - 2^2) h^2 of that change
+                out[name] = max(SURE * max(abs(gap) / (ratio - 1), abs(earlier) / 12), LOOSE * least)
+            else:
+                grows = GROWS if missed or abs(earlier) < abs(gap) else 1.0
+                out[name] = grows * LOOSE * LOOSER.get(kind, 1.0) * max(sizes[name], least)
         if sizes[name] > ROUND * value and name not in GAPS:
             out[name] = max(out[name], OF_FLOOR * float(floor_of(name, size)))
         out[name] += row_of(name).grain / steps

@@ -7,6 +7,7 @@ import pytest
 
 from patchfem.model.model import build
 from patchfem.response.errors import (
+    LOOSE,
     MAIN,
     SURE,
     cells_error,
@@ -114,6 +115,20 @@ def test_exact_runs_that_show_their_order_have_the_error_of_richardson(order, si
     """v(h) = 1 + c h^p at h = 1, 2, 4: the error c, times the safety factor, whatever its sign."""
     fine, half, quarter = ({NAME: 1 + sign * 1e-3 * h**order} for h in (1, 2, 4))
     assert step_error(fine, half, quarter, 400)[NAME] == pytest.approx(SURE * 1e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize(("order", "share"), [(1.4, 1.0), (1.6, 1.0), (2.4, (4**2.4 - 2**2.4) / 12), (3.0, 56 / 12)])
+def test_exact_of_a_higher_order_no_more_than_the_second_is_believed(order, share):
+    """v(h) = 1 + c h^p: below second order the error c; above it a twelfth of the change from 4 to 2 steps."""
+    fine, half, quarter = ({NAME: 1 + 1e-3 * h**order} for h in (1, 2, 4))
+    assert step_error(fine, half, quarter, 400)[NAME] == pytest.approx(SURE * share * 1e-3, rel=1e-9)
+
+
+def test_exact_changes_that_turn_their_sign_keep_the_larger_one():
+    """3 and -1, then 3 and 1: the sign alone tells that no order is shown."""
+    turned, same = ({NAME: 1.0}, {NAME: 1.0 + 1e-3}, {NAME: 1.0 - 2e-3}), ({NAME: 1.0}, {NAME: 1.001}, {NAME: 1.004})
+    assert step_error(*turned, 400)[NAME] == pytest.approx(LOOSE * 1e-3, rel=1e-9)
+    assert step_error(*same, 400)[NAME] == pytest.approx(SURE * 1e-3 / 2, rel=1e-9)
 
 
 @pytest.mark.parametrize("order", [0.5, 1.0, 1.5, 3.0, 4.0])

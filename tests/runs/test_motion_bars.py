@@ -38,6 +38,16 @@ def test_exact_the_independent_program_reads_peaks_between_its_nodes():
             assert found[0][name] == pytest.approx(value, rel=1e-8, abs=1e-16), name
 
 
+def test_exact_the_independent_program_goes_on_from_a_state_as_if_it_had_not_stopped():
+    """Bouc-Wen with its stretch against the speed: from two cycles on, in one run and from where another stopped."""
+    s = spec(41100125)
+    period, motion, whole = 1 / s["frequency"], Motion(s), Motion(s)
+    one = motion.run(2 * period, 1e-11)[-1].solution(2 * period)[:motion.size]
+    other = motion.run(period / 3, 1e-11, one)[-1].solution(period / 3)
+    once = whole.run(7 * period / 3, 1e-11)[-1].solution(7 * period / 3)
+    np.testing.assert_allclose(other[:motion.size], once[:motion.size], rtol=1e-7)
+
+
 @pytest.mark.slow
 def test_always_most_bars_of_forty_rigs_hold(tmp_path):
     """What 114 other rigs had (tests/README.md), less what the chance of forty allows."""

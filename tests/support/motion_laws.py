@@ -24,6 +24,9 @@ class Law:
     def begin(self, v: float, accel: float) -> None:
         self.mode = 1 if (v if v != 0 else accel) >= 0 else -1
 
+    def resume(self, s) -> None:
+        """Take the borders on which a motion lies that begins in a state s other than 0."""
+
     def guards(self, s, v, t) -> list:
         return [self.mode * v]
 
@@ -152,6 +155,10 @@ class BoucWen(Law):
     def begin(self, v, accel):
         super().begin(v, accel)
         self.side = self.mode
+
+    def resume(self, s):
+        if s[0]:
+            self.side = 1 if s[0] > 0 else -1
 
     def turned(self, k, s, v, accel):
         if k:

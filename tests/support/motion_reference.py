@@ -253,6 +253,8 @@ class Motion:
         if not self.laws[0].set_valued:
             for law, v, a in zip(self.laws, rates, self.accelerations(t, y)):
                 law.begin(v, a)
+            for law, part in zip(self.laws, self.parts):
+                law.resume(y[part])
         else:
             self.choose(t, y, [k for k, law in enumerate(self.laws) if law.mode == 0])
         same = count = 0
