@@ -173,5 +173,5 @@ def test_exact_a_batch_brings_the_kind_of_its_cases_alone(scene, law):
     path = scene(POINT + law + STRUCTURE.replace("cycles = 30", "cycles = 20"))
     loaded(code, path)  # keeps the code
     modules = loaded(code, path)
-    absent(modules, "dynamics.smooth", "runs.many.lumped.smooth")
+    absent(modules, "dynamics.smooth")
     assert "xarray" in modules and "dask.array" not in modules

@@ -1,6 +1,9 @@
 """Warnings of measures that are known less well than the tolerance asks: the worst one, how well, and what cures it."""
 
+from collections.abc import Mapping
 from math import ceil, log2, log10, pi
+from types import MappingProxyType
+from typing import NamedTuple
 
 from ..core import say
 from ..effects import has
@@ -22,36 +25,45 @@ FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_
          "pressure_peak", "contact_fraction")
 
 
-def loose(result, coarse=()) -> list:
+class Seen(NamedTuple):
+    """What warnings and cures are told by: measures by name, patch and `extra` as a Result has them."""
+
+    model: object
+    measures: dict
+    patch: object = None
+    extra: Mapping = MappingProxyType({})
+
+
+def beyond_tolerance(seen: Seen, coarse=()) -> list:
     """A warning for the mesh and one for the motion, each with the measures that miss the tolerance and the cure.
 
     Where any that a run answers first, FIRST, do so, these are named and the worst of them is cured. coarse:
     the patch of the result on the coarser meshes of its ladder, where they are at hand.
     """
-    model = result.plan.model
+    model = seen.model
     tolerance = model.accuracy.tolerance
     wide = {name: min(m.error / max(tolerance * abs(m.value) + m.floor, 1e-300), MOST)
-            for name, m in result.measures.items()
+            for name, m in seen.measures.items()
             if m.value is not None and m.error is not None and m.error > tolerance * abs(m.value) + m.floor}
-    pressed = TABLE if result.patch is not None else ()
+    pressed = TABLE if seen.patch is not None else ()
     static = {name: times for name, times in wide.items() if name in pressed}
     moving = {name: times for name, times in wide.items() if name not in pressed}
-    out = [_said(result, static, _finer_mesh(result, static, coarse))] if static else []
-    return [*out, _said(result, moving, _finer_motion(result, moving, coarse))] if moving else out
+    out = [_said(seen, static, _finer_mesh(seen, static, coarse))] if static else []
+    return [*out, _said(seen, moving, _finer_motion(seen, moving, coarse))] if moving else out
 
 
-def _first(result, wide: dict) -> list:
+def _first(seen, wide: dict) -> list:
     """Those of FIRST among `wide` (name -> error over what is allowed) that are not 0 within it, else the worst."""
-    known = result.measures
+    known = seen.measures
     out = [name for name in FIRST if name in wide and known[name].error < abs(known[name].value)]
     asked = {name: times for name, times in wide.items() if not name.startswith(RINGS)} or wide
     return out or [max(asked, key=asked.get)]
 
 
-def _said(result, wide: dict, remedy: str) -> str:
+def _said(seen, wide: dict, remedy: str) -> str:
     """The measures that speak for `wide` (name -> error over what is allowed), and how many others there are."""
-    tolerance, names = result.plan.model.accuracy.tolerance, _first(result, wide)
-    known, left = [_known(result.measures[name]) for name in names], len(wide) - len(names)
+    tolerance, names = seen.model.accuracy.tolerance, _first(seen, wide)
+    known, left = [_known(seen.measures[name]) for name in names], len(wide) - len(names)
     more = "".join(f", {name} {one}" for name, one in zip(names[1:], known[1:], strict=True))
     others = f" ({left} other measure{'s' * (left > 1)} beside {'it' if len(names) == 1 else 'them'})" if left else ""
     return f"{names[0]} is known {known[0]}{more}, the tolerance is {tolerance:g}{others}; {remedy}"
@@ -62,44 +74,44 @@ def _known(found) -> str:
     return f"to {abs(found.error / found.value):.2g} of its value" if share else f"no better than {found}"
 
 
-def _finer_mesh(result, wide: dict, coarse) -> str:
+def _finer_mesh(seen, wide: dict, coarse) -> str:
     """What cures the errors of a mesh in the measures `wide` (name -> error over what is allowed).
 
     A tighter tolerance only where a ladder of meshes climbs further for it; a looser one where it is met by all.
     """
-    asked, tolerance = result.plan.model.patch, result.plan.model.accuracy.tolerance
+    asked, tolerance = seen.model.patch, seen.model.accuracy.tolerance
     times = max(wide.values())
-    peak = result.measures.get("pressure_peak")
-    if "worn_depth_max" in _first(result, wide) and peak is not None and peak.value is None:
+    peak = seen.measures.get("pressure_peak")
+    if "worn_depth_max" in _first(seen, wide) and peak is not None and peak.value is None:
         return "it wears deepest where the pressure has no bound, so a finer mesh is not known to settle it; read it " \
                "by its error"
     if times >= MOST:
         return READ  # it is 0
     if asked.mesh is not None:
         return "split the elements of contact.mesh"
-    nodes, wider = result.patch.x.size, f"accuracy.tolerance = {_up(tolerance * times):g} would be met"
-    if asked.strips is not None and asked.strips[0] > 1 and result.plan.model.kind == "patch":  # of bars
+    nodes, wider = seen.patch.x.size, f"accuracy.tolerance = {_up(tolerance * times):g} would be met"
+    if asked.strips is not None and asked.strips[0] > 1 and seen.model.kind == "patch":  # of bars
         return f"the mesh ({nodes} interface nodes) and the strips share it; {_more_strips(asked, wide)}"
     if not asked.chosen:
         return f"leave out {SIZE}"
     if not wide.keys() - set(DECISIVE):
         return f"a mesh finer than {nodes} interface nodes would take too long; {wider}"
-    if asked.chosen and _locks(result, wide):
+    if asked.chosen and _locks(seen, wide):
         return "cells of any mesh leave that in plane strain at this Poisson's ratio; read it by its error"
-    tighter = _climbing(result, coarse)
+    tighter = _climbing(seen, coarse)
     if tighter is None:
-        finer = f"points closer than {say(result.patch.averaging, 3)}" if result.patch.averaging and \
-            result.patch.sharper else f"a mesh finer than {nodes} interface nodes"
+        finer = f"points closer than {say(seen.patch.averaging, 3)}" if seen.patch.averaging and \
+            seen.patch.sharper else f"a mesh finer than {nodes} interface nodes"
         return f"{finer} would take too long; read {'them by their errors' if len(wide) > 1 else 'it by its error'}"
     return f"the mesh ({nodes} interface nodes) was not chosen for it; accuracy.tolerance = {tighter:.3g} refines it"
 
 
-def _locks(result, wide: dict) -> bool:
+def _locks(seen, wide: dict) -> bool:
     """Whether the measures that speak for `wide` are known as well as Poisson's ratio allows."""
     from .patch.high_order import locked
 
-    share, known = locked(result.plan.model.patch), result.measures
-    return all(known[name].error <= share * abs(known[name].value) for name in _first(result, wide))
+    share, known = locked(seen.model.patch), seen.measures
+    return all(known[name].error <= share * abs(known[name].value) for name in _first(seen, wide))
 
 
 def _more_strips(asked, wide: dict) -> str:
@@ -113,56 +125,56 @@ def _more_strips(asked, wide: dict) -> str:
     return f"set contact.strips.count = {ceil(count)}{sized}" if count <= MOST_STRIPS else READ
 
 
-def _climbing(result, coarse) -> float | None:
+def _climbing(seen, coarse) -> float | None:
     """The tolerance for which the ladder of a patch climbs further; None where it has ended for good.
 
     Where its coarser meshes are not at hand it is one of at least one halving more.
     """
-    asked, tolerance = result.plan.model.patch, result.plan.model.accuracy.tolerance
+    asked, tolerance = seen.model.patch, seen.model.accuracy.tolerance
     if not any(coarse) or asked.meshes is not None:
         return TIGHTER * tolerance
     from .patch.ladder import climbs_at
 
-    return climbs_at(asked, [result.patch, *coarse], asked.mesh_tolerance or tolerance)
+    return climbs_at(asked, [seen.patch, *coarse], asked.mesh_tolerance or tolerance)
 
 
-def _finer_motion(result, wide: dict, coarse) -> str:
+def _finer_motion(seen, wide: dict, coarse) -> str:
     """What cures the errors of a motion in the measure that speaks for `wide` (name -> error over what is allowed).
 
     It is that of what leaves most of it open. Steps cure it where it was seen to fall with them, by as many as its
     order asks for. A looser tolerance is no cure: it chooses coarser steps and meshes.
     """
-    name = max(_first(result, wide), key=wide.get)
-    if name in (rings := result.extra.get("still_rings", {})):
+    name = max(_first(seen, wide), key=wide.get)
+    if name in (rings := seen.extra.get("still_rings", {})):
         return rings[name]
-    steps, cause = result.extra.get("steps_per_cycle") or result.extra.get("steps"), _cause(result, name)
+    steps, cause = seen.extra.get("steps_per_cycle") or seen.extra.get("steps"), _cause(seen, name)
     if cause == "steps" and steps is not None:
-        return _more_steps(result, name, wide, int(steps))
+        return _more_steps(seen, name, wide, int(steps))
     if cause == "end":
-        return _to_a_sample(result.extra["cycles"], int(steps))
+        return _to_a_sample(seen.extra["cycles"], int(steps))
     if cause == "mesh":
-        return _finer_under(result, coarse)
-    if cause == "modes" and result.extra["shear_modes"] < result.patch.x.size:
-        return f"set accuracy.shear_modes = {min(4 * result.extra['shear_modes'], result.patch.x.size)}"
+        return _finer_under(seen, coarse)
+    if cause == "modes" and seen.extra["shear_modes"] < seen.patch.x.size:
+        return f"set accuracy.shear_modes = {min(4 * seen.extra['shear_modes'], seen.patch.x.size)}"
     if cause == "bonds":
-        return _finer_bonds(result.plan.model.accuracy)
-    balanced = result.extra.get("harmonics")  # None where a steady motion is exact between yields
+        return _finer_bonds(seen.model.accuracy)
+    balanced = seen.extra.get("harmonics")  # None where a steady motion is exact between yields
     return READ if balanced is None or name.startswith(OF_SAMPLES) else \
-        more_harmonics(balanced, _sharp(result))
+        more_harmonics(balanced, _sharp(seen))
 
 
-def _cause(result, name: str) -> str:
+def _cause(seen, name: str) -> str:
     """What leaves most of a measure open: one of the kinds of `response.coarser.left_open`."""
-    extra = result.extra
+    extra = seen.extra
     if (left := extra.get("left_open")) is None:  # a batch, which has no steps, or a run without an estimate
         return "steps" if extra.get("steps_per_cycle") or extra.get("steps") else \
-            "own" if result.patch is None else "mesh"
+            "own" if seen.patch is None else "mesh"
     return max(left["parts"], key=lambda kind: left["parts"][kind].get(name, 0.0), default="own")
 
 
-def _more_steps(result, name: str, wide: dict, steps: int) -> str:
+def _more_steps(seen, name: str, wide: dict, steps: int) -> str:
     """As many steps as the order at which the measure `name` was seen to fall asks for, or what helps without one."""
-    model, left = result.plan.model, result.extra.get("left_open") or {"parts": {}, "orders": {name: 2.0}}
+    model, left = seen.model, seen.extra.get("left_open") or {"parts": {}, "orders": {name: 2.0}}
     order = left["orders"].get(name)
     if order is None:
         return _unproven(model, steps, name, wide)
@@ -190,12 +202,12 @@ def _finer_bonds(accuracy) -> str:
         f"accuracy.tolerance = {TIGHTER * accuracy.tolerance:.3g} refines the sum over bonds"
 
 
-def _sharp(result) -> float:
+def _sharp(seen) -> float:
     """Harmonics that show how fast a friction turns that follows the speed: the largest speed over that of the law."""
-    law, slip = result.plan.model.friction, result.measures.get("slip_amplitude")
+    law, slip = seen.model.friction, seen.measures.get("slip_amplitude")
     if law is None or slip is None or not has(law.law, "creeps"):
         return 0.0
-    return 2 * pi / result.extra["period"] * slip.value / law.reference_speed
+    return 2 * pi / seen.extra["period"] * slip.value / law.reference_speed
 
 
 def _unproven(model, steps: int, name: str, wide: dict) -> str:
@@ -215,14 +227,14 @@ def _unproven(model, steps: int, name: str, wide: dict) -> str:
     return f"{seen}, so more steps are not known to cure it; read it by its error"
 
 
-def _finer_under(result, coarse) -> str:
+def _finer_under(seen, coarse) -> str:
     """What refines the mesh that leaves a motion open."""
-    asked, nodes = result.plan.model.patch, result.patch.x.size
+    asked, nodes = seen.model.patch, seen.patch.x.size
     if asked.mesh is not None:
         return "the mesh leaves it open; split the elements of contact.mesh"
     if not asked.chosen:
         return f"the mesh leaves it open; leave out {SIZE}"
-    tighter = _climbing(result, coarse)
+    tighter = _climbing(seen, coarse)
     if tighter is None:
         return f"the mesh ({nodes} interface nodes) leaves it open, and a finer one would take too long; read it by " \
                "its error"

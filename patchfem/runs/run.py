@@ -15,7 +15,7 @@ from ..model.model import Model
 from ..model.source import placed
 from . import memory
 from .plan import Plan, plan, refuse_size
-from .remedies import loose
+from .remedies import Seen, beyond_tolerance
 from .results.result import Result, placeless, worded
 
 __all__ = ["Kept", "Plan", "Result", "plan", "run"]
@@ -115,7 +115,8 @@ def _whole(result: Result, notes: list, begin: float, coarse=()) -> Result:
     """The result with its time since `begin`, its notes, and words that name no folder."""
     result.seconds["total"], model = perf_counter() - begin, result.plan.model
     apart = "strip" if model.patch is not None else "interface"
-    warned, noted = result.warnings + loose(result, coarse), [*notes, *result.extra.get("notes", [])]
+    wide = beyond_tolerance(Seen(model, result.measures, result.patch, result.extra), coarse)
+    warned, noted = result.warnings + wide, [*notes, *result.extra.get("notes", [])]
     return replace(result, measures=worded(result.measures, apart), warnings=placeless(warned, model.source.path),
                    extra=result.extra | {"notes": placeless(noted, model.source.path)})
 

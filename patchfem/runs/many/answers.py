@@ -59,14 +59,16 @@ class Answers:
     def put(self, case: int, outcome: str, measures: dict, seconds: float) -> None:
         """Fill in one case. measures: name -> core.Measure."""
         self.outcome[case], self.seconds[case] = str(outcome), seconds
+        self.fill(case, measures)
+
+    def fill(self, case: int, measures: dict) -> None:
+        """Fill in measures of a case, name -> core.Measure, over what it has of them."""
         for name, one in measures.items():
             self.measure(name, one.unit)
             if one.value is None:
                 self.reasons.setdefault(name, {})[case] = one.reason
-            else:
-                self.values[name][case] = one.value
-            if one.error is not None:
-                self.errors[name][case] = one.error
+            self.values[name][case] = np.nan if one.value is None else one.value
+            self.errors[name][case] = np.nan if one.error is None else one.error
             self.floors[name][case] = one.floor
 
     def place(self, cases: Sequence[int], part: Answers) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,25 +13,12 @@ from ...model.model import Model
 from ..patch import result as of_patch
 from ..patch import static
 from ..patch.meshes import geometry_of
-from ..remedies import loose
+from ..remedies import Seen, beyond_tolerance
 from ..results.result import placeless
 from . import one_by_one
 from .answers import Answers, joined
 
 AT_ONCE = 1000  # cases whose forces are held at once
-
-
-class _Seen(NamedTuple):
-    """What `loose` asks of a result."""
-
-    plan: Any
-    measures: dict
-    patch: Any
-    extra: dict
-
-
-class _Plan(NamedTuple):
-    model: Model
 
 
 class _Nodes(NamedTuple):
@@ -62,11 +49,10 @@ def solve(models: Sequence[Model], say: Callable | None = None) -> Answers:
         measures = of_patch.floored(model, one.measures)
         out.put(case, Outcome.DONE, measures, 0.0)
         out.numerics[case] = nodes
-        seen = _Seen(_Plan(model), measures, _Nodes(np.broadcast_to(0.0, one.nodes)), {})
-        said = [*model.source.remarks, *of_patch.strained_by(model.patch, one.top, one.approach),
-                *loose(seen)]
-        if said:
-            out.warnings[case] = placeless(said, model.source.path)
+        warned = [*model.source.remarks, *of_patch.strained_by(model.patch, one.top, one.approach),
+                *beyond_tolerance(Seen(model, measures, _Nodes(np.broadcast_to(0.0, one.nodes))))]
+        if warned:
+            out.warnings[case] = placeless(warned, model.source.path)
         notes = [*of_patch.slender(model.patch, measures["normal_load"].value / area), *one.band]
         if notes:
             out.notes[case] = placeless(notes, model.source.path)

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ....core import Outcome
+from ....core import Measure, Outcome
+from ....effects import has
 from ....response.errors import total_error
 from ....response.measures import energy_balance
 from ....response.outcome import SMALL, moves_on, settled, steady_error
@@ -13,11 +14,12 @@ from ....response.reasons import CYCLIC, without_value
 from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
 from ....structure.drive_sizes import largest, omega_of, slowest
+from ...remedies import Seen, beyond_tolerance
 from ...results.notes import BOOKS
 from ...results.result import placeless
 from ...rig.engines import knobs_idle
+from ...rig.remarks import said_of_law
 from ..answers import Answers
-from .warned import said
 
 ENDS = 5  # last windows whose phasors tell a steady motion (response.settling)
 MAIN, PHASE = "relative_displacement_amplitude", "slip_start_phase"
@@ -84,7 +86,7 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
     still = np.array([one is Outcome.TRANSIENT for one in outcome]) & ~np.isnan(steady) & ~runs.stuck
     values["relative_displacement_amplitude_steady"] = np.where(still, steady, np.nan)
     errors["relative_displacement_amplitude_steady"] = steady_error(steady, error, values[MAIN], errors[MAIN])
-    resolved, loose = np.ones(n, bool), np.zeros(n, bool)
+    resolved, wide_of = np.ones(n, bool), np.zeros(n, bool)
     for name, value in values.items():
         there = ~np.isnan(value)
         if not there.any():
@@ -92,7 +94,7 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
         row, floor = TABLE[name], floor_of(name, moved)
         wide = there & (errors[name] > tolerance * np.abs(value) + floor)
         floor = np.fmax(floor, tolerance * larger_term(name, values))
-        loose |= wide & (errors[name] > tolerance * np.abs(value) + floor) & ~grows
+        wide_of |= wide & (errors[name] > tolerance * np.abs(value) + floor) & ~grows
         if name == MAIN and runs.again:
             alone |= wide & ~grows
         if not name.endswith("_steady"):
@@ -104,7 +106,7 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
     for case, model in enumerate(models):
         found.numerics[case] = numerics | runs.chosen[case] if runs.chosen else numerics
         remarks = [*model.source.remarks, *knobs_idle(model, numerics["engine"]), *model.rig.notes]
-        if warnings := [*remarks, *said(model, outcome[case], found, case, loose[case])]:
+        if warnings := [*remarks, *warned(model, outcome[case], found, case, wide_of[case])]:
             found.warnings[case] = placeless(warnings, model.source.path)
     return found, alone, resolved
 
@@ -144,3 +146,18 @@ def _reasons(models, runs: Runs, found: Answers) -> None:
             found.floors[name][case] = measure.floor
 
 
+def warned(model, outcome, found: Answers, case: int, wide: bool) -> list:
+    """Warnings of a case, those that its own run would give: of its law and, where `wide` says that some is, of what is
+    known less well than the tolerance asks."""
+    if not wide and not has(model.friction.law, "bonds"):
+        return []
+    known = known_of(found, case)
+    drift = {name: one for name, one in known.items() if name == "drift_per_cycle"}
+    return [*said_of_law(model, outcome, drift, 0.0), *beyond_tolerance(Seen(model, known))]
+
+
+def known_of(found: Answers, case: int) -> dict:
+    """The measures of a case whose errors are known, by name."""
+    return {name: Measure(float(column[case]), found.units[name], float(found.errors[name][case]),
+                          float(found.floors[name][case]))
+            for name, column in found.values.items() if not np.isnan(found.errors[name][case])}

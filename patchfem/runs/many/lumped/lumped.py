@@ -1,8 +1,6 @@
 """The batch of lumped cases: which models it takes, which stand together, and their answers."""
 
 from collections.abc import Sequence
-from functools import lru_cache
-from importlib import import_module
 from time import perf_counter
 
 import numpy as np
@@ -12,9 +10,9 @@ from ....model.model import Model
 from ...rig.engines import engine_of
 from .. import one_by_one
 from ..answers import Answers
+from . import pieces
 from .columns import answered
 
-KINDS = "pieces", "smooth"  # modules of this folder, each imported when the ones before it refuse a model
 TOGETHER = 1024  # cases of one compiled call, so that their histories of cycles stay small
 
 
@@ -28,7 +26,7 @@ def refuses(model: Model) -> str:
         return "its interface is not one point under a constant load"
     if why := not_one_sine(rig):
         return why
-    return "" if _kind(model) is not None else _named(KINDS[0]).refuses(model)
+    return pieces.refuses(model)
 
 
 def not_one_sine(rig) -> str:
@@ -42,20 +40,9 @@ def not_one_sine(rig) -> str:
     return ""
 
 
-@lru_cache(8)
-def _kind(model: Model):
-    """The kind of cases that takes a model, None where there is none."""
-    return next((one for one in map(_named, KINDS) if not one.refuses(model)), None)
-
-
-def _named(kind: str):
-    return import_module(f"{__package__}.{kind}")
-
-
 def group(model: Model) -> tuple:
     """Equal for models of one compiled call."""
-    kind = _kind(model)
-    return int(model.rig.cycles), kind.__name__, model.friction.law, kind.coarsened(model)
+    return int(model.rig.cycles), model.friction.law, pieces.coarsened(model)
 
 
 def solve(models: Sequence[Model], say=None) -> Answers:
@@ -63,15 +50,14 @@ def solve(models: Sequence[Model], say=None) -> Answers:
     found = Answers.blank(len(models))
     for first in range(0, len(models), TOGETHER):
         part = models[first:first + TOGETHER]
-        found.place(range(first, first + len(part)), _solved(part, say, _kind(part[0]).coarsened(part[0])))
+        found.place(range(first, first + len(part)), _solved(part, say, pieces.coarsened(part[0])))
     return found
 
 
 def _solved(models, say, pairs: int) -> Answers:
     begin, cycles = perf_counter(), int(models[0].rig.cycles)
     window = min(10, cycles // 10)
-    kind = _kind(models[0])
-    runs = kind.runs_of(models, cycles, window, say, pairs)
+    runs = pieces.runs_of(models, cycles, window, say, pairs)
     found, alone, resolved = answered(models, runs, {"engine": engine_of(models[0]).name, "window_cycles": window})
     found.seconds[:] = (perf_counter() - begin) / len(models)
     finer = ~resolved & ~runs.lost if pairs else np.zeros(len(models), bool)

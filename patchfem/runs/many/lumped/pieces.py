@@ -36,7 +36,7 @@ class Case(NamedTuple):
 
 
 def refuses(model) -> str:
-    """Why the cases of this kind do not take a model; "" where they do."""
+    """Why the law, the cycles or the engine of a model are not of this batch; "" where they are."""
     f = model.friction
     if not _holds(model) and not has(f.law, "cells") and f.law != "elastic-plastic":
         return "its law is not made of elements"

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....core import Measure, Outcome
+from ....core import Outcome
 from ....effects import has
 from ....model.model import Model
 from ....model.source import placed
 from ....response.errors import pieces_error
 from ...patch import result as of_patch
-from ...remedies import loose
+from ...remedies import Seen, beyond_tolerance
 from ...results.result import placeless
 from ...results.travel import ended, travelled
 from ...rig.engines import PIECES, engine_of
@@ -26,7 +26,7 @@ from ...rig.pieces import Interfaces
 from .. import one_by_one
 from ..answers import Answers
 from . import pieces
-from .columns import answered
+from .columns import answered, known_of
 from .lumped import forget, not_one_sine
 
 TOGETHER = 128  # cases of one compiled call: their elements and histories of cycles are held at once
@@ -42,19 +42,6 @@ class _Pressed(NamedTuple):
     warnings: list
     notes: list
     patch: Any
-
-
-class _Plan(NamedTuple):
-    model: Model
-
-
-class _Seen(NamedTuple):
-    """What `loose` asks of a result."""
-
-    plan: _Plan
-    measures: dict
-    patch: Any
-    extra: dict
 
 
 def refuses(model: Model) -> str:
@@ -145,19 +132,11 @@ def _tell(found: Answers, case: int, model: Model, one: _Pressed, extremes) -> N
     modes = model.rig.modes
     slide = extremes * (float(modes.interfaces[0, 0]) / float(modes.output[0]))
     found.outcome[case] = str(ended(Outcome(found.outcome[case]), model.patch, one.patch, slide))
-    known = {name: Measure(float(column[case]), found.units[name], float(found.errors[name][case]),
-                           float(found.floors[name][case]))
-             for name, column in found.values.items() if not np.isnan(found.errors[name][case])}
-    for name, m in one.measures.items():
-        found.measure(name, m.unit)
-        found.values[name][case] = np.nan if m.value is None else m.value
-        found.errors[name][case] = np.nan if m.error is None else m.error
-        found.floors[name][case] = m.floor
-        if m.value is None:
-            found.reasons.setdefault(name, {})[case] = m.reason
-    seen = _Seen(_Plan(model), one.measures | {name: m for name, m in known.items() if name != "normal_load"},
-                 one.patch, {})
-    warned = placeless([*one.warnings, *model.rig.notes, *travelled(one.patch, slide), *loose(seen)], model.source.path)
+    known = known_of(found, case)
+    found.fill(case, one.measures)
+    seen = Seen(model, one.measures | {name: m for name, m in known.items() if name != "normal_load"}, one.patch)
+    warned = placeless([*one.warnings, *model.rig.notes, *travelled(one.patch, slide), *beyond_tolerance(seen)],
+                       model.source.path)
     found.warnings.pop(case, None)
     if warned:
         found.warnings[case] = warned
