@@ -47,6 +47,9 @@ def keeping(keeper: Keeper | None) -> Iterator[None]:
         _KEEPER.reset(token)
 
 
+MOST_KEPT = 400_000  # samples kept outside the last cycles
+
+
 class Samples:
     """What a march collects: last cycles, samples kept before them, their step numbers, extremes and phasors.
 
@@ -57,6 +60,16 @@ class Samples:
     def __init__(self, last):
         self.last, self.kept, self.kept_at, self.extremes, self.phasors, self.again = last, [], [], [], [], False
         self.marks = []
+
+    @property
+    def room(self) -> int:
+        """Samples that may be kept yet before the last cycles."""
+        return MOST_KEPT - sum(map(len, self.kept_at))
+
+    def early(self, rows, numbers) -> None:
+        """Keep samples from before the last cycles, with the numbers of their steps."""
+        self.kept.append(rows)
+        self.kept_at.append(numbers)
 
     def arrays(self) -> dict:
         """All of it as arrays by name."""

@@ -198,6 +198,23 @@ class Steady(NamedTuple):
     loads: np.ndarray
 
 
+def carried(contact, element=None) -> list | None:
+    """What a contact carries from one step to the next, as rows of numbers of one kind each; None of one whose books
+    grow for ever, as those of a list of bonds. element: the law of an `Element`."""
+    if isinstance(contact, Element):
+        return memory_rows(element, contact.mem[0])
+    if isinstance(contact, Sheared):
+        return [contact.eps, contact.b, *contact.points[:6]]
+    return [contact.eps, contact.b, contact.now, *contact.memory] if isinstance(contact, Rub) else None
+
+
+def memory_rows(element, memory) -> list:
+    """The memory (l,) of an element as rows of numbers of one kind each."""
+    head = {"parallel": 3, "points": 1, "places": 1}.get(element.form, memory.size)
+    kinds = 5 if element.form in ("points", "places") else 1
+    return [*memory[:head, None], *memory[head:].reshape(kinds, -1)]
+
+
 def copied(parts):
     """A tuple of arrays, or of such tuples, with arrays of its own."""
     return type(parts)(*(copied(part) if isinstance(part, tuple) else part.copy() for part in parts))

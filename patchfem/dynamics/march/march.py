@@ -3,6 +3,7 @@
 from collections import deque
 from copy import copy
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -12,16 +13,18 @@ from ..cycles import extremes_of, phasor, thinned
 from ..integrated import histories
 from ..modal_kernels import ModalArrays
 from ..propagator import propagator
+from ..repeats import APART, ahead, looked_at, until_look
 from ..resume import Samples, slot_of
 from ..work_check import sampled_work
 from .faces import GOAL, faces_of
-from .models import ContactModel, load_kernels
+from .models import ContactModel, free_model, load_kernels
 from .room import keep, lengthened
 
 FULL, UNFIT = 2, 4  # status of a loop whose list of bonds is full, and where no contact set fits the motion
 EACH = 5  # columns of an element in a row, as of `faces_kernels`
-MOST_KEPT = 400_000  # samples kept outside the last cycles
 AT_ONCE, PIECES = 8000, 16  # steps and cycles of a piece of a run of which nothing is kept
+REPEATS = 1e-12  # of its size, by which a motion that repeats may still change in all that is left of it
+SUMS = [0, 1, 2, 3, 5, 7, 8]  # of the ledger: what grows from cycle to cycle
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -112,19 +115,15 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
     if not (whole or asked or samples.again or run.passed(behind, lambda: slot.offer(run, samples))):
         run = fresh(modes, drive, model, steps_per_cycle, travel, start)  # it ends before: once more, cycle by cycle
         samples.again = True
-    kept, kept_at, extremes, phasors = samples.kept, samples.kept_at, samples.extremes, samples.phasors
-    count = sum(map(len, kept_at))
-    whole = whole or bool(asked)
+    extremes, phasors = samples.extremes, samples.phasors
+    room, whole = samples.room, whole or bool(asked)
     # a fraction of a cycle comes first, the window is whole
     size = (total - run.done) % steps_per_cycle or steps_per_cycle
     while run.done < total and run.outcome is None:
         final = run.done + size >= total
         first, rows, work = run.cycle(size, frames if final else 0, snapshots)
-        if whole and len(last) == last.maxlen and count < MOST_KEPT:
-            pick = thinned(last[0][1], run)
-            kept.append(last[0][1][pick])
-            kept_at.append(last[0][0] + pick)
-            count += len(pick)
+        if whole and len(last) == last.maxlen and room > 0:
+            room -= _shelved(samples, run, last[0])
         last.append((first, rows, work))
         if whole:
             extremes.append(extremes_of(rows, modes, run.prop.dt))
@@ -133,6 +132,9 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
             samples.marks.append((run.fork(run.drive), list(last)[-window:], extremes[-window:]))
             found.append(mark_of(*samples.marks[-1], samples.marks[-1][0]))
         size = steps_per_cycle
+        left = (min((mark for mark in asked if mark > run.done), default=total) - run.done) // size - last.maxlen
+        if whole and run.repeats(left):
+            room = _left_out(samples, run, left)
         if run.done < total:
             slot.offer(run, samples)
         if progress is not None:
@@ -143,10 +145,40 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
         phasors = [phasor(rows, modes, first, steps_per_cycle) for first, rows, _ in last]
     end = mark_of(run, list(last)[-window:], extremes)
     rows, start = _joined(list(last))
-    number = np.concatenate([*kept_at, start + np.arange(len(rows))])
-    full = run.response(np.concatenate([*kept, rows]), number)
+    number = np.concatenate([*samples.kept_at, start + np.arange(len(rows))])
+    full = run.response(np.concatenate([*samples.kept, rows]), number)
     return MarchResult(full, end.window, end.step_force, end.amplitudes, np.array(phasors), end.ledger, run.outcome,
                        snapshots, end.work, run.done / steps_per_cycle, run.message, tuple(found))
+
+
+def _shelved(samples: Samples, run, cycle) -> int:
+    """Keep what is worth it of a cycle (first step, rows, work) that is none of the last ones; how many samples."""
+    first, rows, _ = cycle
+    pick = thinned(rows, run)
+    samples.early(rows[pick], first + pick)
+    return len(pick)
+
+
+def _left_out(samples: Samples, run, count: int) -> int:
+    """Go on by `count` cycles that are as the last one; the samples that may be kept yet.
+
+    What is kept of them are the samples of that cycle, with the sums that have grown since.
+    """
+    first, rows, _ = samples.last[-1]
+    for cycle in samples.last:
+        if samples.room > 0:
+            _shelved(samples, run, cycle)
+    samples.last.clear()
+    samples.extremes += [samples.extremes[-1]] * count
+    samples.phasors += [samples.phasors[-1]] * count
+    pick, begin = thinned(rows, run), 2 * run.modes.omega.size + 6
+    shown = np.arange(1, 1 + min(count, -(-max(0, samples.room) // len(pick))))[:, None]
+    sums = slice(begin, begin + 3)  # friction work, and what is dissipated and created, since the start
+    later = np.tile(rows[pick], (len(shown), 1))
+    later[:, sums] += np.repeat(shown * (rows[-1, sums] - rows[0, sums]), len(pick), axis=0)
+    samples.early(later, (first + pick + run.prop.steps * shown).ravel())
+    run.leave_out(count)
+    return samples.room
 
 
 def mark_of(run, cycles, extremes, after=None) -> Mark:
@@ -181,6 +213,8 @@ class Run:
         if model.joints or model.loading:
             self.ledger[0] += self.strained()
         self.periodic = self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, BaseSine) else None
+        # of `repeats`: states at the last look and one cycle before the next, their sizes; the books a cycle before
+        self.looks, self.books, self.change = np.zeros((3, sum(map(len, self._carried())))), np.zeros(14), np.inf
 
     def fork(self, drive):
         """A copy of the march as it stands that goes on by itself, under another drive."""
@@ -191,6 +225,50 @@ class Run:
                 setattr(twin, name, value.copy())
         twin.contact, twin.faces, twin.load = map(arrays.copied, (self.contact, self.faces, self.load))
         return twin
+
+    def _carried(self) -> list:
+        """What the march carries from one step to the next, as rows of numbers of one kind each: coordinates and rates
+        over the drive's frequency, then the memories. [] of one that no period brings back."""
+        model = self.model
+        rubs = arrays.carried(self.contact, getattr(model, "element", None) or free_model().element)
+        if self.periodic is None or rubs is None or getattr(model, "load", None) is not None:
+            return []
+        beside = [arrays.memory_rows(one.element, row[:one.element.memory.size])
+                  for one, row in zip(model.joints, self.faces.mem)] if model.joints else []
+        return [np.append(self.state[0], self.state[1] / self.drive.omega), *rubs, *chain(*beside)]
+
+    def _sums_so_far(self) -> np.ndarray:
+        """The ledger, the sums of `_sums` and the second book, (14,)."""
+        return np.concatenate([self.ledger, self.totals, self.second])
+
+    def repeats(self, left: int) -> bool:
+        """Whether the motion has become periodic, at the end of a cycle, so that `left` more may be left out.
+
+        Asked for at the end of every cycle, or of those that `dynamics.repeats.until_look` names.
+        """
+        number, size = self.done // self.prop.steps, self.looks.shape[1]
+        if not size or self.periodic is None or not (looked_at(number) or looked_at(number + 1)):
+            return False
+        rows = self._carried()
+        now = np.concatenate(rows)
+        if not looked_at(number):
+            self.looks[1], self.books = now, self._sums_so_far()
+            return False
+        sizes = np.repeat([np.abs(row).max(initial=0.0) for row in rows], [*map(len, rows)])
+        self.looks[2] = np.maximum(self.looks[2], sizes)
+        scale = np.where(self.looks[2] > 0, self.looks[2], 1.0)
+        change, last = (float(np.max(np.abs(now - then) / scale)) for then in self.looks[:2])
+        before, self.change, self.looks[0] = self.change, change, now
+        known = left > 0 and number >= 4 * APART  # two changes between looks
+        return known and max(change, last) <= REPEATS and ahead(change, before, left, number) <= REPEATS
+
+    def leave_out(self, count: int) -> None:
+        """Go on by `count` cycles that are as the last one, right after `repeats`."""
+        grown = count * (self._sums_so_far() - self.books)
+        self.ledger[SUMS] += grown[SUMS]
+        self.totals += grown[9:12]
+        self.second += grown[12:]
+        self.done += count * self.prop.steps
 
     def placed(self, place, rate) -> None:
         """Go on from the coordinates place and rates (n,) at the start of a cycle of a drive that repeats, the contact
@@ -254,8 +332,13 @@ class Run:
     def passed(self, steps: int, tell=None) -> bool:
         """March to the step of this number in long pieces, of which nothing is kept; whether the run went on so far.
         tell: called after each."""
+        size = self.prop.steps
         while self.done < steps and self.outcome is None:
-            self._sums(self._moved(min(steps - self.done, AT_ONCE, PIECES * self.prop.steps), 0, []))
+            look = (until_look(self.done // size) + self.done // size) * size - self.done
+            self._sums(self._moved(min(steps - self.done, AT_ONCE, PIECES * size, look), 0, []))
+            left = (steps - self.done) // size
+            if self.done % size == 0 and self.outcome is None and self.repeats(left):
+                self.leave_out(left)
             if tell is not None:
                 tell()
         return self.outcome is None

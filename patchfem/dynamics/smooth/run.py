@@ -12,6 +12,7 @@ from ...core import ModalBasis, Outcome, Response
 from ...friction.laws.stretch import bonds_of
 from ..integrated import Integrated, histories
 from ..march.march import MarchResult
+from ..repeats import APART, ahead
 from ..work_check import sampled_work
 from .arrays import (
     CREST,
@@ -50,8 +51,8 @@ MOST_KEPT = 400_000  # reversals kept outside the last cycles
 CLOSER = 0.01  # of the tolerance, that of the last cycles, which are read between the ends of the steps
 TAIL = 8  # windows whose phasors are kept: a steady amplitude takes five (`response.settling.steady_amplitudes`)
 FIRST = 1e-3  # length of the first step over the shortest time of the rig
-APART = 4  # cycles after which a motion is first looked at whether it repeats; then twice as many each time
 REPEATS = 10.0  # tolerances of a step by which a motion that repeats may still change in all that is left of it
+ALIKE = 10.0  # times as much, by which cycles differ whose steps stand elsewhere
 FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED, LIFTED = range(7)  # how a call ends
 HERE = "dynamics.smooth"
 
@@ -190,10 +191,8 @@ class Run:
     def onward(self, time: float) -> None:
         """Move on to a time [s], where the motion repeats under a sine without an end by many cycles at once.
 
-        It is looked at after APART cycles, then after twice as many each time. What it changed by between the last
-        two looks tells what it will change by yet: less and less by the share by which the changes fell, as what dies
-        out does, or as much each time. Its books go on as in the last quarter of these cycles, so that change itself
-        has to be as small.
+        `repeats` says when it is looked at, and what it will change by yet. Its books go on as in the last quarter of
+        these cycles, so that change itself has to be as small. The last cycle has to be as the one before it.
         """
         period, wave, far, before = self.drive.period, self.wave, 2 * APART, None
         first = ceil(max(self.time, wave.pieces[-1, 0]) / period - 1e-9)
@@ -209,11 +208,10 @@ class Run:
             self.until((first + far) * period)
             change, left = self._changed(last), int(time / period + 1e-9) - first - far
             if before is not None and self.outcome is None and left > 0:
-                fell = (np.sqrt(1 + 4 * change / before) - 1) / 2  # a + a^2 = change/before of what dies out by a
-                ahead = change * max(1.0, min(fell**2 / (1 - fell**2) if fell < 1 else np.inf, 2 * left / far))
-                if ahead <= REPEATS * self.tolerance:
+                unlike = ahead(change, before, left, far)
+                if unlike <= REPEATS * self.tolerance and self._alike(first + far):
                     self._leave_out(left, (self._sums() - books) / (far // 4))
-                    self.unlike = ahead
+                    self.unlike = unlike
                     break
             last, before, far = self.moving.y.copy(), change, 2 * far
         self.until(time)
@@ -229,6 +227,11 @@ class Run:
         now, n, sizes = self.moving.now, self.modes.omega.size, self.moving.work[24]
         scale = np.concatenate([np.repeat(now[[CREST, CREST_SPEED]], n), sizes[2 * n:-3]])
         return max(float(np.max(np.abs(self.moving.y - last)[:-3] / np.maximum(scale, 1e-300))), self.tolerance)
+
+    def _alike(self, count: int) -> bool:
+        """Whether the last two of `count` cycles have the same extremes, but for what the steps in them may miss."""
+        before, last = self.kept.cycles[:2, count - 2:count].T
+        return np.abs(last - before).max() <= ALIKE * REPEATS * self.tolerance * np.ptp(last)
 
     def _sums(self) -> np.ndarray:
         """Work of the drive less what is stored, viscous loss, friction work, |work| of the drive and energy lost to

@@ -31,7 +31,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "dynamics.march.room.MOST_STRIPS": "strips of a list of bonds",
     "friction.bonds.parameters.LONGEST": "seconds that a list of bonds may take by its estimate",
     "dynamics.comparison.comparison.MOST_NUMBERS": "numbers that a comparison method keeps",
-    "dynamics.march.march.MOST_KEPT": "samples kept of a run outside its last cycles; more are thinned"}
+    "dynamics.resume.MOST_KEPT": "samples kept of a run outside its last cycles; more are thinned"}
 LEFT_OUT = f"""\
 **Two dimensions.** The pieces are sections in plane strain (or stress, `contact.plane`). The band between the two is
 said with every patch. Edges across the width are not seen; `[contact.strips]` are sections side by side that do not
