@@ -65,17 +65,23 @@ class Clock(NamedTuple):
 
 def clock_of(drive, faces: int) -> Clock:
     """The Clock of a drive of `core` or `structure.drives` at t = 0. PatchfemError where it begins later."""
+    segments = segments_of(drive)
+    if segments[0, :2].any():
+        raise PatchfemError("drive: the first segment must start at 0 s")
+    return Clock(np.zeros(6), segments, np.array([drive.period]), np.zeros(faces + 1))
+
+
+def segments_of(drive) -> np.ndarray:
+    """The segments of a drive of `core` or `structure.drives` as rows (p, 12) of `drive_kernels`."""
     period = drive.period
     if drive.segments:
         rows = [_sine(part, period) for part in drive.segments]
     else:
         rows = (_swept if hasattr(drive, "low") else _lines)(drive)
-    if rows[0][0] != 0:
-        raise PatchfemError("drive: the first segment must start at 0 s")
     out = np.zeros((len(rows), 12))
     for row, (start, *numbers) in zip(out, rows):
         row[:2], row[2:2 + len(numbers)] = place(start, period), numbers
-    return Clock(np.zeros(6), out, np.array([period]), np.zeros(faces + 1))
+    return out
 
 
 def place(time: float, period: float) -> tuple:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 # of Moving.now
-(TIME, STEP, TURNED, ORIGIN, LEFT, CREST, CREST_SPEED, PACE, BEGUN, STOOD, MASS, KIND, PIECE, MOVES, STIFF) = range(15)
+TIME, STEP, TURNED, ORIGIN, LEFT, CREST, CREST_SPEED, PACE, BEGUN, STOOD, MASS, DRIVEN, PIECE, MOVES, STIFF = range(15)
 # of Kept.tally
 POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, PARTS, PERIOD, FORCE = range(10)
 # of Moving.turn, beyond direction, path to the next kink and knee: what a law that holds has to know, and tells
@@ -17,14 +17,14 @@ ENDS = (1 - np.cos(np.pi * np.arange(NODES) / (NODES - 1))) / 2  # these places,
 class Moving(NamedTuple):
     """Modes, drive, law and the state of a motion, in few arrays, as each is handed on in every call.
 
-    rows (5, n): omega, 2 zeta omega, slide, base, output; damping: (n, n) where it couples, else (0, 0). pieces (p, 6):
-    of the drive, `waves.Wave`. num, mem of the law, turn (9,) as the law takes it. y (N,): state; work (26, N): slopes
-    of the 16 stages, extension of the step (8), sizes of the law's states and least ones of the others, state after a
-    step. now (15,): time [s], length of the next step and of the first after a reversal [s], slide at the start of the
-    motion in this direction [m], energy lost to friction till then [J], largest coordinate [m] and rate [m/s] of late,
-    rate of the fastest mode [1/s], 1 once it has begun and 2 where it was left at a reversal, piece of the drive for
-    which the first slopes stand, mass [kg], kind of the drive, its piece now, 1 where it moves the base, stiffness of
-    the law [N/m].
+    rows (5, n): omega, 2 zeta omega, slide, base, output; damping: (n, n) where it couples, else (0, 0). pieces (p,
+    12): of the drive, as of `events.drive_kernels`. num, mem of the law, turn (9,) as the law takes it. y (N,): state;
+    work (26, N): slopes of the 16 stages, extension of the step (8), sizes of the law's states and least ones of the
+    others, state after a step. now (15,): time [s], length of the next step and of the first after a reversal [s],
+    slide at the start of the motion in this direction [m], energy lost to friction till then [J], largest coordinate
+    [m] and rate [m/s] of late, rate of the fastest mode [1/s], 1 once it has begun and 2 where it was left at a
+    reversal, piece of the drive for which the first slopes stand, mass [kg], period of the drive [s], its piece now, 1
+    where it moves the base, stiffness of the law [N/m].
     """
 
     rows: np.ndarray

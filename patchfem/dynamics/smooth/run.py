@@ -10,6 +10,7 @@ import numpy as np
 from ... import compiled
 from ...core import ModalBasis, Outcome, Response
 from ...friction.laws.stretch import bonds_of
+from ..events.plant import segments_of
 from ..integrated import Integrated, histories
 from ..march.march import MarchResult
 from ..repeats import APART, ahead
@@ -18,7 +19,7 @@ from .arrays import (
     CREST,
     CREST_SPEED,
     DONE,
-    KIND,
+    DRIVEN,
     LEFT,
     LOST,
     MASS,
@@ -41,7 +42,6 @@ from .arrays import (
     Moving,
 )
 from .reader import integrated
-from .waves import SINES, wave_of
 
 SAMPLES = 400  # per drive cycle in the kept window
 LEAST = 101  # samples of a run that has no cycles
@@ -55,6 +55,7 @@ REPEATS = 10.0  # tolerances of a step by which a motion that repeats may still 
 ALIKE = 10.0  # times as much, by which cycles differ whose steps stand elsewhere
 FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED, LIFTED = range(7)  # how a call ends
 HERE = "dynamics.smooth"
+of = compiled.kernels("dynamics.events.drive_kernels")  # names of the numbers of a piece of the drive
 
 
 @cache
@@ -79,8 +80,8 @@ class SmoothResult(MarchResult):
     tolerance: float = 0.0
 
 
-def started(modes: ModalBasis, drive, wave, element, cycles: float, start=None) -> tuple:
-    """(Moving, Kept) of a motion before it begins; wave: that of the drive."""
+def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tuple:
+    """(Moving, Kept) of a motion before it begins."""
     n, l = modes.omega.size, len(element.sizes)
     size, damping = 2 * n + l + 3, np.zeros((0, 0)) if modes.damping is None else modes.damping
     state = np.zeros(size)
@@ -90,11 +91,11 @@ def started(modes: ModalBasis, drive, wave, element, cycles: float, start=None) 
     now, tally, work = np.zeros(15), np.zeros(10), np.zeros((26, size))
     now[[STEP, TURNED, PACE, MASS]] = FIRST / pace, FIRST / pace, pace, modes.mass
     now[STIFF] = element.limit / element.length if element.length else 0.0
-    now[[KIND, MOVES]], tally[PERIOD] = (wave.kind, drive.moving), drive.period
+    now[[DRIVEN, MOVES]], tally[PERIOD] = (drive.period, drive.moving), drive.period
     work[24, 2 * n:-3] = element.sizes
     rows = np.stack([modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output])
     law = element.numbers[None], element.memory[None], [1.0, np.inf, 1.0, *np.zeros(6)]
-    own = (rows, damping, wave.pieces, *law, state, work, now)
+    own = (rows, damping, segments_of(drive), *law, state, work, now)
     moving = Moving(*(np.array(part, float, order="C") for part in own))
     cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))
     cycles[0], cycles[1], width = np.inf, -np.inf, 2 * n + 7
@@ -129,8 +130,8 @@ class Run:
     def __init__(self, modes: ModalBasis, drive, element, cycles: float, tolerance: float, travel: float = np.inf,
                  start=None):
         self.modes, self.drive, self.element, self.tolerance, self.travel = modes, drive, element, tolerance, travel
-        self.cycles, self.loops, self.wave = cycles, loops_of(element.kernels), wave_of(drive)
-        self.moving, self.kept = started(modes, drive, self.wave, element, cycles, start)
+        self.cycles, self.loops = cycles, loops_of(element.kernels)
+        self.moving, self.kept = started(modes, drive, element, cycles, start)
         self.turns, self.parts, self.begun, self.unlike = [], [], 0.0, 0.0
         self.outcome, self.message, self.progress = None, "", None
         self.until(0.0)
@@ -143,9 +144,8 @@ class Run:
         twin.moving = type(self.moving)(*(array.copy() for array in self.moving))
         twin.kept, twin.turns = type(self.kept)(*(array.copy() for array in self.kept)), list(self.turns)
         if drive is not self.drive:
-            twin.drive, twin.wave = drive, wave_of(drive)
-            twin.moving = twin.moving._replace(pieces=twin.wave.pieces)
-            twin._enter(int(np.searchsorted(twin.wave.ends, twin.time, side="right")))
+            twin.drive, twin.moving = drive, twin.moving._replace(pieces=segments_of(drive))
+            twin._enter(int(np.searchsorted(twin._starts(), twin.time, side="right")) - 1)
         return twin
 
     def ends_only(self, window: int) -> None:
@@ -162,6 +162,10 @@ class Run:
         """Time [s] that is reached."""
         return float(self.moving.now[TIME])
 
+    def _starts(self) -> np.ndarray:
+        """Times (p,) [s] at which the pieces of the drive begin."""
+        return self.moving.pieces[:, [of.CYCLE, of.OFFSET]] @ [self.drive.period, 1.0]
+
     def _enter(self, piece: int) -> None:
         self.moving.now[PIECE] = piece
 
@@ -175,8 +179,9 @@ class Run:
         samples, parts = np.zeros((times.size, width)), np.zeros((STEPS if whole else 0, NODES, width))
         samples[:, 0], self.kept = times, self.kept._replace(samples=samples, parts=parts)
         self.kept.tally[SAMPLE] = 0
+        ends = np.append(self._starts()[1:], np.inf)
         while self.outcome is None:
-            end = float(self.wave.ends[int(self.moving.now[PIECE])])
+            end = float(ends[int(self.moving.now[PIECE])])
             if self.time >= end:
                 self._enter(int(self.moving.now[PIECE]) + 1)
                 continue
@@ -194,8 +199,8 @@ class Run:
         `repeats` says when it is looked at, and what it will change by yet. Its books go on as in the last quarter of
         these cycles, so that change itself has to be as small. The last cycle has to be as the one before it.
         """
-        period, wave, far, before = self.drive.period, self.wave, 2 * APART, None
-        first = ceil(max(self.time, wave.pieces[-1, 0]) / period - 1e-9)
+        period, far, before = self.drive.period, 2 * APART, None
+        first = ceil(max(self.time, self._starts()[-1]) / period - 1e-9)
         if not self._swings() or (first + far) * period >= time:
             self.until(time)
             return
@@ -218,8 +223,9 @@ class Run:
 
     def _swings(self) -> bool:
         """Whether the drive ends in a sine of its own period."""
-        last = self.wave.pieces[-1]
-        return self.wave.kind == SINES and last[2] != 0 and abs(last[3] * self.drive.period / (2 * np.pi) - 1) < 1e-12
+        last = self.moving.pieces[-1]
+        own = abs(last[of.OMEGA] * self.drive.period / (2 * np.pi) - 1) < 1e-12
+        return last[of.KIND] == of.SINE and last[of.AMPLITUDE] != 0 and own
 
     def _changed(self, last) -> float:
         """Largest change [1] since the state `last` (N,): of coordinates and rates over the largest of late, of states

@@ -5,40 +5,27 @@ viscous loss and friction work [J]. The energies feed nothing and take no part i
 with any law that offers its rates (`friction.protocol`).
 """
 
-from math import sin, sqrt
+from math import sqrt
 
 import numpy as np
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, INNER
 from ...friction.laws import stretch_kernels as law
+from ..events.drive_kernels import value_now
 from ..tableau_kernels import BEFORE, FIFTH, INSIDE, PLACES, SHARES, STAGES, THIRD
-from .arrays import CLOCK, CREST, CREST_SPEED, EASE, FREE, KIND, MASS, ORIGIN, PIECE, PLACE, STIFF, TIME
+from .arrays import CLOCK, CREST, CREST_SPEED, DRIVEN, EASE, FREE, MASS, ORIGIN, PIECE, PLACE, STIFF, TIME
 
 OMEGA, DAMP, SLIDE, BASE, OUTPUT = range(5)  # of Moving.rows
 EXTENSION, SIZES, TRIAL = 16, 24, 25  # of Moving.work, whose first rows are the slopes
 LEAST = 1e-30  # of a size: at rest everything is as large as this
 NOISE = 2e-15  # of the forces of a mode's stiffness and of the law's: round-off of the acceleration where they balance
-SINES, SWEEP, ROWS = range(3)  # of now[KIND]: sines one after the other, a sweep, straight between rows
 
 
 @njit(error_model="numpy", forceinline=True, **INNER)
 def push(m, t):
     """Drive [m s-2] at the time t [s], by the numbers of its piece as it stands, continued beyond its ends."""
-    row = m.pieces[int(m.now[PIECE])]
-    if m.now[KIND] == SINES:
-        return row[1] + row[2] * sin(row[3] * (t - row[0]) + row[4]) if row[2] != 0 else row[1]
-    if m.now[KIND] == ROWS:
-        return row[1] + row[2] * (t - row[0])
-    # turns and frequency after the time t of a sweep: f = low + rate t, or low exp(rate t) of a logarithmic one
-    low, rate, past = row[1], row[2], t - row[0]
-    if row[5] > 0:
-        growth = np.expm1(rate * past)
-        frequency, turns = low * (1 + growth), low * growth / rate if rate != 0 else low * past
-    else:
-        frequency, turns = low + rate * past, past * (low + 0.5 * rate * past)
-    size = row[3] if row[3] >= 0 else -row[3] * (2 * np.pi * frequency)**2
-    return size * sin(2 * np.pi * turns + row[4])
+    return value_now(m.pieces[int(m.now[PIECE])], 0.0, t, m.now[DRIVEN])
 
 
 @njit(error_model="numpy", forceinline=True, **INNER)
