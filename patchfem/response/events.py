@@ -74,19 +74,14 @@ def states(time, slip, period: float, held: float = 0.0) -> tuple:
 
 def _one(time, slip, slide, period: float, held: float, number: int) -> list:
     share, state = states(time, slip, period, held)
-    at, out = (time[1:] + time[:-1]) / 2, []
-    for k in np.flatnonzero(state[1:] != state[:-1]):
-        before, after = state[k], state[k + 1]
-        if before and after:
-            kind, level = (REVERSAL_UP if after > 0 else REVERSAL_DOWN), 0.0
-        else:
-            way = before or after
-            kind, level = (STOP if after == 0 else RELEASE_UP if after > 0 else RELEASE_DOWN), way * STICK
-        rise = share[k + 1] - share[k]
-        part = np.clip((level - share[k]) / rise, 0, 1) if rise else 0.5
-        when = at[k] + part * (at[k + 1] - at[k])
-        out.append((when, number, kind, np.interp(when, time, slide)))
-    return out
+    k, at = np.flatnonzero(state[1:] != state[:-1]), (time[1:] + time[:-1]) / 2
+    before, after, low, rise = state[k], state[k + 1], share[k], share[k + 1] - share[k]
+    turns, way = (before != 0) & (after != 0), np.where(before != 0, before, after)
+    kind = np.where(after > 0, np.where(turns, REVERSAL_UP, RELEASE_UP), np.where(turns, REVERSAL_DOWN, RELEASE_DOWN))
+    kind = np.where(after == 0, STOP, kind)
+    part = np.clip((np.where(turns, 0.0, way * STICK) - low) / np.where(rise != 0, rise, 1.0), 0, 1)
+    when = at[k] + np.where(rise != 0, part, 0.5) * (at[k + 1] - at[k])
+    return [*zip(when, [number] * k.size, kind, np.interp(when, time, slide))]
 
 
 def sticks(events: Events, begin: float, end: float, moves) -> list:
