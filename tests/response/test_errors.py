@@ -7,6 +7,7 @@ import pytest
 
 from patchfem.model.model import build
 from patchfem.response.errors import (
+    GROWS,
     LOOSE,
     MAIN,
     SURE,
@@ -129,6 +130,21 @@ def test_exact_changes_that_turn_their_sign_keep_the_larger_one():
     turned, same = ({NAME: 1.0}, {NAME: 1.0 + 1e-3}, {NAME: 1.0 - 2e-3}), ({NAME: 1.0}, {NAME: 1.001}, {NAME: 1.004})
     assert step_error(*turned, 400)[NAME] == pytest.approx(LOOSE * 1e-3, rel=1e-9)
     assert step_error(*same, 400)[NAME] == pytest.approx(SURE * 1e-3 / 2, rel=1e-9)
+
+
+def test_exact_a_peak_that_two_runs_read_at_one_sample_errs_by_first_order():
+    """Equal at the last two steps: they share samples. An amplitude, which is not read at one, errs by half of that."""
+    runs = [{NAME: 1.0, "absolute_acceleration_peak": 1.0 + gap} for gap in (0.0, 0.0, 1e-3)]
+    assert step_error(*runs, 400)["absolute_acceleration_peak"] == pytest.approx(GROWS * LOOSE * 1e-3 / 2, rel=1e-9)
+    runs = [{NAME: 1.0 + gap} for gap in (0.0, 0.0, 1e-3)]
+    assert step_error(*runs, 400)[NAME] == pytest.approx(GROWS * LOOSE * 1e-3 / 4, rel=1e-9)
+
+
+def test_always_a_force_peak_at_a_jump_that_agrees_by_chance_is_held():
+    """Seed 42000029, a weakening limit on 364, 182 and 91 steps: 4e-6 and 4e-3 of it, and the independent program's."""
+    peak, gap = 15.167624830341591, -4e-6 * 15.167624830341591
+    runs = [{"friction_force_peak": one} for one in (peak, peak - gap, peak - gap + 978.63 * gap)]
+    assert abs(15.203855518276447 - peak) <= step_error(*runs, 364)["friction_force_peak"] <= 0.1
 
 
 @pytest.mark.parametrize("order", [0.5, 1.0, 1.5, 3.0, 4.0])
