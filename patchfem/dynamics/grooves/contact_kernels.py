@@ -28,7 +28,17 @@ STEEP = 1e-4  # radians of a groove below which sines are series
 @njit(error_model="numpy", **LEAN)
 def steep(flank, q):
     """Slope t [1] of the flank at the slide q [m]."""
-    return flank[AMPLITUDE] * flank[WAVE] * sin(flank[WAVE] * q - flank[PHASE])
+    return flank[AMPLITUDE] * flank[WAVE] * np.sin(flank[WAVE] * q - flank[PHASE])
+
+
+@njit(error_model="numpy", **LEAN)
+def path_over(flank, q, dq):
+    """Mean of sqrt(1 + t^2), ds/dq, over the slide dq [m] from q [m], by Gauss's rule of three; real, or complex."""
+    path = 0.0 * q
+    for k in range(-1, 2):
+        t = steep(flank, q + 0.5 * dq * (1 + k * INNER))
+        path = path + (4 / 9 if k == 0 else 5 / 18) * np.sqrt(1 + t * t)
+    return path
 
 
 @njit(error_model="numpy", **LEAN)
@@ -61,11 +71,7 @@ def over(flank, q, dq):
     """(mean slope dz/dq, mean of sqrt(1 + t^2), ds/dq) over the slide dq [m] from q [m]."""
     half, middle = 0.5 * flank[WAVE] * dq, flank[WAVE] * (q + 0.5 * dq) - flank[PHASE]
     share = sin(half) / half if abs(half) > STEEP else 1 - half * half / 6
-    path = 0.0
-    for k in range(-1, 2):
-        t = steep(flank, q + 0.5 * dq * (1 + k * INNER))
-        path += (4 / 9 if k == 0 else 5 / 18) * sqrt(1 + t * t)
-    return flank[AMPLITUDE] * flank[WAVE] * sin(middle) * share, path
+    return flank[AMPLITUDE] * flank[WAVE] * sin(middle) * share, path_over(flank, q, dq)
 
 
 @njit(error_model="numpy", **LEAN)

@@ -10,33 +10,17 @@ import numpy as np
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
+from .contact_kernels import LOAD, path_over, steep
 
 LEAD = 32  # steps from rest to the first sample
-MU, LENGTH, LOAD, WAVE, AMPLITUDE, PHASE = range(6)  # of num
-INNER = np.sqrt(0.6)  # outer points of Gauss's rule of three
+MU, LENGTH = 4, 5  # of num, which begins as Climbing.flank does
 PART = 1e-30  # imaginary, of a number whose derivative is wanted
-
-
-@njit(error_model="numpy", **LEAN)
-def steep(num, q):
-    """Slope t [1] of the flank at the slide q [m]."""
-    return num[AMPLITUDE] * num[WAVE] * np.sin(num[WAVE] * q - num[PHASE])
-
-
-@njit(error_model="numpy", **LEAN)
-def along(num, q0, q1):
-    """Path [m] along the flank from the slide q0 to q1 [m], by Gauss's rule of three."""
-    out = 0.0 * q0
-    for k in range(-1, 2):
-        t = steep(num, 0.5 * (q0 + q1) + 0.5 * INNER * k * (q1 - q0))
-        out = out + (4 / 9 if k == 0 else 5 / 18) * np.sqrt(1 + t * t)
-    return out * (q1 - q0)
 
 
 @njit(error_model="numpy", **LEAN)
 def shifted(num, y0, s0, r0, q0, q1, vertical):
     """(y, s, R) [N] after the slide from q0 to q1 [m], where the flank carries `vertical` [N]; all real, or complex."""
-    mu, t, e = num[MU], steep(num, q1), along(num, q0, q1) / num[LENGTH]
+    mu, t, e = num[MU], steep(num, q1), path_over(num, q0, q1 - q0) * (q1 - q0) / num[LENGTH]
     flat = np.sqrt(1 + t * t) * (vertical if vertical.real > 0.0 else 0.0 * vertical)
     y1, s1 = y0 + s0 * e, s0
     half = 0.5 * (r0 + flat + mu * t * y1)
@@ -86,7 +70,7 @@ def cycle(num, q, vertical, states, most, goal, state):
     """Slide along the samples q (N,) [m] of a cycle under the vertical force (N,) [N] until the force along the flank
     repeats to `goal` [N], `most` times at most: the cycles that it took.
 
-    num: mu, length [m], load [N], wave number [rad/m], amplitude [m], phase of the grooves; states (N + 1, 3): y, s and
+    num: load [N], wave number [rad/m], amplitude [m], phase of the grooves, mu, length [m]; states (N + 1, 3): y, s and
     R [N] at the samples, the last row at the start of the last cycle; state (3,): room. It starts at rest at the slide
     0. 0.1 us per sample and cycle.
     """

@@ -121,7 +121,7 @@ class ElasticFlank:
         """The periodic state that a virgin contact reaches, and its slopes."""
         n, g, mu = track.samples, self.model.grooves, self.model.law.static
         kernels, states = compiled("dynamics.grooves.cycle_kernels"), np.empty((track.samples + 1, 3))
-        num = np.array([mu, self.length, self.model.load, g.wave, g.amplitude, g.phase])
+        num = np.array([self.model.load, g.wave, g.amplitude, g.phase, mu, self.length])
         lift, heavy, q = _lift(g, self.model.load, track), g.lifted_mass > 0, np.ascontiguousarray(track.q)
         turns = kernels.cycle(num, q, lift.force, states, MOST, ROUND * self.limit, np.empty(3))
         along, springs, normal = mu * states[:n, 0], states[:n, 1], states[:n, 2]

@@ -74,7 +74,7 @@ class SampledRun(GroovesRun):
         numbers = [1.0, model.load, g.wave, g.amplitude, g.phase, g.lifted_mass, model.static, model.kinetic,
                    model.speed or 0.0, swing.amplitude, swing.omega, swing.phase]
         element = Element(HERE, np.array(numbers), np.array([raised, 0.0]), model.limit, sizes=(np.inf,) * 4)
-        self.motion_of = smooth.Run(self.modes, self.drive, element, 1.0, TOLERANCE, start=Start(*self.state))
+        self.motion_of = smooth.Motion(self.modes, self.drive, element, 1.0, TOLERANCE, start=Start(*self.state))
         self.motion_of.ends_only(1)
         n, least = self.modes.omega.size, self.motion_of.moving.work[24]
         least[:n], least[n:2 * n] = REST / g.wave, REST / g.wave * self.motion_of.moving.now[PACE]

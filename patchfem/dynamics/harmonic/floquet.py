@@ -20,7 +20,7 @@ from ..propagator import exponentials
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Mark:
+class TurningPoint:
     """Memory of a turning point: row, cell in which it lies and its place [0, 1] there, hold (N,) [N/m] per cell: the
     force per disturbance of the slide at that turning."""
 

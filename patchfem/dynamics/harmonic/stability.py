@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..periodic import is_stable, multipliers
-from .floquet import Fading, Mark, monodromy
+from .floquet import Fading, TurningPoint, monodromy
 from .laws import Flow, Nodes
 
 
@@ -73,7 +73,7 @@ def _inside(track) -> np.ndarray:
 
 
 def _marks(row: int, track, hold, share, slope) -> list:
-    """Marks of the turning points; what hangs on one all the cycle long never slips and is no memory.
+    """The TurningPoints of a track; what hangs on one all the cycle long never slips and is no memory.
 
     In its own cell a turning point holds nothing yet: the slide has not left it by more than the square of the cell.
     """
@@ -84,7 +84,7 @@ def _marks(row: int, track, hold, share, slope) -> list:
             mean = _mean(line, share)
             mean[cell] = x * line[cell]
             slope[cell] += (1 - x) * line[(cell + 1) % line.size]
-            out.append(Mark(row, int(cell), float(x), mean))
+            out.append(TurningPoint(row, int(cell), float(x), mean))
     return out
 
 

@@ -121,7 +121,7 @@ def asked(count: int, window: int) -> np.ndarray:
     return (back % window == 0) & (back < TAIL * window)
 
 
-class Run:
+class Motion:
     """A motion as it stands: the arrays that its loops move, and what was read off it.
 
     unlike: what it still changed by, over its size, where cycles were left out as it repeats.
@@ -347,7 +347,7 @@ def simulate(modes: ModalBasis, drive, element, cycles: float, tolerance: float,
     last cycle; progress(share): called where the run comes back for other reasons, so it changes nothing. The outcome
     is set for travel and where no step meets the tolerance (not_converged, `message` says where).
     """
-    run, period = Run(modes, drive, element, cycles, tolerance, travel, start), drive.period
+    run, period = Motion(modes, drive, element, cycles, tolerance, travel, start), drive.period
     run.ends_only(window)
     end, kept, shots = cycles * period, [], []
     run.progress = progress

@@ -11,7 +11,7 @@ from test_smooth import MASS
 from patchfem.core import BaseSine, Response, Start
 from patchfem.dynamics.smooth.arrays import ENDS
 from patchfem.dynamics.smooth.reader import Parts
-from patchfem.dynamics.smooth.run import Run
+from patchfem.dynamics.smooth.run import Motion
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.stretch import points_element
 from patchfem.friction.laws.tanh import Rate
@@ -84,7 +84,8 @@ def test_exact_peaks_are_those_of_the_motion_seen_closely(name):
     law, load, zeta, ratio, push, moving = CASES[name]
     drive = BaseSine(push, ratio * OMEGA, moving)
     start = None if name == "tanh" else Start(np.full(1, 2e-5), np.zeros(1))
-    run, close = (Run(one_mode(OMEGA, zeta, MASS), drive, element(law, load), 40, 1e-9, start=start) for _ in range(2))
+    modes = one_mode(OMEGA, zeta, MASS)
+    run, close = (Motion(modes, drive, element(law, load), 40, 1e-9, start=start) for _ in range(2))
     end, begin = 40 * drive.period, 30 * drive.period
     fine, _ = run.last(end, end - begin)[1]
     close.until(begin)

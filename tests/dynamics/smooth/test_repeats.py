@@ -7,7 +7,7 @@ from test_smooth import MASS, element
 
 from patchfem.core import BaseSine
 from patchfem.dynamics.smooth.arrays import DONE
-from patchfem.dynamics.smooth.run import REPEATS, Run, simulate
+from patchfem.dynamics.smooth.run import REPEATS, Motion, simulate
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
 from patchfem.friction.laws.tanh import Rate
@@ -22,7 +22,7 @@ def law_of(name):
 
 @pytest.mark.parametrize("name", LAWS)
 def test_exact_cycles_that_are_left_out_are_as_the_last_one(name):
-    left, whole = (Run(MODES, SINE, law_of(name), 400, 1e-9) for _ in range(2))
+    left, whole = (Motion(MODES, SINE, law_of(name), 400, 1e-9) for _ in range(2))
     left.onward(400 * SINE.period)
     whole.until(400 * SINE.period)
     size = abs(whole.kept.cycles[:2]).max()
@@ -52,7 +52,7 @@ def test_exact_the_last_cycles_after_a_million_others():
 
 
 def test_always_a_motion_that_still_grows_is_not_carried_on():
-    run = Run(one_mode(OMEGA, 1e-5, MASS), BaseSine(49.0, OMEGA), law_of("tanh"), 300, 1e-9)
+    run = Motion(one_mode(OMEGA, 1e-5, MASS), BaseSine(49.0, OMEGA), law_of("tanh"), 300, 1e-9)
     run.onward(300 * 2 * np.pi / OMEGA)
     assert run.unlike == 0 and run.time == 300 * 2 * np.pi / OMEGA
 
@@ -60,7 +60,7 @@ def test_always_a_motion_that_still_grows_is_not_carried_on():
 @pytest.mark.parametrize("apart, left_out", [(0.0, True), (1e-6, False)])
 def test_always_a_motion_that_repeats_every_other_cycle_is_not_carried_on(apart, left_out, monkeypatch):
     """Of extremes that go to and fro by a share of them from cycle to cycle."""
-    run, until = Run(MODES, SINE, law_of("tanh"), 300, 1e-9), Run.until
+    run, until = Motion(MODES, SINE, law_of("tanh"), 300, 1e-9), Motion.until
 
     def uneven(time):
         until(run, time)

@@ -11,7 +11,7 @@ from patchfem.dynamics import tableau_kernels as tableau
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
 from patchfem.dynamics.smooth.arrays import DONE
-from patchfem.dynamics.smooth.run import Run, simulate
+from patchfem.dynamics.smooth.run import Motion, simulate
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
 from patchfem.friction.laws.lugre import LuGre
@@ -35,7 +35,7 @@ def element(law):
 
 def compared(modes, law, form, cycles=3, drive=SINE, kink=None, start=None, tolerance=1e-11):
     """(largest error of the coordinates, of the force) over their sizes, against SciPy's integrator."""
-    run, end = Run(modes, drive, element(law), cycles, tolerance, start=start), cycles * drive.period
+    run, end = Motion(modes, drive, element(law), cycles, tolerance, start=start), cycles * drive.period
     times, n = np.linspace(0, end, 50 * cycles + 1), modes.omega.size
     rows = run.until(end, times)
     z, force = ref.integrate(modes, drive, form(law, LOAD), end, times, start, kink)
@@ -67,7 +67,7 @@ def numpy_step(slope, t, y, h):
 
 def test_exact_compiled_steps_are_the_method_in_numpy():
     """A sample at the end of a first step of given length, against the same step of eq. 3.4 and the law in NumPy."""
-    run = Run(ONE, SINE, element(SHORT), 1, 1e-3)
+    run = Motion(ONE, SINE, element(SHORT), 1, 1e-3)
     run.until(1e-3 * SINE.period)
     t, y, h = run.time, run.moving.y[:2].copy(), 2e-2 * SINE.period
     origin, weight = run.moving.now[3], 0.3 * LOAD / SHORT.length
@@ -184,13 +184,13 @@ def test_exact_travel_ends_a_run_where_the_output_passes_it():
     done = simulate(ONE, SINE, element(SHORT), 20, 1e-9, 2, travel=2e-5)
     assert done.outcome is Outcome.EXCEEDS_TRAVEL
     assert abs(done.window.output[-1]) <= 2e-5 and done.cycles_done < 20
-    row = Run(ONE, SINE, element(SHORT), 20, 1e-9, 2e-5)
+    row = Motion(ONE, SINE, element(SHORT), 20, 1e-9, 2e-5)
     row.until(1.0)
     assert abs(row.moving.y[0]) == pytest.approx(2e-5, rel=1e-11)
 
 
 def test_exact_a_fork_goes_on_as_the_run_would():
-    run = Run(ONE, SINE, element(SHORT), 4, 1e-10)
+    run = Motion(ONE, SINE, element(SHORT), 4, 1e-10)
     run.until(1.3 * SINE.period)
     twin = run.fork(SINE)
     run.until(3 * SINE.period)
@@ -199,7 +199,7 @@ def test_exact_a_fork_goes_on_as_the_run_would():
 
 
 def test_exact_extremes_are_those_of_steps_read_inside():
-    plain, read = (Run(ONE, SINE, element(SHORT), 6, 1e-9) for _ in range(2))
+    plain, read = (Motion(ONE, SINE, element(SHORT), 6, 1e-9) for _ in range(2))
     for run, times in ((plain, ()), (read, np.linspace(0, 6, 6001) * SINE.period)):
         run.ends_only(6)  # places of a phasor lie in nearly every step
         rows = run.until(6 * SINE.period, times)
@@ -209,7 +209,7 @@ def test_exact_extremes_are_those_of_steps_read_inside():
 
 
 def test_exact_phasors_of_chosen_cycles_are_those_of_every_cycle():
-    every, chosen = (Run(THREE, SINE, element(SHORT), 8, 1e-9) for _ in range(2))
+    every, chosen = (Motion(THREE, SINE, element(SHORT), 8, 1e-9) for _ in range(2))
     chosen.ends_only(3)
     count = 1024
     rows = every.until(8 * SINE.period, np.arange(8 * count + 1) / count * SINE.period)
@@ -237,7 +237,7 @@ def test_always_snapshots_of_the_interface_are_those_of_the_march():
 def test_exact_slides_far_below_the_bond_length_cost_no_small_steps(drive):
     """Round-off of a bond length of 5 um is 1e-8 of such a slide: no step met its tolerance for it."""
     start = Start(np.array([1e-14]), np.zeros(1)) if not drive.segments[0].amplitude else None
-    run, end = Run(ONE, drive, element(SHORT), 4, 1e-11, start=start), 4 / 143
+    run, end = Motion(ONE, drive, element(SHORT), 4, 1e-11, start=start), 4 / 143
     times = np.linspace(0, end, 201)
     rows, stiff = run.until(end, times), 0.3 * LOAD / SHORT.length / MASS
     free = np.sqrt(OMEGA**2 + stiff - (0.003 * OMEGA)**2)
@@ -260,7 +260,7 @@ def test_exact_a_speed_that_grazes_zero_turns_or_passes(share):
 @pytest.mark.parametrize("law", [Bonds(0.3, 5e-6), Rate(0.3, 3e-4)])
 def test_exact_peaks_of_the_last_cycles_are_those_of_close_samples(law):
     """A force that stands at its limit for most of a cycle has its peaks looked for only where they may rise."""
-    one, other = (Run(ONE, SINE, element(law), 12, 1e-9) for _ in range(2))
+    one, other = (Motion(ONE, SINE, element(law), 12, 1e-9) for _ in range(2))
     period = SINE.period
     _, (fine, _) = one.last(12 * period, 3 * period)
     other.until(9 * period)

@@ -7,7 +7,7 @@ from test_smooth import ONE, element
 
 from patchfem.core import BaseSine, Outcome, Start
 from patchfem.dynamics.smooth.arrays import DONE, REFUSED
-from patchfem.dynamics.smooth.run import Run
+from patchfem.dynamics.smooth.run import Motion
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
 from patchfem.friction.laws.stretch import points_element
@@ -19,8 +19,8 @@ PERIOD = 2 * np.pi / OMEGA
 
 
 def moved(law, push: float, cycles: float) -> tuple:
-    """(Run, times of its reversals [s]) of a motion under a sine of `push` [m s-2]."""
-    run = Run(ONE, BaseSine(push, OMEGA), law, 20, 1e-9)
+    """(Motion, times of its reversals [s]) of a motion under a sine of `push` [m s-2]."""
+    run = Motion(ONE, BaseSine(push, OMEGA), law, 20, 1e-9)
     run.until(cycles * PERIOD)
     return run, np.concatenate(run.turns)[:, 0]
 
@@ -54,7 +54,7 @@ def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
     sets off is no stop; it was taken for one at a 1e-12 of each step, for ever (hundreds of steps are enough)."""
     omega = 2 * np.pi * 162.4
     free, law = drives.release(1 / 162.4), Rate(0.671, 1.569e-3).element(15.46)
-    run = Run(one_mode(omega, 0.05, 0.7626), free, law, 104, 1e-9, start=Start(np.array([4.631e-5]), np.zeros(1)))
+    run = Motion(one_mode(omega, 0.05, 0.7626), free, law, 104, 1e-9, start=Start(np.array([4.631e-5]), np.zeros(1)))
     for cycle in range(105):
         run.until(cycle / 162.4)
     z, v, done = abs(run.moving.y[0]), abs(run.moving.y[1]), run.kept.tally[DONE:REFUSED + 1].sum()
@@ -71,7 +71,7 @@ def test_always_a_motion_held_at_a_distance_is_not_refused_for_its_round_off(tol
     round-off of its forces. Counted relative to such a rate, that took 7 million tries in 99 cycles."""
     omega, stretch = 2 * np.pi * 153.52, 0.361 * 82.15 / 1.138e7
     law, start = BoucWen(0.361, stretch).element(82.15), Start(np.array([2.3559e-4]), np.zeros(1))
-    run = Run(one_mode(omega, 0.05, 0.2199), drives.release(1 / 153.52), law, 104, tolerance, start=start)
+    run = Motion(one_mode(omega, 0.05, 0.2199), drives.release(1 / 153.52), law, 104, tolerance, start=start)
     run.until(104 / 153.52)
     y, force = run.moving.y, run.settled()[0][5]
     assert run.outcome is None and run.kept.tally[DONE:REFUSED + 1].sum() < 12_000
@@ -86,7 +86,7 @@ def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for
     first 40 cycles, 13 000 in all 108 now."""
     omega, load, length = 2 * np.pi * 62.86, 8.528, 1.523e-7
     law, start = points_element(Bonds(0.588, length), [1.0], [load]), Start(np.array([1.023e-5]), np.zeros(1))
-    run = Run(one_mode(omega, 0.05, 0.4143), drives.release(1 / 62.86), law, 108, tolerance, start=start)
+    run = Motion(one_mode(omega, 0.05, 0.4143), drives.release(1 / 62.86), law, 108, tolerance, start=start)
     run.until(108 / 62.86)
     y, force = run.moving.y, run.settled()[0][5]
     assert run.outcome is None and run.kept.tally[DONE:REFUSED + 1].sum() < 40_000
@@ -97,7 +97,7 @@ def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for
 def test_exact_a_long_call_is_left_now_and_then_and_goes_on_to_the_last_bit():
     """So a signal is heard. The room for turns ends calls elsewhere; neither changes the motion."""
     law, told = element(Bonds(0.3, 5e-6)), []
-    often, long = (Run(ONE, BaseSine(49.0, OMEGA), law, 2500, 1e-9) for _ in range(2))
+    often, long = (Motion(ONE, BaseSine(49.0, OMEGA), law, 2500, 1e-9) for _ in range(2))
     long.kept = long.kept._replace(turns=np.zeros((9000, 9)))
     long.progress = told.append
     for run in (often, long):
