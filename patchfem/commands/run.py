@@ -18,7 +18,7 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
     Example: patchfem run rig.toml --set "drive.acceleration=6 g" -o out/six
     """
     from ..export.folder import keeps, run_into
-    from ..runs.plan import once
+    from ..runs.plan import compile_words
     from ..runs.plan import plan as make
 
     talk = (lambda text: None) if quiet else say
@@ -27,7 +27,8 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
         raise Refused("run --resume: only a run with [wear] on a patch or a march in time keeps its state; run the "
                       "scene again")
     if verbose:
-        talk(f"about {what.seconds:.1f} s{once(what.compile_seconds)}, {what.steps} steps, engine {what.engine}")
+        compiles = compile_words(what.compile_seconds)
+        talk(f"about {what.seconds:.1f} s{compiles}, {what.steps} steps, engine {what.engine}")
     target = out if out is not None else Path("out") / what.model.source.path.stem
     with progress_bar(quiet or json_) as progress:
         written = run_into(what, target, talk, progress, fresh, resume)

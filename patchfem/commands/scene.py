@@ -96,14 +96,14 @@ def _plan_sweep(scene: Path, sets, what: Over, json_: bool) -> None:
 
 
 def _print_plan(answer: dict, probe: bool) -> None:
-    from ..runs.plan import once
+    from ..runs.plan import compile_words
 
     print(f"kind     {answer['kind']}, engine {answer['engine']}")
     for effect in answer["effects"]:
         print(f"  runs   {effect['effect']:<28} {effect['equations']}")
     print(f"  not    {', '.join(shown_absent(answer['not_in_scene'], answer['engine']))}")
     print("sizes    " + ", ".join(f"{k} {v}" for k, v in answer["unknowns"].items()) + f", steps {answer['steps']}")
-    print(f"cost     about {answer['seconds']:.1f} s{once(answer['compile_seconds'])} and "
+    print(f"cost     about {answer['seconds']:.1f} s{compile_words(answer['compile_seconds'])} and "
           f"{answer['bytes'] / 1e6:.0f} MB")
     print("chain    " + " -> ".join(f"{k} {v:.4g} N/m" if not isinstance(v, str) else f"{k} {v}"
                                    for k, v in answer["stiffness_chain"].items()))

@@ -9,8 +9,8 @@ from typing import NamedTuple
 from .. import __version__
 from ..core import Missing, NotConverged
 from ..disk.whole import write_text
-from ..runs.results.result import Result, placeless
-from ..runs.run import Kept, marches, run
+from ..runs.results.result import Result, without_folders
+from ..runs.run import KeptState, marches, run
 from . import netcdf
 from .histories import contents
 from .results import PAGE, STATE, Folder
@@ -41,7 +41,7 @@ def run_into(what, target: Path, say=None, progress=None, fresh: bool = False, r
     with Folder(target, resume) as folder:
         if folder.dropped and say is not None:
             say(folder.dropped)
-        kept = Kept(folder.path / STATE, __version__, resume) if keeps(what) else None
+        kept = KeptState(folder.path / STATE, __version__, resume) if keeps(what) else None
         try:
             result = run(what, say, progress, fresh=fresh, kept=kept)
         except NotConverged as error:
@@ -54,7 +54,7 @@ def run_into(what, target: Path, say=None, progress=None, fresh: bool = False, r
 def _marked(error: NotConverged) -> Result:
     """What a run had computed before it did not converge, with the reason among its warnings."""
     found = error.so_far
-    return replace(found, warnings=[*placeless([str(error)], found.plan.model.source.path), *found.warnings])
+    return replace(found, warnings=[*without_folders([str(error)], found.plan.model.source.path), *found.warnings])
 
 
 def keeps(what) -> bool:

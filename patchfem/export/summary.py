@@ -11,7 +11,7 @@ from .. import __version__
 from ..disk.installed import installed
 from ..disk.whole import write_text
 from ..effects import EFFECTS
-from ..runs.results.result import Result, chosen
+from ..runs.results.result import Result, choices
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
@@ -100,7 +100,7 @@ def summary_of(result: Result) -> dict:
     answer = summary(__version__, what.model.source.title, what.kind, str(result.outcome), result.measures,
                      effects_of(result), list(what.not_in_scene), (result.warnings, result.extra.get("notes", [])),
                      result.seconds)
-    return answer | {"numerics": chosen(result)}
+    return answer | {"numerics": choices(result)}
 
 
 def cycles_of(result: Result) -> float | None:

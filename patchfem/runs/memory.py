@@ -21,7 +21,7 @@ CURES = {"contact.element_size": "make contact.element_size larger", "contact.me
          "slide.file": "keep every few rows of slide.file", "drive.file": "keep every few rows of drive.file"}
 
 
-class Code(NamedTuple):
+class EngineCode(NamedTuple):
     """What the code of an engine takes besides the program: bytes, seconds of CPU until it runs, and those of the first
     run of its kind, in which it compiles; 0 of code that is not compiled."""
 
@@ -30,16 +30,16 @@ class Code(NamedTuple):
     compile: float = 0.0
 
 
-NONE = Code(0.0, 0.0)
-STEPS, FOLLOWED = Code(58e6, 0.4, 8.0), Code(58e6, 0.4, 3.0)  # a march; a slide or a method of few kernels
-SMOOTH, PIECES, BALANCE = Code(74e6, 0.4, 13.0), Code(82e6, 0.4, 22.0), Code(1e8, 0.55, 3.0)
+NONE = EngineCode(0.0, 0.0)
+STEPS, FOLLOWED = EngineCode(58e6, 0.4, 8.0), EngineCode(58e6, 0.4, 3.0)  # a march; a slide or a method of few kernels
+SMOOTH, PIECES, BALANCE = EngineCode(74e6, 0.4, 13.0), EngineCode(82e6, 0.4, 22.0), EngineCode(1e8, 0.55, 3.0)
 CODES = {"static": NONE, "bench, closed form": NONE, "bench, law step by step": NONE, "bench, two directions": NONE,
          "bench, parallel elements": FOLLOWED, "duhamel": FOLLOWED, "newmark": FOLLOWED, "euler": FOLLOWED,
          "smooth": SMOOTH, "exact": PIECES, "piecewise": PIECES, "harmonic": BALANCE}
 OF_EVENTS = "exact", "piecewise"  # engines whose loop runs as Python where it is over soon
 
 
-def code(model: Model, engine: str) -> Code:
+def code(model: Model, engine: str) -> EngineCode:
     """The code of the engine that will run a model."""
     rig = model.rig
     if rig is None:
@@ -49,7 +49,7 @@ def code(model: Model, engine: str) -> Code:
     return CODES.get(steady_by(model).like if ENGINES[engine].steady else engine, STEPS)
 
 
-def kind_of(model: Model, engine: str, unknowns: dict) -> str:
+def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
     """What the compiled code of a run hangs on, in words: two runs of one kind run by the same code."""
     rig, f = model.rig, model.friction
     laws = [one.numbers for one in rig.interfaces] if rig is not None else [f] if f is not None else []
@@ -68,7 +68,7 @@ def compile_seconds(model: Model, engine: str, unknowns: dict) -> float:
         from ..compiled import PATIENCE, has_run
 
         short = engine in OF_EVENTS and _as_python(model) <= PATIENCE
-        return 0.0 if short or has_run(kind_of(model, engine, unknowns)) else seconds
+        return 0.0 if short or has_run(compiled_kind(model, engine, unknowns)) else seconds
     return 0.0
 
 
@@ -76,9 +76,9 @@ def _as_python(model: Model) -> float:
     """CPU seconds of a run from event to event as Python, which is not compiled where they are few; of a density all
     its cells, which its error may ask for."""
     from ..dynamics.events.cost import python_seconds
-    from .rig.costs import elements_of, pairs_of
+    from .rig.costs import expected_elements, pairs_of
 
-    count, stiffness = elements_of(model)
+    count, stiffness = expected_elements(model)
     each = python_seconds(model.rig.modes, model.rig.drive, stiffness, count if stiffness else 0)
     return model.rig.cycles * each * 2**pairs_of(model)
 
@@ -149,12 +149,12 @@ def _of_rig(model: Model, engine: str, steps: int, numerics) -> list:
 def free_bytes(compiled: bool = False) -> float:
     """Memory [bytes] that this process may take in all, by the system, its group and its own limits; infinite where
     none of them tells. compiled: a compiler's library is mapped besides, which only the last counts."""
-    used, mapped = own()
+    used, mapped = own_bytes()
     beside = mapped - used + MAPPED + (CODE if compiled else 0.0)
     return min(_available() + used, _of_group(used), *(limit - beside for limit in _limits()))
 
 
-def own(status: Path = Path("/proc/self/statm")) -> tuple:
+def own_bytes(status: Path = Path("/proc/self/statm")) -> tuple:
     """(memory in use, address space) of this process [bytes]; zeros where the system does not tell."""
     try:
         size, resident = map(int, status.read_text("ascii").split()[:2])

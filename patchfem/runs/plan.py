@@ -39,7 +39,7 @@ class Plan:
         sizes = ", ".join(f"{count} {name.removesuffix('_about').replace('_', ' ')}"
                           for name, count in self.unknowns.items())
         lines = [f"Plan of {self.model.source.path.name}: {self.kind}, engine {self.engine}, {sizes or 'one point'}, "
-                 f"{self.steps} steps, about {self.seconds:.1f} s{once(self.compile_seconds)} and "
+                 f"{self.steps} steps, about {self.seconds:.1f} s{compile_words(self.compile_seconds)} and "
                  f"{self.bytes / 1e6:.0f} MB"]
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
 
@@ -53,7 +53,7 @@ class Plan:
                 "compile_seconds": self.compile_seconds}
 
 
-def once(seconds: float) -> str:
+def compile_words(seconds: float) -> str:
     """The words on what compiles, "" where nothing does."""
     return f" (+ {seconds:.0f} s once, to compile)" if seconds else ""
 
@@ -92,7 +92,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
         said[2] = of_rig.sum_words(model) if model.kind == "rig" else []
     if model.patch is not None:
         from .patch import plan as of_patch
-        from .patch.grids import sizes as of_grids
+        from .patch.grids import expected_grids as of_grids
 
         tolerance = model.patch.mesh_tolerance or model.accuracy.tolerance
         grids = of_grids(model.patch, tolerance)

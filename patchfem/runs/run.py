@@ -16,16 +16,16 @@ from ..model.source import placed
 from . import memory
 from .plan import Plan, plan, refuse_size
 from .remedies import Seen, beyond_tolerance
-from .results.result import Result, placeless, worded
+from .results.result import Result, with_meanings, without_folders
 
-__all__ = ["Kept", "Plan", "Result", "plan", "run"]
+__all__ = ["KeptState", "Plan", "Result", "plan", "run"]
 KINDS = {"patch": "patch.result static", "bench": "bench.result prescribed", "rig": "rig.rig coupled",
          "linear": "rig.rig coupled"}  # the function that runs it, imported when it is wanted
 
 AT_REST = "the measures are those of the pressed patch at rest; the motion was not found"
 
 
-class Kept(NamedTuple):
+class KeptState(NamedTuple):
     """Where the state of a long run is kept, by which version of the program, and whether to go on from it."""
 
     path: Path
@@ -34,7 +34,7 @@ class Kept(NamedTuple):
 
 
 def run(what, say=None, progress=None, per_point: bool = False, estimate: bool = True, fresh: bool = False,
-        kept: Kept | None = None) -> Result:
+        kept: KeptState | None = None) -> Result:
     """Run a Plan, or plan and run a Scene or a Model.
 
     say: called with one line when compiled code has to be made; progress: called with the share of the main pass that
@@ -49,7 +49,7 @@ def run(what, say=None, progress=None, per_point: bool = False, estimate: bool =
         return _run(what, say, progress, per_point, estimate, fresh, kept)
 
 
-def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool, kept: Kept | None) -> Result:
+def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool, kept: KeptState | None) -> Result:
     begin, model = perf_counter(), what.model
     seconds, warnings, notes = {}, list(model.source.remarks), list(model.source.notes)
     patch, coarse = None, (None, None)
@@ -79,7 +79,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         if model.wear is not None and patch is not None:
             from .wear.evolve import evolved_with
 
-            key = kept and key_of(model, patch, kept.version)
+            key = kept and state_key(model, patch, kept.version)
             evolved = evolved_with(kept, key, model, patch, coarse[:2], progress)
             progress = None  # it has told of all cycles
             patch, coarse = evolved.patch, evolved.coarse
@@ -107,7 +107,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
     if what.compile_seconds and estimate:
         from ..compiled import ran
 
-        ran(memory.kind_of(model, what.engine, what.unknowns))
+        ran(memory.compiled_kind(model, what.engine, what.unknowns))
     return _whole(result, notes, begin, coarse)
 
 
@@ -117,11 +117,12 @@ def _whole(result: Result, notes: list, begin: float, coarse=()) -> Result:
     apart = "strip" if model.patch is not None else "interface"
     wide = beyond_tolerance(Seen(model, result.measures, result.patch, result.extra), coarse)
     warned, noted = result.warnings + wide, [*notes, *result.extra.get("notes", [])]
-    return replace(result, measures=worded(result.measures, apart), warnings=placeless(warned, model.source.path),
-                   extra=result.extra | {"notes": placeless(noted, model.source.path)})
+    warned, noted = (without_folders(texts, model.source.path) for texts in (warned, noted))
+    return replace(result, measures=with_meanings(result.measures, apart), warnings=warned,
+                   extra=result.extra | {"notes": noted})
 
 
-def _keeping(kept: Kept | None, what: Plan, patch):
+def _keeping(kept: KeptState | None, what: Plan, patch):
     """A context in which marches keep their states, or nothing where none is to be kept. PatchfemError where there is
     none to go on from."""
     model = what.model
@@ -134,10 +135,10 @@ def _keeping(kept: Kept | None, what: Plan, patch):
 
     if kept.resume and model.wear is None and not path(1).is_file():
         raise PatchfemError(f"{kept.path.parent.name}: no interrupted run is kept there; run without --resume")
-    return keeping(Keeper(path, key_of(model, patch, kept.version), kept.resume))
+    return keeping(Keeper(path, state_key(model, patch, kept.version), kept.resume))
 
 
-def key_of(model, patch, version: str) -> str:
+def state_key(model, patch, version: str) -> str:
     """What a kept state belongs to: the scene in SI, the unworn gap on its nodes, a slide from a file, the version."""
     corners = () if model.slide is None or model.slide.corners is None else model.slide.corners
     of_patch = () if patch is None else (patch.x, patch.gap)

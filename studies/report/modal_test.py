@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 import patchfem as pf
 from patchfem.dynamics.march.march import march, warm_up
-from patchfem.runs.rig.interface import model_of
+from patchfem.runs.rig.interface import contact_of
 from patchfem.runs.rig.numerics import choose
 from patchfem.structure.drives import Recorded
 
@@ -58,7 +58,7 @@ def tested(scene, seconds: float, rms: float, seed: int = 1) -> Test:
     """The rig of a scene (path or text, without [contact]) under `random_base` from rest."""
     model = pf.build(scene)
     drive, modes = random_base(seconds, rms, seed), model.rig.modes
-    contact, cycles = model_of(model, choose(model), None), int(seconds * RATE) // STEPS - 1
+    contact, cycles = contact_of(model, choose(model), None), int(seconds * RATE) // STEPS - 1
     warm_up(modes, drive, contact)
     seen = march(modes, drive, contact, cycles, STEPS, cycles).window
     return Test(seen.base_acceleration, seen.acceleration, seen.output, seen.output_rate)

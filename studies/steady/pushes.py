@@ -9,7 +9,7 @@ from patchfem.dynamics.events.elements import coulomb
 from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.march import march as marching
 from patchfem.runs.patch.ladder import solve_all
-from patchfem.runs.rig.interface import model_of
+from patchfem.runs.rig.interface import contact_of
 from patchfem.runs.rig.numerics import choose
 
 
@@ -35,7 +35,7 @@ def marched(model, start: Start, steps: int, settle: int, cycles: int, size: flo
     modes, drive = model.rig.modes, model.rig.drive
     model = replace(model, rig=replace(model.rig, start=start))
     patch = solve_all(model.patch, model.accuracy.tolerance, False)[0] if model.patch is not None else None
-    run = marching.fresh(modes, drive, model_of(model, choose(model), patch), steps, np.inf, start)
+    run = marching.fresh(modes, drive, contact_of(model, choose(model), patch), steps, np.inf, start)
     for _ in range(settle):
         run.cycle(steps, 0, [])
 

@@ -11,7 +11,7 @@ from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.model.model import build
 from patchfem.response.measures import work_check
 from patchfem.runs.bench import bench
-from patchfem.runs.bench.engine import engine_of, strokes
+from patchfem.runs.bench.engine import bench_engine, strokes
 from patchfem.runs.bench.ledger import BLOCK, UNWATCHED, Watch
 from patchfem.runs.bench.stepped import stepped
 from patchfem.runs.patch.ladder import solve_all
@@ -133,7 +133,7 @@ def test_exact_strokes_are_counted_between_reversals():
 
 
 def test_always_short_strokes_are_summed_as_finely_as_their_force_is_small():
-    wide, short = (engine_of(model, model.slide.samples(400)[1]).choice for model in
+    wide, short = (bench_engine(model, model.slide.samples(400)[1]).choice for model in
                    (model_of(BONDS + "order = 2\n", slide) for slide in ("sine", "small")))
     assert short.error < 0.2 * wide.error
 
@@ -141,7 +141,7 @@ def test_always_short_strokes_are_summed_as_finely_as_their_force_is_small():
 def test_always_pinned_keys_of_the_sum_are_kept():
     model = model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=merged", "accuracy.merge=0.1",
                      "accuracy.tail=1e-5")
-    found = engine_of(model, model.slide.samples(400)[1]).choice
+    found = bench_engine(model, model.slide.samples(400)[1]).choice
     assert (found.engine, found.merge, found.tail) == ("merged", 0.1, 1e-5)
 
 

@@ -6,7 +6,7 @@ from list_paths import follow_list
 
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.runs.results.notes import unbounded
+from patchfem.runs.results.notes import unbounded_bonds
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -53,7 +53,7 @@ def test_exact_the_printed_initial_bonds_that_do_not_grow_are_noted(text):
 def test_exact_initial_bonds_of_negative_order_are_warned_of_in_rigs_too():
     found, _ = notes(RIG.replace("cycles = 10", "cycles = 1"), 'reading = "report"\norder = -0.5\n')
     assert any("infinite at the first instant" in line for line in found.warnings)
-    assert not unbounded(Bonds(0.3, 1e-6, -0.5, "report", initial=0.0)) and not unbounded(Bonds(0.3, 1e-6))
+    assert not unbounded_bonds(Bonds(0.3, 1e-6, -0.5, "report", initial=0.0)) and not unbounded_bonds(Bonds(0.3, 1e-6))
 
 
 @pytest.mark.parametrize("order", [-0.9, -0.5, 0.0])

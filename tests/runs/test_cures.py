@@ -55,11 +55,11 @@ def test_always_a_printed_remedy_does_what_it_promises(seed):
 def test_exact_a_tolerance_that_is_advised_climbs_and_none_is_where_the_ladder_ends():
     asked, tolerance, nodes = replace(build(loads(PATCH)).patch, still=False), 1e-2, []
     while tolerance is not None:
-        found = ladder.climbed(asked, tolerance)
+        found = ladder.climb(asked, tolerance)
         nodes.append(found[0].x.size)
         tolerance = ladder.climbs_at(asked, found, tolerance)
     assert len(nodes) > 1 and nodes == sorted(set(nodes))
-    assert ladder.climbed(asked, 1e-6)[0].x.size == nodes[-1]
+    assert ladder.climb(asked, 1e-6)[0].x.size == nodes[-1]
 
 
 @pytest.mark.slow

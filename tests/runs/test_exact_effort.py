@@ -11,7 +11,7 @@ import patchfem as pf
 from patchfem.core import Missing
 from patchfem.runs.rig import costs
 from patchfem.runs.rig.engines import engine_of
-from patchfem.runs.rig.pieces import limits_of
+from patchfem.runs.rig.pieces import coulomb_limits
 from patchfem.structure.drives import Recorded
 
 CHAIN = """[structure]
@@ -60,13 +60,13 @@ SWEEP = '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "120 Hz"\nto = "150 
 def pieces(model) -> int:
     """Pieces that the engine takes."""
     rig = model.rig
-    return len(rows_of(rig.modes, rig.drive, *np.transpose(limits_of(model, None)), rig.cycles, rig.start)[1])
+    return len(rows_of(rig.modes, rig.drive, *np.transpose(coulomb_limits(model, None)), rig.cycles, rig.start)[1])
 
 
 @pytest.mark.parametrize("text", [CHAIN.format(0.1), CHAIN.format(40), MODES + RUBS + SWEEP])
 def test_always_pieces_are_foreseen_within_a_factor_of_four(text):
     model = pf.plan(text).model
-    expected, took = costs.pieces(model) * model.rig.cycles, pieces(model)
+    expected, took = costs.pieces_per_cycle(model) * model.rig.cycles, pieces(model)
     assert took / 4 < expected < 4 * took
 
 

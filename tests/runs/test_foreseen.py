@@ -81,7 +81,7 @@ def test_exact_a_group_with_a_limit_leaves_what_it_has_not_used(tmp_path):
 
 
 def test_exact_a_limit_of_the_process_is_seen(monkeypatch):
-    used, mapped = memory.own()
+    used, mapped = memory.own_bytes()
     assert 2e7 < used < mapped
     limits = {resource.RLIMIT_AS: 4 * GIGABYTE, resource.RLIMIT_DATA: resource.RLIM_INFINITY}
     monkeypatch.setattr(resource, "getrlimit", lambda kind: (limits[kind], resource.RLIM_INFINITY))
@@ -111,7 +111,7 @@ def test_exact_a_plan_tells_what_compiles_until_a_run_of_its_kind_has_come_to_it
     seconds = before.compile_seconds
     assert seconds > 0 and f"(+ {seconds:.0f} s once, to compile)" in repr(before)
     assert before.as_json()["compile_seconds"] == seconds and before.seconds == planned(RIG, MARCH).seconds
-    compiled.ran(memory.kind_of(before.model, before.engine, before.unknowns))
+    compiled.ran(memory.compiled_kind(before.model, before.engine, before.unknowns))
     assert planned(RIG, MARCH, "drive.cycles=7").compile_seconds == 0 and "compile" not in repr(planned(RIG, MARCH))
     assert planned(PATCH).compile_seconds == 0 and other.compile_seconds == seconds
     assert memory.compile_seconds(other.model, other.engine, other.unknowns) == seconds

@@ -11,7 +11,7 @@ from patchfem.elasticity import elasticity
 from patchfem.model.gap import Gap
 from patchfem.model.model import build
 from patchfem.runs.patch import grids
-from patchfem.runs.patch.grids import base_grids, sizes
+from patchfem.runs.patch.grids import base_grids, expected_grids
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.plan import plan
 from patchfem.scene.scene import loads
@@ -47,7 +47,7 @@ def grids_of_run(patch, tolerance) -> tuple:
     (PIECES + '[contact.upper]\nheight = "4 mm"\n', 1e-3, ["contact.element_size=0.2 mm"])])
 def test_exact_a_plan_counts_the_grids_of_the_run(text, tolerance, sets):
     patch = asked(text, *sets)
-    found, (finest, levels) = sizes(patch, tolerance), grids_of_run(patch, tolerance)
+    found, (finest, levels) = expected_grids(patch, tolerance), grids_of_run(patch, tolerance)
     assert found.finest == finest and found.levels == levels and found.points == max(n for n, _ in finest)
 
 
@@ -59,7 +59,7 @@ def test_always_a_plan_expects_the_grids_of_a_contact_that_only_its_pressure_end
     """Both sides within a fifth, as the edges are those of springs; of 58 random patches 57 had their nodes within a
     quarter, half of them all."""
     patch = asked(text)
-    (found,), ((wanted,), _) = sizes(patch, 1e-2).finest, grids_of_run(patch, 1e-2)
+    (found,), ((wanted,), _) = expected_grids(patch, 1e-2).finest, grids_of_run(patch, 1e-2)
     assert np.allclose(np.subtract(found, 1), np.subtract(wanted, 1), rtol=0.2)
 
 
@@ -81,7 +81,7 @@ def test_always_a_plan_presses_nothing_which_a_run_does(monkeypatch):
 @pytest.mark.parametrize("tolerance", [3e-3, 1e-3])
 def test_always_a_plan_is_at_most_one_level_off_where_a_contact_ends_inside(shape, tolerance):
     patch = asked(PIECES + shape)
-    assert abs(sizes(patch, tolerance).levels - grids_of_run(patch, tolerance)[1]) <= 1
+    assert abs(expected_grids(patch, tolerance).levels - grids_of_run(patch, tolerance)[1]) <= 1
 
 
 def ripple(x, length, height):

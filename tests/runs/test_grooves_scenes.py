@@ -15,9 +15,9 @@ from patchfem.dynamics.harmonic.point import point as periodic_point
 from patchfem.dynamics.harmonic.starts import one_harmonic
 from patchfem.model.model import build
 from patchfem.runs.bench import bench
-from patchfem.runs.many.many import taken
+from patchfem.runs.many.many import batch_of
 from patchfem.runs.rig.numerics import choose
-from patchfem.runs.rig.steady.balance import Balance
+from patchfem.runs.rig.steady.balance import BalanceFinder
 from patchfem.scene.scene import SceneError, loads
 
 GROOVES = 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}'
@@ -203,7 +203,7 @@ def test_always_a_balanced_motion_that_does_not_last_is_said():
     scene = loads(text.replace("steps_per_cycle = 100", 'method = "harmonic"\ntolerance = 5e-3'), sets=[
         "drive.acceleration=58.8 m/s^2", "normal.load=115.65 N", "structure.moving_mass=1.194 kg"])
     model = build(scene)
-    finder = Balance(model, choose(model), None, None)
+    finder = BalanceFinder(model, choose(model), None, None)
     found, _ = finder.point(model.rig.drive)
     assert found.outcome is Outcome.STEADY
     assert found.values["relative_displacement_amplitude"] == pytest.approx(9e-6, rel=0.1)
@@ -347,7 +347,7 @@ def test_refuses_a_batch_that_knows_no_grooves(law):
     """The lumped batch takes the same rig without them, with them each case runs by itself."""
     text = RIG.replace('law = "coulomb"', f'law = "{law}"' + '\nbond_length = "1 um"' * (law != "coulomb"))
     text = text.replace("steps_per_cycle = 100", "")
-    assert taken(build(loads(text))) is None and taken(build(loads(flat(text)))) is not None
+    assert batch_of(build(loads(text))) is None and batch_of(build(loads(flat(text)))) is not None
 
 
 LEAVES = {"normal.grooves.lifted_mass": "1.5 kg", "drive.acceleration": "60 g", "normal.load": "60 N",

@@ -8,7 +8,7 @@ import patchfem as pf
 from patchfem.core import Outcome
 from patchfem.dynamics.march.march import march
 from patchfem.model.model import build
-from patchfem.runs.rig.interface import model_of
+from patchfem.runs.rig import interface
 from patchfem.runs.rig.numerics import choose
 from patchfem.runs.rig.steady.marched import FINE, ROUGH, disturbed
 from patchfem.scene.scene import loads
@@ -47,7 +47,7 @@ def scene(law, *sets):
 
 def contact_of(text):
     model = build(text)
-    return model, model_of(model, choose(model), None)
+    return model, interface.contact_of(model, choose(model), None)
 
 
 def marched(text, cycles=40, steps=400):

@@ -9,8 +9,8 @@ from patchfem.core import Missing
 from patchfem.dynamics.march import march
 from patchfem.response.levels import Level
 from patchfem.runs.plan import plan
-from patchfem.runs.rig.levels import measures, onset
-from patchfem.runs.rig.lists import chatters, holding, lists_grow, stalls
+from patchfem.runs.rig.levels import level_measures, onset
+from patchfem.runs.rig.lists import chatters, force_that_holds, lists_grow, stalls
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -137,7 +137,7 @@ def test_exact_what_holds_a_mass_is_what_its_neighbour_and_the_base_bring():
     omega, push = 2 * np.pi * 176.5, 7.711
     own = 428400 + 115500 - 0.9066 * omega**2 + 1j * omega * 10.35
     wanted = abs(0.7043 * push + (428400 + 1j * omega * 10.35) * 0.9066 * push / own)
-    assert holding(rig) == pytest.approx(wanted, rel=1e-9)
+    assert force_that_holds(rig) == pytest.approx(wanted, rel=1e-9)
 
 
 @pytest.mark.parametrize(("reading", "push", "held"), [("report", 39.8, True), ("report", 39.9, False),
@@ -196,5 +196,5 @@ def test_exact_an_onset_may_be_off_by_what_each_pair_of_coarser_runs_is_apart():
 
     fine, half, quarter, mesh = map(run, (1.5, 1.52, 1.6, 1.63))
     rig = SimpleNamespace(kind="base", onset=("slip", None))
-    found = measures(rig, fine.levels, fine.probe, 1e-6, True, ((half, None), (mesh, quarter)))["onset_level"]
+    found = level_measures(rig, fine.levels, fine.probe, 1e-6, True, ((half, None), (mesh, quarter)))["onset_level"]
     assert abs(found.value - 1.5) < 1e-5 and abs(found.error - (0.02 + 0.03)) < 1e-5

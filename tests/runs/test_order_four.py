@@ -66,14 +66,14 @@ def test_stiffnesses_of_unlike_pieces_lie_within_the_bars_of_bilinear_meshes():
 def test_an_edge_that_stands_wrong_is_found_and_taken_out_of_the_stiffnesses():
     """Columns that break 1e-3 of the contact off its edge change them by 2e-4 to 3e-4 before, by a tenth after."""
     model = model_of("contact.tilt.angle=1e-3 rad").patch
-    ends = high_order.start_of(solve_all(model, 1e-3)[0])
+    ends = high_order.first_edges(solve_all(model, 1e-3)[0])
     for level in (1, 2):
-        ends = high_order.level_of(model, ends, *high_order.grids_of(model, ends, level)).found
+        ends = high_order.level_of(model, ends, *high_order.cells_of(model, ends, level)).found
     wide, names = ends[1].place - ends[0].place, ("normal_stiffness", "tangential_stiffness", "rotational_stiffness")
 
     def values(off):
         edges = (ends[0], ends[1]._replace(place=ends[1].place + off * wide))
-        level = high_order.level_of(model, edges, *high_order.grids_of(model, edges, 2))
+        level = high_order.level_of(model, edges, *high_order.cells_of(model, edges, 2))
         assert abs(level.found[1].place - ends[1].place) <= 5e-5 * wide
         return np.array([level.values[name] for name in names])
 
@@ -124,8 +124,8 @@ def test_always_a_tighter_tolerance_has_no_wider_bar_on_twenty_scenes():
                                      "contact.asperities={law = \"linear\", normal_stiffness = \"1e14 Pa/m\"}",
                                      "contact.upper.length=9 mm", "contact.upper.end_radius=1 mm"])
 def test_refuses_patches_that_it_is_not_made_for(setting):
-    assert high_order.serves(model_of().patch)
-    assert not high_order.serves(model_of(setting).patch)
+    assert high_order.takes_cells(model_of().patch)
+    assert not high_order.takes_cells(model_of(setting).patch)
 
 
 def test_the_run_says_where_its_measures_come_from():
@@ -141,16 +141,16 @@ def test_the_run_says_where_its_measures_come_from():
 def test_exact_what_is_left_of_a_geometric_series_is_held(ratio):
     sums = np.cumsum(ratio ** -np.arange(5.0))
     left = ratio / (ratio - 1) - sums[-1]
-    assert left <= high_order.rest(list(sums)) <= 3 * left
-    assert high_order.rest([0.0, 1.0, 1.0]) >= 1 / 25  # a change small by chance is not believed
-    assert high_order.rest([0.0, 1.0, 3.0]) >= 4.0
+    assert left <= high_order.remainder(list(sums)) <= 3 * left
+    assert high_order.remainder([0.0, 1.0, 1.0]) >= 1 / 25  # a change small by chance is not believed
+    assert high_order.remainder([0.0, 1.0, 3.0]) >= 4.0
 
 
 def test_contact_of_positive_weights_stays_nodal():
     """The solver's own check, forces and gaps, passes on nodes of order 4 as on those of bilinear cells."""
     model = model_of("contact.tilt.angle=1e-4 rad").patch
-    edges = high_order.start_of(solve_all(model, 1e-2)[0])
-    pieces, _, _ = high_order.condensed(model, *high_order.grids_of(model, edges, 2))
+    edges = high_order.first_edges(solve_all(model, 1e-2)[0])
+    pieces, _, _ = high_order.condensed_cells(model, *high_order.cells_of(model, edges, 2))
     answer = press(pieces, model.gap.at(pieces.interface.x)[0], model.load)
     assert pieces.interface.weight.min() > 0 and answer.sigma_n.min() >= 0 and answer.gap.min() >= 0
     assert max(answer.residuals.values()) <= 1e-12

@@ -65,8 +65,8 @@ def on_points(tmp_path, x, z, text, *settings):
     rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(x.tolist(), z.tolist()))
     (tmp_path / "trace.csv").write_text(f"x [m],z [m]\n{rows}\n", "utf-8")
     asked = build(loads(text + '[contact.profile]\nfile = "trace.csv"\n', tmp_path / "scene.toml", sets=settings)).patch
-    assert trace.serves(asked)
-    return trace.sharper(asked, lambda found: True)[0]
+    assert trace.takes_points(asked)
+    return trace.sharper_by_points(asked, lambda found: True)[0]
 
 
 def test_points_as_fine_as_a_file_hold_an_independent_program(tmp_path):

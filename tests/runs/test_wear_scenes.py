@@ -285,14 +285,14 @@ def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(tmp_path, m
     scene.write_text(text)
     _refusing(monkeypatch, until)
 
-    save = evolve.save
+    save = evolve.save_state
 
     def noted(path, *more):
         save(path, *more)
         states.append(path.read_bytes())
 
     with monkeypatch.context() as patched:
-        patched.setattr(evolve, "save", noted)
+        patched.setattr(evolve, "save_state", noted)
         assert cli("run", scene, "-o", tmp_path / "whole", "-q", "--no-page").code == 0
     assert len(states) >= 2
     for state in states:
@@ -307,7 +307,7 @@ def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(tmp_path, m
 
 
 def test_refuses_an_interrupted_run_of_another_scene_and_names_the_way_on(tmp_path, monkeypatch):
-    scene, save = tmp_path / "worn.toml", evolve.save
+    scene, save = tmp_path / "worn.toml", evolve.save_state
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
 
     def interrupted(*asked):
@@ -315,7 +315,7 @@ def test_refuses_an_interrupted_run_of_another_scene_and_names_the_way_on(tmp_pa
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(evolve, "save", interrupted)
+        patched.setattr(evolve, "save_state", interrupted)
         answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 130 and "--resume" in answer.err
     assert [path.name for path in (tmp_path / "out.partial").iterdir()] == ["wear.npz"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...core import PatchfemError
-from ...runs.many.many import compile_seconds, taken
+from ...runs.many.many import batch_compile_seconds, batch_of
 from ...runs.plan import plan
 from .asked import Asked
 from .cases import Cases
@@ -29,12 +29,12 @@ def estimate(asked: Asked, cases: Cases) -> dict:
     if not plans:
         raise wrong
     alone = [max(one.seconds - ONCE, TOGETHER) for one in plans]
-    batches = [taken(one.model) for one in plans]
+    batches = [batch_of(one.model) for one in plans]
     each = sum(one if batch is None else max(TOGETHER, batch.share * one) for one, batch in zip(alone, batches))
     each /= len(plans)
     once = ONCE + max(one * (batch is not None) for one, batch in zip(alone, batches))  # the first as a single run
     first = batches[0]
-    compiles = plans[0].compile_seconds if first is None else compile_seconds(first, plans[0].model)
+    compiles = plans[0].compile_seconds if first is None else batch_compile_seconds(first, plans[0].model)
     return plans[0].as_json() | {
         "compile_seconds": compiles, "seconds": round(once + each * len(cases), 2), "seconds_per_case": round(each, 4),
         "bytes": max(one.bytes for one in plans), "disk_bytes": DISK * len(cases), "cases": len(cases),

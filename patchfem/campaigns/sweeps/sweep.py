@@ -51,7 +51,7 @@ def warmed(work: Work) -> None:
     from ...runs.plan import plan
 
     try:
-        many.taken(model := work.asked.model(work.cases.sets(0))) or plan(model)
+        many.batch_of(model := work.asked.model(work.cases.sets(0))) or plan(model)
     except Exception:
         return
 

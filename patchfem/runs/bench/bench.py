@@ -7,8 +7,8 @@ import numpy as np
 
 from ...response.loops import at_turns, half_range, interface_loop, secant_stiffness, turns_of
 from ...response.measures import harmonic, ledger_measures, step_harmonic, work_check
-from .closed import closed
-from .engine import CLOSED, STEPPED, Engine, engine_of
+from .closed import closed_form
+from .engine import CLOSED, STEPPED, BenchEngine, bench_engine
 from .ledger import UNWATCHED, Watch
 from .stepped import stepped
 
@@ -33,7 +33,7 @@ class BenchRun:
     values: dict
     seconds: float
     first: int
-    engine: Engine
+    engine: BenchEngine
     lateral: np.ndarray | None = None
     lateral_force: np.ndarray | None = None
     yaw_moment: np.ndarray | None = None
@@ -48,7 +48,7 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
         start = time[first]
         time, slide = model.point.refined(model.slide, time, slide, steps)
         first = int(np.searchsorted(time, start))
-    engine = engine_of(model, slide, 1 if patch is None else patch.x.size, watch.choice)
+    engine = bench_engine(model, slide, 1 if patch is None else patch.x.size, watch.choice)
     out, more = _slid(model, patch, (time, slide), frames, engine, watch)
     values = _values(model, time, slide, out, first, omega) | \
         {"work_check": work_check(out.ledger[0], [(slide, out.force), *more.pop("pairs", ())],
@@ -58,7 +58,7 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
     return BenchRun(time, slide, rate, *out, values, perf_counter() - begin, first, engine, **more)
 
 
-def _slid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) -> tuple:
+def _slid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Watch) -> tuple:
     """(Slid, histories of the other direction by name) of a pass along path = (time, slide)."""
     if model.slide.across is not None:
         from .stepped import run_plane
@@ -71,7 +71,7 @@ def _slid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) 
     if engine.kind == STEPPED:
         return stepped(model, patch, *path, frames, watch), {}
     if engine.kind == CLOSED:
-        return closed(model, patch, path, frames, watch), {}
+        return closed_form(model, patch, path, frames, watch), {}
     from .rigid import rigid
 
     return rigid(model, patch, path, frames, engine, watch), {}

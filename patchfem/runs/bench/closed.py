@@ -6,20 +6,20 @@ In every step such a law carries a share of its limit, and the limit is that of 
 
 import numpy as np
 
-from .law import ends_of_rest, law_for, pressed
+from .law import ends_of_rest, law_for, pressure_of
 from .ledger import Slid, Watch, elastic_slip, frame_numbers, ledger_of, local_slip
 
 GAUSS = 8  # points in a step over a flank
 
 
-def closed(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
+def closed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     """Slide the interface of a law without memory along path = (time (k,) [s], slide (k,) [m]), in closed form.
 
     patch: the solved Patch or None; frames: how many frames of tractions are kept.
     """
     if model.grooves is not None:
-        return climbed(model, patch, path, frames, watch)
-    (time, slide), (sigma, weight), law = path, pressed(model, patch), law_for(model, patch)
+        return climbed_form(model, patch, path, frames, watch)
+    (time, slide), (sigma, weight), law = path, pressure_of(model, patch), law_for(model, patch)
     limits = np.stack([law.limit(sigma, -1.0), law.limit(sigma, 1.0)])
     move = np.diff(slide)
     share = law.share(move, np.diff(time))
@@ -44,13 +44,13 @@ def closed(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
                 local_slip(model, slide[at], tau, sigma))
 
 
-def climbed(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
-    """As `closed`, of a slow slide over grooves: the force is N (t + phi)/(1 - phi t), phi = f/R along the flank.
+def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
+    """As `closed_form`, of a slow slide over grooves: the force is N (t + phi)/(1 - phi t), phi = f/R along the flank.
 
     The height of the load is stored, friction's own work along the flank is dissipated; no mass is lifted. Under a load
     N(time) on a point what counts as stored is the work done against it, int N dz.
     """
-    (time, slide), (sigma, weight), law, grooves = path, pressed(model, patch), law_for(model, patch), model.grooves
+    (time, slide), (sigma, weight), law, grooves = path, pressure_of(model, patch), law_for(model, patch), model.grooves
     move, f, varies = np.diff(slide), model.friction, model.load_varies
     load = model.point.at(time) if varies else np.full(time.size, float(weight @ sigma))
     pace = np.divide(move, np.diff(time), out=np.zeros_like(move), where=np.diff(time) > 0)

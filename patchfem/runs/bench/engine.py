@@ -24,7 +24,7 @@ PASSES = 1 / 3  # of the passes over the list that a rig makes: a given slide ne
 
 
 @dataclass(frozen=True, slots=True)
-class Engine:
+class BenchEngine:
     """How a bench slides its interface.
 
     kind: one of the numbers above; seconds: per sample; choice: how bonds are summed, None without a sum.
@@ -40,7 +40,7 @@ class Engine:
         return "bench, " + (f"{self.choice.engine} bond list" if self.kind == LIST else NAMES[self.kind])
 
 
-def engine_of(model, slide, points: int = 1, choice: Choice | None = None) -> Engine:
+def bench_engine(model, slide, points: int = 1, choice: Choice | None = None) -> BenchEngine:
     """The engine of a bench along the samples slide (k,) [m]; points: nodes of the interface; choice: how bonds are
     summed where that is known already.
 
@@ -48,20 +48,20 @@ def engine_of(model, slide, points: int = 1, choice: Choice | None = None) -> En
     """
     f, soft = model.friction, bool(model.soft)
     if model.slide.across is not None:
-        return Engine(PLANE, _stepped_seconds(model, slide, 1))
+        return BenchEngine(PLANE, _stepped_seconds(model, slide, 1))
     if soft and (has(f.law, "bonds") or model.grooves is not None):
         from ...slip.shear_modes import SHEAR_MODES
 
         modes = model.accuracy.shear_modes or SHEAR_MODES
-        return Engine(POINTS, 4e-8 * points * (1 + modes / 4))
+        return BenchEngine(POINTS, 4e-8 * points * (1 + modes / 4))
     if soft:
-        return Engine(ELEMENTS, 3e-9 * points + 1e-7)
-    if changes(model) and model.grooves is None:
+        return BenchEngine(ELEMENTS, 3e-9 * points + 1e-7)
+    if pressure_changes(model) and model.grooves is None:
         return _stepped(model, slide, points)
     if has(f.law, "memoryless"):
-        return Engine(CLOSED, 1e-7)
+        return BenchEngine(CLOSED, 1e-7)
     if not has(f.law, "bonds"):
-        return Engine(ELEMENTS, 1e-7)
+        return BenchEngine(ELEMENTS, 1e-7)
     return _summed(model, slide, points, choice or sum_of(model, slide))
 
 
@@ -75,7 +75,7 @@ def steps_of(model) -> int:
     return max(steps, min(4 * ceil(FLANK * turns / 4), MOST_STEPS))
 
 
-def changes(model) -> bool:
+def pressure_changes(model) -> bool:
     """Whether the pressure of a point changes during the slide: with the load, or as it slides over the other piece."""
     return model.load_varies or model.side == "lower"
 
@@ -108,10 +108,10 @@ def strokes(slide) -> tuple:
     return float(np.abs(move).sum()) / count, max(way.size / count, 1.0)
 
 
-def _summed(model, slide, points: int, found: Choice) -> Engine:
+def _summed(model, slide, points: int, found: Choice) -> BenchEngine:
     law = model.bonds
     if found.engine == "recursion":
-        return Engine(RECURSION, 3e-8, found)
+        return BenchEngine(RECURSION, 3e-8, found)
     if law.breakaway:  # a list has no elastic range
         return _stepped(model, slide, points)
     size = slide.size
@@ -121,11 +121,11 @@ def _summed(model, slide, points: int, found: Choice) -> Engine:
         raise Missing(f"the bond list (about {strips:.0f} entries) would take about {size * seconds:.0f} "
                       f"s, more than {LONGEST:.0f} s; lower accuracy.steps_per_cycle or slide.cycles, or loosen "
                       "accuracy.tail or accuracy.merge", "")
-    return Engine(LIST, seconds, found)
+    return BenchEngine(LIST, seconds, found)
 
 
-def _stepped(model, slide, points: int) -> Engine:
-    return Engine(STEPPED, _stepped_seconds(model, slide, points))
+def _stepped(model, slide, points: int) -> BenchEngine:
+    return BenchEngine(STEPPED, _stepped_seconds(model, slide, points))
 
 
 def _stepped_seconds(model, slide, points: int) -> float:
@@ -150,7 +150,7 @@ def cost(model, unknowns: dict) -> tuple:
     time, slide = model.slide.samples(per_cycle)[:2]
     if model.load_varies:
         time, slide = model.point.refined(model.slide, time, slide, per_cycle)
-    runs = engine_of(model, slide, unknowns.get("interface_points", 1))
+    runs = bench_engine(model, slide, unknowns.get("interface_points", 1))
     if runs.choice is not None and runs.choice.strips:
         unknowns["bond_list_about"] = int(runs.choice.strips)
     steps = 2 * time.size  # half and a quarter of the steps and what checks the sum beside them

@@ -18,7 +18,7 @@ FINER = 0.5  # merge width of the run that shows what merging does
 MERGED = 2.0  # times its change: where merging is of second order 4/3 would do
 
 
-class Variant(NamedTuple):
+class Pass(NamedTuple):
     """A pass beside: steps per cycle, on the coarser mesh or not, how bonds are summed, the springs of a `Watch`."""
 
     steps: int
@@ -30,7 +30,7 @@ class Variant(NamedTuple):
 def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
     """([error by measure name, ...], seconds, `left_open`) of the pass `fine` at `steps` per cycle on the ladder of
     `ladder_of`; coarse: the patch on the coarser mesh or None."""
-    def solve(variant: Variant):
+    def solve(variant: Pass):
         on = coarse if variant.rough else patch
         return bench.run(model, on, variant.steps, watch=Watch(variant.choice, say, springs=variant.springs))
 
@@ -38,7 +38,7 @@ def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
     errors, seconds = estimate(solve, fine.values, ladder, made)
     kinds = [one.of for one in ladder]
     if sum_error(model, fine.engine):
-        errors, kinds = [*errors, stated(model, fine)], [*kinds, "bonds"]
+        errors, kinds = [*errors, sum_errors_of_bench(model, fine)], [*kinds, "bonds"]
     runs = [fine.values, *(made[one].values for one in ladder[0].runs)]
     return errors, seconds, left_open(kinds, errors, runs)
 
@@ -47,7 +47,7 @@ def ladder_of(model, patch, coarse, fine, steps: int) -> list:
     """Rungs of a bench: half and a quarter of the steps; at a quarter of them the coarser mesh, where there is one, and
     for a merged list of bonds narrower strips."""
     choice = fine.engine.choice
-    half, few = Variant(max(4, steps // 8 * 4), False, choice), Variant(max(4, steps // 16 * 4), False, choice)
+    half, few = Pass(max(4, steps // 8 * 4), False, choice), Pass(max(4, steps // 16 * 4), False, choice)
     times = 2.0 if model.load_varies else 1.0  # first order
 
     def rule(*values) -> dict:
@@ -74,7 +74,7 @@ def sum_error(model, engine) -> float:
     return tail_of(model) if engine.kind in (STEPPED, PLANE) and listed(model.friction) else 0.0
 
 
-def stated(model, fine) -> dict:
+def sum_errors_of_bench(model, fine) -> dict:
     """Error by measure name that follows from the bound of the sum over bonds, which is a share of the friction limit:
     forces and slip directly, work as that share of what went to and fro, the store as that of a bond length at the
     limit."""

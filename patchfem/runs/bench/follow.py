@@ -36,7 +36,7 @@ class Followed:
         return ledger_of(work, self.stored, losses)
 
 
-def follow(model, time, slide, frames: int, watch: Watch, paced: bool = False) -> Followed:
+def follow_path(model, time, slide, frames: int, watch: Watch, paced: bool = False) -> Followed:
     """Slide a ContactModel along the samples time [s], slide [m] (k,), with `frames` copies of its state on the way.
 
     paced: whether the law feels how fast it slides. Missing where a list of bonds outgrows its room.

@@ -34,7 +34,7 @@ def tail_of(model) -> float:
     return accuracy.tail if accuracy.tail is not None else 1e-3 * accuracy.tolerance
 
 
-def pressed(model, patch) -> tuple:
+def pressure_of(model, patch) -> tuple:
     """(pressure (m,) [Pa], nodal area (m,) [m2]) of the points; one point that carries the load without a patch."""
     if patch is None:
         return np.array([model.point.load]), np.ones(1)

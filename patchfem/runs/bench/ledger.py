@@ -32,7 +32,7 @@ def ledger_of(work, stored, losses) -> np.ndarray:
     return np.stack([work, stored, dissipated, created])
 
 
-def split(losses) -> tuple:
+def gains_and_losses(losses) -> tuple:
     """(created, dissipated) of the energy (..., m) that points lose, some of it below zero; summed over the points."""
     return -np.minimum(losses, 0.0).sum(axis=-1), np.maximum(losses, 0.0).sum(axis=-1)
 

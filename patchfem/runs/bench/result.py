@@ -6,9 +6,9 @@ from ...core import Outcome
 from ...effects import has
 from ...response.errors import with_errors
 from ...response.rows import judged
-from ..results.notes import climbing_as_one, of_growth, two_books, unbounded, unripe, warming
+from ..results.notes import climbing_as_one, of_growth, unbounded_bonds, unripe, warming, work_check_warning
 from ..results.result import FRAMES, Result, frames_of, on_a_mesh_of_known_error, without_errors
-from ..results.travel import FAR, ended, reach, travelled
+from ..results.travel import FAR, largest_slide, outcome_on_piece, travelled
 from . import bench
 from .engine import steps_of
 from .errors import errors_of
@@ -19,7 +19,7 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     """Run a plan of kind bench; arguments as `run.run` has them."""
     model, f = what.model, what.model.friction
     if has(f.law, "bonds"):
-        warnings = [*warnings, *unbounded(model.bonds), *unripe(model.bonds, model.speed)]
+        warnings = [*warnings, *unbounded_bonds(model.bonds), *unripe(model.bonds, model.speed)]
         if f.reading == "report" and model.load_varies:
             warnings = [*warnings, "as printed a bond keeps the pressure it formed under: while the load falls the "
                         "friction may exceed mu_s N; reading = \"stretch\" keeps to it"]
@@ -35,11 +35,11 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     if f.reading == "report" and created > 1e-6 * power:
         warnings = [*warnings, f"the law as printed created {created:.3g} J, {100 * created / power:.2g} % of the work "
                     "that went to and fro: reading = \"stretch\" creates none"]
-    warnings = [*warnings, *warming(model, patch, fine), *two_books(found, steps)]
+    warnings = [*warnings, *warming(model, patch, fine), *work_check_warning(found, steps)]
     if patch is not None:
         warnings = [*warnings, *_overhang(model.patch, patch, fine)]
         fields = frames_of(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])
-    outcome, notes = ended(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral), []
+    outcome, notes = outcome_on_piece(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral), []
     if has(f.law, "bonds"):
         peak = fine.values["friction_ratio_peak"] / f.static if f.static > 0 and not model.load_varies else None
         notes = of_growth(model.bonds, peak)
@@ -53,7 +53,7 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
 def _overhang(asked, patch, fine) -> list:
     """Warnings of a bench whose slide leaves the patch."""
     out = []
-    if fine.lateral is not None and (aside := reach(fine.lateral) / asked.width) > FAR:
+    if fine.lateral is not None and (aside := largest_slide(fine.lateral) / asked.width) > FAR:
         out.append(f"the slide across is {aside:.2g} of the width; the overhang is not modelled")
     lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
     if lost > 0.01:

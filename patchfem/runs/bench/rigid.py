@@ -11,22 +11,22 @@ import numpy as np
 from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
 from ...effects import carries, has
 from ...friction.record import law_from
-from .engine import ELEMENTS, Engine
-from .follow import follow
-from .law import pressed
+from .engine import ELEMENTS, BenchEngine
+from .follow import follow_path
+from .law import pressure_of
 from .ledger import Slid, Watch, elastic_slip, local_slip
 
 
-def rigid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) -> Slid:
+def rigid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Watch) -> Slid:
     """Slide the interface rigidly along path = (time (k,) [s], slide (k,) [m]) by a compiled engine.
 
     patch: the solved Patch or None; frames: how many frames of tractions are kept; engine: of `engine_of`.
     """
     (time, slide), f = path, model.friction
-    sigma, weight = pressed(model, patch)
+    sigma, weight = pressure_of(model, patch)
     load = float(weight @ sigma)
     paced = f.rest_growth is not None or model.load_varies or not (has(f.law, "bonds") or has(f.law, "timeless"))
-    done = follow(one_point(model, load, engine), time, slide, frames, watch, paced)
+    done = follow_path(one_point(model, load, engine), time, slide, frames, watch, paced)
     tau = np.outer(done.force[done.at] / load if load > 0 else np.zeros(done.at.size), sigma)
     loads = model.point.at(time) if model.load_varies else np.full(time.size, load)
     if engine.kind == ELEMENTS or model.grooves is not None:
@@ -62,7 +62,7 @@ def swing_of(model):
     return Swing(point.amplitude, 2 * np.pi * point.frequency, point.phase) if model.load_varies else STEADY
 
 
-def one_point(model, load: float, engine: Engine) -> ContactModel:
+def one_point(model, load: float, engine: BenchEngine) -> ContactModel:
     """One point that carries the whole load [N], as a contact of the compiled loops."""
     f = model.friction
     if model.grooves is not None:

@@ -12,7 +12,7 @@ from ...response.errors import GAPS, change
 from ...slip.fields import element_fields, point_fields, shear_of
 from ...slip.grain import spread, stiffer
 from ..patch.kept import elements
-from .follow import follow
+from .follow import follow_path
 from .ledger import Slid, Watch
 from .rigid import climbing
 
@@ -34,7 +34,8 @@ def _elements(model, patch, time, slide, frames, watch) -> Slid:
     length = law_from(f).element(1.0).length
     found = elements(patch, f.static, length)
     springs = found.stiffness, found.yield_slide
-    done = follow(jenkins_model(*(watch.springs(*springs) if watch.springs else springs)), time, slide, frames, watch)
+    model = jenkins_model(*(watch.springs(*springs) if watch.springs else springs))
+    done = follow_path(model, time, slide, frames, watch)
     tau, local = element_fields(patch, found, done.states, length)
     return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)
 
@@ -43,7 +44,7 @@ def _climbing(model, patch, time, slide, frames, watch) -> Slid:
     """Points behind the shear modes of pieces that climb grooves as one."""
     load = patch.pressure.load
     contact = climbing(model, load, patch, model.accuracy.shear_modes)
-    done = follow(contact, time, slide, frames, watch, not has(model.friction.law, "timeless"))
+    done = follow_path(contact, time, slide, frames, watch, not has(model.friction.law, "timeless"))
     refuse_missed(done)
     tau, local = climbed_fields(patch, contact, done.states)
     return Slid(done.force, np.full(time.size, load), done.slip, done.ledger, done.at, tau, local)
@@ -74,7 +75,7 @@ def _points(model, patch, time, slide, frames, watch) -> Slid:
     law = model.bonds
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
     shear = shear_of(patch, law, model.accuracy.shear_modes, model.accuracy.tolerance)
-    done = follow(points_model(law, weight, sigma, shear), time, slide, frames, watch, law.grows)
+    done = follow_path(points_model(law, weight, sigma, shear), time, slide, frames, watch, law.grows)
     refuse_missed(done)
     tau, local = point_fields(patch, law, shear, done.states)
     return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)

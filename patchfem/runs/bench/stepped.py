@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Missing
-from .law import ends_of_rest, law_for, pressed
-from .ledger import BLOCK, Slid, Watch, elastic_slip, frame_numbers, ledger_of, local_slip, split
+from .law import ends_of_rest, law_for, pressure_of
+from .ledger import BLOCK, Slid, Watch, elastic_slip, frame_numbers, gains_and_losses, ledger_of, local_slip
 
 MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a bench is refused
 
@@ -19,7 +19,7 @@ def stepped(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
     """Slide every point along the samples time [s], slide [m] (k,); the pressure rides on the upper piece or stays on
     the lower one, or the load changes in time. Missing where the sum over bonds would take too long."""
     law, (weight, pressure) = law_for(model, patch), _pressures(model, patch, time, slide)
-    refuse_costly(model, law, time.size, weight.size, slide)
+    refuse_long_sum(model, law, time.size, weight.size, slide)
     peaks, at = ends_of_rest(model, slide), frame_numbers(time.size, frames)
     found = _walked((law, _under_load if model.load_varies else _along), (time, slide[:, None]), (weight, pressure), at,
                     peaks, watch)
@@ -37,7 +37,7 @@ def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:
     friction on the upper piece, f positive against its slip; strips have their places y over the width.
     """
     law = law_for(model)
-    refuse_costly(model, law, time.size, 1, slide)
+    refuse_long_sum(model, law, time.size, 1, slide)
     across, one = np.interp(time, model.slide.corners[0], model.slide.across), np.ones(1)
     at = frame_numbers(time.size, frames)
     found = _walked((law, _along), (time, np.stack([slide, across], axis=1)), (one, lambda k: one), at, {}, watch)
@@ -77,7 +77,7 @@ def _walked(laws: tuple, path: tuple, points: tuple, at, peaks: dict, watch: Wat
         if k:
             dq, s1 = slide[k] - slide[k - 1], pressure(k)
             mean, lost, state = move(law, state, dq if width > 1 else dq[0], s0, s1, time[k] - time[k - 1])
-            s0, losses[k] = s1, split(weight * lost)
+            s0, losses[k] = s1, gains_and_losses(weight * lost)
             work[k] = work[k - 1] + dq @ np.atleast_2d(mean) @ weight
         here = np.atleast_2d(law.breaking(s0, peaks[k]) if k in peaks else law.traction(state))
         force[k], load[k], stored[k] = here @ weight, weight @ s0, weight @ law.stored(state)
@@ -88,7 +88,7 @@ def _walked(laws: tuple, path: tuple, points: tuple, at, peaks: dict, watch: Wat
     return _Walked(force, load, ledger_of(work, stored, losses), np.array(tau).reshape(len(tau), width, weight.size))
 
 
-def refuse_costly(model, law, samples: int, points: int, slide) -> None:
+def refuse_long_sum(model, law, samples: int, points: int, slide) -> None:
     """Raise Missing where the NumPy sum over bonds would form more strip-point products than MOST_WORK.
 
     slide: (k,) [m]; bonds older than 25 lengths are taken as cut off.
@@ -108,7 +108,7 @@ def _pressures(model, patch, time, slide) -> tuple:
     if model.load_varies:
         loads = model.point.at(time)
         return np.ones(1), lambda k: loads[k:k + 1]
-    sigma, weight = pressed(model, patch)
+    sigma, weight = pressure_of(model, patch)
     if patch is None or model.side != "lower":
         return weight, lambda k: sigma
     return weight, lambda k: np.interp(patch.x + slide[k], patch.x, sigma, left=0.0, right=0.0)

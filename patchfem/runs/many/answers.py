@@ -90,7 +90,7 @@ class Answers:
         return not np.isnan(self.values[name][case]) or case in self.reasons.get(name, ())
 
 
-def joined(count: int, parts: Iterable[tuple[Sequence[int], Answers]]) -> Answers:
+def joined_answers(count: int, parts: Iterable[tuple[Sequence[int], Answers]]) -> Answers:
     """Answers of `count` cases put together from parts, each with the places of its cases."""
     out = Answers.blank(count)
     for cases, part in parts:

@@ -44,7 +44,7 @@ BATCHES: tuple[Batch, ...] = (_batch("patches", "patch"), _batch("lumped.lumped"
                               _batch("lumped.sheared", "rig", 0.4, 12.0))
 
 
-def compile_seconds(batch: Batch, model: Model) -> float:
+def batch_compile_seconds(batch: Batch, model: Model) -> float:
     """CPU seconds in which a batch compiles for a model like this; 0 where one like it has been answered."""
     if batch.compile:
         from ...compiled import has_run
@@ -59,7 +59,7 @@ def _kind(batch: Batch, model: Model) -> str:
     return " ".join([batch.name, rig.waveform, *(one.numbers.law for one in rig.interfaces), str(bool(model.soft))])
 
 
-def taken(model: Model) -> Batch | None:
+def batch_of(model: Model) -> Batch | None:
     """The batch that takes a model; None where it is run by itself."""
     return next((one for one in BATCHES if not one.refuses(model)), None)
 
@@ -87,7 +87,7 @@ def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = Non
 def _place(model: Model) -> tuple:
     """(batch, group) of a model; (None, None) where it is run by itself."""
     try:
-        batch = taken(model)
+        batch = batch_of(model)
         return (batch, batch.group(model)) if batch is not None else (None, None)
     except Exception:  # what is odd about the model is told by its own run
         return None, None
@@ -102,7 +102,7 @@ def _solved(batch: Batch | None, models: list, alone: Callable, say: Callable | 
     if batch is not None:
         try:
             out = batch.solve(models, say)
-            if batch.compile and compile_seconds(batch, models[0]):
+            if batch.compile and batch_compile_seconds(batch, models[0]):
                 from ...compiled import ran
 
                 ran(_kind(batch, models[0]))

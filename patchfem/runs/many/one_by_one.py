@@ -8,7 +8,7 @@ from time import perf_counter
 from ...core import PatchfemError
 from ...model.model import Model
 from ..plan import plan
-from ..results.result import chosen
+from ..results.result import choices
 from ..run import run
 from .answers import Answers
 
@@ -33,7 +33,7 @@ def solve(models: Sequence[Model], say: Callable | None = None, keep: Callable |
             found.fail(case, f"internal fault, please report it: {type(error).__name__}: {error}")
         else:
             found.put(case, result.outcome, result.measures, 0.0)
-            found.numerics[case] = chosen(result)
+            found.numerics[case] = choices(result)
             for kept, said in ((found.warnings, result.warnings), (found.notes, result.extra.get("notes"))):
                 if said:
                     kept[case] = list(said)

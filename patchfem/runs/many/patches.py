@@ -14,9 +14,9 @@ from ..patch import result as of_patch
 from ..patch import static
 from ..patch.meshes import geometry_of
 from ..remedies import Seen, beyond_tolerance
-from ..results.result import placeless
+from ..results.result import without_folders
 from . import one_by_one
-from .answers import Answers, joined
+from .answers import Answers, joined_answers
 
 AT_ONCE = 1000  # cases whose forces are held at once
 
@@ -27,19 +27,20 @@ class _Nodes(NamedTuple):
 
 def refuses(model: Model) -> str:
     """Why a model is not pressed together with others; "" where it may be."""
-    return static.refuses(model.patch) if model.kind == "patch" else "it is no static patch"
+    return static.not_together(model.patch) if model.kind == "patch" else "it is no static patch"
 
 
 def group(model: Model) -> Hashable:
     """Equal for models whose patches are pressed together."""
-    return geometry_of(model.patch), static.kind_of(model.patch), model.accuracy.tolerance
+    return geometry_of(model.patch), static.pressing_kind(model.patch), model.accuracy.tolerance
 
 
 def solve(models: Sequence[Model], say: Callable | None = None) -> Answers:
     """Answers of a group; cases that do not press together with the others are run by themselves."""
     begin, first, found = perf_counter(), models[0], []
     for start in range(0, len(models), AT_ONCE):
-        found += static.solved([model.patch for model in models[start:start + AT_ONCE]], first.accuracy.tolerance)
+        these = [model.patch for model in models[start:start + AT_ONCE]]
+        found += static.pressed_together(these, first.accuracy.tolerance)
     out, single = Answers.blank(len(models)), [case for case, one in enumerate(found) if one is None]
     area, nodes = first.patch.length * first.patch.width * first.patch.pairs, None
     for case, (model, one) in enumerate(zip(models, found, strict=True)):
@@ -52,12 +53,12 @@ def solve(models: Sequence[Model], say: Callable | None = None) -> Answers:
         warned = [*model.source.remarks, *of_patch.strained_by(model.patch, one.top, one.approach),
                 *beyond_tolerance(Seen(model, measures, _Nodes(np.broadcast_to(0.0, one.nodes))))]
         if warned:
-            out.warnings[case] = placeless(warned, model.source.path)
+            out.warnings[case] = without_folders(warned, model.source.path)
         notes = [*of_patch.slender(model.patch, measures["normal_load"].value / area), *one.band]
         if notes:
-            out.notes[case] = placeless(notes, model.source.path)
+            out.notes[case] = without_folders(notes, model.source.path)
     out.seconds[:] = (perf_counter() - begin) / len(models)
     if not single:
         return out
-    return joined(len(models), [(range(len(models)), out),
-                                (single, one_by_one.solve([models[case] for case in single], say))])
+    return joined_answers(len(models), [(range(len(models)), out),
+                                        (single, one_by_one.solve([models[case] for case in single], say))])

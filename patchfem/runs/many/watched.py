@@ -104,9 +104,9 @@ class Watcher:
 
     def _orbits(self):
         from ...dynamics.events.orbits import Orbits
-        from ..rig.pieces import Interfaces
+        from ..rig.pieces import YieldingElements
 
-        modes, groups = self.model.rig.modes, Interfaces(self.model, self.numerics, self.patch).groups
+        modes, groups = self.model.rig.modes, YieldingElements(self.model, self.numerics, self.patch).groups
         found = self.before.pop("yields", None)
         return found if found is not None and found.renewed(modes, groups) else Orbits(modes, groups)
 
@@ -114,30 +114,30 @@ class Watcher:
         from ...dynamics.harmonic.balance import periodic_response
         from ...dynamics.harmonic.point import point
         from ...response.measures import acceleration_peak
-        from ..rig.steady.balance import SAMPLES, Balance
+        from ..rig.steady.balance import SAMPLES, BalanceFinder
 
-        one = self._once("balance", lambda: Balance(self.model, self.numerics, self.patch, 0, self.say))
+        one = self._once("balance", lambda: BalanceFinder(self.model, self.numerics, self.patch, 0, self.say))
         found = point(one.modes, drive, one.group, one.harmonics, one.tolerance, start=near)
         window = periodic_response(found, one.modes, drive, SAMPLES)
         return Watched(window, acceleration_peak(window), found.amplitude(one.modes.output), found)
 
     def _events(self, drive, near) -> Watched | None:
-        from ..rig.steady.maps import Events
+        from ..rig.steady.maps import EventFinder
 
-        raw = self._once("events", lambda: Events(self.model, self.numerics, self.patch, 0, self.say)).point(drive)[0]
-        return _seen(raw)
+        one = self._once("events", lambda: EventFinder(self.model, self.numerics, self.patch, 0, self.say))
+        return _seen(one.point(drive)[0])
 
     def _run(self, drive, near) -> Watched | None:
         model = replace(self.model, rig=replace(self.model.rig, drive=drive))
         few = replace(self.numerics, whole=False)  # what is before the window is neither kept nor measured
         if ENGINES[self.numerics.engine] is not MARCH:
             return _seen(ENGINES[self.numerics.engine].run(model, few, self.patch, 0, self.say, None))
-        from ..rig.march import Read, marched
+        from ..rig.march import MarchReader, marched
 
         contact, done, *_ = marched(model, few, self.patch, 0, self.say)
         if done.outcome in UNBOUNDED:
             return None
-        values = Read(model, few, self.patch, contact).values(done)
+        values = MarchReader(model, few, self.patch, contact).values(done)
         return _measured(done.window, values)
 
 

@@ -29,7 +29,7 @@ NEAR, CORNERED = 1e-3, 0.2  # of the length: what counts as a corner; its share 
 OVERLAP = 1e-6  # of what the pressure moves: the largest overlap of a solved contact
 
 
-class Level(NamedTuple):
+class PointLevel(NamedTuple):
     """A solved level: forces (n,) [N], values by name, what its meshes may hide, iterations.
 
     cornered: the pressure at a free corner may be the largest, which a few cells at the ends do not tell.
@@ -42,14 +42,14 @@ class Level(NamedTuple):
     cornered: bool
 
 
-def serves(asked) -> bool:
+def takes_points(asked) -> bool:
     """Whether a `PatchModel` is bare pieces of one length under a profile, pressed by what a row of points can take."""
     held = asked.approach is None or not (asked.rotates or asked.spring > 0)
     return asked.chosen and asked.gap.profile is not None and asked.skin is None and asked.strips is None \
         and not asked.outlined and asked.sweeps != "wear" and held
 
 
-def sharper(asked, enough) -> tuple:
+def sharper_by_points(asked, enough) -> tuple:
     """(static measures by name as (value, error), spacing [m] of the finest points) of a `PatchModel`.
 
     enough(measures) -> bool ends the climb, as do MOST_POINTS and MOST_WORK. ({}, None) where a level is not solved.
@@ -74,7 +74,7 @@ def _first(asked) -> int:
     return max(POINTS, min(round(asked.length / spacing_of(asked.gap.profile) / 4), MOST_POINTS // 4))
 
 
-def _dear(last: Level) -> bool:
+def _dear(last: PointLevel) -> bool:
     """Whether twice the points of a level are too many, or take too many iterations."""
     return 2 * last.force.size > MOST_POINTS or 3 * last.work * last.force.size > MOST_WORK
 
@@ -131,7 +131,7 @@ def _rows(piece, layout: Layout) -> tuple:
     return rows(Layout(0.0, height, tuple(bands), (0.0, height), most, most, layout.slope), thick)
 
 
-def _level(asked, ends: tuple, count: int, start) -> Level:
+def _level(asked, ends: tuple, count: int, start) -> PointLevel:
     normal, shear = operators(asked, ends, count)
     x, between = normal.x, np.linspace(-asked.length / 2, asked.length / 2, 2 * count + 1)
     gap = asked.gap.at(between)[0][1::2]
@@ -146,7 +146,7 @@ def _level(asked, ends: tuple, count: int, start) -> Level:
                     asked.moment is not None, float(np.ptp(gap) + np.abs(moved).max()), 0.0, 0.0)
     near = max(1, round(NEAR * count))
     cornered = max(force[:near].max(), force[-near:].max()) > CORNERED * force.max()
-    return Level(force, values, hidden, work, bool(cornered))
+    return PointLevel(force, values, hidden, work, bool(cornered))
 
 
 def _pressed(asked, normal: Products, gap, start) -> tuple:

@@ -3,7 +3,7 @@
 The coarsest grid follows from the patch alone: its contact is searched on columns that are graded to what the search
 before found. A plan, which presses nothing, lays it out by the same rules for the contact of springs. Every next grid
 splits all cells in two, so the grids of a tighter tolerance are those of a wider one and more. How far the ladder is
-climbed a run decides in `ladder`, a plan expects in `sizes`. Read `base_grids` first, then `layout_of`.
+climbed a run decides in `ladder`, a plan expects in `expected_grids`. Read `base_grids` first, then `layout_of`.
 """
 
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ from ...model.patch import bars
 from ...model.pieces import grid_of, outlined, rounded_edges
 from .condensed import condensed
 from .press import Patch, pressed
-from .values import found_ends
+from .values import contact_ends
 
 SEARCH_CELLS = 96  # columns of the first search for the contact
 MOST_COLUMNS = 120  # of the coarsest grid
@@ -45,7 +45,7 @@ ONE_MORE = 2e-3  # tolerance below which a contact that ends inside, or over a j
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Found:
+class ContactExtent:
     """What a search finds of a contact.
 
     span: (from, to) [m] of the loaded stretch; places: where the pressure ends inside the interface, or the nodes of a
@@ -77,7 +77,7 @@ def base_grids(asked) -> list:
     for _ in range(SEARCHES):
         grids = grids_of(asked, layout)
         pair = condensed(asked, *grids)
-        seen = [loaded(pressed(each, pair)) for each in (asked, *sweep)]
+        seen = [contact_extent(pressed(each, pair)) for each in (asked, *sweep)]
         layout = layout_of(asked, seen)
         cells = max(one.cell / one.wide for one in seen)
         if cells <= 1 / (EDGE[asked.still] - 1) and _shows_crests(asked, grids[0].x, layout):
@@ -147,7 +147,7 @@ def _coating(asked) -> float:
     return min((piece.thickness for piece in (asked.lower, asked.upper) if piece.thickness), default=0.0)
 
 
-def loaded(patch: Patch) -> Found:
+def contact_extent(patch: Patch) -> ContactExtent:
     """Extent of the contact of a patch; where nothing touches, the cells around the narrowest gap.
 
     Of a smooth skin the part that bears a thousandth of the largest pressure counts.
@@ -156,23 +156,23 @@ def loaded(patch: Patch) -> Found:
     if not (sigma > 0).any():
         least = int(np.argmin(patch.pressure.gap))
         low, high = float(x[max(least - 1, 0)]), float(x[min(least + 1, x.size - 1)])
-        return Found((low, high), (float(x[least]),), (), np.inf)
+        return ContactExtent((low, high), (float(x[least]),), (), np.inf)
     strips = patch.strips.pressure if patch.strips is not None else sigma[None]
     bears = strips > (1e-3 * strips.max() if patch.skin is not None else 0.0)
     index = np.flatnonzero(bears.any(axis=0))
     low, high = x[max(index[0] - 1, 0)], x[min(index[-1] + 1, x.size - 1)]
     if index.size < 4 and index.size < x.size:  # a point of contact between a few nodes: look closer around it
-        return Found((float(low), float(high)), tuple(x[index].tolist()), (), np.inf)
+        return ContactExtent((float(low), float(high)), tuple(x[index].tolist()), (), np.inf)
     changes = np.flatnonzero((bears[:, 1:] != bears[:, :-1]).any(axis=0))
     places, cells = (x[changes] + x[changes + 1]) / 2, np.diff(x)[changes]
-    found = found_ends(patch)
+    found = contact_ends(patch)
     if len(found) == changes.size:
         places = np.array([end.place for end in found])
     corners = tuple(float(x[at]) for at in (0, -1) if bears[:, at].any())
     low = places[0] if index[0] else x[0]
     high = places[-1] if index[-1] < x.size - 1 else x[-1]
-    return Found((float(low), float(high)), tuple(places.tolist()), corners, float(cells.max(initial=0.0)),
-                 _crests(x, sigma))
+    return ContactExtent((float(low), float(high)), tuple(places.tolist()), corners, float(cells.max(initial=0.0)),
+                         _crests(x, sigma))
 
 
 def _crests(x, sigma) -> tuple:
@@ -237,7 +237,7 @@ class Sizes(NamedTuple):
         return float(sum(columns * rows for columns, rows in self.finest))
 
 
-def sizes(asked, tolerance: float) -> Sizes:
+def expected_grids(asked, tolerance: float) -> Sizes:
     """The grids that a `PatchModel` is solved on at a tolerance, as the rules that make them lay them out for the
     contact that is expected, which is not solved. A mesh file counts as one as fine as the automatic grid: it is not
     read."""
@@ -266,7 +266,7 @@ def sizes(asked, tolerance: float) -> Sizes:
                  asked.outlined or not plain, ends)
 
 
-def expected_contact(asked) -> Found:
+def expected_contact(asked) -> ContactExtent:
     """The contact of a `PatchModel` as springs beside each other have it, each as soft as a bar of the pieces.
 
     A contact shorter than the pieces are high strains them about as deep as it is long, so that its springs are bars of
@@ -283,8 +283,8 @@ def expected_contact(asked) -> Found:
         share = min(1.0, np.count_nonzero(bears) * (x[1] - x[0]) / height)
     index, change = np.flatnonzero(bears), np.flatnonzero(bears[1:] != bears[:-1])
     places = ((x[change] + x[change + 1]) / 2).tolist()
-    return Found((places[0] if index[0] else float(x[0]), places[-1] if index[-1] < x.size - 1 else float(x[-1])),
-                 tuple(places), tuple(float(x[at]) for at in (0, -1) if bears[at]), 0.0)
+    low, high = places[0] if index[0] else float(x[0]), places[-1] if index[-1] < x.size - 1 else float(x[-1])
+    return ContactExtent((low, high), tuple(places), tuple(float(x[at]) for at in (0, -1) if bears[at]), 0.0)
 
 
 def _bearing(x, gap, depth: float, arm: float | None) -> np.ndarray:

@@ -18,7 +18,7 @@ from ...elasticity.grid_fronts import predicted_seconds
 from ...elasticity.lapack import cho_factor, cho_solve, one_thread
 from ...mesh.grading import Layout, columns, rows
 from ...model.pieces import layers_of
-from .grids import loaded
+from .grids import contact_extent
 from .press import pressure_on
 
 ORDER = 4
@@ -48,7 +48,7 @@ class Edge(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Level:
+class CellLevel:
     """One level: its columns break at `edges`, the contact was found to end at `found`; values by name of measure.
 
     rounding: relative error of the compliance by round-off [1]; nodes: of the interface.
@@ -61,22 +61,22 @@ class Level:
     nodes: int
 
 
-def serves(asked) -> bool:
+def takes_cells(asked) -> bool:
     """Whether a `PatchModel` has what cells of order 4 are made for: bare blocks under smooth shapes."""
     return asked.chosen and not asked.outlined and asked.skin is None and asked.strips is None \
         and asked.gap.profile is None and not asked.gap.jumps and asked.sweeps != "wear"
 
 
-def sharper(asked, patch, enough) -> dict:
+def sharper_by_cells(asked, patch, enough) -> dict:
     """Static measures by name, as (value, error), of a `PatchModel` pressed on a bilinear grid as `patch`.
 
     enough(measures) -> bool ends the climb, as do SPENT and MOST_LEVELS. {} where the contact is no stretch or two that
     cells can be laid out for, or where three levels cannot be solved.
     """
-    edges, series = start_of(patch), []
+    edges, series = first_edges(patch), []
     while edges and len(series) < MOST_LEVELS:
-        grids = grids_of(asked, edges, len(series))
-        if seconds_of(*grids) > SPENT:
+        grids = cells_of(asked, edges, len(series))
+        if seconds_of_cells(*grids) > SPENT:
             break
         try:
             series.append(level_of(asked, edges, *grids))
@@ -86,10 +86,10 @@ def sharper(asked, patch, enough) -> dict:
         if not _apart(edges):
             break
         if len(series) >= LEAST_LEVELS:
-            found = summed(series, locked(asked))
+            found = best_levels(series, locked(asked))
             if enough(found):
                 break
-    return summed(series, locked(asked)) if len(series) >= LEAST_LEVELS else {}
+    return best_levels(series, locked(asked)) if len(series) >= LEAST_LEVELS else {}
 
 
 def locked(asked) -> float:
@@ -99,28 +99,28 @@ def locked(asked) -> float:
     return float(np.interp(max(ratios), *LOCKED)) if asked.plane == "strain" else 0.0
 
 
-def summed(series: list, locked: float = 0.0) -> dict:
+def best_levels(series: list, locked: float = 0.0) -> dict:
     """(value, error) by name: that of the level, from the third on, whose error is least; at least the share `locked`
     of the value."""
     out = {}
     for name in series[0].values:
         values = [level.values[name] for level in series]
         falls = PLACE_FALLS if name in PLACES else FALLS
-        errors = [(max(rest(values[:k + 1], falls), _round_off(name, series[k])), k)
+        errors = [(max(remainder(values[:k + 1], falls), _round_off(name, series[k])), k)
                   for k in range(LEAST_LEVELS - 1, len(values))]
         error, best = min(errors)
         out[name] = values[best], max(error, locked * abs(values[best]))
     return out
 
 
-def _round_off(name: str, level: Level) -> float:
+def _round_off(name: str, level: CellLevel) -> float:
     """Error of a measure by round-off; some are zero by symmetry."""
     share, value = max(ROUND, level.rounding), level.values[name]
     arm = share * (abs(level.found[-1].place) + abs(level.found[0].place)) / 10
     return max(share * abs(value), {"pressure_centre": arm, "moment": arm * level.values["normal_load"]}.get(name, 0.0))
 
 
-def rest(values: list, falls: float = FALLS) -> float:
+def remainder(values: list, falls: float = FALLS) -> float:
     """Half-width around the last of three values or more that holds what is left of the series.
 
     The changes fall by some `falls` from level to level. Slower ones are taken as the geometric series that they show;
@@ -133,10 +133,10 @@ def rest(values: list, falls: float = FALLS) -> float:
     return SAFE * left
 
 
-def start_of(patch) -> tuple:
+def first_edges(patch) -> tuple:
     """The edges of a contact pressed on a bilinear grid, () where they are no stretches that cells can be laid out
     for."""
-    half, bears, seen = float(patch.x[-1]), patch.active, loaded(patch)
+    half, bears, seen = float(patch.x[-1]), patch.active, contact_extent(patch)
     places = [(-half, False)] * bool(bears[0]) + [(place, True) for place in seen.places]
     places += [(half, False)] * bool(bears[-1])
     edges = tuple(Edge(float(place), 2 * (k % 2) - 1, free) for k, (place, free) in enumerate(places))
@@ -150,10 +150,10 @@ def _apart(edges: tuple) -> bool:
         all(b - a > LEAST * (places[-1] - places[0]) for a, b in pairwise(places))
 
 
-def level_of(asked, edges: tuple, breaks, depths: list) -> Level:
-    """Solve a `PatchModel` on the cells of `grids_of`."""
+def level_of(asked, edges: tuple, breaks, depths: list) -> CellLevel:
+    """Solve a `PatchModel` on the cells of `cells_of`."""
     with one_thread():
-        pieces, closing, rounding = condensed(asked, breaks, depths)
+        pieces, closing, rounding = condensed_cells(asked, breaks, depths)
         if rounding > ROUGH:
             raise NotConverged(f"the compliance of the pieces is known to {rounding:.1e} only")
         x = pieces.interface.x
@@ -162,12 +162,12 @@ def level_of(asked, edges: tuple, breaks, depths: list) -> Level:
             raise NotConverged("contact: the pieces touch on coarser cells only")
         found = edges_of(x, pressure.sigma_n, _thin(asked))
         values = _values(asked, pieces, pressure, found) | _stiffnesses(asked, pieces, closing, edges, found)
-    return Level(edges, found, values, rounding, x.size)
+    return CellLevel(edges, found, values, rounding, x.size)
 
 
-def condensed(asked, breaks, depths: list) -> tuple:
+def condensed_cells(asked, breaks, depths: list) -> tuple:
     """(Compliance of both pieces, (m, m) normal closing per shear force [m/N], rounding [1]) on the cells of
-    `grids_of`."""
+    `cells_of`."""
     width, pieces = asked.width * asked.pairs, (asked.lower, asked.upper)
     faces = [high_order.condense(breaks, depth, coated, layers_of(asked, piece), ORDER)
              for piece, (depth, coated) in zip(pieces, depths)]
@@ -177,13 +177,13 @@ def condensed(asked, breaks, depths: list) -> tuple:
     return Compliance(interface, normal, tangential), (low.nt - high.nt) / width, max(low.rounding, high.rounding)
 
 
-def seconds_of(breaks, depths: list) -> float:
-    """Predicted CPU time [s] of condensing the pieces on the cells of `grids_of`."""
+def seconds_of_cells(breaks, depths: list) -> float:
+    """Predicted CPU time [s] of condensing the pieces on the cells of `cells_of`."""
     return sum(predicted_seconds(ORDER * (breaks.size - 1) + 1, ORDER * (depth.size - 1) + 1, False, ORDER)
                for depth, _ in depths)
 
 
-def grids_of(asked, edges: tuple, level: int) -> tuple:
+def cells_of(asked, edges: tuple, level: int) -> tuple:
     """Cells of a level: break points (k + 1,) [m] of the columns, and (depths (r + 1,) [m], rows in the coating) of
     each piece, one where they are alike."""
     layout = _layout(asked, edges, level)

@@ -46,7 +46,7 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
             return on_pairs(asked, [condensed(asked, *level, fresh=True) for level in asked.meshes.levels], estimate)
         return _kept(by_content(asked), estimate) if shares(asked) else on_pairs(asked, shared_pairs(asked), estimate)
     if asked.chosen:
-        return climbed(asked, asked.mesh_tolerance or tolerance, estimate, fresh)
+        return climb(asked, asked.mesh_tolerance or tolerance, estimate, fresh)
     return _with_coarser(asked, *bodies_of(asked), estimate, fresh)
 
 
@@ -68,17 +68,17 @@ def _filled(patches) -> tuple:
 
 def _with_coarser(asked, low, high, estimate: bool, fresh: bool) -> tuple:
     """A patch on given bodies and on coarser ones, as `solve_all`."""
-    found = [(low, high), *(beside(low, high) if estimate else ())]
+    found = [(low, high), *(meshes_beside(low, high) if estimate else ())]
     return _filled(solve(asked, *level, fresh) for level in found)
 
 
-def levels_of(asked) -> list:
+def meshes_of_file(asked) -> list:
     """The meshes of a patch whose elements are pinned or come from a file, as `solve_all` takes them."""
     low, high = bodies_of(asked)
-    return [(low, high), *beside(low, high)]
+    return [(low, high), *meshes_beside(low, high)]
 
 
-def beside(low, high) -> list:
+def meshes_beside(low, high) -> list:
     """The meshes, (lower, upper or None), that show the error of given ones: coarser grids, or a mesh of any cells
     with every edge halved."""
     if low.x.size <= 8:
@@ -92,7 +92,7 @@ def beside(low, high) -> list:
     return out
 
 
-def climbed(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
+def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
     """A patch on the coarsest mesh of the ladder that meets its tolerance, and on all coarser ones, fine to coarse.
 
     Where the tolerance is below FINE, or the next mesh is dear, cells of order 4 add sharper measures if they can, or
@@ -122,10 +122,10 @@ def climbed(asked, tolerance: float, estimate: bool = True, fresh: bool = False)
             found = measures(*out, tolerance=tolerance)
             if sharp:
                 return tuple(out)
-        if sharp is None and not met(found, tolerance) and high_order.serves(asked) and \
+        if sharp is None and not met(found, tolerance) and high_order.takes_cells(asked) and \
                 (dear > SPENT[False] or (asked.still and met(found, FINE))):
             before = missed(found, tolerance)
-            sharp = high_order.sharper(asked, out[0], partial(_enough, out, tolerance))
+            sharp = high_order.sharper_by_cells(asked, out[0], partial(_enough, out, tolerance))
             out[0] = replace(out[0], sharper=sharp)
             found = measures(*out, tolerance=tolerance)
             if missed(found, tolerance) <= before / HELPED:
@@ -138,16 +138,16 @@ def _finer(asked) -> bool:
     """Whether a trace may be solved on points finer than any cells."""
     if asked.gap.profile is None:
         return False
-    from .fine import serves
+    from .fine import takes_points
 
-    return serves(asked)
+    return takes_points(asked)
 
 
 def _on_points(asked, patches: list, tolerance: float) -> tuple:
     """Sharper measures of patches, fine to coarse, from points as fine as a trace, and the finest patch with them."""
-    from .fine import sharper
+    from .fine import sharper_by_points
 
-    found, apart = sharper(asked, partial(_enough, patches, tolerance))
+    found, apart = sharper_by_points(asked, partial(_enough, patches, tolerance))
     first = patches[0]
     return found, replace(first, sharper=found, averaging=apart or first.averaging)
 
@@ -155,7 +155,7 @@ def _on_points(asked, patches: list, tolerance: float) -> tuple:
 def climbs_at(asked, patches, tolerance: float) -> float | None:
     """The loosest tenth, hundredth, ... of a tolerance for which a patch climbs beyond its finest mesh.
 
-    patches: as `climbed` returns them for that tolerance. None where the next mesh is dear, or no tolerance asks for
+    patches: as `climb` returns them for that tolerance. None where the next mesh is dear, or no tolerance asks for
     it: then the ladder has ended for good.
     """
     if seconds_of([finer(grid) for grid in _grids(patches[0])]) > SPENT[asked.still]:

@@ -102,7 +102,7 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
         return _bounded(_unbounded(fine), combined([mine], {}))
     missed_peak, series = unresolved_rounding(fine), _alike(fine, series)
     found = [values(one) for one in reversed(series)]
-    nested = all(halved(a.pair, b.pair) and _stretches(a) == _stretches(b) for a, b in pairwise((fine, *series)))
+    nested = all(cells_halved(a.pair, b.pair) and _stretches(a) == _stretches(b) for a, b in pairwise((fine, *series)))
     rough = 2.0 if missed_peak else 1.0  # of meshes that pass over a rounding none shows what it does
     least = least_of(_hidden(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
     edged = tuple(mine) if fine.jumps else EDGED
@@ -247,7 +247,7 @@ def reaching(found: dict, top: float) -> dict:
     return found | {"pressure_peak": peak, "loaded_fraction": _of_peak(found["loaded_fraction"], peak)}
 
 
-def halved(fine, coarse) -> bool:
+def cells_halved(fine, coarse) -> bool:
     """Whether every cell of the coarse Pair was split in two."""
     bodies = ((fine.grid, coarse.grid), (fine.upper_grid, coarse.upper_grid))
     plans = [tuple(map(plan_of, pair)) for pair in bodies]

@@ -46,8 +46,8 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
     """
     asked = patches[0]
     if not asked.chosen:
-        return named(ladder.levels_of(asked))
-    cases, every = spread(patches)
+        return with_digest(ladder.meshes_of_file(asked))
+    cases, every = farthest_apart(patches)
     swept = [replace(one, load=share * one.load) for one in cases if one.sweeps == "load" and one.load is not None
              for share in grids.SWING]
     layout = _layout([*cases, *swept], not (every and all_))
@@ -55,11 +55,11 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
     for share in () if layout is None else START[-1:] if asked.sweeps else START:
         levels, good = _climbed(cases, grids.grids_of(asked, layout.times(share)), tolerance, share > 1)
         if good or share == START[-1]:
-            return named(levels)
+            return with_digest(levels)
     return None
 
 
-def named(levels) -> Meshes:
+def with_digest(levels) -> Meshes:
     """Meshes with the hash of their content."""
     digest = sha256()
     for body in (body for level in levels for body in level):
@@ -71,7 +71,7 @@ def named(levels) -> Meshes:
     return Meshes(tuple(levels), digest.hexdigest()[:32])
 
 
-def spread(patches) -> tuple:
+def farthest_apart(patches) -> tuple:
     """(the patches that lie farthest apart in what presses and shapes them, CASES at most, whatever their order;
     whether these are all)."""
     rows = {_numbers(one): one for one in patches}
@@ -120,7 +120,7 @@ def _layout(cases: list, between: bool) -> Layout | None:
 def _loaded(asked, pair):
     """The contact of a case, None of one that cannot be pressed: its own run says why."""
     try:
-        return grids.loaded(pressed(asked, pair))
+        return grids.contact_extent(pressed(asked, pair))
     except PatchfemError:
         return None
 

@@ -5,7 +5,7 @@ from math import log10, sqrt
 from ...model.model import Model
 from ...model.patch import bars, block_shear
 from .grids import Sizes
-from .high_order import serves
+from .high_order import takes_cells
 
 PRESSED, WORK = 0.15, 3.0  # seconds of a patch with its fields, and per predicted second of condensing it
 OUTLINED = 2.2  # the last of pieces beyond the interface, whose predicted seconds are those of any cells already
@@ -31,7 +31,7 @@ def effort(asked, found: Sizes, tolerance: float) -> tuple:
     """
     seconds = PRESSED + (OUTLINED if found.outlined else WORK) * found.seconds
     size = PACKAGES + (OUTLINED_NODE * found.nodes if found.outlined else CONDENSED * found.bytes)
-    if tolerance < SHARP_FROM and serves(asked):
+    if tolerance < SHARP_FROM and takes_cells(asked):
         decades = log10(1e-3 / tolerance) * (1 if found.ends == 0 and not asked.lower.thickness else sqrt(EDGED))
         seconds, size = seconds + SHARPER * decades**2, size + SHARPER_BYTES * decades**2
     if not asked.still:

@@ -9,7 +9,7 @@ from ...core import Outcome, say
 from ...mesh.nested import plan_of
 from ...model.pieces import bodies_of
 from ...model.source import placed
-from ..results.result import Result, still
+from ..results.result import Result, at_rest
 from . import kept
 from .kept import band
 from .ladder import solve_all
@@ -68,7 +68,7 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
     found = measured(what.model, patch, coarse)
     if patch.strips is not None and coarse[0] is not None:
         found = strip_error(what.model.patch, coarse[0], found)
-    return Result(what, p.outcome, found, None, None, patch, still(patch), seconds, warnings, extra)
+    return Result(what, p.outcome, found, None, None, patch, at_rest(patch), seconds, warnings, extra)
 
 
 def strained(asked, patch) -> list:

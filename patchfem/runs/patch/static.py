@@ -22,7 +22,7 @@ SOLVED = 1e-12  # largest residual, as `contact.unilateral` has it
 BORDER = 3  # nodes whose means give the pressure at an end
 
 
-class Solved(NamedTuple):
+class SolvedPatch(NamedTuple):
     """A patch solved together with others: static measures by name; top [Pa]: largest nodal pressure; approach [m] of
     the finest mesh; band: sentences on the plane state, as `measures.plane_band` has them; nodes: of the interface."""
 
@@ -33,7 +33,7 @@ class Solved(NamedTuple):
     nodes: int
 
 
-class Found(NamedTuple):
+class LevelValues(NamedTuple):
     """What q patches have on one level: values: name -> (q,); count: (q,) nodes in contact; cell: (q,) [m] in which the
     contact ends, 0 of full contact; spread, corner: (q,) as `Hidden` has them; top: (q,) largest nodal pressure [Pa];
     inside: (q,) whether no border of the interface bears as much; good: (q,) whether it was solved."""
@@ -48,7 +48,7 @@ class Found(NamedTuple):
     good: np.ndarray
 
 
-def refuses(asked) -> str:
+def not_together(asked) -> str:
     """Why a `PatchModel` is not pressed together with others; "" where it may be."""
     if asked.meshes is None:
         return "its mesh is its own"
@@ -61,15 +61,15 @@ def refuses(asked) -> str:
     return "its pressure may have no bound" if asked.singular_ends or asked.gap.jumps else ""
 
 
-def kind_of(asked) -> tuple:
+def pressing_kind(asked) -> tuple:
     """What patches pressed together have in common beside their pieces."""
     skin = None if asked.skin is None else (asked.skin.normal_stiffness, asked.skin.tangential_ratio)
     return asked.meshes.name, skin, asked.moment is None
 
 
-def solved(patches, tolerance: float) -> list:
-    """Each of `PatchModel`s alike in their pieces and in `kind_of` as Solved; None of those that do not press as this
-    module can.
+def pressed_together(patches, tolerance: float) -> list:
+    """Each of `PatchModel`s alike in their pieces and in `pressing_kind` as SolvedPatch; None of those that do not
+    press as this module can.
 
     tolerance: relative error beyond which values are extrapolated.
     """
@@ -85,7 +85,7 @@ def solved(patches, tolerance: float) -> list:
     theirs = None if theirs is None else _rows(theirs.values)
     series = [_rows(level.values) for level in reversed(levels)]
     fine, pair = levels[0], pairs[0]
-    nested = all(one_by_one.halved(a, b) for a, b in pairwise(pairs))
+    nested = all(one_by_one.cells_halved(a, b) for a, b in pairwise(pairs))
     alike, turns = max(one_by_one.ALIKE, pair.rounding), patches[0].moment is not None
     length, out = pair.compliance.interface.length, []
     stated = tolerance if patches[0].chosen else None
@@ -100,11 +100,11 @@ def solved(patches, tolerance: float) -> list:
         found = combined([rows[k] for rows in series], least_of(hidden, mine), nested, stated, alike)
         found = one_by_one.reaching(found, float(fine.top[k])) if fine.inside[k] else found
         band = one_by_one.band_words(patches[k], series[-2][k], theirs[k]) if theirs is not None else []
-        out.append(Solved(found, float(fine.top[k]), mine["approach"], band, pair.compliance.interface.x.size))
+        out.append(SolvedPatch(found, float(fine.top[k]), mine["approach"], band, pair.compliance.interface.x.size))
     return out
 
 
-def _in_other_plane(patches) -> Found | None:
+def _in_other_plane(patches) -> LevelValues | None:
     """The patches on the second mesh in the other plane state; None where nobody asks."""
     first = one_by_one.other_plane(patches[0])
     if first is None:
@@ -117,7 +117,7 @@ def _rows(values: dict) -> list:
     return [dict(zip(names, row)) for row in np.stack([values[name] for name in names], axis=1).tolist()]
 
 
-def pressed_on(patches, pair: Pair) -> Found:
+def pressed_on(patches, pair: Pair) -> LevelValues:
     """Values of patches on one Pair, by contacts that begin at either end."""
     gaps = np.array([asked.gap.at(pair.compliance.interface.x)[0] for asked in patches]) + pair.rise
     left = _from_one_end(patches, pair, gaps, 1)
@@ -132,7 +132,7 @@ def pressed_on(patches, pair: Pair) -> Found:
     return left
 
 
-def _from_one_end(patches, pair: Pair, gaps, way: int) -> Found:
+def _from_one_end(patches, pair: Pair, gaps, way: int) -> LevelValues:
     """Values of patches on one Pair by contacts from the end at -x (way 1) or at +x (-1), seen in its mirror."""
     first, bare = patches[0], pair.compliance
     pieces = bare if first.skin is None else with_linear_skin(first.skin, bare)
@@ -150,7 +150,7 @@ def _from_one_end(patches, pair: Pair, gaps, way: int) -> Found:
     edge = np.where(count < m, np.minimum(edge, x[-1]), x[-1])
     sigma = found.force / weight
     skin = None if first.skin is None else soft / normal.c.diagonal()
-    peak = peaks(x, sigma, count, skin)
+    peak = peak_pressures(x, sigma, count, skin)
     total, moved = found.force.sum(axis=1), np.abs(found.force @ normal.c).max(axis=1)
     turn = way * found.theta + np.array([asked.gap.angle for asked in patches])
     pull = way * (found.force @ x)
@@ -162,21 +162,21 @@ def _from_one_end(patches, pair: Pair, gaps, way: int) -> Found:
               "rotational_stiffness": normal.stiffness(count, share, True)}
     cells = np.diff(x)
     ends = np.stack([sigma[:, 0], sigma[:, -1]])
-    corner = np.zeros(load.size) if first.skin is not None else corners(pair, ends, cells[[0, -1]])
+    corner = np.zeros(load.size) if first.skin is not None else corner_layers(pair, ends, cells[[0, -1]])
     good = found.flaw <= SOLVED
     cell = np.where(count < m, cells[np.minimum(count, m - 1) - 1], 0.0)
     top = sigma.max(axis=1)
     inside = (sigma[:, 0] < top) & (sigma[:, -1] < top)
-    return Found(values, count, cell, np.ptp(g, axis=1) + moved, corner, top, inside, good)
+    return LevelValues(values, count, cell, np.ptp(g, axis=1) + moved, corner, top, inside, good)
 
 
-def corners(pair: Pair, sigma, cells):
+def corner_layers(pair: Pair, sigma, cells):
     """`measures.corner_layer` of many patches: sigma (2, q) [Pa] at both ends, cells (2,) [m]."""
     sides = [one_by_one.corner_layer(pair, (1.0,), (cell,)) for cell in cells]
     return np.maximum(sides[0] * sigma[0], sides[1] * sigma[1])
 
 
-def peaks(x, sigma, count, skin=None):
+def peak_pressures(x, sigma, count, skin=None):
     """`values.peak_pressure` (q,) [Pa] of pressures sigma (q, m) [Pa] on the first `count` (q,) nodes at x (m,) [m]."""
     top = np.argmax(sigma, axis=1)
     out = np.empty(len(sigma))

@@ -95,7 +95,7 @@ def _values(patch: Patch) -> dict:
 def _on_edges(patch: Patch) -> dict:
     """The values that hang on where the contact ends."""
     x, normal, force = patch.x, patch.pieces.normal, patch.pressure.sigma_n * patch.pieces.interface.weight
-    found, active = found_ends(patch), patch.active
+    found, active = contact_ends(patch), patch.active
     stretches = edges.intervals(x, force, found)
     return {"contact_fraction": float(np.diff(stretches).sum() / np.ptp(x)),
             "contact_half_width": float(stretches[-1, 1] - stretches[0, 0]) / 2,
@@ -104,7 +104,7 @@ def _on_edges(patch: Patch) -> dict:
             "rotational_stiffness": edges.stiffness(normal, active, x, found)}
 
 
-def found_ends(patch: Patch) -> list:
+def contact_ends(patch: Patch) -> list:
     """Ends of the contact set between the nodes, as a list of `contact.edges.End`; of the means over strips none."""
     if patch.strips is not None:
         return []
@@ -113,7 +113,7 @@ def found_ends(patch: Patch) -> list:
 
 
 def _between(patch: Patch) -> list:
-    """The ends of `found_ends` as if the gap were smooth."""
+    """The ends of `contact_ends` as if the gap were smooth."""
     if patch.skin is not None:
         return edges.faded(patch.x, patch.skin.pressure, edges.BEARING)
     own, bare = patch.pieces.normal, patch.pair.compliance.normal

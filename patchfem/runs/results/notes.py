@@ -60,7 +60,7 @@ def creeping(law, outcome, found) -> list:
             "by each swing do so under a biased load"]
 
 
-def unbounded(law) -> list:
+def unbounded_bonds(law) -> list:
     """Warning, as a list, of initial bonds of negative order: they pull without a bound in the first instant.
 
     Bonds that form later never do: grown or not, theirs is at most the share P(p + 1, R/eps_0) of mu_s N.
@@ -92,7 +92,7 @@ def of_growth(law, peak: float | None) -> list:
     return out
 
 
-def two_books(values: dict, steps: int | None, harmonics: int | None = None) -> list:
+def work_check_warning(values: dict, steps: int | None, harmonics: int | None = None) -> list:
     """Warning, as a list, of friction work that the samples of a run do not show as its ledger books it.
 
     values: measures; steps: per cycle, harmonics: of the run, each None of an engine without. The trapezoidal rule is

@@ -41,7 +41,7 @@ class Result:
                f"  {' and '.join(counts)}, {self.seconds.get('total', 0.0):.2f} s"
 
 
-def worded(measures: dict, apart: str) -> dict:
+def with_meanings(measures: dict, apart: str) -> dict:
     """The measures by name, with their meanings.
 
     apart: what a number behind a name counts, "interface" or "strip".
@@ -62,7 +62,7 @@ def meaning(name: str, apart: str = "interface") -> str:
     return rows.row_of(name).text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")
 
 
-def still(patch) -> dict:
+def at_rest(patch) -> dict:
     """Fields of the pressed patch before any motion: normal_stress [Pa], gap [m] and status, (1, m) each."""
     return {"time": np.zeros(1), "normal_stress": patch.pressure.sigma_n[None], "gap": patch.pressure.gap[None],
             "status": patch.active.astype(np.int8)[None]}
@@ -73,7 +73,7 @@ def frames_of(patch, time, tau, local, slide) -> dict:
 
     slide (f,): motion of the upper holder [m] in the given frames.
     """
-    first = still(patch)
+    first = at_rest(patch)
     count = len(time) + 1
     tau = np.concatenate([np.zeros((1, tau.shape[1])), tau])
     slip = np.concatenate([np.zeros((1, tau.shape[1])), local])
@@ -98,7 +98,7 @@ def without_errors(found: dict, estimate: bool) -> dict:
     return found if estimate else {k: replace(m, error=None) for k, m in found.items()}
 
 
-def chosen(result) -> dict:
+def choices(result) -> dict:
     """Engine, steps per cycle or those that a tolerance chose, cycles and window of a run, shear modes or elements
     behind the pieces' shear, how bonds are summed, and interface nodes and strips of its patch,
     and the length [m] that its profile is averaged over.
@@ -129,7 +129,7 @@ def chosen(result) -> dict:
     return out
 
 
-def placeless(texts, path: Path) -> list:
+def without_folders(texts, path: Path) -> list:
     """Remarks in which a file is named without its folder where that is absolute, and numbers are written for people;
     path: of the scene, beside which files lie."""
     folders = [f"{folder}/" for folder in (path.parent, path.parent.absolute()) if folder.is_absolute()]

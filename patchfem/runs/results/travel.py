@@ -8,7 +8,7 @@ from ...response.outcome import off_the_piece
 FAR = 0.1  # of the contact length; from there on the fixed pressure is doubtful
 
 
-def reach(slide) -> float:
+def largest_slide(slide) -> float:
     """Largest |slide| [m] of kept samples (k,) [m]; infinite where the motion left the numbers."""
     largest = float(np.abs(slide).max(initial=0.0))
     return largest if np.isfinite(largest) else np.inf
@@ -26,19 +26,19 @@ def contact_length(patch) -> float:
 
 def travelled(patch, slide) -> list:
     """A warning, as a list, where the slide (k,) [m] is a tenth of the contact length or more."""
-    largest, contact = reach(slide), contact_length(patch)
+    largest, contact = largest_slide(slide), contact_length(patch)
     if not contact > 0 or largest < FAR * contact:
         return []
     return [f"slide amplitude {say(largest, 3)} is {largest / contact:.2g} of the contact length {say(contact)}: the "
             f"pressure is taken as fixed and the overhang of the pieces is not modelled (limit {FAR:g})"]
 
 
-def ended(outcome, asked, patch, slide, lateral=None):
+def outcome_on_piece(outcome, asked, patch, slide, lateral=None):
     """The outcome of a run, or that the slide passed the end of the piece (`response.outcome.off_the_piece`).
 
     patch: None for [normal], which has no length; lateral (k,) [m]: slide across, or None.
     """
     if patch is None:
         return outcome
-    found = off_the_piece(outcome, reach(slide), (asked.lower.length + asked.upper.length) / 2)
-    return found if lateral is None else off_the_piece(found, reach(lateral), asked.width)
+    found = off_the_piece(outcome, largest_slide(slide), (asked.lower.length + asked.upper.length) / 2)
+    return found if lateral is None else off_the_piece(found, largest_slide(lateral), asked.width)

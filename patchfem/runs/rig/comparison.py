@@ -14,7 +14,7 @@ from ...dynamics.march.models import load_kernels
 from ...effects import has, module_of
 from ...friction.record import law_from
 from ...structure.drive_sizes import omega_of, peak_speed
-from .reading import Reader, books_of
+from .reading import Reader, friction_works
 from .solution import borne, sampled_loop
 
 TOLERANCE = 1e-6  # of a converged step, relative, where the scene does not say
@@ -59,7 +59,7 @@ class Compared(Reader):
 
     def integrated(self, run, drive) -> Integrated:
         """Friction work along the slides of all samples, and that of the ledger, which is summed in time."""
-        return Integrated(books=books_of(run.response, run.ledger["friction"]))
+        return Integrated(books=friction_works(run.response, run.ledger["friction"]))
 
     def more(self, run, drive, stuck: bool) -> dict:
         """The loop by the trapezoidal rule, and the ledger."""

@@ -64,7 +64,7 @@ def pairs_of(model: Model) -> int:
 
 
 @lru_cache(8)
-def elements_of(model: Model) -> tuple:
+def expected_elements(model: Model) -> tuple:
     """(elements, stiffness [N/m] of those of the stiffest interface) that the interfaces of a rig have, estimated; a
     rigid element has no spring to ring on."""
     count, stiff = 0, 0.0
@@ -86,7 +86,7 @@ def elements_of(model: Model) -> tuple:
     return count, stiff
 
 
-def pieces(model: Model) -> float:
+def pieces_per_cycle(model: Model) -> float:
     """Pieces of the motion per cycle of the drive at most: of its fastest rate while all holds, and of every event."""
     return sum(_ringing_and_events(model))
 
@@ -94,7 +94,7 @@ def pieces(model: Model) -> float:
 def _ringing_and_events(model: Model) -> tuple:
     """Pieces per cycle of a motion whose elements hold all the time, and those of every event and row."""
     modes, drive = model.rig.modes, model.rig.drive
-    count, stiff = elements_of(model)
+    count, stiff = expected_elements(model)
     faces = np.asarray(modes.interfaces)
     reach = float((faces**2).sum(axis=1).max(initial=0.0)) / modes.mass
     damping = float(np.linalg.norm(modes.dampers, 2))
@@ -107,7 +107,7 @@ def _ringing_and_events(model: Model) -> tuple:
 def seconds_of_pieces(model: Model) -> float:
     """Seconds of a run from event to event at most, by which its engine is chosen: all holds all the time."""
     cycles = model.rig.cycles
-    return ((MOST_PIECE + _of_size(model)) * cycles + READ * min(cycles, 10.0)) * pieces(model)
+    return ((MOST_PIECE + _of_size(model)) * cycles + READ * min(cycles, 10.0)) * pieces_per_cycle(model)
 
 
 def _of_size(model: Model) -> float:
@@ -119,7 +119,7 @@ def _of_size(model: Model) -> float:
 def expected_seconds(model: Model) -> float:
     """Seconds of a run from event to event as a plan counts them: what rings while an element holds is passed in the
     share of the time in which it does."""
-    rig, (count, stiff) = model.rig, elements_of(model)
+    rig, (count, stiff) = model.rig, expected_elements(model)
     limit = sum(one.numbers.static * (model.nominal_load if one.load is None else one.load) for one in rig.interfaces)
     push = rig.force or rig.mass * largest(rig.drive)
     ringing, events = _ringing_and_events(model)
@@ -129,7 +129,7 @@ def expected_seconds(model: Model) -> float:
 
 def seconds_of_steps(model: Model) -> float:
     """Estimated seconds of a march with the coarser runs of its error, which has none of the exactness."""
-    count, many = elements_of(model)[0], len(model.rig.interfaces)
+    count, many = expected_elements(model)[0], len(model.rig.interfaces)
     return 1.75 * model.rig.cycles * (CYCLE + steps_per_cycle(model) * many * (STEP + STEP_ELEMENT * count))
 
 
@@ -149,19 +149,20 @@ def refuse_endless(model: Model, numerics=None) -> None:
     """Raise Missing when a run from event to event would take longer than LONGEST seconds."""
     seconds = seconds_of_pieces(model)
     if seconds > LONGEST:
-        raise Missing(f"the exact motion (about {pieces(model):.2g} pieces per cycle, between events, rows of the "
-                      f"drive and the fastest ringing) would take about {seconds:.0f} s, more than {LONGEST:.0f} s; "
-                      "lower drive.cycles or the frequency of the fastest mode, or use accuracy.method = \"march\"", "")
+        raise Missing(f"the exact motion (about {pieces_per_cycle(model):.2g} pieces per cycle, between events, rows "
+                      f"of the drive and the fastest ringing) would take about {seconds:.0f} s, more than "
+                      f"{LONGEST:.0f} s; lower drive.cycles or the frequency of the fastest mode, or use "
+                      "accuracy.method = \"march\"", "")
 
 
 def exact_cost(model: Model, numerics, unknowns: dict) -> tuple:
     """Pieces and seconds of a run from event to event."""
-    return int(pieces(model) * numerics.cycles), expected_seconds(model)
+    return int(pieces_per_cycle(model) * numerics.cycles), expected_seconds(model)
 
 
 def exact_words(model: Model, engine: str) -> list:
     """The sentence of a plan on which engine takes the elements, and why."""
-    count, exact, march = elements_of(model)[0], expected_seconds(model), seconds_of_steps(model)
+    count, exact, march = expected_elements(model)[0], expected_seconds(model), seconds_of_steps(model)
     return [f"{count} element{'s' * (count > 1)} by engine {engine}: about {exact:.2g} s from yield to yield, exact, "
             f"about {march:.2g} s by steps at this tolerance"]
 

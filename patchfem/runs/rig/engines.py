@@ -19,7 +19,7 @@ from ...response.coarser import Rung, space_rung
 from ...response.errors import cells_error, change, pieces_error, step_error, tolerance_error
 from ...scene.rules import methods
 from ...scene.rules.draft import acts, pinned
-from .costs import dear_elements, dear_events, not_smooth, pieces
+from .costs import dear_elements, dear_events, not_smooth, pieces_per_cycle
 from .solution import gauged
 
 FINER, MERGED = 0.5, 2.0  # merge width of the run that shows what merging does, and times its change
@@ -124,10 +124,10 @@ class Finder(NamedTuple):
 
 
 FINDERS = {one.name: one for one in (
-    Finder("events", "the map from event to event, exact", "steady.maps Events", "exact"),
-    Finder("yields", "the map from yield to yield, exact", "steady.maps Yields", "piecewise"),
-    Finder("march", "a march that is brought to repeat", "steady.marched Marched", "march"),
-    Finder("balance", "harmonic balance", "steady.balance Balance", "harmonic"))}
+    Finder("events", "the map from event to event, exact", "steady.maps EventFinder", "exact"),
+    Finder("yields", "the map from yield to yield, exact", "steady.maps YieldFinder", "piecewise"),
+    Finder("march", "a march that is brought to repeat", "steady.marched MarchFinder", "march"),
+    Finder("balance", "harmonic balance", "steady.balance BalanceFinder", "harmonic"))}
 
 
 def steady_by(model: Model) -> Finder:
@@ -141,14 +141,14 @@ def steady_by(model: Model) -> Finder:
     if model.grooves is not None and (model.soft or not methods.balances_over_grooves(model.friction)):
         return FINDERS["march"]
     named = model.accuracy.harmonics is not None
-    return FINDERS["balance" if named or PIECES.lacks(model) or pieces(model) > MOST_PIECES else "yields"]
+    return FINDERS["balance" if named or PIECES.lacks(model) or pieces_per_cycle(model) > MOST_PIECES else "yields"]
 
 
 def _no_rungs(*_) -> list:
     return []
 
 
-def sampled(values: dict) -> dict:
+def sampling_errors(values: dict) -> dict:
     """Errors by name of the measures that are read off 400 samples a cycle."""
     loops = ("loop_area", "equivalent_stiffness", "equivalent_damping", "slip_amplitude", "friction_force_peak")
     return {name: 1e-4 * abs(value) if name in loops else 0.005 if name in ("stick_fraction", "slip_start_phase")
@@ -162,7 +162,7 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """
     averaged = model.friction is not None and has(model.friction.law, "averaged")
     meshed = coarse is not None and (model.rig.strips_slide_apart or averaged)
-    samples = [Rung((), sampled)] if model.rig.strips_slide_apart else []
+    samples = [Rung((), sampling_errors)] if model.rig.strips_slide_apart else []
     return [*samples, space_rung(Variant(numerics, coarse))] if meshed else samples
 
 
@@ -211,7 +211,7 @@ def _summed(model: Model, few, patch, solution) -> list:
     choice = solution.summed
     if choice is None or not choice.error:
         return []
-    out = [Rung((), lambda fine: stated(model, patch, choice.error, fine, solution), of="bonds")]
+    out = [Rung((), lambda fine: sum_errors(model, patch, choice.error, fine, solution), of="bonds")]
     if choice.merge > 0 or choice.tail > LOOSE * model.accuracy.tolerance:
         finer = replace(choice, merge=FINER * choice.merge, tail=LESS * choice.tail)
         same, narrow = (Variant(replace(few, choice=one), patch) for one in (choice, finer))
@@ -220,7 +220,7 @@ def _summed(model: Model, few, patch, solution) -> list:
     return out
 
 
-def stated(model: Model, patch, error: float, values: dict, solution) -> dict:
+def sum_errors(model: Model, patch, error: float, values: dict, solution) -> dict:
     """Errors by measure name that follow from the bound of a sum over bonds, a share of the friction limit.
 
     error: of the sum [1]; values: measures of the run. Forces and slip have it directly, work as that share of what
@@ -268,7 +268,7 @@ PIECES = Engine("piecewise", "exact", "pieces run_piecewise", _no_rungs, _pieces
 SMOOTH = Engine("smooth", "", "smooth run_smooth", _smooth_in_time, _own_errors, "costs smooth_cost",
                 dearer=not_smooth, chosen="numerics by_error", least=3e-8, closes=None, tells=("iterations",))
 MARCH = Engine("march", "march", "march run_march", _march_in_time, _march_in_space, "plan march_cost",
-               chosen="numerics by_steps", refuse="lists refuse_costly",
+               chosen="numerics by_steps", refuse="lists refuse_long_list",
                notes="remarks marched_elements", tells=("steps_per_cycle", "iterations"), resumes=True)
 HARMONIC = Engine("harmonic", "harmonic", "steady.steady run_steady", _no_rungs, _steady_in_space, "costs steady_cost",
                   words="plan steady_words", notes="remarks unmoved_elements", least=0.0, closes=None, steady=True)

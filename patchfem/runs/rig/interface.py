@@ -22,7 +22,7 @@ from .numerics import Numerics
 from .strips import strip_loads
 
 
-def model_of(model: Model, numerics: Numerics, patch):
+def contact_of(model: Model, numerics: Numerics, patch):
     """The contact that a march takes: a ContactModel, a JointsModel where interfaces or springs stand beside it, or one
     that climbs grooves.
 
@@ -99,9 +99,9 @@ def contact_model(model: Model, numerics: Numerics, patch):
     if f is None:
         return models.free_model()
     if model.rig.load_varies:
-        from .varying_load import model_of
+        from .varying_load import varying_load_model
 
-        return model_of(model, patch, numerics.shear_modes)
+        return varying_load_model(model, patch, numerics.shear_modes)
     load = patch.pressure.load if patch is not None else model.point.load
     if has(f.law, "bonds"):
         return _bonds(model, numerics, patch, load)

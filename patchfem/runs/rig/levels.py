@@ -14,12 +14,12 @@ EXACT = 1e-9  # relative error of what is read off a motion in closed form
 MOST = 40  # halvings of the bracket of an onset
 
 
-def ends(rig) -> tuple:
+def level_ends(rig) -> tuple:
     """Cycles (l,) after which the levels of a drive end; () without levels."""
     return tuple(rig.level_cycles * (k + 1) for k in range(len(rig.levels)))
 
 
-def with_errors(levels, rungs, made: dict) -> tuple:
+def levels_with_errors(levels, rungs, made: dict) -> tuple:
     """The levels with what the Rungs of their run leave open at each of them, over what is a level's own.
 
     made: variant -> Solution of the runs that the rungs take. What a coarser run does not reach is as uncertain as it
@@ -70,7 +70,7 @@ def drive_with(drive, number: int, level: float):
     return replace(drive, segments=(*drive.segments[:number], replace(drive.segments[number], amplitude=level)))
 
 
-def measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=()) -> dict:
+def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=()) -> dict:
     """Measures over all levels: onset_level, jump_level, level_hysteresis, with a reason where they have no value.
 
     rig: model.rig, with the kind of onset; probe as in `onset`; rubs: whether an interface bears a load; coarser: as in
@@ -99,7 +99,7 @@ def measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=()) -> di
     return out
 
 
-def shown(rig, levels) -> tuple:
+def in_scene_units(rig, levels) -> tuple:
     """The levels as the results show them: of a force drive with the force [N]."""
     return tuple(replace(level, drive=_size(rig) * level.drive, unit=_unit(rig)) for level in levels)
 
@@ -138,7 +138,7 @@ def by_levels(reader, go, state, end, progress=None) -> tuple:
         "levels": tuple(found), "probe": lambda number, level: at(level, states[number + 1])[1]}
 
 
-def whole_cycles(done):
+def without_part_of_cycle(done):
     """The run without the extremes and the phasor of a last cycle that is cut short."""
     count = int(done.cycles_done + 1e-9)
     if not count or count >= len(done.amplitudes):

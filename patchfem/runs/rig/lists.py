@@ -60,7 +60,7 @@ def _stretch(model: Model, least: float = FAST) -> float:
     f, rig = model.friction, model.rig
     if f.reading == "report" or rig.kind == "free":
         return inf
-    needed, limit = holding(rig), f.static * model.nominal_load
+    needed, limit = force_that_holds(rig), f.static * model.nominal_load
     return needed / limit if limit >= least * needed else inf
 
 
@@ -84,7 +84,7 @@ def _bond_swing(model: Model) -> float:
     return sqrt(f.static * model.nominal_load / f.bond_length * float((modes.slide**2).sum()) / modes.mass)
 
 
-def held(model: Model, push: float | None = None) -> float:
+def held_by_bonds(model: Model, push: float | None = None) -> float:
     """Limit of the bonds of a law without stiffness over the force that holds the block; 0 of other laws.
 
     The printed law reaches its limit however small the stroke, so that its stiffness mu_s N/stroke has no bound; bonds
@@ -100,13 +100,13 @@ def held(model: Model, push: float | None = None) -> float:
             (not printed and model.bonds.order != 0):
         return 0.0
     needed = _held_with(rig, 0.0, np.zeros(rig.modes.omega.size), rig.modes.interfaces @ rig.start.z) if released else \
-        holding(rig, push)
+        force_that_holds(rig, push)
     return f.static * model.nominal_load / needed if needed else inf
 
 
 def least_held(model: Model) -> float:
-    """What `held` is at least where a list grows with every step: FAST; 1 of a driven block where each step leaves a
-    strip, which no path wears away: bonds that grow, or have no stiffness by their order."""
+    """What `held_by_bonds` is at least where a list grows with every step: FAST; 1 of a driven block where each step
+    leaves a strip, which no path wears away: bonds that grow, or have no stiffness by their order."""
     leaves = form_of(model.bonds) == AGED or model.friction.reading != "report"
     return 1.0 if leaves and model.rig.kind != "free" else FAST
 
@@ -115,12 +115,12 @@ def chatters(model: Model) -> bool:
     """Whether the printed law holds a driven block fast: it turns back in almost every step, and its list grows by a
     strip with each."""
     return model.rig.kind != "free" and model.friction is not None and model.friction.reading == "report" \
-        and held(model) >= FAST
+        and held_by_bonds(model) >= FAST
 
 
 def stalls(model: Model) -> bool:
     """Whether growing bonds of the printed law hold a released block fast from its start on."""
-    return model.rig.kind == "free" and held(model) >= FAST
+    return model.rig.kind == "free" and held_by_bonds(model) >= FAST
 
 
 def limp(model: Model) -> bool:
@@ -131,7 +131,7 @@ def limp(model: Model) -> bool:
 def lists_grow(model: Model) -> bool:
     """Whether a law without stiffness holds the block at some time of the run, so that its list grows with every
     step."""
-    most = held(model, gentlest(model.rig))
+    most = held_by_bonds(model, gentlest(model.rig))
     return most > 0 and most >= least_held(model)
 
 
@@ -141,7 +141,7 @@ def gentlest(rig) -> float:
     return min(rig.levels[0] / 2, *rig.levels) if rig.levels else largest(rig.drive)
 
 
-def holding(rig, push: float | None = None) -> float:
+def force_that_holds(rig, push: float | None = None) -> float:
     """Peak force [N] on the first interface that keeps all interfaces of a Rig still under a sine of its drive, of its
     largest push [m s-2] unless one is given.
 
@@ -195,14 +195,14 @@ def held_cost(model: Model, numerics: Numerics) -> tuple:
 def _held_seconds(model: Model, push: float, first: float, last: float, moving: float) -> float:
     """Seconds of the steps from number `first` to `last` under a sine of this push [m s-2], each of which counts the
     strips that those before it have left; moving: seconds of a step of a block that moves, which leaves none."""
-    ratio = held(model, push)
+    ratio = held_by_bonds(model, push)
     if ratio < least_held(model):
         return moving * (last - first)
     return _held_step(model, ratio) * (last**2 - first**2) / 2
 
 
 def _held_step(model: Model, ratio: float) -> float:
-    """Seconds of a step of a held block per strip of its list; ratio: of `held`."""
+    """Seconds of a step of a held block per strip of its list; ratio: of `held_by_bonds`."""
     law = model.bonds
     if model.friction.reading != "report":
         return LIMP_STEP
@@ -247,7 +247,7 @@ def refuse_unresolved(model: Model, numerics: Numerics) -> None:
                       "structure.moving_mass or friction.bond_length, or use reading = \"stretch\" with order = 1", "")
 
 
-def refuse_costly(model: Model, numerics: Numerics, limit: float = LONGEST) -> None:
+def refuse_long_list(model: Model, numerics: Numerics, limit: float = LONGEST) -> None:
     """Raise Missing when the shared bond list of a coupled run would take longer than `limit` seconds."""
     f = model.friction
     if f is None or not has(f.law, "bonds") or quadrature_of(model, numerics).engine == "recursion":

@@ -12,11 +12,11 @@ from ...response.measures import peaks_between, step_harmonic
 from ...response.spectrum import friction_harmonic, motion_harmonic
 from ...structure.drive_sizes import omega_of, peak_speed, sinusoidal, whole
 from . import levels as rig_levels
-from .interface import model_of
+from .interface import contact_of
 from .lists import quadrature_of
 from .reading import Reader
 from .solution import Solution, sampled_loop
-from .strips import joined, mark_as_one
+from .strips import mark_as_one, run_of_strips
 
 LATE = 1.5  # times what an end beside the asked one changes to first order
 
@@ -24,27 +24,27 @@ LATE = 1.5  # times what an end beside the asked one changes to first order
 def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """One march at numerics.steps per cycle; patch: the solved Patch or None."""
     contact, done, seconds, prepare = marched(model, numerics, patch, frames, say, progress)
-    return Read(model, numerics, patch, contact).solution(done, seconds, prepare)
+    return MarchReader(model, numerics, patch, contact).solution(done, seconds, prepare)
 
 
 def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
     """(contact, MarchResult, seconds of the march, seconds before it by what they were for); arguments as `run_march`.
     """
     rig, begin = model.rig, perf_counter()
-    contact = model_of(model, numerics, patch)
+    contact = contact_of(model, numerics, patch)
     reduced = perf_counter() - begin
     hub.warm_up(rig.modes, rig.drive, contact, say)
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
     frames = 0 if rig.strips_slide_apart else frames  # strips have no common field of shear
     done = hub.march(rig.modes, rig.drive, contact, numerics.cycles, numerics.steps, numerics.window, rig.travel,
-                     frames, say, progress, rig.start, rig_levels.ends(rig), numerics.whole)
+                     frames, say, progress, rig.start, rig_levels.level_ends(rig), numerics.whole)
     seconds = perf_counter() - begin
-    done = joined(done, patch) if rig.strips_slide_apart else done
+    done = run_of_strips(done, patch) if rig.strips_slide_apart else done
     return contact, done, seconds, {"reduce": reduced, "compiled_code": loaded}
 
 
-class Read(Reader):
+class MarchReader(Reader):
     """What a finished march shows."""
 
     def __init__(self, model, numerics, patch, contact):

@@ -22,9 +22,9 @@ from ...response.rows import stuck_share
 from ...response.spectrum import distorted
 from ...structure.drive_sizes import largest, omega_of, sinusoidal, whole
 from ..bench.averaged import limit_share
-from .levels import by_levels, whole_cycles
+from .levels import by_levels, without_part_of_cycle
 from .reading import Reader
-from .solution import Solution, borne, stiffness_of
+from .solution import Solution, borne, mode_stiffness
 from .strips import as_one, strip_loads
 
 OF_MOTION = ("relative_displacement_amplitude", "absolute_acceleration_peak", "absolute_acceleration_fundamental",
@@ -35,12 +35,12 @@ CHANGES = 1e-2  # share of the tolerance by which windows may differ in a motion
 def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """Solution of a Coulomb rig, or of a structure without friction; patch: the solved Patch, or None under [normal] or
     between masses."""
-    return _run(Pieces(model, numerics, patch, Limits(model, numerics, patch)), 0, say, progress)
+    return _run(Pieces(model, numerics, patch, RigidElements(model, numerics, patch)), 0, say, progress)
 
 
 def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """Solution of a rig behind elastic-plastic elements; patch: the solved Patch, or None."""
-    return _run(Pieces(model, numerics, patch, Interfaces(model, numerics, patch)), frames, say, progress)
+    return _run(Pieces(model, numerics, patch, YieldingElements(model, numerics, patch)), frames, say, progress)
 
 
 def _run(reader, frames: int, say, progress) -> Solution:
@@ -57,7 +57,7 @@ def _run(reader, frames: int, say, progress) -> Solution:
     if rig.levels:
         done, more = by_levels(reader, go, (rig.start, None), lambda run: run.end, progress)
     else:
-        done = whole_cycles(go(rig.drive, (rig.start, None), progress, True, numerics.cycles))
+        done = without_part_of_cycle(go(rig.drive, (rig.start, None), progress, True, numerics.cycles))
     more |= {} if reader.rigid else {"prepare": prepare}
     return reader.solution(done, perf_counter() - begin, **more)
 
@@ -89,7 +89,7 @@ class Pieces(Reader):
     def more(self, run, drive, stuck: bool) -> dict:
         """What the series of the pieces give, by name; what goes into rigid elements is lost."""
         found = read_off(run.reading, run.ledger, sinusoidal(drive), bool(whole(run.reading.span, drive)),
-                         stiffness_of(self.model, run.window), largest(drive))
+                         mode_stiffness(self.model, run.window), largest(drive))
         known = {name: None if np.isnan(value) else float(value) for name, value in found.items()}
         if not self.rubs:
             return {"known": {name: known[name] for name in (*OF_MOTION, "drift_per_cycle")}}
@@ -129,7 +129,7 @@ class Pieces(Reader):
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """The Solution of a PieceRun; where its windows still change, with the motion that it settles to."""
         drive, numerics = drive or self.model.rig.drive, self.numerics
-        unsettled = changes(window_amplitudes(run.amplitudes, numerics.window), self.model.accuracy.tolerance)
+        unsettled = still_changes(window_amplitudes(run.amplitudes, numerics.window), self.model.accuracy.tolerance)
         if numerics.whole and run.outcome is None and not self.rigid and not self.sticks(run) and unsettled:
             steady = settles(self.model.rig.modes, drive, self.groups, run)
             more |= {} if steady is None else {"steady": steady, "bounded": True}
@@ -150,7 +150,7 @@ def _of_strips(run, drive) -> Loop:
                 float(np.abs(window.force).max()))
 
 
-def changes(amplitudes, tolerance: float) -> bool:
+def still_changes(amplitudes, tolerance: float) -> bool:
     """Whether amplitudes (w,) of successive windows still change by a share of the tolerance, or are too few to say."""
     return amplitudes.size < 3 or np.ptp(amplitudes[-3:]) > CHANGES * tolerance * amplitudes[-1]
 
@@ -187,7 +187,7 @@ def settled_of(amplitude: float, residual: float, multipliers) -> tuple:
     return float(amplitude), float(amplitude * max(1e-9, 10 * residual / apart))
 
 
-class Interfaces:
+class YieldingElements:
     """The elements of every interface of a model, as `groups`; contact: the ContactModel of a single one; held: slip
     [m] below which a cycle sticks; seconds: of its reduction."""
 
@@ -203,22 +203,22 @@ class Interfaces:
             self.contact = contact_model(model, numerics, patch)
             parts = [self.contact.element]
         self.held = 1e-3 * min(one.length for one in parts)
-        self.groups = tuple(group_of(one) for one in parts)
+        self.groups = tuple(elements_of_law(one) for one in parts)
         for _ in range(numerics.pairs):
             self.groups = tuple(map(elements.paired, self.groups))
         self.seconds = perf_counter() - begin
 
 
-class Limits:
+class RigidElements:
     """The rigid elements of every Coulomb interface of a model, as `groups`: no slip is small beside them."""
 
     rigid, contact, held, seconds = True, None, 0.0, 0.0
 
     def __init__(self, model, numerics, patch):
-        self.groups = tuple(elements.coulomb(*pair) for pair in limits_of(model, patch))
+        self.groups = tuple(elements.coulomb(*pair) for pair in coulomb_limits(model, patch))
 
 
-def limits_of(model, patch) -> list:
+def coulomb_limits(model, patch) -> list:
     """(static, kinetic) friction [N] of every interface, 0 where nothing rubs."""
     rig, share = model.rig, 1.0
     if rig.strips_slide_apart:
@@ -233,7 +233,7 @@ def limits_of(model, patch) -> list:
     return [(float(static * share), float(kinetic if model.friction.kinetic is not None else static * share))]
 
 
-def group_of(element) -> elements.Elements:
+def elements_of_law(element) -> elements.Elements:
     """Elements of an Element of form "parallel"."""
     count = int(element.numbers[1])
     return elements.elements_of(element.numbers[2:2 + count], element.numbers[2 + count:2 + 2 * count])

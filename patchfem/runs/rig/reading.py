@@ -15,7 +15,7 @@ from ...response.loops import at_turns
 from ...response.measures import slip_noise, window_amplitudes, window_ends
 from ...response.outcome import steady_of
 from ...response.rows import measures_of, row_of
-from .solution import Solution, seen
+from .solution import Solution, last_cycles
 
 
 class Reader:
@@ -47,7 +47,7 @@ class Reader:
             given = {"by": at_turns(self.model), "ledger": ledger} | given
         window, book = given.pop("window", run.window), given.pop("book", run.ledger)
         last = run.amplitudes[-min(self.numerics.window, len(run.amplitudes)):]
-        return measures_of(seen(self.model, self.patch, window, last, book, drive=drive, **given))
+        return measures_of(last_cycles(self.model, self.patch, window, last, book, drive=drive, **given))
 
     def sticks(self, run) -> bool:
         """Whether no interface slips in the last cycles of a run by more than `held`, or the last digit."""
@@ -70,7 +70,7 @@ class Reader:
 
     def fewer(self, run):
         """The run with every second of its samples."""
-        return replace(run, window=thinned(run.window))
+        return replace(run, window=every_second(run.window))
 
     def sampled(self, run, drive, values: dict) -> dict:
         """What samples leave open of the values by name of a motion that is exact, by every second of them: nothing of
@@ -103,7 +103,7 @@ class Reader:
         return Level(size, self.sticks(run), kept, {name: left * abs(v) for name, v in kept.items()} if left else {})
 
 
-def thinned(window):
+def every_second(window):
     """A window without every second of its equally spaced samples; its last, and those of events between the others,
     stay."""
     place = (window.time - window.time[0]) / np.diff(window.time).max()
@@ -113,7 +113,7 @@ def thinned(window):
     return window.at(kept)
 
 
-def books_of(response, work: float, passed: float | None = None) -> tuple:
+def friction_works(response, work: float, passed: float | None = None) -> tuple:
     """(friction work [J] by the trapezoidal rule on the samples of all interfaces, that of a ledger, what went to and
     fro); passed: the last where it is known better."""
     extra = response.extra

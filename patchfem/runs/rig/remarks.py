@@ -6,7 +6,7 @@ from ...core import Outcome
 from ...core import say as length
 from ...effects import has
 from ...response.outcome import changing_note
-from ..results.notes import climbing_as_one, creeping, of_growth, two_books, unbounded, unripe, warming
+from ..results.notes import climbing_as_one, creeping, of_growth, unbounded_bonds, unripe, warming, work_check_warning
 from ..results.travel import travelled
 from .costs import dear_elements
 from .engines import ENGINES, PIECES
@@ -22,13 +22,13 @@ def warnings_of(run) -> list:
     out = [*model.rig.notes, *_as_one_point(model, patch, run.numerics), *warming(model, patch, raw.response,
                                                                                  book["friction"])]
     if run.rubs:
-        out += said_of_law(model, run.outcome, found, float(np.abs(raw.window.slide_rate).max()))
+        out += law_warnings(model, run.outcome, found, float(np.abs(raw.window.slide_rate).max()))
     out += created_warning(model, book, model.rig.cycles)
     if patch is not None and model.rig.load_varies and raw.contact is not None and raw.contact.reduction is not None:
         out += modes_note(model, raw.contact.reduction.stiffness.size, raw.contact.sets.x.size)
     if model.grooves is not None and model.soft:
         out += modes_note(model, raw.contact.shear.stiffness.size, raw.contact.shear.points.size)
-    out += [*two_books(found, steps, harmonics), *changing_note(run.outcome, run.drive), *raw.notes]
+    out += [*work_check_warning(found, steps, harmonics), *changing_note(run.outcome, run.drive), *raw.notes]
     if raw.message and raw.outcome is not Outcome.LEAVES_GROOVES:
         out.append(raw.message)
     return [*out, *(travelled(patch, raw.response.slide) if patch is not None else ())]
@@ -85,10 +85,10 @@ def unmoved_elements(model, numerics, patch, raw) -> list:
     """The note of a steady motion on elements that it never moves."""
     if PIECES.lacks(model) or raw.outcome not in (Outcome.STEADY, Outcome.STUCK):
         return []
-    from .pieces import Interfaces
+    from .pieces import YieldingElements
 
     slides = raw.window.extra.get("slides", raw.window.slide[:, None])
-    for group, slide in zip(Interfaces(model, numerics, patch).groups, slides.T):
+    for group, slide in zip(YieldingElements(model, numerics, patch).groups, slides.T):
         most, half = float(group.yield_slide.max(initial=0.0)), float(np.ptp(slide)) / 2
         if most > half:
             return [f"part of the joint yields only at {length(most)} and never slips in this motion of "
@@ -97,11 +97,11 @@ def unmoved_elements(model, numerics, patch, raw) -> list:
     return []
 
 
-def said_of_law(model, outcome, found, peak: float) -> list:
+def law_warnings(model, outcome, found, peak: float) -> list:
     """Warnings of the law of a run; found: its measures by name, peak: its largest speed of the slide [m/s]."""
     if not has(model.friction.law, "bonds"):
         return []
-    return [*unbounded(model.bonds), *unripe(model.bonds, peak), *creeping(model.bonds, outcome, found)]
+    return [*unbounded_bonds(model.bonds), *unripe(model.bonds, peak), *creeping(model.bonds, outcome, found)]
 
 
 def created_warning(model, book: dict, cycles: float) -> list:

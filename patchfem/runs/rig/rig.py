@@ -15,7 +15,7 @@ from ...response.run_events import events_of, with_own
 from ...response.settling import slip_period
 from ...structure.drive_sizes import sinusoidal, slowest
 from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_errors
-from ..results.travel import ended
+from ..results.travel import outcome_on_piece
 from . import levels, remarks
 from .costs import MOST_STEPS
 from .engines import ENGINES, Variant, unbalanced
@@ -67,13 +67,14 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         raw = replace(raw, outcome=Outcome.NOT_CONVERGED, message=raw.message or wrong)
     known = estimate and raw.outcome is not Outcome.NOT_CONVERGED and on_a_mesh_of_known_error(model, patch, coarse)
     run = Coupled(model, numerics, patch, raw, raw.extra.get("at", rig.drive), known, measures)
-    for go in (_levelled, _settled, _rung, _reasoned):
+    for go in (_levelled, _settled, _started, _reasoned):
         run = go(run)
-    told, notes = remarks.warnings_of(run), remarks.notes_of(run)
+    warned, notes = remarks.warnings_of(run), remarks.notes_of(run)
     run = _judged(run)
-    return Result(what, ended(run.outcome, model.patch, patch, raw.response.slide), run.measures, raw.response,
-                  raw.window, patch, {} if patch is None else fields_of(model, numerics, patch, raw), seconds,
-                  [*warnings, *told], _extra(run, notes))
+    outcome = outcome_on_piece(run.outcome, model.patch, patch, raw.response.slide)
+    fields = {} if patch is None else fields_of(model, numerics, patch, raw)
+    return Result(what, outcome, run.measures, raw.response, raw.window, patch, fields, seconds, [*warnings, *warned],
+                  _extra(run, notes))
 
 
 def _levelled(run: Coupled) -> Coupled:
@@ -81,8 +82,8 @@ def _levelled(run: Coupled) -> Coupled:
     raw, model = run.raw, run.model
     if not raw.levels:
         return run
-    return replace(run, measures=run.measures | levels.measures(model.rig, raw.levels, raw.probe,
-                                                                model.accuracy.tolerance, run.rubs, raw.coarser))
+    return replace(run, measures=run.measures | levels.level_measures(model.rig, raw.levels, raw.probe,
+                                                                      model.accuracy.tolerance, run.rubs, raw.coarser))
 
 
 def _settled(run: Coupled) -> Coupled:
@@ -94,7 +95,7 @@ def _settled(run: Coupled) -> Coupled:
     return replace(run, outcome=outcome, measures=found)
 
 
-def _rung(run: Coupled) -> Coupled:
+def _started(run: Coupled) -> Coupled:
     """With what the ringing of the start leaves open behind a patch that holds."""
     rings = StartRing(run.measures, {}, [])
     if run.patch is not None and not run.raw.levels:
@@ -127,7 +128,7 @@ def _extra(run: Coupled, notes: list) -> dict:
     out |= {name: numbers[name] for name in tells}
     out.pop("at", None)
     if raw.levels:
-        out["levels"] = levels.shown(rig, raw.levels)
+        out["levels"] = levels.in_scene_units(rig, raw.levels)
     if run.rubs:
         out["events"] = events_of(raw.window, run.drive, raw.log, raw.held)
     reduced = getattr(raw.contact, "reduction", None)
@@ -164,11 +165,11 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         time, more = estimate(solve, found.values, rungs, made)
         spent += more
         measures = with_errors(found.values, *time, *space, least=engine.least, size=size)
-        if numerics.pairs and not resolved(measures, model.accuracy.tolerance):
+        if numerics.pairs and not errors_met(measures, model.accuracy.tolerance):
             return _solved(model, numerics.finer(), patch, coarse, seconds, say, progress, estimated)
         if found.levels:
             apart = [one for one in (*rungs, *meshed) if one.runs or found.errors is None]  # else levels have their own
-            found = replace(found, levels=levels.with_errors(found.levels, apart, made),
+            found = replace(found, levels=levels.levels_with_errors(found.levels, apart, made),
                             coarser=tuple((made[one.runs[0]], one.beside and made[one.beside]) for one in apart
                                           if one.runs and one.runs[0].numerics.choice is None))  # a list has its bound
         if _enough(model, numerics, found, measures) or not time:
@@ -193,7 +194,7 @@ def _halved(engine, model, numerics, patch) -> tuple:
     return rungs[0].runs if rungs and not numerics.local else ()
 
 
-def resolved(measures, tolerance: float) -> bool:
+def errors_met(measures, tolerance: float) -> bool:
     """Whether the errors of all Measures by name are within a tolerance of their values, or their floors."""
     return all(one.error <= tolerance * abs(one.value) + one.floor for one in measures.values())
 

@@ -7,8 +7,8 @@ from ...dynamics.integrated import Integrated
 from ...dynamics.smooth import run as hub
 from ...response.measures import slip_noise
 from ...response.rows import row_of
-from .interface import model_of
-from .reading import Reader, thinned
+from .interface import contact_of
+from .reading import Reader, every_second
 from .solution import Solution
 
 CLEAR = 1e3  # times the round-off of the slip, beyond which its share of the slide is known inside a step
@@ -17,25 +17,25 @@ LOCATED = 1e-7  # what a crossing of that share may be off: the extension of a s
 
 def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """One run with steps that meet numerics.local; patch: the solved Patch or None."""
-    found, done, reader = moved(model, numerics, patch, frames, say, progress)
+    found, done, reader = smooth_run(model, numerics, patch, frames, say, progress)
     return replace(found, errors=reader.left_open(done, found.values))
 
 
-def moved(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
+def smooth_run(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
     """(Solution without what it leaves open itself, SmoothResult, Smooth that tells it); arguments as `run_smooth`."""
     rig, begin = model.rig, perf_counter()
-    contact = model_of(model, numerics, patch)
+    contact = contact_of(model, numerics, patch)
     hub.loops_of(contact.element.kernels, say)
     loaded = perf_counter() - begin
     begin = perf_counter()
     done = hub.simulate(rig.modes, rig.drive, contact.element, numerics.cycles, numerics.local, numerics.window,
                         rig.travel, frames, rig.start, progress)
-    reader = Smooth(model, numerics, patch, contact)
+    reader = SmoothReader(model, numerics, patch, contact)
     return reader.solution(done, perf_counter() - begin, prepare={"compiled_code": loaded}, extra={
         "step_tolerance": numerics.local, "steps_taken": int(done.ledger["steps"])}), done, reader
 
 
-class Smooth(Reader):
+class SmoothReader(Reader):
     """What a finished run of high order shows: what the integrator knows comes before what samples show."""
 
     def __init__(self, model, numerics, patch, contact):
@@ -54,7 +54,7 @@ class Smooth(Reader):
 
     def fewer(self, run):
         """The run with every second of its samples."""
-        return replace(super().fewer(run), turned=thinned(run.turned))
+        return replace(super().fewer(run), turned=every_second(run.turned))
 
     def left_open(self, run, values: dict) -> dict:
         """Errors of the measures `values` by name that a SmoothResult leaves open itself: those of samples, of peaks,

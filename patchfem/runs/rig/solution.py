@@ -79,18 +79,18 @@ def borne(model, patch) -> float | None:
     return patch.pressure.load if patch is not None else model.point.load
 
 
-def seen(model, patch, window, extremes, book: dict, **more) -> Seen:
+def last_cycles(model, patch, window, extremes, book: dict, **more) -> Seen:
     """The last cycles of a run of a model, as the measures see them (`response.rows.Seen`).
 
     window: Response; extremes: (c, 2) [m] of the output; book: energies; more: the other
     fields of Seen, with `drive` where it is not the model's own.
     """
     drive = more.pop("drive", model.rig.drive)
-    return Seen(window, drive, extremes, book, borne(model, patch), stiffness_of(model, window), sinusoidal(drive),
+    return Seen(window, drive, extremes, book, borne(model, patch), mode_stiffness(model, window), sinusoidal(drive),
                 **more)
 
 
-def stiffness_of(model, window) -> float:
+def mode_stiffness(model, window) -> float:
     """Stiffness [N/m] of the first mode as the contact meets it, 0 where another mode carries part of the slide."""
     return 0.0 if model.rig.beside_first(window.modal) > SHARED else model.rig.stiffness
 

@@ -10,7 +10,7 @@ def strip_loads(patch) -> np.ndarray:
     return patch.strips.force.sum(axis=1)
 
 
-def joined(done, patch):
+def run_of_strips(done, patch):
     """A MarchResult of strips as that of the patch, averaged by `as_one`."""
     loads, offsets = strip_loads(patch), patch.strips.offsets
     window = as_one(done.window, loads, offsets)

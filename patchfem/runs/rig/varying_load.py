@@ -17,7 +17,7 @@ def rubbing_of(model: Model):
     return march.bonds(model.bonds)
 
 
-def model_of(model: Model, patch, count: int | None = None):
+def varying_load_model(model: Model, patch, count: int | None = None):
     """The VaryingLoadModel of a rig whose load changes; patch: the solved Patch or None under [normal]; count: how many
     shear modes stand for pieces that give way, None: by the tolerance."""
     load, sets = (model.point.at, None) if patch is None else (None, march.sets_of(patch, model.patch.spring))

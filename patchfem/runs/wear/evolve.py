@@ -4,6 +4,7 @@ from which an interrupted run goes on to the same bits."""
 import json
 import os
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
@@ -167,11 +168,11 @@ def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved
     state belongs to."""
     if kept is None:
         return evolve(model, patch, coarse, progress)
-    begin = load(kept.path, key) if kept.resume else None
-    return evolve(model, patch, coarse, progress, begin, lambda state, moments: save(kept.path, key, state, moments))
+    begin = load_state(kept.path, key) if kept.resume else None
+    return evolve(model, patch, coarse, progress, begin, partial(save_state, kept.path, key))
 
 
-def save(path: Path, key: str, state: Worn, moments: tuple) -> None:
+def save_state(path: Path, key: str, state: Worn, moments: tuple) -> None:
     """Write a state and the moments so far; an earlier file is replaced only when the new one is whole."""
     arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE}
     arrays |= {f"moment_{name}": np.array([getattr(one, name) for one in moments]) for name in MOMENT}
@@ -182,7 +183,7 @@ def save(path: Path, key: str, state: Worn, moments: tuple) -> None:
         os.fsync(file.fileno())
 
 
-def load(path: Path, key: str) -> tuple:
+def load_state(path: Path, key: str) -> tuple:
     """(state, moments) of a kept file. PatchfemError where it belongs to another scene or cannot be read."""
     try:
         with np.load(path, allow_pickle=False) as file:

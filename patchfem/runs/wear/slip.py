@@ -10,7 +10,7 @@ from ...response.outcome import settle
 from ..bench import bench
 from ..bench.closed import over_steps
 from ..bench.engine import steps_of
-from ..results.travel import ended
+from ..results.travel import outcome_on_piece
 from ..rig.engines import ENGINES
 from ..rig.fields import fields_of
 from ..rig.numerics import choose
@@ -56,7 +56,7 @@ def _bench(model, patch, frames: int) -> Rubbed:
     steps = steps_of(model)
     shaped = not even(model)
     found = bench.run(model, patch, steps, frames * cycles if shaped else 0)
-    outcome = ended(None, model.patch, patch, found.slide)
+    outcome = outcome_on_piece(None, model.patch, patch, found.slide)
     if shaped:
         last = found.frames >= found.first
         local, tau, slide = found.local[last], found.tau[last], found.slide[found.frames[last]]
@@ -66,7 +66,7 @@ def _bench(model, patch, frames: int) -> Rubbed:
             if model.grooves is not None:  # it stands on its flank
                 tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
         if model.grooves is not None:
-            local, tau = along(model, patch, slide, np.full(slide.size, patch.pressure.load), local, tau)
+            local, tau = slip_path_of(model, patch, slide, np.full(slide.size, patch.pressure.load), local, tau)
         return _read(model, patch, local, tau, False, found.values, outcome)
     last = [part[found.first:] for part in (found.slide, found.slip, found.force, found.load)]
     return _alike(model, patch, last, last[-1][0], found.values, outcome)
@@ -79,7 +79,7 @@ def _rig(model, patch, frames: int) -> Rubbed:
     amplitude = Measure(found.values["relative_displacement_amplitude"], "m", 0.0)
     wanted = {"relative_displacement_amplitude": amplitude}
     settled, _ = settle(found, wanted, model.accuracy.tolerance, model.rig.drive)
-    outcome = ended(settled if settled in UNBOUNDED else None, model.patch, patch, found.response.slide)
+    outcome = outcome_on_piece(settled if settled in UNBOUNDED else None, model.patch, patch, found.response.slide)
     if shaped:
         fields = fields_of(model, numerics, patch, found)
         local, tau = fields["slip"][1:], fields["shear_stress"][1:]
@@ -87,7 +87,7 @@ def _rig(model, patch, frames: int) -> Rubbed:
             slide, time, window = fields["holder_slide"][1:], fields["time"][1:], found.response
             lifted = np.interp(time, window.time, window.extra.get("normal_load", np.full(
                 window.time.size, patch.pressure.load)))
-            local, tau = along(model, patch, slide, lifted, local, tau)
+            local, tau = slip_path_of(model, patch, slide, lifted, local, tau)
         return _read(model, patch, local, tau, True, found.values, outcome)
     load = patch.pressure.load
     return _alike(model, patch, _last_cycle(model, found.window, load), load, found.values, outcome)
@@ -140,7 +140,7 @@ def along_flanks(model, slide, force, load) -> np.ndarray:
     return np.abs(force - load * t) if model.wear.energy else np.maximum(load + force * t, 0.0)
 
 
-def along(model, patch, slide, vertical, local, tau) -> tuple:
+def slip_path_of(model, patch, slide, vertical, local, tau) -> tuple:
     """(slip along the flank (f, m) [m], what wears there (f, m) [Pa]) of points of pieces that give way, from frames of
     the holder's slide (f,) [m], the vertical force V (f,) [N], irreversible slip and resultant traction (f, m).
 
@@ -159,7 +159,7 @@ def along(model, patch, slide, vertical, local, tau) -> tuple:
 
 def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> Rubbed:
     """The path of every node from frames (f, m) of local slip [m] and shear stress [Pa], over grooves those of
-    `along`; closed: the last frame is followed by the first."""
+    `slip_path_of`; closed: the last frame is followed by the first."""
     path = _path(model, patch, local, tau, closed)
     coarse = _path(model, patch, local[::2], tau[::2], closed)
     total = path @ patch.pressure.sigma_n

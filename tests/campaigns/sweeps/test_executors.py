@@ -24,7 +24,7 @@ from patchfem.campaigns.sweeps.executors.here import Here
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import TRIES, Chunks, Clock, Work, solved
 from patchfem.core import Missing, PatchfemError
-from patchfem.runs.many.answers import FAILED, Answers, joined
+from patchfem.runs.many.answers import FAILED, Answers, joined_answers
 from patchfem.scene.axes import read
 
 SUPPORT = Path(__file__).parents[2] / "support"
@@ -41,7 +41,8 @@ def all_of(asked: Work, executor) -> tuple:
     count = len(asked.cases)
     parts = list(solved(asked, range(count), executor))
     assert sorted(number for numbers, _, _ in parts for number in numbers) == list(range(count))
-    return joined(count, [part[:2] for part in parts]), dict(pair for one in parts for pair in zip(one[0], one[2]))
+    pairs = dict(pair for one in parts for pair in zip(one[0], one[2]))
+    return joined_answers(count, [part[:2] for part in parts]), pairs
 
 
 def same(found: Answers, want: Answers, cases) -> None:

@@ -13,7 +13,7 @@ from patchfem.campaigns.sweeps.executors import pool as pool_module
 from patchfem.campaigns.sweeps.executors.here import Here
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import Work, solved, with_meshes
-from patchfem.runs.many.answers import joined
+from patchfem.runs.many.answers import joined_answers
 from patchfem.scene.axes import read
 
 WORK = Work(Asked(Path("a.toml"), PATCH), Cases(tuple(read(["contact.tilt.angle=2e-5 rad,2e-4 rad",
@@ -22,8 +22,8 @@ WORK = Work(Asked(Path("a.toml"), PATCH), Cases(tuple(read(["contact.tilt.angle=
 
 @pytest.mark.slow
 def test_exact_a_part_of_a_sweep_has_the_answers_of_the_whole():
-    whole = joined(4, [part[:2] for part in solved(WORK, range(4), Here())])
-    rest = joined(4, [part[:2] for part in solved(WORK, [3, 1], Here())])
+    whole = joined_answers(4, [part[:2] for part in solved(WORK, range(4), Here())])
+    rest = joined_answers(4, [part[:2] for part in solved(WORK, [3, 1], Here())])
     assert len({one["interface_nodes"] for one in whole.numerics.values()}) == 1
     for name, values in whole.values.items():
         np.testing.assert_allclose(rest.values[name][[3, 1]], values[[3, 1]], rtol=1e-9)
@@ -35,9 +35,9 @@ def test_exact_meshes_are_made_once_and_travel_with_the_work():
 
 
 def test_exact_processes_that_begin_before_the_meshes_are_chosen_take_them():
-    here = joined(4, [part[:2] for part in solved(WORK, range(4), Here())])
+    here = joined_answers(4, [part[:2] for part in solved(WORK, range(4), Here())])
     pool = Pool(2)
-    found = joined(4, [part[:2] for part in solved(WORK, range(4), pool)])
+    found = joined_answers(4, [part[:2] for part in solved(WORK, range(4), pool)])
     assert pool.ready == [] and found.numerics == here.numerics
     for name, values in here.values.items():
         np.testing.assert_allclose(found.values[name], values, rtol=1e-9)

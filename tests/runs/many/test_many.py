@@ -7,7 +7,7 @@ from scene_texts import BENCH, COULOMB, PLASTIC, POINT, SHORT
 import patchfem as pf
 from patchfem.core import PatchfemError
 from patchfem.runs.many import many
-from patchfem.runs.many.answers import FAILED, Answers, joined
+from patchfem.runs.many.answers import FAILED, Answers, joined_answers
 
 RIG = POINT + COULOMB + SHORT
 
@@ -84,7 +84,7 @@ def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(monkeypatch):
 def test_exact_parts_join_to_the_whole(order):
     whole = many.answers([pf.build(RIG), pf.build(BENCH), PatchfemError("no")])
     parts = [many.answers([pf.build(RIG)]), many.answers([pf.build(BENCH)]), many.answers([PatchfemError("no")])]
-    found = joined(3, [([case], parts[case]) for case in order])
+    found = joined_answers(3, [([case], parts[case]) for case in order])
     assert found.outcome.tolist() == whole.outcome.tolist() and found.messages == whole.messages
     for name, values in whole.values.items():
         np.testing.assert_array_equal(found.values[name], values)

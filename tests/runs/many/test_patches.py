@@ -43,7 +43,7 @@ def same(models, together=None):
 def test_exact_together_as_one_by_one(tables, values):
     models = family(tables, *values)
     assert all(patches.refuses(model) == "" for model in models)
-    assert all(one is not None for one in patches.static.solved([model.patch for model in models], 1e-2))
+    assert all(one is not None for one in patches.static.pressed_together([model.patch for model in models], 1e-2))
     same(models)
 
 

@@ -99,7 +99,7 @@ def test_exact_a_case_of_any_kind_is_its_single_run(kind):
 
 @pytest.mark.parametrize("kind", MARCHED)
 def test_refuses_what_is_marched(kind):
-    assert many.taken(build(loads(MARCHED[kind]))) is None
+    assert many.batch_of(build(loads(MARCHED[kind]))) is None
 
 
 @pytest.mark.parametrize("end", ENDS)
@@ -107,7 +107,7 @@ def test_exact_a_batch_ends_as_single_runs_do(end):
     pairs, outcome, estimated = ENDS[end]
     model = build(loads(changed(*pairs)))
     found = alike(model)
-    assert many.taken(model) is not None and found.outcome[0] == outcome
+    assert many.batch_of(model) is not None and found.outcome[0] == outcome
     assert ("relative_displacement_amplitude_steady" in found.values) == estimated
     assert bool(found.warnings) == (end == "remarked on")
 
@@ -117,5 +117,5 @@ def test_exact_a_batch_of_elements_ends_as_single_runs_do(end):
     """The same cases behind an elastic-plastic element, however they end."""
     text = changed(*ENDS[end][0])
     model = build(loads(text.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"')))
-    assert many.taken(model) is not None
+    assert many.batch_of(model) is not None
     alike(model)

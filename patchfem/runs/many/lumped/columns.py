@@ -16,9 +16,9 @@ from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
 from ....structure.drive_sizes import largest, omega_of, slowest
 from ...remedies import Seen, beyond_tolerance
 from ...results.notes import BOOKS
-from ...results.result import placeless
+from ...results.result import without_folders
 from ...rig.engines import knobs_idle
-from ...rig.remarks import said_of_law
+from ...rig.remarks import law_warnings
 from ..answers import Answers
 
 ENDS = 5  # last windows whose phasors tell a steady motion (response.settling)
@@ -62,11 +62,11 @@ class Runs:
         return (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
 
 
-def answered(models, runs: Runs, numerics: dict) -> tuple:
+def batch_answers(models, runs: Runs, numerics: dict) -> tuple:
     """(Answers of the models, (n,) whether a case must be run by itself, (n,) whether all its errors but that of the
     steady estimate are within its tolerance).
 
-    numerics: as `results.result.chosen` has it.
+    numerics: as `results.result.choices` has it.
     """
     n, values = len(models), dict(runs.values)
     values[MAIN] = runs.values.get(MAIN, runs.amplitudes)
@@ -107,7 +107,7 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
         found.numerics[case] = numerics | runs.chosen[case] if runs.chosen else numerics
         remarks = [*model.source.remarks, *knobs_idle(model, numerics["engine"]), *model.rig.notes]
         if warnings := [*remarks, *warned(model, outcome[case], found, case, wide_of[case])]:
-            found.warnings[case] = placeless(warnings, model.source.path)
+            found.warnings[case] = without_folders(warnings, model.source.path)
     return found, alone, resolved
 
 
@@ -153,7 +153,7 @@ def warned(model, outcome, found: Answers, case: int, wide: bool) -> list:
         return []
     known = known_of(found, case)
     drift = {name: one for name, one in known.items() if name == "drift_per_cycle"}
-    return [*said_of_law(model, outcome, drift, 0.0), *beyond_tolerance(Seen(model, known))]
+    return [*law_warnings(model, outcome, drift, 0.0), *beyond_tolerance(Seen(model, known))]
 
 
 def known_of(found: Answers, case: int) -> dict:

@@ -11,7 +11,7 @@ from ...rig.engines import engine_of
 from .. import one_by_one
 from ..answers import Answers
 from . import pieces
-from .columns import answered
+from .columns import batch_answers
 
 TOGETHER = 1024  # cases of one compiled call, so that their histories of cycles stay small
 
@@ -58,18 +58,18 @@ def _solved(models, say, pairs: int) -> Answers:
     begin, cycles = perf_counter(), int(models[0].rig.cycles)
     window = min(10, cycles // 10)
     runs = pieces.runs_of(models, cycles, window, say, pairs)
-    found, alone, resolved = answered(models, runs, {"engine": engine_of(models[0]).name, "window_cycles": window})
+    found, alone, resolved = batch_answers(models, runs, {"engine": engine_of(models[0]).name, "window_cycles": window})
     found.seconds[:] = (perf_counter() - begin) / len(models)
     finer = ~resolved & ~runs.lost if pairs else np.zeros(len(models), bool)
     for cases, solve_again in ((np.flatnonzero(alone & ~finer).tolist(), lambda these: one_by_one.solve(these, say)),
                                (np.flatnonzero(finer).tolist(), lambda these: _solved(these, say, max(0, pairs - 2)))):
         if cases:
-            forget(found, cases)
+            take_out(found, cases)
             found.place(cases, solve_again([models[case] for case in cases]))
     return found
 
 
-def forget(found: Answers, cases: list) -> None:
+def take_out(found: Answers, cases: list) -> None:
     """Take out what was found of cases."""
     for case in cases:
         for columns in (found.values, found.errors, found.floors):

@@ -18,7 +18,7 @@ from ....response.ringing import held_ring
 from ....structure.drive_sizes import largest
 from ...rig.costs import pairs_of
 from ...rig.engines import EXACT, PIECES, engine_of
-from ...rig.pieces import Limits, changes, group_of, read_off, settles
+from ...rig.pieces import RigidElements, elements_of_law, read_off, settles, still_changes
 from .columns import ENDS, MAIN, Runs
 from .threads import in_threads
 
@@ -60,9 +60,9 @@ def coarsened(model) -> int:
 def case_of(model, pairs: int = 0) -> Case:
     """The Case of a model of one point; pairs: as `Numerics` has it."""
     if _holds(model):
-        return Case(model, Limits(model, None, None).groups, 0.0, model.point.load)
+        return Case(model, RigidElements(model, None, None).groups, 0.0, model.point.load)
     element = law_from(model.friction, model.point.load).element(model.point.load)
-    group = group_of(element)
+    group = elements_of_law(element)
     for _ in range(pairs):
         group = paired(group)
     return Case(model, (group,), 1e-3 * element.length, model.point.load)
@@ -71,14 +71,14 @@ def case_of(model, pairs: int = 0) -> Case:
 def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     """Runs of models of this kind, all of `cycles` cycles from their starts; pairs: as `Numerics` has it."""
     cases = [case_of(model, pairs) for model in models]
-    out = moved(cases, cycles, window, say)
+    out = runs_of_cases(cases, cycles, window, say)
     if has(models[0].friction.law, "cells"):
         fewer = [case._replace(groups=tuple(map(paired, case.groups))) for case in cases]
-        return with_errors(out, moved(fewer, cycles, window, say, steady=False), cells_error)
+        return with_coarser_errors(out, runs_of_cases(fewer, cycles, window, say, steady=False), cells_error)
     return out
 
 
-def moved(cases: list, cycles: int, window: int, say=None, least: int = 0, steady: bool = True) -> Runs:
+def runs_of_cases(cases: list, cycles: int, window: int, say=None, least: int = 0, steady: bool = True) -> Runs:
     """Runs of cases; least: cases of a thread, as `in_threads` has it; steady: whether the motion is sought that a case
     settles to, as a run for an error does not."""
     histories.warm_up(say)
@@ -114,7 +114,8 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
         lost[k] = ring is None
         for name, value in (ring or {}).items():
             rings[name][k] = value
-        if steady and not rigid and not stuck[k] and changes(window_amplitudes(one.amplitudes, window), tolerance[k]):
+        ends = window_amplitudes(one.amplitudes, window)
+        if steady and not rigid and not stuck[k] and still_changes(ends, tolerance[k]):
             found = settles(model.rig.modes, model.rig.drive, cases[k].groups, one)
             lost[k] |= found is None
             known[:, k] = (np.nan, np.nan) if found is None else found
@@ -148,7 +149,7 @@ def _rings(case: Case, one) -> dict | None:
     return None if run_events.rings(more.window, modes, drive, more.log, repeats=True) != ({}, {}) else {}
 
 
-def with_errors(fine: Runs, coarse: Runs, told_by) -> Runs:
+def with_coarser_errors(fine: Runs, coarse: Runs, told_by) -> Runs:
     """Runs with the errors that coarser runs tell; told_by(fine, coarse): errors by name from values of both."""
     whole = [one.values | {MAIN: one.amplitudes, "energy_balance": energy_balance(one.book)} for one in (fine, coarse)]
     for case in range(len(fine.stuck)):

@@ -18,16 +18,16 @@ from ....model.source import placed
 from ....response.errors import pieces_error
 from ...patch import result as of_patch
 from ...remedies import Seen, beyond_tolerance
-from ...results.result import placeless
-from ...results.travel import ended, travelled
+from ...results.result import without_folders
+from ...results.travel import outcome_on_piece, travelled
 from ...rig.engines import PIECES, engine_of
 from ...rig.numerics import choose
-from ...rig.pieces import Interfaces
+from ...rig.pieces import YieldingElements
 from .. import one_by_one
 from ..answers import Answers
 from . import pieces
-from .columns import answered, known_of
-from .lumped import forget, not_one_sine
+from .columns import batch_answers, known_of
+from .lumped import not_one_sine, take_out
 
 TOGETHER = 128  # cases of one compiled call: their elements and histories of cycles are held at once
 LEAST = 2  # cases of a thread: one takes as long as hundreds of a point
@@ -36,8 +36,8 @@ LEAST = 2  # cases of a thread: one takes as long as hundreds of a point
 class _Pressed(NamedTuple):
     """A case whose patch is pressed: what its motion and its words want of it; patch: for lengths and places alone."""
 
-    fine: Interfaces
-    coarse: Interfaces
+    fine: YieldingElements
+    coarse: YieldingElements
     measures: dict
     warnings: list
     notes: list
@@ -84,7 +84,7 @@ def _solved(models, say) -> Answers:
         answers, lost = _moved(these, [held[case] for case in moves], say)
         answers.seconds[:] = (perf_counter() - begin) / len(models)
         alone |= {moves[k] for k in np.flatnonzero(lost)}
-        forget(answers, np.flatnonzero(lost).tolist())
+        take_out(answers, np.flatnonzero(lost).tolist())
         out.place(moves, answers)
     if alone:
         rest = sorted(alone)
@@ -101,7 +101,7 @@ def _pressed(model: Model) -> _Pressed | None:
                 return None
             warnings = [*model.source.remarks, *of_patch.strained(model.patch, patch), *patch.notes]
             numerics = choose(model)
-            return _Pressed(Interfaces(model, numerics, patch), Interfaces(model, numerics, coarse[0]),
+            return _Pressed(YieldingElements(model, numerics, patch), YieldingElements(model, numerics, coarse[0]),
                             of_patch.measured(model, patch, coarse), warnings,
                             of_patch.left_out(model, patch, coarse), patch)
     except Exception:  # what is wrong is told by its own run
@@ -114,13 +114,13 @@ def _moved(models, held: list, say) -> tuple:
     window = min(10, cycles // 10)
     cases = [pieces.Case(model, one.fine.groups, one.fine.held, one.patch.pressure.load)
              for model, one in zip(models, held)]
-    fine = pieces.moved(cases, cycles, window, say, LEAST)
-    coarse = pieces.moved([case._replace(groups=one.coarse.groups) for case, one in zip(cases, held)], cycles, window,
-                          say, LEAST, steady=False)
+    fine = pieces.runs_of_cases(cases, cycles, window, say, LEAST)
+    coarser = [case._replace(groups=one.coarse.groups) for case, one in zip(cases, held)]
+    coarse = pieces.runs_of_cases(coarser, cycles, window, say, LEAST, steady=False)
     chosen = tuple({"elements": int(one.fine.contact.reduction.stiffness.size),
                     "interface_nodes": int(one.patch.x.size)} for one in held)
-    runs = replace(pieces.with_errors(fine, coarse, pieces_error), chosen=chosen, again=False)
-    found, alone, _ = answered(models, runs, {"engine": PIECES.name, "window_cycles": window})
+    runs = replace(pieces.with_coarser_errors(fine, coarse, pieces_error), chosen=chosen, again=False)
+    found, alone, _ = batch_answers(models, runs, {"engine": PIECES.name, "window_cycles": window})
     alone = alone | runs.stuck | coarse.lost
     for case in np.flatnonzero(~alone).tolist():
         _tell(found, case, models[case], held[case], runs.extremes[case])
@@ -131,14 +131,14 @@ def _tell(found: Answers, case: int, model: Model, one: _Pressed, extremes) -> N
     """Put the measures of the pressed patch in, and the outcome, warnings and notes as a run of its own has them."""
     modes = model.rig.modes
     slide = extremes * (float(modes.interfaces[0, 0]) / float(modes.output[0]))
-    found.outcome[case] = str(ended(Outcome(found.outcome[case]), model.patch, one.patch, slide))
+    found.outcome[case] = str(outcome_on_piece(Outcome(found.outcome[case]), model.patch, one.patch, slide))
     known = known_of(found, case)
     found.fill(case, one.measures)
     seen = Seen(model, one.measures | {name: m for name, m in known.items() if name != "normal_load"}, one.patch)
-    warned = placeless([*one.warnings, *model.rig.notes, *travelled(one.patch, slide), *beyond_tolerance(seen)],
-                       model.source.path)
+    warned = without_folders([*one.warnings, *model.rig.notes, *travelled(one.patch, slide), *beyond_tolerance(seen)],
+                             model.source.path)
     found.warnings.pop(case, None)
     if warned:
         found.warnings[case] = warned
-    if noted := placeless(one.notes, model.source.path):
+    if noted := without_folders(one.notes, model.source.path):
         found.notes[case] = noted

@@ -21,8 +21,8 @@ from ....dynamics.march.march import march
 from ....response.errors import finer_error
 from ....response.measures import acceleration_peak
 from ....response.spectrum import odd_harmonics, wave_measures
-from ..interface import contact_model, flank_of, model_of
-from ..reading import Reader, books_of
+from ..interface import contact_model, contact_of, flank_of
+from ..reading import Reader, friction_works
 from ..solution import Solution, sampled_loop
 from .curves import LAST, SHOWN, Shown, unlasting
 from .marched import disturbed, lasts, left_grooves
@@ -40,7 +40,7 @@ class Balanced(Reader):
 
     def integrated(self, run, drive) -> Integrated:
         """The two books of friction work and the turns; the middle of a motion that repeats stays."""
-        return Integrated(drift=0.0, books=books_of(run.response, run.ledger["friction"]),
+        return Integrated(drift=0.0, books=friction_works(run.response, run.ledger["friction"]),
                           turns=(tuple(one[:2] for one in self.turns),) if self.turns else ())
 
     def more(self, run, drive, stuck: bool) -> dict:
@@ -54,7 +54,7 @@ class Balanced(Reader):
                                         "slip_amplitude": float(np.ptp(slips)) / 2}}
 
 
-class Balance:
+class BalanceFinder:
     """Laws with memory and springs that bend, by harmonic balance."""
 
     tries_another = False
@@ -73,7 +73,7 @@ class Balance:
         self.model, self.modes, self.patch, self.harmonics = model, rig.modes, patch, model.accuracy.harmonics
         self.numerics = numerics
         self.group, self.tolerance = Group(rig.modes, parts), model.accuracy.tolerance
-        self.climbing = model_of(model, numerics, patch) if model.grooves is not None else None
+        self.climbing = contact_of(model, numerics, patch) if model.grooves is not None else None
 
     def _near(self, drive, near):
         """A start: the Periodic `near`; over grooves, where there are several motions, the unknowns of the last cycle

@@ -54,7 +54,7 @@ def unlasting(multipliers) -> str:
         'use accuracy.method = "march"'
 
 
-def shown_of(drive, raw, near=None) -> Shown:
+def curve_point(drive, raw, near=None) -> Shown:
     """The Solution of a steady motion as a point of a curve."""
     size = float(np.abs(np.asarray(raw.extra["multipliers"])).max(initial=0.0))
     bounded = raw.outcome not in (Outcome.GROWS, Outcome.LEAVES_GROOVES, Outcome.NOT_CONVERGED)
@@ -97,7 +97,7 @@ def largest_of(points) -> int:
     return int(np.argmax(np.where(lasting | ~lasting.any(), sizes, -2.0)))
 
 
-def columns(points, folds=()) -> dict:
+def curve_columns(points, folds=()) -> dict:
     """Columns (c,) of a curve by name: frequency [Hz], level [m s-2], regime, multiplier, and each of SHOWN with its
     error; NaN where no bounded motion is. folds: where it turns back."""
     out = {"frequency": np.array([one.drive.omega / (2 * np.pi) for one in points]),
@@ -109,7 +109,7 @@ def columns(points, folds=()) -> dict:
                   "multiplier": np.array([one.multiplier for one in points]), "folds": np.array(folds)}
 
 
-def levels_of(finder, drive):
+def motion_at_levels(finder, drive):
     """The Solution of the largest of the levels of a drive, each found from the one before it as a rig comes to it,
     with the curve of them all, the Level of each and a probe as `levels.onset` asks.
 
@@ -127,7 +127,7 @@ def levels_of(finder, drive):
             points.append(lost(sine))
             said.append(why)
             continue
-        points.append(shown_of(sine, gauged(finder.model, raw), near))
+        points.append(curve_point(sine, gauged(finder.model, raw), near))
         if best is None or largest_of(points) == len(points) - 1:
             best = raw, sine
         said += [raw.message] if raw.message else []
@@ -140,5 +140,5 @@ def levels_of(finder, drive):
 
     lost_ones = f"{len(said)} of {len(points)} levels have no steady motion that was found: "
     notes = tuple(f"{lost_ones}{one}" for one in said[:1])
-    return replace(best[0], extra=best[0].extra | {"curve": columns(points), "at": best[1]}, probe=probe,
+    return replace(best[0], extra=best[0].extra | {"curve": curve_columns(points), "at": best[1]}, probe=probe,
                    levels=tuple(one.level for one in points), notes=(*best[0].notes, *notes))

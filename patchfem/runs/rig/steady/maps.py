@@ -1,5 +1,6 @@
 """The steady motion of what is linear between events, by the map from event to event over a period: of Coulomb
-interfaces or none at all (`Events`), of elastic-plastic elements (`Yields`); its curve over frequency or level.
+interfaces or none at all (`EventFinder`), of elastic-plastic elements (`YieldFinder`); its curve over frequency or
+level.
 
 Nothing is left open but round-off: what the interfaces do is followed from event to event, and the period closes to the
 residual that is stated.
@@ -19,7 +20,7 @@ from ....response.measures import half_swing
 from ....response.spectrum import wave_measures
 from ....structure.drive_sizes import largest
 from ....structure.response import receptance
-from ..pieces import Interfaces, Limits, Pieces
+from ..pieces import Pieces, RigidElements, YieldingElements
 from .curves import SHOWN, Shown, exact_errors, traced, unlasting
 
 
@@ -111,10 +112,10 @@ def _of_curve(amplitude: float, acceleration: float, waves: dict) -> dict:
     return {name: value for name, value in values.items() if value is not None}
 
 
-class Yields(Maps):
+class YieldFinder(Maps):
     """Elastic-plastic elements, by the map from yield to yield."""
 
-    name, elements = "yields", Interfaces
+    name, elements = "yields", YieldingElements
 
     def __init__(self, model, *given):
         super().__init__(model, *given)
@@ -135,10 +136,10 @@ class Yields(Maps):
                          one.iterations, True, is_stable(one.multipliers))
 
 
-class Events(Maps):
+class EventFinder(Maps):
     """Coulomb interfaces, or none at all, by the event map."""
 
-    name, elements = "events", Limits
+    name, elements = "events", RigidElements
 
     @cached_property
     def forces(self) -> np.ndarray:

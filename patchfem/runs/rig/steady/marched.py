@@ -12,10 +12,10 @@ from ....dynamics.harmonic.laws import synthesis
 from ....dynamics.march import march as hub
 from ....dynamics.periodic import is_stable
 from ....response.measures import peaks_between
-from ..interface import model_of
-from ..march import Read
+from ..interface import contact_of
+from ..march import MarchReader
 from ..solution import Solution
-from .curves import Shown, shown_of, traced, unlasting
+from .curves import Shown, curve_point, traced, unlasting
 
 STEPS, MOST = 256, 4096  # of a cycle, at first and at most
 FINE = 512  # of a cycle of marches that a balance is disturbed in
@@ -41,21 +41,22 @@ def left_grooves(model, numerics, patch, drive, contact, start=None) -> Solution
         done = hub.march(rig.modes, drive, contact, LEAD, steps, 1, rig.travel, start=start, whole=False)
         if done.outcome is not Outcome.LEAVES_GROOVES:
             return None
-        read = Read(replace(model, rig=rig), replace(numerics, cycles=LEAD, steps=steps, window=1), patch, contact)
+        few = replace(numerics, cycles=LEAD, steps=steps, window=1)
+        read = MarchReader(replace(model, rig=rig), few, patch, contact)
         found.append(read.solution(done, perf_counter() - begin, None))
     fine, half = (one.values for one in found)
     errors = {name: abs(value - half.get(name, 0.0)) + READ * abs(value) for name, value in fine.items()}
     return replace(found[0], errors=errors, extra={"regime": "leaves its grooves", "multipliers": np.zeros(0)})
 
 
-class Marched:
+class MarchFinder:
     """Laws over grooves by a march that is brought to repeat."""
 
     tries_another = True
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         self.model, self.patch, self.frames = model, patch, frames
-        self.contact = model_of(model, numerics, patch)
+        self.contact = contact_of(model, numerics, patch)
         exact = self.contact.set_valued
         self.steps = model.accuracy.steps_per_cycle or (EXACT if exact else STEPS)
         self.numerics = replace(numerics, cycles=1.0, window=1)
@@ -79,7 +80,7 @@ class Marched:
     def _read(self, run, steps: int, frames: int = 0) -> tuple:
         """(measures by name, Mark of a cycle, snapshots, whether it sticks)."""
         mark, snapshots = orbits.shown(run, frames)
-        read = Read(self.model, replace(self.numerics, steps=steps), self.patch, self.contact)
+        read = MarchReader(self.model, replace(self.numerics, steps=steps), self.patch, self.contact)
         stuck = bool(np.ptp(mark.window.slip) <= read.held) and not read.creeps
         values = read.values(mark, run.drive, stuck)
         return values | {"drift_per_cycle": 0.0}, mark, snapshots, stuck
@@ -128,11 +129,11 @@ class Marched:
     def shown(self, drive, near=None) -> Shown:
         """A point of a curve."""
         try:
-            return shown_of(drive, *self.point(drive, near))
+            return curve_point(drive, *self.point(drive, near))
         except NotConverged:
             if near is None:
                 raise
-        return shown_of(drive, *self.point(drive))
+        return curve_point(drive, *self.point(drive))
 
     def curve(self, drive) -> tuple:
         """(points of the curve over the frequency, each found from the one before it, no folds)."""

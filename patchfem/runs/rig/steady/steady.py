@@ -10,7 +10,7 @@ from dataclasses import replace
 from ....core import BaseSine, NotConverged
 from ..engines import FINDERS, PIECES, late, steady_by
 from ..solution import Solution
-from .curves import columns, largest_of, levels_of
+from .curves import curve_columns, largest_of, motion_at_levels
 
 
 def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -33,8 +33,8 @@ def _found(finder, model) -> Solution:
     if isinstance(drive, BaseSine):
         return finder.point(drive)[0]
     if model.rig.levels:
-        return levels_of(finder, drive)
+        return motion_at_levels(finder, drive)
     points, folds = finder.curve(drive)
     best = points[largest_of(points)]
     raw, _ = finder.point(best.drive, best.near)
-    return replace(raw, extra=raw.extra | {"curve": columns(points, folds), "at": best.drive})
+    return replace(raw, extra=raw.extra | {"curve": curve_columns(points, folds), "at": best.drive})
