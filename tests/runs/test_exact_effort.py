@@ -63,7 +63,8 @@ def pieces(model) -> int:
     return len(rows_of(rig.modes, rig.drive, *np.transpose(coulomb_limits(model, None)), rig.cycles, rig.start)[1])
 
 
-@pytest.mark.parametrize("text", [CHAIN.format(0.1), CHAIN.format(40), MODES + RUBS + SWEEP])
+@pytest.mark.parametrize("text", [CHAIN.format(0.01), CHAIN.format(0.0004), CHAIN.format(40), MODES + YAW + SLOW,
+                                  MODES + RUBS + SWEEP])
 def test_always_pieces_are_foreseen_within_a_factor_of_four(text):
     model = pf.plan(text).model
     expected, took = costs.pieces_per_cycle(model) * model.rig.cycles, pieces(model)
@@ -71,19 +72,21 @@ def test_always_pieces_are_foreseen_within_a_factor_of_four(text):
 
 
 def test_exact_a_linear_rig_under_a_drive_far_below_its_modes():
-    """A piece for every second radian of 1.7e4 cycles of its modes."""
+    """A piece for every second radian of 5e6 cycles of its modes would take some 100 s."""
+    model = pf.plan(MODES + YAW + SLOW).model
     begin = process_time()
-    result = pf.run(MODES + YAW + SLOW.replace("0.0003404368455286208 Hz", "0.1 Hz"))
-    assert process_time() - begin < 20
+    result = pf.run(MODES + YAW + SLOW)
+    assert process_time() - begin < 20  # most of it to compile
+    assert pieces(model) < 30_000
     assert result.plan.engine == "exact"
     w = 2 * np.pi * np.array([143.0, 129.0])
-    wanted = 5 * 9.80665 / (w[0]**2 - (0.2 * np.pi)**2)  # the output is the first mode's alone
+    wanted = 5 * 9.80665 / w[0]**2  # the output is the first mode's alone
     assert result.measures["relative_displacement_amplitude"].value == pytest.approx(wanted, rel=1e-9)
     assert result.measures["energy_balance"].value < 1e-12
 
 
 @pytest.mark.share(1, 2, 3)
-@pytest.mark.parametrize("frequency", ["0.1 Hz"])
+@pytest.mark.parametrize("frequency", ["0.01 Hz", "0.0003 Hz"])
 @pytest.mark.parametrize("kinetic", [None, 0.2])
 def test_exact_one_mode_under_a_drive_far_below_it(frequency, kinetic):
     """Stick-slip of a spring: the slide lags by the limit; the energy closes."""
@@ -102,7 +105,7 @@ def test_exact_one_mode_under_a_drive_far_below_it(frequency, kinetic):
 def test_always_a_motion_that_rings_for_ever_is_left_to_the_march():
     text = MODES.replace("0.003", "0") + RUBS + SLOW.replace("5 g", "18 g")
     plan = pf.plan(text)
-    assert plan.engine == "march" and costs.seconds_of_pieces(plan.model) > 60
+    assert plan.engine == "march" and costs.seconds_of_pieces(plan.model) > costs.PATIENCE
 
 
 def test_exact_the_averaged_pressure_behind_a_damper_without_end_is_marched():

@@ -2,11 +2,12 @@
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
-from .drive_kernels import RATE, drive_series
+from .drive_kernels import RATE, drive_series, rate_of
 from .march_kernels import EACH, HEAD
 from .memory_kernels import RIGID
 from .search_kernels import moved, speed_series
-from .series_kernels import fastest, largest, motion_series, powers, value
+from .series_kernels import REACH, fastest, largest, motion_series, powers, value
+from .slow_kernels import at_reach, shortened
 from .stick_kernels import constrain
 
 
@@ -19,8 +20,7 @@ def unfold(row, h, plant, clock, room):
     n, faces = len(plant.square), len(plant.reach)
     segment = clock.segments[int(row[3])]
     start = HEAD + 2 * n
-    for i in range(n):
-        room.nodes[i, 0], room.nodes[i, 1] = row[HEAD + i], row[HEAD + n + i]
+    place, speed = row[HEAD:HEAD + n], row[HEAD + n:start]
     for f in range(faces):
         room.polys[faces, f], room.springs[f] = row[start + EACH * f], row[start + EACH * f + 1]
         holds = 1.0 if room.springs[f] == RIGID else 0.0
@@ -28,11 +28,15 @@ def unfold(row, h, plant, clock, room):
             room.mask[f], room.held[0] = holds, -1.0
     if room.held[0] < 0.0:
         constrain(plant, room)
-    own = fastest(plant, room.springs) if room.held[1] == 0.0 else 0.0
-    top = powers(max(own, segment[RATE]) * h)
-    drive_series(segment, row[5], row[6], clock.period[0], h, top, room.waves)
-    motion_series(room.nodes[:n, :2].T, room.polys[faces], room.springs, plant, room.waves[0], h, top, room.coefs,
-                  room)
+    own, rate = fastest(plant, room.springs) if room.held[1] == 0.0 else 0.0, rate_of(segment, clock.period[0])
+    if own * h > REACH * (1 + 1e-9):
+        at_reach(segment, row[5], row[6], clock.period[0], place, speed, room.polys[faces], plant, room)
+        top = powers(rate * h)
+        shortened(rate * h / REACH, top, faces, room)
+    else:
+        top = powers(max(own, segment[RATE]) * h)
+        drive_series(segment, row[5], row[6], clock.period[0], h, top, room.waves)
+        motion_series(place, speed, room.polys[faces], room.springs, plant, room.waves[0], h, top, room.coefs, room)
     for f in range(faces):
         speed_series(plant.faces[f], len(plant.square), room.coefs, top, room.polys[f])
     return top

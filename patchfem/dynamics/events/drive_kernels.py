@@ -23,6 +23,13 @@ def since(segment, cycle, offset, period):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def rate_of(segment, period):
+    """Fastest rate [1/s] of a drive, and at least that of its cycles, whose sines and cosines are taken of the
+    motion."""
+    return max(segment[RATE], 2 * pi / period)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def phase_of(segment, cycle, offset, period):
     """Phase of the drive [rad], modulo 2 pi; along a straight line that of the cycle."""
     if segment[KIND] == SINE:

@@ -6,7 +6,7 @@ An event is a yield, the release of a slide that a rigid element holds, a turnin
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
-from .drive_kernels import KIND, RATE, SINE, drive_series, phase_of, value_now
+from .drive_kernels import KIND, SINE, drive_series, phase_of, rate_of, value_now
 from .memory_kernels import carried, give_way, holds, pulled, tangent, threshold, turn
 from .repeat_kernels import come_back, forget
 from .search_kernels import (
@@ -22,6 +22,7 @@ from .search_kernels import (
     speed_series,
 )
 from .series_kernels import EPS, NONE, REACH, fastest, motion_series, powers, value
+from .slow_kernels import followed, shortened
 from .stick_kernels import LAST, at_rest, keep, settle
 from .sum_kernels import sums
 
@@ -71,6 +72,8 @@ def arrive(clock, stop, left):
         new = value_now(segment, now[0], now[1], period)
         changes = (segment[KIND] == SINE and clock.segments[before, KIND] == SINE) or \
             abs(new - old) > 1e-12 * max(abs(old), abs(new))
+    if changes:
+        now[4] = 0.0
     return changes
 
 
@@ -159,7 +162,7 @@ def enter(motion, plant, table, memory, clock, room):
     for f in range(len(plant.reach)):
         stiff = tangent(f, table, memory)[0]
         room.springs[f] = 0.0 if table.static[f] > 0.0 and room.resting[f] == 1.0 else stiff
-    h = REACH / max(fastest(plant, room.springs), segment[RATE], 1 / clock.period[0])
+    h = REACH / max(fastest(plant, room.springs), rate_of(segment, clock.period[0]))
     drive_series(segment, now[0], now[1], clock.period[0], h, LAST + 1, room.waves)
     return settle(motion, plant, table, memory, h, room)
 
@@ -211,6 +214,8 @@ def output_of(motion, plant):
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def happen(what, face, sign, plant, table, memory, clock):
     """Change the elements, and note what stands still, as the event asks."""
+    if what != NOTHING and what != OUTPUT_TURNS:
+        clock.now[4] = 0.0
     if what == YIELDS:
         give_way(face, sign, table, memory)
     elif what == TURNS:
@@ -222,6 +227,19 @@ def happen(what, face, sign, plant, table, memory, clock):
         clock.rest[face] = 1.0
     if (what == YIELDS or what == TURNS) and table.static[face] == 0.0:
         memory.force[face] = carried(face, table, memory)[0]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def piece_series(h, rate, slow, motion, force, plant, clock, room):
+    """Fill the room with the series of a piece of h [s] from here on; its highest power. rate: the fastest [1/s]; slow:
+    as of `followed`, whose series the room has where it is not 0."""
+    top, now, segment = powers(rate * h), clock.now, clock.segments[int(clock.now[2])]
+    if slow > 0.0:
+        shortened(slow * h / REACH, top, len(plant.reach), room)
+    else:
+        drive_series(segment, now[0], now[1], clock.period[0], h, top, room.waves)
+        motion_series(motion[0], motion[1], force, room.springs, plant, room.waves[0], h, top, room.coefs, room)
+    return top
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -263,12 +281,11 @@ def march(stop, motion, plant, table, memory, past, clock, books, room, rows):
         for f in range(faces):
             room.springs[f] = tangent(f, table, memory)[0]
         own = fastest(plant, room.springs) if room.held[1] == 0.0 else 0.0
-        rate = max(own, segment[RATE], 1 / clock.period[0])
+        slow = followed(motion, memory.force, plant, clock, room) if own > 0.0 else 0.0
+        rate = slow if slow > 0.0 else max(own, rate_of(segment, clock.period[0]))
         h = min(REACH / rate * min(1.0, max(rate * wait(motion, plant, table, memory), 0.02)), left)
         whole = h == left
-        top = powers(rate * h)
-        drive_series(segment, now[0], now[1], clock.period[0], h, top, room.waves)
-        motion_series(motion, memory.force, room.springs, plant, room.waves[0], h, top, room.coefs, room)
+        top = piece_series(h, rate, slow, motion, memory.force, plant, clock, room)
         for f in range(faces):
             if holds(f, table, memory):
                 memory.force[f] = room.reactions[f, 0]

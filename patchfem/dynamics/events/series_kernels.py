@@ -68,11 +68,11 @@ def fastest(plant, springs):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def single_series(motion, force, spring, plant, wave, h, top, coefs):
+def single_series(place, rate, force, spring, plant, wave, h, top, coefs):
     """`motion_series` of one mode with one interface, three times as fast."""
     face, squared, base = plant.faces[0, 0] / plant.mass, h * h, plant.base[0]
     stiff, damp = squared * (plant.square[0] + spring * plant.reach[0]), h * plant.damping[0, 0]
-    here, after = motion[0, 0], h * motion[1, 0]
+    here, after = place[0], h * rate[0]
     coefs[0, 0], coefs[1, 0] = here, after
     here, after = after, -0.5 * (squared * (plant.square[0] * here + base * wave[0] + face * force) + damp * after)
     coefs[2, 0] = after
@@ -82,13 +82,13 @@ def single_series(motion, force, spring, plant, wave, h, top, coefs):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def double_series(motion, force, spring, plant, wave, h, top, coefs):
+def double_series(place, rate, force, spring, plant, wave, h, top, coefs):
     """`motion_series` of two modes with one interface and dampers of their own, all in registers."""
     squared, face_1, face_2, base_1, base_2 = h * h, plant.faces[0, 0], plant.faces[0, 1], plant.base[0], plant.base[1]
     second = len(plant.square) - 1  # no constant: of one mode, where nothing comes here, it would not compile
     stiff_1, stiff_2, stiff = squared * plant.square[0], squared * plant.square[second], squared * spring / plant.mass
     damp_1, damp_2, pull = h * plant.damping[0, 0], h * plant.damping[1, 1], squared * force / plant.mass
-    here_1, here_2, after_1, after_2 = motion[0, 0], motion[0, 1], h * motion[1, 0], h * motion[1, 1]
+    here_1, here_2, after_1, after_2 = place[0], place[1], h * rate[0], h * rate[1]
     coefs[0, 0], coefs[0, 1], coefs[1, 0], coefs[1, 1] = here_1, here_2, after_1, after_2
     for k in range(top - 1):
         push, count = squared * wave[k], k + 1
@@ -100,16 +100,16 @@ def double_series(motion, force, spring, plant, wave, h, top, coefs):
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def still_series(motion, force, plant, wave, top, coefs, room):
+def still_series(place, force, plant, wave, top, coefs, room):
     """`motion_series` where what is held lets nothing move: the reactions alone."""
     n = len(plant.square)
     for k in range(top + 1):
         for i in range(n):
-            coefs[k, i] = motion[0, i] if k == 0 else 0.0
+            coefs[k, i] = place[i] if k == 0 else 0.0
     for f in range(len(plant.reach)):
         level, share = 0.0, 0.0
         for i in range(n):
-            part = plant.square[i] * motion[0, i]
+            part = plant.square[i] * place[i]
             for g in range(len(plant.reach)):
                 if room.springs[g] < RIGID:
                     part += plant.faces[g, i] * force[g] / plant.mass
@@ -136,26 +136,26 @@ def constrained(k, scale, plant, coefs, room):
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def motion_series(motion, force, springs, plant, wave, h, top, coefs, room):
+def motion_series(place, rate, force, springs, plant, wave, h, top, coefs, room):
     """Fill coefs (>= top + 1, n) with the series of z'' = -D z' - w^2 z - base a - slide^T (force + springs
     slide)/mass; slides of infinite springs are held, and room.reactions (i, >= top - 1) are the forces [N] that do it.
 
-    motion (2, n): coordinates and rates at first; force (i,) [N] there; springs (i,) [N/m]; wave: series of a; room:
-    with react and held as `stick_kernels.constrain` leaves them.
+    place, rate (n,): coordinates [m] and rates [m/s] at first; force (i,) [N] there; springs (i,) [N/m]; wave: series
+    of a; room: with react and held as `stick_kernels.constrain` leaves them.
     """
     n, faces, squared, pull = len(plant.square), plant.faces, h * h, room.pull
     held = room.held[0] > 0.0
     if room.held[1] == 1.0:
-        still_series(motion, force, plant, wave, top, coefs, room)
+        still_series(place, force, plant, wave, top, coefs, room)
         return
     if n == 1 and len(plant.reach) == 1:
-        single_series(motion, force[0], springs[0], plant, wave, h, top, coefs)
+        single_series(place, rate, force[0], springs[0], plant, wave, h, top, coefs)
         return
     if n == 2 and len(plant.reach) == 1 and not plant.coupled and not held:
-        double_series(motion, force[0], springs[0], plant, wave, h, top, coefs)
+        double_series(place, rate, force[0], springs[0], plant, wave, h, top, coefs)
         return
     for i in range(n):
-        coefs[0, i], coefs[1, i] = motion[0, i], h * motion[1, i]
+        coefs[0, i], coefs[1, i] = place[i], h * rate[i]
     for f in range(len(plant.reach)):
         pull[f] = force[f] / plant.mass if springs[f] < RIGID else 0.0
     for k in range(top - 1):

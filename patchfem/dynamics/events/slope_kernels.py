@@ -8,7 +8,7 @@ that of the slide.
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
-from .drive_kernels import RATE, drive_series
+from .drive_kernels import drive_series, rate_of
 from .march_kernels import AT_ONCE, MOST_IDLE, advance, arrive, happen, left_of, output_of, wait, widen
 from .memory_kernels import pulled, tangent
 from .search_kernels import TURNS, next_event
@@ -36,7 +36,7 @@ def carry(u, h, top, slopes, marks, plant, table, memory, room, spare):
                 end = memory.upto[f, k]
                 force[f] -= (table.stiff[f, end] - table.stiff[f, first]) * marks[f, k, s]
                 first = end
-        motion_series(one, force, room.springs, plant, zero, h, top, coefs, room)
+        motion_series(one[0], one[1], force, room.springs, plant, zero, h, top, coefs, room)
         for i in range(n):
             place, rate = coefs[top, i], top * coefs[top, i]
             for k in range(top - 1, 0, -1):
@@ -64,12 +64,12 @@ def follow(stop, motion, slopes, marks, plant, table, memory, clock, books, room
             room.springs[f] = tangent(f, table, memory)[0]
             seen[0, f] = max(seen[0, f], memory.slipping[f])
             seen[1, f] = min(seen[1, f], memory.depth[f])
-        rate = max(fastest(plant, room.springs), segment[RATE], 1 / clock.period[0])
+        rate = max(fastest(plant, room.springs), rate_of(segment, clock.period[0]))
         h = min(REACH / rate * min(1.0, max(rate * wait(motion, plant, table, memory), 0.02)), left)
         whole = h == left
         top = powers(rate * h)
         drive_series(segment, now[0], now[1], clock.period[0], h, top, room.waves)
-        motion_series(motion, memory.force, room.springs, plant, room.waves[0], h, top, room.coefs, room)
+        motion_series(motion[0], motion[1], memory.force, room.springs, plant, room.waves[0], h, top, room.coefs, room)
         u, what, face, sign = next_event(top, plant, table, memory, clock, room)
         if u > 0:
             if now[1] == 0.0:

@@ -67,8 +67,9 @@ def turned_rows(plant, room):
 def constrain(plant, room):
     """Hold the slides of room.mask (i,).
 
-    Fills react (i, n), the pseudo-inverse of their rows turned over (0 in those of the others), tied (i,) 1 where they
-    hold a slide, and held: (how many there are, whether nothing can move).
+    Fills turned (i, n), orthogonal rows that span theirs (0 in those too many), react (i, n), the pseudo-inverse of
+    their rows turned over (0 in those of the others), tied (i,) 1 where they hold a slide, and held: (how many there
+    are, whether nothing can move).
     """
     n, faces = len(plant.square), len(plant.reach)
     count = 0.0
@@ -86,6 +87,8 @@ def constrain(plant, room):
         for i in range(n):
             size += room.turned[p, i]**2
         if sqrt(size) <= 1e-10 * most:
+            for i in range(n):
+                room.turned[p, i] = 0.0
             continue
         for q in range(faces):
             if room.mask[q] == 1.0:
@@ -229,7 +232,7 @@ def judge(noise, motion, plant, table, memory, h, room):
         memory.force[f] = pulled(f, table, memory)
         room.springs[f] = tangent(f, table, memory)[0]
         room.orders[f, 0], room.orders[f, 1] = 0.0, 0.0
-    motion_series(motion, memory.force, room.springs, plant, room.waves[0], h, LAST + 1, room.coefs, room)
+    motion_series(motion[0], motion[1], memory.force, room.springs, plant, room.waves[0], h, LAST + 1, room.coefs, room)
     round_off(motion, memory.force, room.springs, plant, h, room)
     for f in range(faces):
         if room.resting[f] == 0.0 or table.static[f] == 0.0 or abs(memory.head[f]) == 2.0:

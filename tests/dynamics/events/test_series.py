@@ -36,7 +36,7 @@ def test_exact_series_is_the_exponential_of_its_system(count, coupled):
     segment = np.array([0.0, 0.0, drives.SINE, *drive, theta, 0.0, 0.0, 2.0, 0.0, 0.0])
     top = series.powers(rate * h)
     drives.drive_series(segment, 0.0, 0.0, np.pi, h, top, room.waves)
-    series.motion_series(motion, np.array([force]), np.array([spring]), plant, room.waves[0], h, top, room.coefs,
+    series.motion_series(*motion, np.array([force]), np.array([spring]), plant, room.waves[0], h, top, room.coefs,
                          room)
     # state z, v, 1, a sin, a cos of the same system
     big = np.zeros((2 * count + 3, 2 * count + 3))
