@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_piecewise import basis, random_rig
+from test_elastic_plastic import basis, random_rig
 
 from patchfem.core import BaseSine, NotConverged
 from patchfem.dynamics.events.elements import elements_of

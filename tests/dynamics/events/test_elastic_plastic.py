@@ -195,3 +195,36 @@ def test_refuses_a_start_beyond_the_travel():
     with pytest.raises(PatchfemError, match="travel"):
         simulate(ONE, BaseSine(1.0, 1.0), [elements_of([1.0], [1.0])], 5, travel=0.1,
                  start=Start(np.array([1.0]), np.array([0.0])))
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_exact_elements_that_yield_at_one_instant_yield_in_any_order(mirrored):
+    """Two equal masses with a mode in which they part: both sets of elements turn and yield at the same instants,
+    whichever stands first, and each moves as one mass alone does; equal forces leave the other mode at rest."""
+    h, sign = np.sqrt(0.5), -1.0 if mirrored else 1.0
+    rows = np.array([[h, h], [sign * h, -sign * h]])
+    both = ModalBasis(("with", "against"), np.array([1.0, 2.3]), np.array([0.02, 0.03]), rows[0], np.array([1.0, 0.0]),
+                      np.array([h, h]), 1.0, faces=rows)
+    alone = ModalBasis(("with",), *(np.array([x]) for x in (1.0, 0.02, h, 1.0, h)), 1.0)
+    k, y = np.array([0.4, 1.0, 0.3]), np.array([0.1, 0.3, 0.8])
+    one = simulate(alone, BaseSine(1.5, 1.1), [elements_of(2 * k, y)], 40, 5)
+    two = simulate(both, BaseSine(1.5, 1.1), [elements_of(k, y)] * 2, 40, 5)
+    np.testing.assert_allclose(two.amplitudes, one.amplitudes, rtol=1e-11)
+    assert np.abs(two.response.modal[:, 1]).max() < 1e-11
+    assert two.ledger["friction"] == pytest.approx(one.ledger["friction"], rel=1e-11)
+    np.testing.assert_allclose([loop.work for loop in two.loops], one.loops[0].work / 2, rtol=1e-11)
+    assert two.log.count == 2 * one.log.count
+    assert energy_balance(two.ledger) < 1e-12
+
+
+def test_exact_the_order_of_interfaces_does_not_matter():
+    """Three equal sets of elements, two of them under one and the same slide: permuted, the motion is the same."""
+    rows, runs = np.array([[0.8, -0.6], [0.8, -0.6], [0.5, 0.7]]), []
+    for order in ([0, 1, 2], [2, 1, 0], [1, 2, 0]):
+        modes = ModalBasis(("a", "b"), np.array([1.0, 2.7]), np.array([0.02, 0.03]), rows[order][0],
+                           np.array([1.0, 0.4]), np.array([1.0, 0.3]), 1.0, faces=rows[order])
+        done = simulate(modes, BaseSine(1.5, 1.1), [elements_of([0.5, 1.0], [0.1, 0.4])] * 3, 40, 5)
+        runs.append((done.amplitudes, np.array([loop.work for loop in done.loops])[np.argsort(order)]))
+    for amplitudes, works in runs[1:]:
+        np.testing.assert_allclose(amplitudes, runs[0][0], rtol=1e-11)
+        np.testing.assert_allclose(works, runs[0][1], rtol=1e-11)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.optimize import fsolve
-from test_piecewise import ONE, basis, random_rig
+from test_elastic_plastic import ONE, basis, random_rig
 
 from patchfem.core import BaseSine, NotConverged, PatchfemError, Start
 from patchfem.dynamics.events.elements import elements_of

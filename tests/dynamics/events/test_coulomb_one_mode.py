@@ -1,0 +1,231 @@
+"""One mode with Coulomb friction: closed forms of decay, growth, sliding and steps, 40-digit arithmetic, DOP853, runs
+of a million cycles."""
+
+from math import pi, sqrt
+
+import mpmath
+import numpy as np
+import pytest
+from event_reference import run_reference
+from event_run import groups_of, run, simulate
+from scipy.integrate import solve_ivp
+
+from patchfem import closed_forms
+from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
+from patchfem.core import BaseSine, ModalBasis, Segment, Start
+from patchfem.dynamics.events import histories
+from patchfem.response.measures import energy_balance
+from patchfem.structure.drives import Piecewise, levels, release
+
+
+def modes_of(omega=1.0, zeta=0.003, slide=1.0, base=1.0, output=1.0, mass=1.0):
+    return ModalBasis(("m",), *(np.array([float(v)]) for v in (omega, zeta, slide, base, output)), mass)
+
+
+def driven(friction, zeta=0.003, ratio=1.0, cycles=200, omega=1.0, start=None, kinetic=None, window=10):
+    """A run under a unit base acceleration at `ratio` times the natural frequency 1."""
+    kinetic = friction if kinetic is None else kinetic
+    return simulate(modes_of(omega, zeta), BaseSine(1.0, ratio), friction, kinetic, cycles, window, start=start)
+
+
+def swing(result, last=10):
+    tail = result.amplitudes[-last:]
+    return (tail[:, 1].max() - tail[:, 0].min()) / 2
+
+
+@pytest.mark.parametrize("start, rest, time", [(11.5, -0.5, 6 * pi), (11.0, -1.0, 5 * pi),
+                                               (11 + 1e-9, -0.999999999, 6 * pi), (0.9, 0.9, 0.0)])
+def test_exact_free_decay(start, rest, time):
+    begin = Start(np.array([start]), np.zeros(1))
+    result = simulate(modes_of(zeta=0.0), release(2 * pi), 1.0, 1.0, 10, 10, start=begin)
+    assert result.window.slide[-1] == pytest.approx(rest, abs=2e-14)
+    assert np.ptp(result.window.slide[result.window.time > time + 1e-9]) == 0.0
+    late = result.window.time
+    np.testing.assert_allclose(result.window.slide, closed_forms.decay(late, start, 1.0, 1.0), atol=1e-13 * start)
+    assert energy_balance(result.ledger) < 1e-13
+
+
+def test_exact_levels_that_do_not_change_are_a_sine():
+    one = driven(0.8, cycles=30)
+    many = simulate(modes_of(), levels([1.0] * 6, 1.0, 5.0), 0.8, 0.8, 30)
+    np.testing.assert_allclose(many.amplitudes, one.amplitudes, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(many.phasors, one.phasors, rtol=0, atol=1e-13)
+
+
+def test_exact_rest_after_the_drive_is_switched_off():
+    """A level of no amplitude is a free decay from where the sine left the mode."""
+    drive = levels([1.0, 0.0], 0.8, 7.25)
+    done = simulate(modes_of(zeta=0.0), drive, 0.3, 0.3, 30, 30)
+    k = np.searchsorted(done.window.time, 7.25 * drive.period)
+    z, v, t, f = done.window.slide[k], done.window.slide_rate[k], done.window.time[k], 0.3
+    assert np.hypot(z, v) > 0.5
+    way = np.sign(v)
+    size, lead = np.hypot(z + way * f, v), np.arctan2(v, z + way * f)
+    first = t + (lead if lead > 0 else lead + pi)  # z + way f = size cos(t - lead'), at its next extreme
+    after = done.window.time > first
+    expected = closed_forms.decay(done.window.time[after] - first, way * (size - f), f, 1.0)
+    np.testing.assert_allclose(done.window.slide[after], expected, atol=1e-11)
+    assert energy_balance(done.ledger) < 1e-12
+
+
+def test_exact_step_of_the_base():
+    """A constant acceleration below friction holds for ever; above it the mode swings to a/w^2 - f sgn and stops."""
+    held = simulate(modes_of(zeta=0.0), Piecewise((Segment(0.0, 0.5),), 2 * pi), 0.6, 0.6, 5)
+    assert not held.window.slide.any()
+    moved = simulate(modes_of(zeta=0.0), Piecewise((Segment(0.0, 1.0),), 2 * pi), 0.6, 0.6, 5)
+    assert moved.window.slide[-1] == pytest.approx(-2 * (1.0 - 0.6), abs=1e-14)
+
+
+@pytest.mark.parametrize("z, v", [(3.0, 0.0), (-2.0, 1.5), (0.0, -4.0)])
+def test_exact_start_against_dop853(z, v):
+    def slope(t, y, way):
+        return [y[1], -np.sin(0.7 * t) - y[0] - 0.1 * y[1] - 0.4 * way]
+
+    def stops(t, y, way):
+        return y[1] * way
+
+    stops.terminal, stops.direction = True, -1
+    way = np.sign(v) if v else -np.sign(z)
+    done = solve_ivp(slope, (0, 30), [z, v], "DOP853", args=(way,), events=stops, rtol=1e-12, atol=1e-14)
+    run = driven(0.4, 0.05, 0.7, 5, start=Start(np.array([z]), np.array([v])))
+    rows = run.response.time > 0
+    times = run.response.time[rows]
+    t = float(done.t_events[0][0])
+    assert np.abs(times - t).min() < 1e-10
+    k = int(np.argmin(np.abs(times - t)))
+    assert run.response.slide[rows][k] == pytest.approx(done.y_events[0][0][0], abs=1e-11)
+
+
+@pytest.mark.parametrize("zeta", [0.05, 0.7])
+def test_exact_slight_friction(zeta):
+    """Friction 1e-9 of the drive is felt, and by the amount of the closed form."""
+    alone = swing(driven(0.0, zeta, 0.9, 120))
+    assert alone == pytest.approx(1 / abs(1 - 0.81 + 1.8j * zeta), rel=1e-13)
+    found = swing(driven(1e-9, zeta, 0.9, 120))
+    assert found == pytest.approx(sliding_amplitude(0.9, 1e-9, zeta), rel=1e-13)
+    assert 0.5e-9 < 1 - found / alone < 2e-9
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.3, 0.5])
+def test_exact_rigid_block_that_slides(friction):
+    """No spring: v' = a sin - f sgn(v), half stroke sqrt(1 - (pi f/2)^2) a/omega^2 while f < a/sqrt(1 + pi^2/4)."""
+    result = driven(friction, 0.0, 1.3, 80, omega=0.0)
+    low, high = result.amplitudes[-1]
+    assert (high - low) / 2 * 1.3**2 == pytest.approx(sqrt(1 - (pi * friction / 2)**2), rel=1e-12)
+
+
+@pytest.mark.parametrize("above", [1e-3, 3e-4])
+def test_exact_beside_the_bounding_ratio(above):
+    """Above pi/4 the motion settles on the closed form of two stops, below it grows by pi - 4 D a cycle."""
+    ratio = pi / 4 + above
+    assert swing(driven(ratio, 0.0, cycles=1500)) == pytest.approx(two_stop_amplitude(ratio), rel=1e-6)
+    top = np.abs(driven(pi / 4 - above, 0.0, cycles=20_000).amplitudes).max(axis=1)
+    assert (top[-1] - top[-5001]) / 5000 == pytest.approx(4 * above, rel=2e-3)
+
+
+@pytest.mark.parametrize("cycles", [100_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
+def test_exact_a_million_cycles_without_drift(cycles, monkeypatch):
+    """Every cycle marched, none counted on: the amplitude, the number of stops and the energy are those of the first
+    ones."""
+    monkeypatch.setattr(histories._Run, "_count_on", lambda self, *given: None)
+    done = driven(0.8, cycles=cycles)
+    np.testing.assert_allclose(np.abs(done.amplitudes[100:]), 0.28704671337871602595, rtol=1e-12)
+    assert done.log.count == 4 * cycles
+    assert energy_balance(done.ledger) < 1e-11
+
+
+@pytest.mark.parametrize("cycles", [3000, pytest.param(100_000, marks=pytest.mark.slow)])
+def test_exact_a_growing_motion_that_never_repeats(cycles):
+    """No damping, D below pi/4: the energy of every cycle stays counted, at speeds that grow with the cycles."""
+    done = driven(0.5, 0.0, cycles=cycles)
+    top = np.abs(done.amplitudes).max(axis=1)
+    assert not done.repeats and energy_balance(done.ledger) < 1e-11
+    assert (top[-1] - top[cycles // 2]) / (cycles - 1 - cycles // 2) == pytest.approx(pi - 4 * 0.5, rel=2e-3)
+
+
+@pytest.mark.parametrize("omega, decay, om", [
+    (1.0, 0.003, 1.0), (1.0, 0.0, 1.0), (1.0, 1e-9, 1 + 1e-7), (1.0, 0.0, 1 + 1e-4), (1.0, 0.3, 0.01), (1.0, 0.0, 50.0),
+    (1.0, 1.0, 0.7), (1.0, 1 - 1e-9, 0.7), (1.0, 1 + 1e-9, 2.0), (1.0, 1.2, 0.5), (1.0, 30.0, 1.0), (0.0, 0.0, 1.3),
+    (1e-6, 0.0, 1.0), (1e-3, 1e-5, 2.0)])
+def test_exact_motion_in_40_digits(omega, decay, om):
+    """A sine from a speed, over four decades of time: at resonance, without damping, near critical damping, without
+    spring."""
+    def divided(u, rate, order):  # of r^order exp(r u)
+        table = [r**order * mpmath.exp(r * u) for r in rate]
+        for k in range(1, len(rate)):
+            table = [(table[i + 1] - table[i]) / (rate[i + k] - rate[i]) for i in range(len(table) - 1)]
+        return table[0]
+
+    modes = modes_of(omega, decay / omega if omega else 0.0)
+    phase, push, v0 = 0.9, 0.7, 0.3
+    drive = Piecewise((Segment(0.0, 0.2, push, om, phase),), 2 * pi / om)
+    times = np.array([1e-3, 0.02, 0.2, 0.29, 0.31, 0.8, 2.0, 5.0]) / max(om, omega, 0.1)
+    found = histories.at_times(modes, drive, groups_of(modes, 0.0, 0.0), 2, times, Start(np.zeros(1), np.array([v0])))
+    with mpmath.workdps(120):  # the reference divides by the gaps of rates that it parts by 1e-27
+        w = [mpmath.mpf(decay), mpmath.mpf(omega)]
+        root = mpmath.sqrt(w[0]**2 - w[1]**2)
+        rates = [-w[0] + root + mpmath.mpf(10)**-28, -w[0] - root - mpmath.mpf(10)**-28,
+                 mpmath.mpc(0, om) + mpmath.mpf(10)**-29, mpmath.mpf(10)**-27]
+        for k, u in enumerate(map(float, times)):
+            exact = []
+            for order in range(2):
+                out = v0 * divided(u, rates[:2], order) - mpmath.mpf(0.2) * divided(u, [*rates[:2], rates[3]], order)
+                out -= (push * mpmath.expj(phase) * divided(u, rates[:3], order)).imag
+                exact.append(float(mpmath.re(out)))
+            size = [abs(v0) * u + u * u, abs(v0) + u]
+            assert abs(found.modal[k, 0] - exact[0]) <= 4e-14 * size[0]
+            assert abs(found.modal_rate[k, 0] - exact[1]) <= 4e-14 * size[1]
+
+
+@pytest.mark.parametrize("drive, zeta, static, kinetic", [
+    (levels([0.9, 1.3, 0.2], 0.9, 2.3), 0.02, 0.6, 0.6), (levels([1.0, 0.4], 1.4, 3.0), 0.1, 0.5, 0.35),
+    (Piecewise((Segment(0.0, 0.2, 1.0, 0.7, 0.3), Segment(9.0, -0.1, 0.5, 1.1, 0.0), Segment(20.0, -0.7)), 2 * pi,
+               False), 0.05, 0.4, 0.4)])
+def test_exact_drives_in_segments_against_dop853(drive, zeta, static, kinetic):
+    cycles = 6 if drive.segments[-1].amplitude else 4.5
+    end, modes = cycles * drive.period, modes_of(zeta=zeta)
+    wanted = run_reference(modes, drive.segments, static, kinetic, end, np.zeros(1), np.zeros(1))
+    wanted = [one for k, one in enumerate(wanted[:-1]) if k == 0 or one[1] != wanted[k - 1][1]]
+    found = run(modes, drive, static, kinetic, end)
+    found = [one for k, one in enumerate(found) if k == 0 or one.directions != found[k - 1].directions]
+    assert len(found) == len(wanted) > 6
+    assert [one.directions for one in found] == [one[1] for one in wanted]
+    np.testing.assert_allclose([one.time for one in found], [one[0] for one in wanted], rtol=0, atol=3e-11)
+    np.testing.assert_allclose([one.modal[0](0.0) for one in found], [one[2][0] for one in wanted], rtol=0, atol=3e-11)
+    done = simulate(modes, drive, static, kinetic, cycles, 20)
+    assert energy_balance(done.ledger) < 1e-12
+    top = np.abs(done.window.acceleration).max()
+    assert top * (1 - 1e-12) <= done.acceleration <= top * (1 + 1e-3)
+
+
+@pytest.mark.parametrize("friction, kinetic, ratio, periods", [
+    (0.78348258, 0.75015892, 1.03988092, 1), (0.2721165, 0.1821656, 0.496223, 1),
+    (0.2345384, 0.1100844, 0.31121007, 25), (0.45029613, 0.1698178, 0.42124622, 51)])
+def test_exact_more_static_than_kinetic_friction(friction, kinetic, ratio, periods):
+    """Where static friction is larger there are motions that repeat after many periods, none of which a shorter one
+    shows."""
+    done = driven(friction, 0.05 if friction > 0.7 else 0.003, ratio, 4000, kinetic=kinetic)
+    late, size = done.amplitudes[-2 * periods - 2:], np.abs(done.amplitudes[-periods:]).max()
+    np.testing.assert_allclose(late[periods:], late[:-periods], rtol=0, atol=1e-10 * size)
+    for fewer in (k for k in range(1, periods) if periods % k == 0):
+        assert np.abs(late[fewer:] - late[:-fewer]).max() > 1e-3 * size
+    assert energy_balance(done.ledger) < 1e-11
+
+
+@pytest.mark.share(0, 4)
+@pytest.mark.parametrize("zeta", [0.0, 0.02, 1.0, 3.0, 200.0])
+def test_exact_energy_balance(zeta):
+    for friction, ratio in ((0.3, 0.4), (0.6, 1.0), (0.9, 2.0)):
+        done = driven(friction, zeta, ratio, 40, kinetic=0.8 * friction)
+        assert energy_balance(done.ledger) < 1e-11
+        assert done.ledger["peak_stored"] >= done.ledger["stored"]
+
+
+@pytest.mark.parametrize("zeta, ratio", [(0.003, 1.0), (0.2, 0.31), (0.0, 1.7)])
+def test_exact_phasor_of_free_sliding_is_its_closed_form(zeta, ratio):
+    """Started in the steady motion, every cycle has the transfer function's phasor."""
+    modes, drive = modes_of(1.0, zeta), BaseSine(1.0, ratio)
+    size = -1 / complex(1 - ratio**2, 2 * zeta * ratio)  # of sin
+    start = Start(np.array([size.imag]), np.array([ratio * size.real]))
+    done = simulate(modes, drive, 0.0, 0.0, 50, 1, start=start)
+    np.testing.assert_allclose(done.phasors, -1j * size, rtol=0, atol=1e-11 * abs(size))
