@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scene_texts import BLOCK
+from scene_texts import BLOCK, KEYS
 
 import patchfem as pf
 from patchfem.core import Outcome
@@ -31,18 +31,13 @@ cycles = 30
 [accuracy]
 method = "harmonic"
 """
-LAWS = {"coulomb": [], "tanh": ["friction.reference_speed=1 mm/s"], "elastic-plastic": ["friction.bond_length=1 um"],
-        "nonlocal": ["friction.bond_length=1 um"],
-        "iwan": ["friction.stiffness=1e7 N/m", "friction.chi=-0.5", "friction.beta=0.5"],
-        "bouc-wen": ["friction.stiffness=1e7 N/m"],
-        "lugre": ["friction.stiffness=1e7 N/m", "friction.stribeck_speed=1 mm/s"]}
 SHOWN = ("relative_displacement_amplitude", "loop_area", "friction_force_peak")
 EVERY = [("coulomb", 139), ("coulomb", 143), ("coulomb", 150), ("elastic-plastic", 139), ("elastic-plastic", 143),
          ("elastic-plastic", 150), ("nonlocal", 143), ("iwan", 143), ("bouc-wen", 150), ("lugre", 139), ("tanh", 150)]
 
 
 def scene(law, *sets):
-    return loads(RIG, sets=[f"friction.law={law}", *LAWS[law], *sets])
+    return loads(RIG.replace('"coulomb"', f'"{law}"\n{KEYS[law]}'), sets=sets)
 
 
 def contact_of(text):
@@ -64,14 +59,14 @@ def test_always_the_steady_motion_is_that_of_a_march(law, frequency):
     asked = scene(law, f"drive.frequency={frequency} Hz")
     found = pf.run(asked)
     assert found.outcome is Outcome.STEADY and found.measures["energy_balance"].value < 2e-3
-    for name, true in zip(SHOWN, marched(asked, steps=1600 if "bond_length" in str(LAWS[law]) else 400)):
+    for name, true in zip(SHOWN, marched(asked, steps=1600 if "bond_length" in KEYS[law] else 400)):
         one = found.measures[name]
         assert abs(one.value - true) <= one.error + 1.5e-3 * abs(true), name
         assert one.error < 5e-3 * abs(one.value)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", KEYS)
 @pytest.mark.parametrize("frequency", [130, 139, 143, 150, 165])
 def test_always_the_steady_motion_with_a_lifted_mass_is_that_of_a_march(law, frequency):
     asked = scene(law, f"drive.frequency={frequency} Hz", "normal.grooves.lifted_mass=0.3 kg")

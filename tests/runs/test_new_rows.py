@@ -2,26 +2,14 @@
 
 import numpy as np
 import pytest
+from scene_texts import MODE, PLASTIC, POINT
 
 from patchfem.api import run
 from patchfem.core import Row
 from patchfem.response import rows
 from patchfem.response.loops import time_mean
 
-SCENE = """
-[normal]
-load = "26 lbf"
-[friction]
-law = "elastic-plastic"
-static = 0.30
-bond_length = "{length} um"
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
+SCENE = POINT + PLASTIC.replace("1 um", "{length} um") + MODE + """\
 [drive]
 kind = "base"
 frequency = "{frequency} Hz"

@@ -10,6 +10,7 @@ from support.scene_texts import (
     COULOMB,
     DRIVE,
     FORCED,
+    KEYS,
     KILOGRAM,
     MODE,
     PAIR,
@@ -18,13 +19,14 @@ from support.scene_texts import (
     SECOND,
     SHEAR,
     SWEEP,
+    friction_of,
     only,
 )
 
 import patchfem as pf
 from patchfem.effects import LAWS
 
-IWAN = '[friction]\nlaw = "iwan"\nstatic = 0.3\nstiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5\n'
+IWAN = friction_of("iwan")
 RIG = POINT + PLASTIC + MODE + DRIVE
 ROUND = ("energy_balance", "work_check", "energy_created", "drift_per_cycle")  # of the same size as round-off
 
@@ -156,7 +158,7 @@ def test_always_the_plan_says_what_both_engines_cost():
 
 def test_refuses_an_exact_run_without_end():
     stiff = RIG.replace("1 um", "1e-13 um") + '[accuracy]\nmethod = "exact"\n'
-    with pytest.raises(pf.Missing, match=r"more than \d+ s; lower drive.cycles or the stiffness"):
+    with pytest.raises(pf.Missing, match=r"more than \d+ s; lower drive.cycles or the stiffness of"):
         pf.run(stiff)
 
 
@@ -174,11 +176,8 @@ def test_always_laws_of_pieces_are_those_with_parallel_elements():
     from patchfem.friction.record import law_from
     from patchfem.scene.scene import loads
 
-    more = {"tanh": 'reference_speed = "1 mm/s"', "elastic-plastic": 'bond_length = "1 um"', "coulomb": "",
-            "iwan": 'stiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5', "bouc-wen": 'stiffness = "1e7 N/m"',
-            "lugre": 'stiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"'}
-    for law, keys in more.items():
-        scene = loads(POINT + f'[friction]\nlaw = "{law}"\nstatic = 0.3\n{keys}\n' + MODE + DRIVE, "a.toml")
+    for law in sorted(KEYS.keys() - {"nonlocal"}):
+        scene = loads(POINT + friction_of(law) + MODE + DRIVE, "a.toml")
         parallel = law_from(scene.friction, 100.0).element(100.0).form == "parallel"
         carried = "pieces" in LAWS[law].carries.split()
         assert carried == (parallel or law == "coulomb")  # Coulomb's points behind the pieces' shear are such elements

@@ -1,18 +1,17 @@
 """Progress is said on the way and changes nothing: a run on a terminal answers as one in a pipe does."""
 
 import pytest
+from scene_texts import KEYS
 
 import patchfem as pf
 from patchfem.scene.scene import loads
 from patchfem.scene.starting import text_of
 
-LAWS = {"coulomb": "", "elastic-plastic": 'bond_length = "1 um"', "nonlocal": 'bond_length = "1 um"',
-        "tanh": 'reference_speed = "10 mm/s"', "lugre": 'stiffness = "1e8 N/m"\nstribeck_speed = "10 mm/s"',
-        "iwan": 'stiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5'}
+LAWS = "coulomb", "elastic-plastic", "nonlocal", "tanh", "lugre", "iwan"
 
 
 def scene(law, *sets):
-    return loads(text_of("rig").replace('"coulomb"', f'"{law}"\n{LAWS[law]}'), sets=("drive.cycles=40", *sets))
+    return loads(text_of("rig").replace('"coulomb"', f'"{law}"\n{KEYS[law]}'), sets=("drive.cycles=40", *sets))
 
 
 @pytest.mark.share(0, 1, 2, 6)
@@ -26,7 +25,7 @@ def test_exact_who_looks_on_sees_the_same_motion(law, sets):
 
 def test_always_a_long_run_is_told_on_the_way():
     """Under a sweep, for a motion that repeats is not run to its end."""
-    head, drive = text_of("rig").replace('"coulomb"', f'"nonlocal"\n{LAWS["nonlocal"]}').split("[drive]")
+    head, drive = text_of("rig").replace('"coulomb"', f'"nonlocal"\n{KEYS["nonlocal"]}').split("[drive]")
     drive = '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "120 Hz"\nto = "160 Hz"\nrate = "2 Hz/s"\n' \
             'acceleration = "5 g"\n[accuracy]' + drive.split("[accuracy]")[1]
     shares = []

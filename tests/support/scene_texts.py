@@ -6,6 +6,17 @@ import pytest
 
 from patchfem.scene.scene import SceneError, loads
 
+# keys that a law asks for beside its static friction
+KEYS = {"coulomb": "", "elastic-plastic": 'bond_length = "1 um"', "nonlocal": 'bond_length = "1 um"',
+        "tanh": 'reference_speed = "1 mm/s"', "iwan": 'stiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5',
+        "bouc-wen": 'stiffness = "1e7 N/m"', "lugre": 'stiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"'}
+
+
+def friction_of(law: str) -> str:
+    """The block of a law of friction with a limit of 0.3 of the load."""
+    return f'[friction]\nlaw = "{law}"\nstatic = 0.3\n' + (KEYS[law] + "\n" if KEYS[law] else "")
+
+
 # blocks; one scene is a sum of them
 POINT = '[normal]\nload = "26 lbf"\n'
 PIECE = '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\n'
@@ -13,9 +24,7 @@ BLOCK = PIECE.replace("6.35 mm", "6 mm") + 'load = "115 N"\nsubstrate = "Ti-8Al-
 COATING = '[contact.coating]\nmaterial = "WC-Co"\nthickness = "6 mil"\n'
 COATED = PIECE + 'load = "26 lbf"\nelement_size = "0.5 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
 SHEAR = "[contact.shear]\n"
-COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
-PLASTIC = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "1 um"\n'
-NONLOCAL = '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\n'
+COULOMB, PLASTIC, NONLOCAL = map(friction_of, ("coulomb", "elastic-plastic", "nonlocal"))
 GROWING = """\
 [friction]
 law = "nonlocal"

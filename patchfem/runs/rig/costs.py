@@ -165,7 +165,7 @@ def refuse_endless(model: Model, numerics=None) -> None:
     if seconds > LONGEST:
         raise Missing(f"the exact motion (about {pieces_per_cycle(model):.2g} pieces per cycle, between events, rows "
                       f"of the drive and the fastest ringing) would take about {seconds:.0f} s, more than "
-                      f"{LONGEST:.0f} s; lower drive.cycles or the frequency of the fastest mode, or use "
+                      f"{LONGEST:.0f} s; lower drive.cycles or the stiffness of modes and elements, or use "
                       "accuracy.method = \"march\"", "")
 
 
