@@ -189,6 +189,10 @@ class Entry:
             if code is None:
                 _tell()
                 with tidied_later():
+                    optimised = import_module(f"{__name__}.inner").optimised  # brings numba
+                    code = machine.make(path, self.function(), arguments, optimised)
+            if code is None:
+                with tidied_later():
                     answer = self.function()(*arguments)
                     if not machine.keep(path, self.function(), arguments):
                         UNKEPT.add(self.kept[:-1])
@@ -356,7 +360,7 @@ def _tell() -> None:
 
 @cache
 def _told(say) -> None:
-    if not PLAIN and not any(_folder().rglob("*.nbi")):
+    if not PLAIN and not any(any(_folder().rglob(f"*.{ending}")) for ending in ("code", "nbi")):
         why = _placed()[1] or short(_folder() / "code", LEAST)
         say("compiling the time loop for this machine, " +
             (f"at every command (10 to 30 s): {why}; name another folder in PATCHFEM_CACHE" if why else

@@ -109,7 +109,15 @@ def _shaped(results, values):
 def found(path: Path) -> Code | None:
     """The function of a file; None where there is no file, or one that is damaged or that this machine cannot run."""
     try:
-        line, _, code = path.read_bytes().partition(b"\n")
+        return loaded(path.read_bytes())
+    except OSError:
+        return None
+
+
+def loaded(content: bytes) -> Code | None:
+    """The function of the content of a file; None as of `found`."""
+    try:
+        line, _, code = content.partition(b"\n")
         about = json.loads(line)
         whole = about["sha256"] == hashlib.sha256(code).hexdigest()
         if not (whole and os.name == "posix" and all(map(_in_c_library, about["calls"]))):
@@ -118,7 +126,7 @@ def found(path: Path) -> Code | None:
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
         return Code(engine.get_function_address(about["name"]), about["results"], about.get("nogil", False))
-    except (OSError, ValueError, KeyError, ImportError, RuntimeError):
+    except (ValueError, KeyError, ImportError, RuntimeError):
         return None
 
 
@@ -152,17 +160,39 @@ def keep(path: Path, function, arguments: tuple) -> bool:
     function: a numba dispatcher that has been called with them.
     """
     try:
-        made = function.overloads[tuple(function.typeof_pyval(one) for one in arguments)]
-        name = "patchfem_" + hashlib.sha256(path.name.encode()).hexdigest()[:16]
-        results = _results(made.signature.return_type)
-        code, calls = _code(function.targetctx, made, name, max(len(_leaves(results)), 1))
-        if not all(map(_in_c_library, calls)):
-            return False
-        about = {"name": name, "results": results, "calls": calls, "sha256": hashlib.sha256(code).hexdigest(),
-                 "nogil": bool(function.targetoptions.get("nogil"))}
-        return own.put(path, json.dumps(about).encode() + b"\n" + code)
+        made = function.overloads[tuple(map(function.typeof_pyval, arguments))]
+        return own.put(path, _content(path.name, function.targetctx, made, function.targetoptions))
     except Exception:  # of numba's and llvmlite's insides: whatever they refuse, the run has its function already
         return False
+
+
+def make(path: Path, function, arguments: tuple, optimised) -> Code | None:
+    """The code of a function, which numba makes for this alone, also written where there is room; None where it is not
+    to be had so.
+
+    function: a numba dispatcher; optimised: that of the module `inner`.
+    """
+    if os.name != "posix":
+        return None
+    try:
+        content = _content(path.name, *optimised(function, arguments), function.targetoptions)
+    except Exception:  # of their insides: what they refuse is told by the call itself
+        return None
+    own.put(path, content)
+    return loaded(content)
+
+
+def _content(name: str, target, made, options: dict) -> bytes:
+    """Content of the file of this name: numba's result of a compilation for a target. Unfit where it calls more than
+    the C library."""
+    name = "patchfem_" + hashlib.sha256(name.encode()).hexdigest()[:16]
+    results = _results(made.signature.return_type)
+    code, calls = _code(target, made, name, max(len(_leaves(results)), 1))
+    if not all(map(_in_c_library, calls)):
+        raise Unfit
+    about = {"name": name, "results": results, "calls": calls, "sha256": hashlib.sha256(code).hexdigest(),
+             "nogil": bool(options.get("nogil"))}
+    return json.dumps(about).encode() + b"\n" + code
 
 
 def _results(kind, inside: bool = False):

@@ -32,7 +32,7 @@ class EngineCode(NamedTuple):
 
 NONE = EngineCode(0.0, 0.0)
 STEPS, FOLLOWED = EngineCode(58e6, 0.4, 8.0), EngineCode(58e6, 0.4, 3.0)  # a march; a slide or a method of few kernels
-SMOOTH, PIECES, BALANCE = EngineCode(74e6, 0.4, 13.0), EngineCode(82e6, 0.4, 22.0), EngineCode(1e8, 0.55, 3.0)
+SMOOTH, PIECES, BALANCE = EngineCode(74e6, 0.4, 13.0), EngineCode(82e6, 0.4, 20.0), EngineCode(1e8, 0.55, 3.0)
 CODES = {"static": NONE, "bench, closed form": NONE, "bench, law step by step": NONE, "bench, two directions": NONE,
          "bench, parallel elements": FOLLOWED, "duhamel": FOLLOWED, "newmark": FOLLOWED, "euler": FOLLOWED,
          "smooth": SMOOTH, "exact": PIECES, "piecewise": PIECES, "harmonic": BALANCE}
@@ -114,7 +114,7 @@ def needs(model: Model, engine: str, steps: int, unknowns: dict, numerics=None, 
     if model.rig is not None:
         parts += _of_rig(model, engine, steps, numerics)
     if "bond_list_about" in unknowns:
-        from ..dynamics.march.capacity import most_bytes
+        from ..dynamics.march.room import most_bytes
 
         parts.append(Need(most_bytes(unknowns["bond_list_about"]), "the list of bonds", "accuracy.tail"))
     return tuple(sorted((part for part in parts if part.bytes > 0), reverse=True))

@@ -119,7 +119,7 @@ class BondList(NamedTuple):
     bound: np.ndarray
 
 
-class Single(NamedTuple):
+class Alone(NamedTuple):
     """A contact on port 0 with nothing beside it: goal (1,) [N] of its residual."""
 
     goal: np.ndarray
@@ -218,3 +218,28 @@ def memory_rows(element, memory) -> list:
 def copied(parts):
     """A tuple of arrays, or of such tuples, with arrays of its own."""
     return type(parts)(*(copied(part) if isinstance(part, tuple) else part.copy() for part in parts))
+
+
+class ModalArrays(NamedTuple):
+    """The modes as the compiled loops of a march take them.
+
+    omega, damp = 2 zeta omega, slide, base, output: (n,); damping: (n, n) where it couples, else (0, 0); their steps,
+    arrays of `propagator.Propagator`, dt [s] and the beta [m/N] of the first interface; mass [kg]; room: (3, n).
+    """
+
+    omega: np.ndarray
+    damp: np.ndarray
+    slide: np.ndarray
+    base: np.ndarray
+    output: np.ndarray
+    damping: np.ndarray
+    free: np.ndarray
+    push: np.ndarray
+    dense: np.ndarray
+    reach: np.ndarray
+    loss: np.ndarray
+    dense_loss: np.ndarray
+    dt: float
+    beta: float
+    mass: float
+    room: np.ndarray
