@@ -65,11 +65,18 @@ def compile_seconds(model: Model, engine: str, unknowns: dict) -> float:
     """CPU seconds in which the first run of this kind compiles; 0 where one has run, or nothing of it is compiled."""
     seconds = code(model, engine).compile
     if seconds:
-        from ..compiled import PATIENCE, has_run
+        from ..compiled import has_run
 
-        short = engine in OF_EVENTS and _as_python(model) <= PATIENCE
+        short = engine in OF_EVENTS and _short(model)
         return 0.0 if short or has_run(compiled_kind(model, engine, unknowns)) else seconds
     return 0.0
+
+
+def _short(model: Model) -> bool:
+    """Whether a run from event to event is over soon as Python."""
+    from ..compiled import PATIENCE
+
+    return _as_python(model) <= PATIENCE
 
 
 def _as_python(model: Model) -> float:
@@ -101,6 +108,8 @@ def needs(model: Model, engine: str, steps: int, unknowns: dict, numerics=None, 
     """
     points = unknowns.get("interface_points", 0)
     runs = code(model, engine)
+    if engine in OF_EVENTS and _short(model):
+        runs = NONE
     parts = [Need(PACKAGES, "packages", ""), Need(runs.bytes, CODE_PART if runs.compile else "code", "")]
     if points:
         key = "contact.mesh" if model.patch.mesh else "contact.element_size"
