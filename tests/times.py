@@ -96,9 +96,9 @@ def spent(text: str) -> float:
 
 
 def a_cycle(scene, few: int = 100) -> float:
-    """Microseconds a cycle of scene(cycles), of runs that are 3 times as long, or 45 times where that is short; a first
-    run brings the compiled code."""
-    spent(scene(few))
+    """Microseconds a cycle of scene(cycles), of runs that are 3 times as long, or 45 times where that is short; a
+    long first run brings the compiled code, which a short one does without."""
+    spent(scene(45 * few))
     low = median(spent(scene(few)) for _ in range(3))
     for many in (3 * few, 45 * few):
         high = median(spent(scene(many)) for _ in range(3))
