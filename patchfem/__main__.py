@@ -217,9 +217,14 @@ def _once_more(lost) -> None:
     if lost.exc_type is not KeyboardInterrupt:
         sys.__unraisablehook__(lost)
         return
-    again = threading.Timer(0.05, _thread.interrupt_main, ENDINGS[:1])
-    again.daemon = True
-    again.start()
+    while True:
+        try:  # on a busy machine the interrupt comes before the thread is seen to run, and would be dropped here again
+            again = threading.Timer(0.05, _thread.interrupt_main, ENDINGS[:1])
+            again.daemon = True
+            again.start()
+            return
+        except KeyboardInterrupt:
+            continue
 
 
 sys.unraisablehook = _once_more

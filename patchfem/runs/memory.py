@@ -65,18 +65,22 @@ def compile_seconds(model: Model, engine: str, unknowns: dict) -> float:
     """CPU seconds in which the first run of this kind compiles; 0 where one has run, or nothing of it is compiled."""
     seconds = code(model, engine).compile
     if seconds:
-        from ..compiled import has_run
-
-        short = engine in OF_EVENTS and _short(model)
-        return 0.0 if short or has_run(compiled_kind(model, engine, unknowns)) else seconds
+        return 0.0 if _short(model, engine) or _kept(model, engine, unknowns) else seconds
     return 0.0
 
 
-def _short(model: Model) -> bool:
-    """Whether a run from event to event is over soon as Python."""
+def _short(model: Model, engine: str) -> bool:
+    """Whether this is a run from event to event that is over soon as Python."""
     from ..compiled import PATIENCE
 
-    return _as_python(model) <= PATIENCE
+    return engine in OF_EVENTS and _as_python(model) <= PATIENCE
+
+
+def _kept(model: Model, engine: str, unknowns: dict) -> bool:
+    """Whether compiled code of a run of this kind is kept, which a short one takes too."""
+    from ..compiled import has_run
+
+    return has_run(compiled_kind(model, engine, unknowns))
 
 
 def _as_python(model: Model) -> float:
@@ -108,7 +112,7 @@ def needs(model: Model, engine: str, steps: int, unknowns: dict, numerics=None, 
     """
     points = unknowns.get("interface_points", 0)
     runs = code(model, engine)
-    if engine in OF_EVENTS and _short(model):
+    if _short(model, engine) and not _kept(model, engine, unknowns):
         runs = NONE
     parts = [Need(PACKAGES, "packages", ""), Need(runs.bytes, CODE_PART if runs.compile else "code", "")]
     if points:

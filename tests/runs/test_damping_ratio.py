@@ -56,7 +56,9 @@ def test_exact_the_scale_of_a_mode_does_not_enter(law, method):
     plain, scaled = (pf.run(loads(scene(law, method, slide))) for slide in (1.0, SLIDE))
     for name in ("equivalent_damping", "equivalent_stiffness", "loop_area", "relative_displacement_amplitude"):
         a, b = plain.measures[name], scaled.measures[name]
-        assert b.value == pytest.approx(a.value, rel=1e-7, abs=1e-12), name
+        # a stiffness far below that of the limit at the amplitude is a difference of larger forces
+        least = 1e-8 * 3.6 / plain.measures["relative_displacement_amplitude"].value if "stiffness" in name else 1e-12
+        assert b.value == pytest.approx(a.value, rel=1e-7, abs=least), name
     assert scaled.measures["equivalent_damping"].value == pytest.approx(ratio(scaled), rel=2e-3)
 
 

@@ -19,7 +19,7 @@ from patchfem import closed_forms
 from patchfem.closed_forms.dynamics import sliding_amplitude
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.contacts.arrays import Alone, Steady
-from patchfem.dynamics.march.march import GOAL, march, plant_of
+from patchfem.dynamics.march.march import GOAL, march, modal_arrays
 from patchfem.dynamics.march.models import jenkins_model, load_kernels, points_model
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.bonds import point_kernels
@@ -204,7 +204,7 @@ def free_rows(basis, model, start, per_cycle, count):
     n = basis.omega.size
     state = np.zeros((2, n))
     state[0] = start
-    plant, table = plant_of(basis, prop), prop.tables(drive, 0, 1)
+    plant, table = modal_arrays(basis, prop), prop.tables(drive, 0, 1)
     ledger, rows = np.zeros(9), np.zeros((count + 1, 2 * n + 7))
     alone, steady = Alone(np.array([1e-3 * GOAL * model.limit])), Steady(np.zeros(0))
     done = hub.march(model, 0, count, state, plant, table, contact, alone, steady, np.inf, ledger, rows)
