@@ -127,7 +127,7 @@ def needs(model: Model, engine: str, steps: int, unknowns: dict, numerics=None, 
     if model.rig is not None:
         parts += _of_rig(model, engine, steps, numerics)
     if "bond_list_about" in unknowns:
-        from ..dynamics.march.room import most_bytes
+        from ..dynamics.march.capacity import most_bytes
 
         parts.append(Need(most_bytes(unknowns["bond_list_about"]), "the list of bonds", "accuracy.tail"))
     return tuple(sorted((part for part in parts if part.bytes > 0), reverse=True))

@@ -119,7 +119,7 @@ class BondList(NamedTuple):
     bound: np.ndarray
 
 
-class Alone(NamedTuple):
+class Single(NamedTuple):
     """A contact on port 0 with nothing beside it: goal (1,) [N] of its residual."""
 
     goal: np.ndarray

@@ -1,4 +1,4 @@
-"""A contact that climbs flanks under a law along them, for the loops of `march.hub`.
+"""A contact that climbs flanks under a law along them, for the loops of `march.instances`.
 
 Over a step of dq the path ds = int sqrt(1 + t^2) dq runs along the flank and the height rises by dz. The law acts over
 ds under a normal force that goes from R0 to R1, R = V sqrt(1 + t^2) + f t, and pulls with f on the mean; then the force

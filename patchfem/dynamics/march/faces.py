@@ -9,10 +9,10 @@ GOAL = 1e-11  # residual of the step solve over the friction limit
 
 
 def faces_of(model, prop, plant, mass: float):
-    """Fresh `arrays.Faces` of a march, from the Propagator and the Plant of its modes [kg]; `arrays.Alone` of a model
+    """Fresh `arrays.Faces` of a march, from the Propagator and the Plant of its modes [kg]; `arrays.Single` of a model
     without joints."""
     if not model.joints:
-        return arrays.Alone(np.array([GOAL * model.limit]))
+        return arrays.Single(np.array([GOAL * model.limit]))
     elements, (p, n), numbers = [one.element for one in model.joints], prop.rows.shape, number_of(model.laws)
     e = len(elements)
     num, mem = (np.zeros((e, max(1, *(len(part) for part in parts)))) for parts in (

@@ -4,7 +4,7 @@ Port p is a row of slides; the contact, where there is one, and the elements eac
 path-mean forces F satisfy d = free - beta F together with every law. Turn by turn each law is solved with the others
 held (block descent on a convex problem for laws that dissipate); the rest of the forces moves d of the others by beta.
 All set-valued elements are one block, followed from stop to release inside the step (`stops_kernels`). The text runs
-with any contact and any laws: `hub` makes an instance per set of them. j: `contacts.arrays.Faces`.
+with any contact and any laws: `instances` makes an instance per set of them. j: `contacts.arrays.Faces`.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ from ...friction.laws.coulomb_kernels import stick
 from ..contacts import element_kernels as contact
 from ..contacts import element_solve_kernels as solver
 from ..modal_kernels import ended, free_rate, free_slide
-from . import alone_kernels as parts
+from . import parts_kernels as parts
 from . import stops_kernels as stops
 from . import together_kernels as together
 from .stops_kernels import (

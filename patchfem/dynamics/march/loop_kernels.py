@@ -3,7 +3,7 @@
 Over a step the modes move exactly under the path means of the friction forces along the straight increments of slide,
 which do exactly the work of the laws: the sum of all energies never rises by itself. The faces are one contact, or
 elements beside it or in its place (`faces_kernels`), of which the set-valued ones say too at what speed the step ends
-(`stops_kernels`); the load stays, or changes (`pressing_kernels`). The text runs with any of them: `hub` makes an
+(`stops_kernels`); the load stays, or changes (`pressing_kernels`). The text runs with any of them: `instances` makes an
 instance of it per contact, of a module with solve, given, commit and state as those named here, and per set of parts,
 and what a rig does not have is not compiled.
 """
@@ -12,8 +12,8 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ..contacts import element_kernels as contact
 from ..modal_kernels import free_slide, move, note, push_back, sample, stored, tell
-from . import alone_kernels as parts
 from . import faces_kernels as faces
+from . import parts_kernels as parts
 from . import pressing_kernels as pressing
 
 MANY, STOPS, PRESSED = parts.MANY, parts.STOPS, parts.PRESSED  # names by which numba leaves branches out
@@ -25,7 +25,7 @@ def march(first, steps, motion, plant, table, c, j, n, travel, ledger, rows):
     """March `steps` steps, the first by row `first` of the table (in turns); 0.1-0.3 us per step, a few ns per point.
 
     motion (2, n): coordinates and rates; table: of `propagator.Propagator`; c: the contact on port 0; j: Faces, or
-    Alone; n: Pressing, or Steady (all of `contacts.arrays`);
+    Single; n: Pressing, or Steady (all of `contacts.arrays`);
     ledger (9,): work in, viscous loss, |work in| per step, friction loss, peak stored, iterations, worst iterations,
     steps without convergence, friction work;
     rows (steps + 1, 2 n + 7 + ...): z, z', q, q', F, slip, mean force of the step that follows, energy in the

@@ -1,4 +1,4 @@
-"""From the results of the stages to the arrays of the compiled hub, and the march in pieces of one drive cycle."""
+"""From the results of the stages to the arrays of the compiled loop, and the march in pieces of one drive cycle."""
 
 from collections import deque
 from copy import copy
@@ -16,9 +16,9 @@ from ..propagator import propagator
 from ..repeats import APART, ahead, looked_at, until_look
 from ..resume import Samples, slot_of
 from ..work_check import sampled_work
+from .capacity import keep, lengthened
 from .faces import GOAL, faces_of
 from .models import ContactModel, free_model, load_kernels
-from .room import keep, lengthened
 
 FULL, UNFIT = 2, 4  # status of a loop whose list of bonds is full, and where no contact set fits the motion
 EACH = 5  # columns of an element in a row, as of `faces_kernels`

@@ -21,8 +21,8 @@ IDLE = ELEMENTS, "friction.laws.elastic_plastic_kernels"  # kind of a contact th
 
 
 def load_kernels(say=None):
-    """The hub of the march, `hub`; `say` is told when its loops have to be compiled first."""
-    return load("dynamics.march.hub", say)
+    """The instances of the loop of the march, `instances`; `say` is told when its loops have to be compiled first."""
+    return load("dynamics.march.instances", say)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -40,7 +40,7 @@ class Joint:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactModel:
-    """What the hub needs to know of an interface; `build()` makes fresh arrays, so a model can be run many times.
+    """What the loop needs to know of an interface; `build()` makes fresh arrays, so a model can be run many times.
 
     contact: module of the compiled contact; law: that of the compiled law in it, "" where the contact
     has none to choose; limit: friction limit [N]; fields: arrays of `tuple_of`;
@@ -61,7 +61,7 @@ class ContactModel:
 
     @property
     def kind(self) -> tuple:
-        """(contact, law): what the hub takes an instance of its loop for."""
+        """(contact, law): what `instances` takes an instance of the loop for."""
         return self.contact, self.law
 
     @property

@@ -16,8 +16,8 @@ from ...contact.press_path_kernels import path_mean
 from ...friction.flags_kernels import INNER
 from ..contacts import element_kernels as contact
 from ..modal_kernels import free_rate, free_slide
-from . import alone_kernels as parts
 from . import faces_kernels as faces
+from . import parts_kernels as parts
 from .stops_kernels import BESIDE, FREE, GAMMA, PULL, RATE, STEP
 
 STOPS, POINTED = parts.STOPS, parts.POINTED

@@ -163,7 +163,7 @@ class VaryingLoadModel:
 
     @property
     def loading(self) -> str:
-        """How the load is borne, as `hub` names it."""
+        """How the load is borne, as `instances` names it."""
         return "points" if self.pointed else "whole"
 
     @property
@@ -179,7 +179,7 @@ class VaryingLoadModel:
 
     @property
     def kind(self) -> tuple:
-        """(contact, law) of what rubs beside the joints: what the hub takes an instance of its loop for."""
+        """(contact, law) of what rubs beside the joints: what `instances` takes an instance of the loop for."""
         if self.pointed:
             return "dynamics.contacts.pressed_points_kernels", ""
         return IDLE if self.set_valued else (IDLE[0], "friction.laws.tanh_kernels")

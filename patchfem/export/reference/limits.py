@@ -28,7 +28,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "surface.files.raw.LARGEST": "bytes of a scan, packed or not", "surface.samples.LONGEST": "length of a trace [m]",
     "model.slide.MOST": "steps per cycle of a bench",
     "runs.rig.costs.MOST_STEPS": "steps per cycle of a march, unnamed",
-    "dynamics.march.room.MOST_STRIPS": "strips of a list of bonds",
+    "dynamics.march.capacity.MOST_STRIPS": "strips of a list of bonds",
     "friction.bonds.parameters.LONGEST": "seconds that a list of bonds may take by its estimate",
     "dynamics.comparison.comparison.MOST_NUMBERS": "numbers that a comparison method keeps",
     "dynamics.resume.MOST_KEPT": "samples kept of a run outside its last cycles; more are thinned"}

@@ -5,9 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from ...dynamics.march.capacity import keep, lengthened
 from ...dynamics.march.march import GOAL
 from ...dynamics.march.models import load_kernels
-from ...dynamics.march.room import keep, lengthened
 from .ledger import BLOCK, Watch, frame_numbers, ledger_of
 
 

@@ -9,7 +9,7 @@ import pytest
 from patchfem.core import BaseSine, ModalBasis, Outcome, Start
 from patchfem.dynamics.grooves.climbing import ClimbingModel
 from patchfem.dynamics.grooves.run import model_of
-from patchfem.dynamics.march.hub import follow_path
+from patchfem.dynamics.march.instances import follow_path
 from patchfem.dynamics.march.march import fresh, march
 from patchfem.dynamics.march.models import element_model, points_model
 from patchfem.dynamics.march.varying_load import bonds, plastic

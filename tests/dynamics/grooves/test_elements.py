@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from patchfem.core import BaseSine, ModalBasis, Outcome, Start
 from patchfem.dynamics.grooves.climbing import ElementsModel
 from patchfem.dynamics.grooves.run import model_of
-from patchfem.dynamics.march.hub import follow_path
+from patchfem.dynamics.march.instances import follow_path
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import element_model
 from patchfem.friction.grooves import STEADY, Grooves, Swing

@@ -9,7 +9,7 @@ import patchfem as pf
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.grooves import climbing
 from patchfem.dynamics.grooves.climbing import ClimbingModel
-from patchfem.dynamics.march.hub import follow_path
+from patchfem.dynamics.march.instances import follow_path
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import jenkins_model
 from patchfem.dynamics.march.varying_load import bonds, plastic

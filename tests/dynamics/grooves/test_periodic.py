@@ -10,7 +10,7 @@ from patchfem.dynamics.grooves.periodic import ElasticFlank, PacedFlank
 from patchfem.dynamics.harmonic.floquet import monodromy
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.laws import Track, analysis, synthesis
-from patchfem.dynamics.march.hub import follow_path
+from patchfem.dynamics.march.instances import follow_path
 from patchfem.dynamics.march.varying_load import plastic
 from patchfem.friction.grooves import Grooves
 

@@ -7,7 +7,7 @@ from march_paths import OMEGA, follow, one_mode
 from scipy.integrate import solve_ivp
 
 from patchfem.core import BaseSine, ModalBasis, Outcome
-from patchfem.dynamics.contacts.arrays import Alone, Steady
+from patchfem.dynamics.contacts.arrays import Single, Steady
 from patchfem.dynamics.march.march import GOAL, march, modal_arrays
 from patchfem.dynamics.march.models import jenkins_model, list_model, load_kernels, points_model
 from patchfem.dynamics.propagator import propagator
@@ -285,7 +285,7 @@ def release(basis, model, start, steps_per_cycle, count):
     contact, _ = model.build(hub)
     state = np.zeros((2, basis.omega.size))
     state[0] = start
-    plant, table, alone = modal_arrays(basis, prop), prop.tables(drive, 0, 1), Alone(np.array([GOAL * model.limit]))
+    plant, table, alone = modal_arrays(basis, prop), prop.tables(drive, 0, 1), Single(np.array([GOAL * model.limit]))
     ledger, rows = np.zeros(9), np.zeros((2, 2 * basis.omega.size + 7))
 
     def energy():

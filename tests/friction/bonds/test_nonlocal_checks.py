@@ -18,7 +18,7 @@ from scipy.special import gammainc
 from patchfem import closed_forms
 from patchfem.closed_forms.dynamics import sliding_amplitude
 from patchfem.core import BaseSine, ModalBasis
-from patchfem.dynamics.contacts.arrays import Alone, Steady
+from patchfem.dynamics.contacts.arrays import Single, Steady
 from patchfem.dynamics.march.march import GOAL, march, modal_arrays
 from patchfem.dynamics.march.models import jenkins_model, load_kernels, points_model
 from patchfem.dynamics.propagator import propagator
@@ -206,7 +206,7 @@ def free_rows(basis, model, start, per_cycle, count):
     state[0] = start
     plant, table = modal_arrays(basis, prop), prop.tables(drive, 0, 1)
     ledger, rows = np.zeros(9), np.zeros((count + 1, 2 * n + 7))
-    alone, steady = Alone(np.array([1e-3 * GOAL * model.limit])), Steady(np.zeros(0))
+    alone, steady = Single(np.array([1e-3 * GOAL * model.limit])), Steady(np.zeros(0))
     done = hub.march(model, 0, count, state, plant, table, contact, alone, steady, np.inf, ledger, rows)
     assert done == (count, 0)
     return rows, ledger, prop

@@ -34,7 +34,7 @@ def loop_of(kind: tuple, laws: tuple = (), load: str = STEADY, there: bool = Tru
     contact, named = contact_of(kind), {}
     flags = {"MANY": bool(laws), "STOPS": COULOMB in laws, "SMOOTH": {*laws} > {COULOMB} or COULOMB not in laws,
              "THERE": there, "SEVERAL": several, "PRESSED": load != STEADY, "POINTED": load == POINTS}
-    text = '"""Parts of a loop, written by patchfem.dynamics.march.hub."""\n\n' + "".join(
+    text = '"""Parts of a loop, written by patchfem.dynamics.march.instances."""\n\n' + "".join(
         f"{name} = {value}\n" for name, value in flags.items())
     parts = compiled.written(f"{HERE}.parts_{compiled.digest(text)}_kernels", text)
     if laws:

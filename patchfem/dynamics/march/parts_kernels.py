@@ -1,4 +1,4 @@
-"""What a loop of `loop_kernels` holds: here one contact under a load that stays. `hub` writes one for other rigs.
+"""What a loop of `loop_kernels` holds, by flags: here one contact under a load that stays. `instances` writes others.
 
 Numba leaves out the branches behind what is False, so nothing is compiled that a rig does not have.
 """

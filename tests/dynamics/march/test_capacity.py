@@ -7,7 +7,7 @@ import pytest
 from march_paths import OMEGA, one_mode
 
 from patchfem.core import BaseSine, Missing
-from patchfem.dynamics.march import room
+from patchfem.dynamics.march import capacity
 from patchfem.dynamics.march.joints import JointsModel, cubic
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import list_model
@@ -36,7 +36,7 @@ def marched(model, frames=0):
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("beside", [False, True])
 def test_exact_a_march_whose_list_grows_is_that_with_room_from_the_start(law, beside):
-    """Every strip is kept, so the list fills up within a cycle: it goes back, takes twice the room and goes on."""
+    """Every strip is kept, so the list fills up within a cycle: it goes back, takes twice the capacity and goes on."""
     def model(entries):
         alone = model_of(LAWS[law], entries)
         return JointsModel(alone, (cubic(1, 1e10),), np.ones((2, 1)), LIMIT) if beside else alone
@@ -48,7 +48,7 @@ def test_exact_a_march_whose_list_grows_is_that_with_room_from_the_start(law, be
 
 
 def test_refuses_more_entries_than_the_stated_limit(monkeypatch):
-    monkeypatch.setattr(room, "MOST_STRIPS", 100)
+    monkeypatch.setattr(capacity, "MOST_STRIPS", 100)
     with pytest.raises(Missing, match=r"outgrew 100 entries \(0 MB\) at step \d+; loosen accuracy.tail"):
         marched(model_of(LAWS["stretch"], 40))
 
@@ -65,4 +65,4 @@ def test_exact_a_bench_whose_list_grows_is_that_with_room_from_the_start(monkeyp
 
 
 def test_always_a_plan_foresees_the_memory_of_the_list():
-    assert room.most_bytes(1000) == 240_000 and room.most_bytes(1e12) == 240 * room.MOST_STRIPS
+    assert capacity.most_bytes(1000) == 240_000 and capacity.most_bytes(1e12) == 240 * capacity.MOST_STRIPS

@@ -1,7 +1,7 @@
-"""Room for a list of bonds that grows: what a stretch of a run may change is kept, and where the list fills up the
-stretch is gone through again with twice the room.
+"""Capacity for a list of bonds that grows: what a stretch of a run may change is kept, and where the list fills up the
+stretch is gone through again with twice the capacity.
 
-A contact without a list has all the room it needs; for it everything here does nothing.
+A contact without a list has all the capacity it needs; for it everything here does nothing.
 """
 
 from typing import NamedTuple
@@ -34,7 +34,7 @@ def keep(contact, *others) -> Kept | None:
 
 
 def lengthened(contact, kept: Kept, place: str, *others):
-    """The contact as it was kept, with twice the room; the other arrays are set back in place.
+    """The contact as it was kept, with twice the capacity; the other arrays are set back in place.
 
     place: where the run stands, for the message. Missing beyond MOST_STRIPS entries.
     """
