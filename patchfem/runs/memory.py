@@ -71,9 +71,11 @@ def compile_seconds(model: Model, engine: str, unknowns: dict) -> float:
 
 def _short(model: Model, engine: str) -> bool:
     """Whether this is a run from event to event that is over soon as Python."""
+    if engine not in OF_EVENTS:
+        return False
     from ..compiled import PATIENCE
 
-    return engine in OF_EVENTS and _as_python(model) <= PATIENCE
+    return _as_python(model) <= PATIENCE
 
 
 def _kept(model: Model, engine: str, unknowns: dict) -> bool:
