@@ -319,6 +319,11 @@ def has_run(kind: str) -> bool:
     return PLAIN or (_placed()[0] / "kinds" / digest(kind)).is_file()
 
 
+def is_kept(function: str) -> bool:
+    """Whether machine code of a function is kept, such as "dynamics.events.march_kernels.march"."""
+    return any((_placed()[0] / "code").glob(f"{function}-*.code"))
+
+
 def _bytes_of(path: Path) -> bytes | None:
     try:
         return path.read_bytes()

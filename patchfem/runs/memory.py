@@ -65,7 +65,9 @@ def compile_seconds(model: Model, engine: str, unknowns: dict) -> float:
     """CPU seconds in which the first run of this kind compiles; 0 where one has run, or nothing of it is compiled."""
     seconds = code(model, engine).compile
     if seconds:
-        return 0.0 if _short(model, engine) or _kept(model, engine, unknowns) else seconds
+        from ..compiled import has_run
+
+        return 0.0 if _short(model, engine) or has_run(compiled_kind(model, engine, unknowns)) else seconds
     return 0.0
 
 
@@ -78,11 +80,11 @@ def _short(model: Model, engine: str) -> bool:
     return _as_python(model) <= PATIENCE
 
 
-def _kept(model: Model, engine: str, unknowns: dict) -> bool:
-    """Whether compiled code of a run of this kind is kept, which a short one takes too."""
-    from ..compiled import has_run
+def _loop_is_kept() -> bool:
+    """Whether the loop from event to event is kept compiled, which a short run takes too."""
+    from ..compiled import is_kept
 
-    return has_run(compiled_kind(model, engine, unknowns))
+    return is_kept("dynamics.events.march_kernels.march")
 
 
 def _as_python(model: Model) -> float:
@@ -114,7 +116,7 @@ def needs(model: Model, engine: str, steps: int, unknowns: dict, numerics=None, 
     """
     points = unknowns.get("interface_points", 0)
     runs = code(model, engine)
-    if _short(model, engine) and not _kept(model, engine, unknowns):
+    if _short(model, engine) and not _loop_is_kept():
         runs = NONE
     parts = [Need(PACKAGES, "packages", ""), Need(runs.bytes, CODE_PART if runs.compile else "code", "")]
     if points:
