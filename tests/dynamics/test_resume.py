@@ -129,10 +129,11 @@ def test_always_a_short_march_keeps_nothing(tmp_path, monkeypatch):
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL, *(
     pytest.param(one, marks=pytest.mark.slow) for one in (signal.SIGHUP, signal.SIGINT))])
 def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):
-    """In a process of its own; one that is killed says nothing and leaves its state too."""
+    """In a process of its own that marches every cycle; one that is killed says nothing and leaves its state too."""
     scene, out = tmp_path / "scene.toml", tmp_path / "out"
     scene.write_text(RIGS["one slide"].replace("cycles = 16.3", "cycles = 4000"), "utf-8")
     code = "from patchfem.dynamics import resume; resume.SECONDS = 0.05; resume.SHARE = 1.0; " \
+           "from patchfem.dynamics.march import march; march.REPEATS = -1.0; " \
            "from patchfem.__main__ import main; main()"
     words = [sys.executable, "-c", code, "run", scene, "--no-page", "-q", "-o", out]
     run = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
