@@ -352,6 +352,16 @@ def test_refuses_a_batch_that_knows_no_grooves(law):
 
 LEAVES = {"normal.grooves.lifted_mass": "1.5 kg", "drive.acceleration": "60 g", "normal.load": "60 N",
           "structure.moving_mass": "8 kg"}
+@pytest.mark.parametrize("law", ['law = "coulomb"', 'law = "tanh"\nreference_speed = "5 mm/s"'])
+def test_exact_the_books_end_with_the_sample_that_exceeds_the_travel(law):
+    """The sums are those of the last sample, wherever travel is exceeded within what is marched at once."""
+    limit = RIG.replace('law = "coulomb"', law).replace("moving_mass", 'travel = "0.08 mm"\nmoving_mass')
+    for level in ("9 g", "10 g", "12 g"):
+        found = run(limit, **{"drive.acceleration": level})
+        assert found.outcome is Outcome.EXCEEDS_TRAVEL
+        assert value(found, "energy_balance") < 1e-9 and value(found, "work_check") < 5e-3
+
+
 BALANCED = RIG.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"').replace(
     "steps_per_cycle = 100", 'method = "harmonic"\nharmonics = 15')
 

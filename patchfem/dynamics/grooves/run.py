@@ -101,12 +101,16 @@ class SampledRun(GroovesRun):
         if motion.time != times[0] or not np.array_equal(motion.moving.y[:2 * n], self.state.ravel()):
             self._begin()
             motion = self.motion_of
+        begun = motion.fork(self.drive)
         seen = motion.until(times[-1], times)
         if motion.outcome is not None and len(seen) <= count:  # where it ends, at the sample that follows
             seen = np.concatenate([seen, motion.settled()[0][None]])
         out = seen[:, 1:1 + n] @ self.modes.output
         beyond = np.flatnonzero(np.abs(out) > self.travel)
         last, status = (int(beyond[0]), 1) if beyond.size else (len(seen) - 1, ENDS.get(motion.outcome, 0))
+        if 0 < last < len(seen) - 1:  # the sums and the state are those of the last sample
+            motion = self.motion_of = begun
+            motion.until(times[last], times[:last + 1])
         seen, work, slid = seen[:last + 1], np.diff(seen[:last + 1, -1]), np.diff(seen[:last + 1, 2 * n + 1])
         part = rows[:last + 1]
         part[:, :2 * n + 2], part[:, 2 * n + 2], part[:, 2 * n + 3] = seen[:, 1:2 * n + 3], seen[:, 2 * n + 3], \
