@@ -8,11 +8,11 @@ import re
 from pathlib import Path
 
 from ...disk.opened import reading
+from ...inputs.columns import NUMBER
 from ...scene.axes import Axis, values_of
 from .cases import Cases
 
 _HEAD = re.compile(r"\s*([^\[\]]+?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
 
 
@@ -49,7 +49,7 @@ def _column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[
     for number, cell in cells:
         if cell in known:
             continue
-        if unit is not None and not _NUMBER.fullmatch(cell):
+        if unit is not None and not NUMBER.fullmatch(cell):
             wrong.append((number, f"'{cell[:60]}' is no number; its unit stands in the header"))
             continue
         try:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array, say
+from ...core import PatchfemError, frozen_array
 from ..areal import Areal, level_plane
 from ..profile import Profile, level
 from ..roughness.filter import even
@@ -169,8 +169,3 @@ def likeness(first, second, step: float, band: tuple = BAND) -> tuple:
         size = float(np.sqrt(np.vdot(a, a).real * np.vdot(b, b).real))
         out.append(float(np.clip(np.vdot(a, b).real / size, 0.0, 1.0)) if size > 0 else 0.0)
     return tuple(out)
-
-
-def band_text(band: tuple) -> str:
-    """The band in words."""
-    return f"waves of {say(band[0])} to {say(band[1])}"

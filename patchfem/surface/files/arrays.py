@@ -3,11 +3,11 @@
 Such files name no units, so the caller does.
 """
 
-import ast
-import re
-import struct
+import io
+import math
 
 import numpy as np
+from numpy.lib import format as npy_format
 
 from ...core import PatchfemError
 from ...inputs.matlab import variables
@@ -19,7 +19,7 @@ from .raw import POINTS, Raw, shown
 from .text import UNITS
 
 _HEADER = 10_000  # bytes of the header of an .npy
-_KIND = re.compile(r"[<>=|]?[fiu][1248]")
+_HEADERS = {(1, 0): npy_format.read_array_header_1_0, (2, 0): npy_format.read_array_header_2_0}
 _LEAST = 8  # rows of a matrix that may be columns of a table
 TABLE = 'np.save("scan.npy", np.column_stack([x, z]))'
 HEIGHTS = ("z", "gap", "height", "heights")
@@ -93,31 +93,26 @@ def _named(path, places: list, z, factors: tuple) -> Profile | Areal:
 
 def _npy(raw: Raw):
     """The array of an .npy file, a view of its bytes."""
-    path, data = raw.path, raw.data
-    if len(data) < 12 or data[6] not in (1, 2):
-        raise PatchfemError(f"{path}: an .npy file of an unknown version; save it anew: {TABLE}")
-    start, size = (10, struct.unpack_from("<H", data, 8)[0]) if data[6] == 1 else (
-        12, struct.unpack_from("<I", data, 8)[0])
+    path, file = raw.path, io.BytesIO(raw.data)
     try:
-        if size > _HEADER:
+        version = npy_format.read_magic(file)
+        if version not in _HEADERS:
+            raise PatchfemError(f"{path}: an .npy file of an unknown version; save it anew: {TABLE}")
+        shape, fortran, kind = _HEADERS[version](file, max_header_size=_HEADER)
+        if min(shape, default=0) < 0:
             raise ValueError
-        head = ast.literal_eval(data[start:start + size].decode("latin-1").strip())
-        kind, order, shape = head["descr"], head["fortran_order"], head["shape"]
-        plain = isinstance(kind, str) and isinstance(order, bool) and isinstance(shape, tuple)
-        if not plain or not all(type(one) is int and one >= 0 for one in shape):
-            raise ValueError
-    except (ValueError, SyntaxError, TypeError, KeyError, RecursionError, MemoryError):
+    except PatchfemError:
+        raise
+    except Exception:  # NumPy lets through whatever Python says of a damaged header
         raise PatchfemError(f"{path}: the header of the .npy file is damaged or holds no plain array; save it anew: "
                             f"{TABLE}") from None
-    if not _KIND.fullmatch(kind):
-        what = "Python objects, which are never loaded" if "O" in kind else f"'{shown(kind)}'"
+    if kind.kind not in "fiu" or kind.itemsize > 8:
+        what = "Python objects, which are never loaded" if kind.hasobject else f"'{shown(kind.str)}'"
         raise PatchfemError(f"{path}: holds {what}; save numbers: {TABLE}")
-    count, dtype = 1, np.dtype(kind)
-    for one in shape:
-        count *= one
+    count, left = math.prod(shape), len(raw.data) - file.tell()
     if count > POINTS * 3:
         raise PatchfemError(f"{path}: {count} numbers by its header, more than {POINTS:.0e} points; save a part of it")
-    if count * dtype.itemsize != len(data) - start - size:
-        raise PatchfemError(f"{path}: {len(data) - start - size} bytes where {count} numbers of {dtype.name} are "
-                            "wanted; the file is cut off or damaged")
-    return np.frombuffer(data, dtype, count, start + size).reshape(shape, order="F" if order else "C")
+    if count * kind.itemsize != left:
+        raise PatchfemError(f"{path}: {left} bytes where {count} numbers of {kind.name} are wanted; the file is cut "
+                            "off or damaged")
+    return np.frombuffer(raw.data, kind, count, file.tell()).reshape(shape, order="F" if fortran else "C")

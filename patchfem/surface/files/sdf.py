@@ -4,12 +4,12 @@ A file is a header, NumProfiles profiles of NumPoints heights each, and a traile
 binary NaN, the least value of a signed and the largest of an unsigned integer of two bytes or more.
 """
 
-import re
 import struct
 
 import numpy as np
 
 from ...core import PatchfemError
+from ...inputs.columns import NUMBER
 from ..areal import Areal
 from ..profile import Profile
 from .raster import areal
@@ -20,7 +20,6 @@ _BINARY = struct.Struct("<8s10s12s12sHHddddBBB")
 _NAMES = ("NumPoints", "NumProfiles", "Xscale", "Yscale", "Zscale", "Zresolution", "Compression", "DataType",
           "CheckType")
 _NEEDED = _NAMES[:5]
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _LINES = 200  # of an ASCII header
 
 
@@ -86,7 +85,7 @@ def _ascii(raw: Raw) -> tuple:
     for number, line in enumerate(lines[1:], 2):
         name, _, value = (part.strip() for part in line.partition("="))
         known = next((one for one in _NAMES if one.lower() == name.lower()), None)
-        if known and not _NUMBER.fullmatch(value):
+        if known and not NUMBER.fullmatch(value):
             raise PatchfemError(f"{raw.path}:{number}: {known} = '{shown(value)}': a number is wanted")
         if known:
             header[known] = float(value)

@@ -9,23 +9,22 @@ is missing. UTF-8 with or without its mark, UTF-16 with it, else Latin-1.
 import io
 import re
 from array import array
-from collections.abc import Mapping
 
 import numpy as np
 
 from ...core import PatchfemError
+from ...inputs.columns import NUMBER
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import checked
 from .raster import raster
-from .raw import Raw, fetch, shown
+from .raw import Raw, shown
 
 UNITS = {"m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9,
          "in": 0.0254, "ft": 0.3048, "mil": 25.4e-6}
 WIDEST = 1000  # characters of a line
 EXAMPLE = "write the header as `x [um],z [um]`"
 _SIGNS = (";", ",", "\t", "|")
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 _LOST = re.compile(r"(?:[+-]?nan|\*+)?", re.IGNORECASE)
 _COLUMN = re.compile(r"(\w+?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|[_/]\s*(\w+))")
@@ -35,20 +34,12 @@ _WIDE = re.compile(rf"\n[^\n]{{{WIDEST + 1}}}")
 _COMMENT = ("#", "%", "//")
 
 
-def read_trace(path, units: Mapping = UNITS) -> Profile:
-    """The trace of a two-column text file in the order of growing x; units: name of a length -> factor to metres.
+def columns(raw: Raw, given: tuple | None = None) -> Profile | Areal:
+    """The trace or areal scan in a text file of two or three columns, in the order of growing x.
 
-    Samples at one x become their mean, x that only its printed digits keep from even spacing is evened, both with a
-    note; an x that turns back is refused. A million samples: 0.3 s. PatchfemError, Missing where there is no file.
-    """
-    return columns(fetch(path), None, units, 2)
-
-
-def columns(raw: Raw, given: tuple | None = None, units: Mapping = UNITS, most: int = 3) -> Profile | Areal:
-    """The trace or areal scan in a text file of two or three columns.
-
-    given: units of x (and y) and of z where the file names none; most: columns that are allowed. PatchfemError names
-    the line.
+    given: units of x (and y) and of z where the file names none. Samples at one x become their mean, x that only its
+    printed digits keep from even spacing is evened, both with a note; an x that turns back is refused. A million
+    samples: 0.3 s. PatchfemError names the line.
     """
     path, text = raw.path, text_of(raw)
     header, number, body = _header(path, text)
@@ -59,7 +50,7 @@ def columns(raw: Raw, given: tuple | None = None, units: Mapping = UNITS, most: 
                                 "sample")
         names = {2: ["x", "z"], 3: ["x", "y", "z"]}.get(len(cells), cells)
         cells, body, number = names, f"{header}\n{body}", number - 1
-    order, factors = _columns(f"{path}:{max(number, 1)}", cells, (given, units), header, most)
+    order, factors = _columns(f"{path}:{max(number, 1)}", cells, given, header)
     found, at = values(path, body, number, order, delimiter)
     if len(order) == 2:
         return checked(path, *found, at, factors)
@@ -128,15 +119,11 @@ def _names(line: str, comment: bool) -> tuple:
 def _split(text: str) -> tuple:
     """Cells of a line without the empty ones at the end, and the delimiter between them, None for blanks."""
     for delimiter in (*_SIGNS, None):  # numbers with a decimal comma stand apart by something else
-        cells = _cells(text, delimiter)
+        cells = _trimmed(text.split(delimiter))
         if 1 < len(cells) < 4 and all(_is_number(cell, delimiter) for cell in cells):
             return cells, delimiter
     delimiter = next((sign for sign in _SIGNS if sign in text), None)
     return _trimmed(text.split(delimiter) if delimiter else _CELL.findall(text)), delimiter
-
-
-def _cells(text: str, delimiter) -> list:
-    return _trimmed(text.split(delimiter))
 
 
 def _trimmed(cells: list) -> list:
@@ -147,29 +134,28 @@ def _trimmed(cells: list) -> list:
 
 
 def _is_number(cell: str, delimiter) -> bool:
-    number = _NUMBER.fullmatch(cell) or _LOST.fullmatch(cell)
+    number = NUMBER.fullmatch(cell) or _LOST.fullmatch(cell)
     return bool(number or (delimiter != "," and _COMMA.fullmatch(cell)))
 
 
-def _columns(at: str, cells: list, units: tuple, header: str, most: int) -> tuple:
+def _columns(at: str, cells: list, given: tuple | None, header: str) -> tuple:
     """Meaning of the header: places of x, (y,) z; factors of x, (y,) z."""
     if len(cells) < 2:
         raise PatchfemError(f"{at}: one column, '{shown(header)}', where x and z are wanted; {EXAMPLE}")
-    if len(cells) > most:
-        wanted = "x and z are wanted" if most == 2 else "x and z, or x, y and z, are wanted"
-        raise PatchfemError(f"{at}: {len(cells)} columns where {wanted}; keep one trace of two columns and {EXAMPLE}")
+    if len(cells) > 3:
+        raise PatchfemError(f"{at}: {len(cells)} columns where x and z, or x, y and z, are wanted; keep one trace of "
+                            f"two columns and {EXAMPLE}")
     found, known = {}, ("x", "z") if len(cells) == 2 else ("x", "y", "z")
     for place, cell in enumerate(cells):
-        name, factor = _column(at, cell, known, units)
+        name, factor = _column(at, cell, known, given)
         if name in found:
             raise PatchfemError(f"{at}: two columns are named {name}; {EXAMPLE}")
         found[name] = place, factor
     return tuple(zip(*(found[name] for name in known)))
 
 
-def _column(at: str, cell: str, known: tuple, units: tuple) -> tuple:
+def _column(at: str, cell: str, known: tuple, given: tuple | None) -> tuple:
     """(name, factor) of a column; its own unit counts, and one given for it must be the same."""
-    given, lengths = units
     match = _COLUMN.fullmatch(cell)
     if match is None and (given is None or cell.lower() not in known):
         raise PatchfemError(f"{at}: column '{shown(cell)}' has no unit, and units are never guessed; {EXAMPLE}")
@@ -179,10 +165,10 @@ def _column(at: str, cell: str, known: tuple, units: tuple) -> tuple:
         raise PatchfemError(f"{at}: column '{shown(match[1])}' is not known, {listed} are wanted; {EXAMPLE}")
     asked = None if given is None else given[name == "z"]
     unit = next((part for part in match.groups()[1:] if part is not None), "").strip() if match else asked
-    factor = lengths.get(unit.replace("µ", "u").replace("μ", "u"))
+    factor = UNITS.get(unit.replace("µ", "u").replace("μ", "u"))
     if factor is None:
-        raise PatchfemError(f"{at}: unknown unit '{shown(unit)}' of {name}; use one of {', '.join(lengths)}")
-    if asked is not None and lengths.get(asked) != factor:
+        raise PatchfemError(f"{at}: unknown unit '{shown(unit)}' of {name}; use one of {', '.join(UNITS)}")
+    if asked is not None and UNITS.get(asked) != factor:
         raise PatchfemError(f"{at}: the header gives {name} in {shown(unit)}, but {shown(asked)} was given for it; "
                             "leave the units out, the header names them")
     return name, factor
@@ -270,7 +256,7 @@ def _row(at: str, line: str, order: tuple, delimiter, comma: bool) -> list | Non
 def _value(at: str, name: str, cell: str) -> float:
     if name == "z" and _LOST.fullmatch(cell):
         return np.nan
-    if _NUMBER.fullmatch(cell) or re.fullmatch(r"[+-]?(?:nan|inf)", cell, re.IGNORECASE):
+    if NUMBER.fullmatch(cell) or re.fullmatch(r"[+-]?(?:nan|inf)", cell, re.IGNORECASE):
         return float(cell)
     if name == "z":
         raise PatchfemError(f"{at}: '{shown(cell)}' is not a height; a missing one is empty, nan or ***")

@@ -8,6 +8,8 @@ Verified before use: sizes by the header, checksums, the data type by the number
 import hashlib
 import posixpath
 import re
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
 
 import numpy as np
 
@@ -15,10 +17,10 @@ from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
 from .raster import areal, raster
-from .raw import POINTS, Raw, member, opened, shown
-from .xmltree import Node, parsed
+from .raw import POINTS, Raw, member, opened, reason, shown
 
 XML = 16 * 2**20  # bytes of main.xml
+DEEPEST, MOST = 50, 500_000  # elements of it inside one another, and in all
 TYPES = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}
 _AXES = ("CX", "CY", "CZ")
 _MD5 = re.compile(r"[0-9a-fA-F]{32}")
@@ -31,7 +33,7 @@ def x3p(raw: Raw) -> Profile | Areal:
     if len(main) != 1:
         raise PatchfemError(f"{path}: {len(main)} main.xml inside it where one is wanted")
     text = member(raw, archive, main[0], XML)
-    root = parsed(path, text)
+    root = _parsed(path, text)
     axes = [_axis(path, root, name) for name in _AXES]
     shape, listed = _shape(path, root)
     link = root.find("Record3/DataLink")
@@ -67,18 +69,18 @@ def _surface(path, columns: list, axes: list, shape: tuple, listed: bool, notes:
     return raster(path, *(one[there] for one in (*places, columns[-1])), None, None)
 
 
-def _axis(path, root: Node, name: str) -> tuple:
+def _axis(path, root: Element, name: str) -> tuple:
     """(type "I" or "A", data type, increment [m], offset [m]) of an axis; CY of a profile may be absent."""
     node = root.find(f"Record1/Axes/{name}")
     if node is None and name != "CY":
         raise PatchfemError(f"{path}: main.xml lacks Record1/Axes/{name}; export the surface anew")
-    kind = "I" if node is None else node.text("AxisType", "I" if name != "CZ" else "A")
+    kind = "I" if node is None else _text(node, "AxisType", "I" if name != "CZ" else "A")
     if kind not in ("I", "A"):
         raise PatchfemError(f"{path}: AxisType of {name} is '{shown(kind)}'; I or A is wanted")
-    data = "D" if node is None else node.text("DataType", "D")
+    data = "D" if node is None else _text(node, "DataType", "D")
     if data not in TYPES:
         raise PatchfemError(f"{path}: DataType of {name} is '{shown(data)}'; one of {', '.join(TYPES)} is wanted")
-    numbers = [_number(path, f"{key} of {name}", "" if node is None else node.text(key, ""), default)
+    numbers = [_number(path, f"{key} of {name}", "" if node is None else _text(node, key), default)
                for key, default in (("Increment", 1.0), ("Offset", 0.0))]
     if kind == "A" and not abs(numbers[0]) > 0:
         raise PatchfemError(f"{path}: Increment of {name} is 0; export the surface anew")
@@ -95,14 +97,14 @@ def _number(path, name: str, text: str, default: float) -> float:
     return value
 
 
-def _shape(path, root: Node) -> tuple:
+def _shape(path, root: Element) -> tuple:
     """((rows, points of a row), whether the points are a list without a matrix)."""
     matrix = root.find("Record3/MatrixDimension")
     names = ("SizeX", "SizeY", "SizeZ") if matrix is not None else ("ListDimension",)
-    where = matrix or root.find("Record3")
+    where = matrix if matrix is not None else root.find("Record3")
     sizes = []
     for name in names:
-        text = where.text(name, "1" if name != "SizeX" else "") if where is not None else ""
+        text = _text(where, name, "1" if name != "SizeX" else "") if where is not None else ""
         if not re.fullmatch(r"[0-9]{1,18}", text) or not 1 <= int(text) <= POINTS:
             raise PatchfemError(f"{path}: {name} is '{shown(text)}'; a whole number from 1 to {POINTS:.0e} is wanted")
         sizes.append(int(text))
@@ -129,7 +131,7 @@ def _linked(raw: Raw, archive, link: tuple, axes: list, shape: tuple) -> list:
     columns = [points[name].astype(float) for name in record.names]
     for values in columns:
         values[np.isinf(values)] = np.nan
-    if node.text("ValidPointsLink", ""):
+    if _text(node, "ValidPointsLink"):
         valid = _file(raw, archive, node, folder, ("ValidPointsLink", "MD5ChecksumValidPoints", count + 8))
         if len(valid) < (count + 7) // 8:
             raise PatchfemError(f"{path}: {len(valid)} bytes of valid points where {(count + 7) // 8} are wanted")
@@ -138,23 +140,23 @@ def _linked(raw: Raw, archive, link: tuple, axes: list, shape: tuple) -> list:
     return columns
 
 
-def _file(raw: Raw, archive, node: Node, folder: str, asked: tuple) -> bytes:
+def _file(raw: Raw, archive, node: Element, folder: str, asked: tuple) -> bytes:
     """A binary file that main.xml names, by its name inside the zip file alone, with its checksum verified."""
     link, checksum, most = asked
-    name = node.text(link, "")
+    name = _text(node, link)
     if not name or name.startswith(("/", "\\")) or ".." in re.split(r"[/\\]", name):
         raise PatchfemError(f"{raw.path}: {link} '{shown(name)}' leads out of the file; export the surface anew")
     data = member(raw, archive, posixpath.join(folder, name.removeprefix("./")), most)
-    wanted = node.text(checksum, "")
+    wanted = _text(node, checksum)
     if _MD5.fullmatch(wanted) and hashlib.md5(data, usedforsecurity=False).hexdigest() != wanted.lower():
         raise PatchfemError(f"{raw.path}: the checksum of {shown(name)} is wrong: the heights were changed after the "
                             "file was written; export the surface anew")
     return data
 
 
-def _main_checksum(raw: Raw, archive, root: Node, folder: str, text: bytes) -> tuple:
+def _main_checksum(raw: Raw, archive, root: Element, folder: str, text: bytes) -> tuple:
     """A note where the checksum file speaks of main.xml and disagrees."""
-    name = posixpath.join(folder, root.text("Record4/ChecksumFile", "md5checksum.hex"))
+    name = posixpath.join(folder, _text(root, "Record4/ChecksumFile", "md5checksum.hex"))
     if name not in archive.namelist() or ".." in name:
         return ()
     said = member(raw, archive, name, 4096).decode("latin-1").split()
@@ -166,10 +168,10 @@ def _main_checksum(raw: Raw, archive, root: Node, folder: str, text: bytes) -> t
             "written",)
 
 
-def _listed(path, root: Node, axes: list, shape: tuple) -> list:
+def _listed(path, root: Element, axes: list, shape: tuple) -> list:
     """Raw values of each absolute axis from the list in main.xml; an empty datum is missing."""
     listed = root.find("Record3/DataList")
-    datums = [] if listed is None else listed.all("Datum")
+    datums = [] if listed is None else [(one.text or "").strip() for one in listed.findall("Datum")]
     count, wide = shape[0] * shape[1], sum(axis[0] == "A" for axis in axes)
     if len(datums) != count:
         raise PatchfemError(f"{path}: {len(datums)} heights in main.xml where {count} are wanted; export it anew")
@@ -184,3 +186,37 @@ def _listed(path, root: Node, axes: list, shape: tuple) -> list:
                 raise PatchfemError(f"{path}: datum {k + 1} is '{shown(text)}'; {wide} numbers are wanted") from None
     table[np.isinf(table)] = np.nan
     return list(table.T)
+
+
+def _text(node: Element, path: str, default: str = "") -> str:
+    """The text at a path of names without blanks around it; the default where there is none."""
+    return (node.findtext(path) or "").strip() or default
+
+
+def _parsed(path, data: bytes) -> Element:
+    """The root of main.xml, names without namespaces; no document type, no entities, no deep nesting, no other file."""
+    parser, tree, count, deep = expat.ParserCreate(), TreeBuilder(), 0, 0
+
+    def refuse(*_):
+        raise PatchfemError(f"{path}: main.xml declares entities or a document type, which no surface needs; export "
+                            "the surface anew")
+
+    def start(name, _):
+        nonlocal count, deep
+        count, deep = count + 1, deep + 1
+        if deep > DEEPEST or count > MOST:
+            raise PatchfemError(f"{path}: main.xml is nested deeper than {DEEPEST} or has more than {MOST} elements")
+        tree.start(name.rpartition(":")[2], {})
+
+    def end(name):
+        nonlocal deep
+        deep -= 1
+        tree.end(name.rpartition(":")[2])
+
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
+    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, tree.data
+    try:
+        parser.Parse(data, True)
+    except (expat.ExpatError, ValueError, UnicodeError, LookupError) as error:
+        raise PatchfemError(f"{path}: main.xml is damaged ({reason(error)}); export the surface anew") from None
+    return tree.close()

@@ -18,7 +18,8 @@ from traces import UM, bumpy, text
 from patchfem.core import Missing, PatchfemError
 from patchfem.scene.keys.quantities import KINDS
 from patchfem.surface.files import raw
-from patchfem.surface.files.text import UNITS, read_trace
+from patchfem.surface.files.read import read_profile
+from patchfem.surface.files.text import UNITS
 
 QUIET = settings(deadline=None, suppress_health_check=list(HealthCheck))
 
@@ -26,7 +27,7 @@ QUIET = settings(deadline=None, suppress_health_check=list(HealthCheck))
 def read(tmp_path, content, name="before.csv"):
     path = tmp_path / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return read_trace(path)
+    return read_profile(path)
 
 
 def test_exact_units_are_those_of_the_package():
@@ -84,15 +85,6 @@ def test_exact_units_of_both_columns(tmp_path, unit):
     assert profile.z == pytest.approx(np.array([0, 0.25, -0.25]) * scale, rel=1e-15)
 
 
-def test_exact_the_caller_names_the_units(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text("x [thou],z [thou]\n0,1\n5,3\n")
-    assert read_trace(path, {"thou": 25.4e-6}).z == pytest.approx([25.4e-6, 76.2e-6])
-    with pytest.raises(PatchfemError, match=r"use one of thou$"):
-        path.write_text("x [um],z [thou]\n0,1\n5,3\n")
-        read_trace(path, {"thou": 25.4e-6})
-
-
 def test_exact_missing_heights_keep_their_place(tmp_path):
     profile = read(tmp_path, "x [um],z [um]\n0,1\n1,\n2,NaN\n3,***\n4, nan \n5,2\n6,*****\n7,1\n")
     assert profile.missing.tolist() == [False, True, True, True, True, False, True, False]
@@ -130,8 +122,8 @@ REFUSED = {
     "\nx [um],z []\n0,1\n": "{path}:2: unknown unit '' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
     "x [um],z [furlong]\n0,1\n": "{path}:1: unknown unit 'furlong' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
     "x [um]\n0\n": "{path}:1: one column, 'x [um]', where x and z are wanted; write the header as `x [um],z [um]`",
-    "x [um],y [um],z [um]\n0,0,1\n": "{path}:1: 3 columns where x and z are wanted; keep one trace of two columns and "
-                                     "write the header as `x [um],z [um]`",
+    "x [um],y [um],z [um],w [um]\n0,0,1,1\n": "{path}:1: 4 columns where x and z, or x, y and z, are wanted; keep one "
+                                               "trace of two columns and write the header as `x [um],z [um]`",
     "x [um],x [um]\n0,1\n": "{path}:1: two columns are named x; write the header as `x [um],z [um]`",
     "t [s],z [um]\n0,1\n": "{path}:1: column 't' is not known, x and z are wanted; write the header as `x [um],z [um]`",
     "x [um],z [um]\n": "{path}: 0 heights; a trace wants two at least",
@@ -181,11 +173,11 @@ def test_refuses_by_name(tmp_path, content):
 
 def test_refuses_what_is_no_file_and_what_is_too_much(tmp_path, monkeypatch):
     with pytest.raises(Missing, match="there is no such file"):
-        read_trace(tmp_path / "none.csv")
+        read_profile(tmp_path / "none.csv")
     with pytest.raises(PatchfemError, match="not a file; a profile is a text file with two columns"):
-        read_trace(tmp_path)
+        read_profile(tmp_path)
     with pytest.raises(PatchfemError, match="cannot be read"):
-        read_trace("a\0b")
+        read_profile("a\0b")
     with pytest.raises(PatchfemError, match=r"damaged .*; pack it again"):
         read(tmp_path, gzip.compress(text(X, Z).encode())[:-20])
     monkeypatch.setattr(raw, "TEXT", 1 << 20)
@@ -203,7 +195,7 @@ def test_always_hostile_files_are_refused_in_little_memory(tmp_path, monkeypatch
         (tmp_path / "before.csv").write_bytes(content)
         tracemalloc.start()
         with pytest.raises(PatchfemError, match=r"more than 1 MiB|a line of 1000001 characters"):
-            read_trace(tmp_path / "before.csv")
+            read_profile(tmp_path / "before.csv")
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         assert peak < megabytes * 2**20
@@ -214,7 +206,7 @@ def timed(tmp_path, count) -> float:
     path = tmp_path / "long.csv"
     path.write_text("x [um],z [um]\n" + "".join(f"{i * 0.0127:.4f},{h:.6f}\n" for i, h in enumerate(z)))
     start = process_time()
-    profile = read_trace(path)
+    profile = read_profile(path)
     seconds = process_time() - start
     assert profile.x.size == count and np.allclose(profile.z, np.round(z, 6) * UM, rtol=1e-14, atol=0)
     return seconds
@@ -241,7 +233,7 @@ def attempt(content: bytes) -> None:
         start = process_time()
         try:
             with warnings.catch_warnings(action="error"):
-                profile = read_trace(path)
+                profile = read_profile(path)
         except PatchfemError as refusal:
             assert str(path) in str(refusal) and len(str(refusal)) < 400 + len(str(path))
         else:
