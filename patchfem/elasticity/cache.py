@@ -26,7 +26,7 @@ def folder() -> Path:
 
 
 GRID_SOURCE = ("elasticity.py", "tensor_stiffness.py", "condense.py", "grid_fronts.py")
-MESH_SOURCE = ("elasticity.py", "mapped.py", "dissect.py", "factor.py", "fronts.py", "substructure.py")
+MESH_SOURCE = ("elasticity.py", "dissect.py", "factor.py", "fronts.py", "substructure.py")
 
 
 def key_of(x, depth, coating_rows: int, layers) -> str:

@@ -8,8 +8,8 @@ after it. The inside is ordered by nested dissection.
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse import csc_matrix
-from skfem import Basis, ElementQuad1, ElementTriP1, MeshQuad, MeshTri
+from scipy.sparse import coo_matrix, csc_matrix
+from skfem import Basis, BilinearForm, ElementQuad1, ElementTriP1, ElementVector, MeshQuad, MeshTri
 
 from ..core import NotConverged, frozen_array
 from ..mesh.anymesh import cell_edges
@@ -18,7 +18,6 @@ from .dissect import dissection
 from .elasticity import Layers, hooke, lame, remedy, von_mises
 from .factor import factorise
 from .lapack import one_thread
-from .mapped import stiffness
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -106,25 +105,33 @@ def elimination(mesh) -> tuple:
     return np.concatenate([nodes[order], mesh.interface]), np.append(firsts, nodes.size + mesh.interface.size)
 
 
+@BilinearForm
+def _elastic_work(u, v, w):
+    """Stress of the motion u times strain of the motion v, of a cell with the Lame pair w.lam, w.mu [Pa]."""
+    (ux_x, ux_y), (uy_x, uy_y) = u.grad
+    (vx_x, vx_y), (vy_x, vy_y) = v.grad
+    return w.lam * (ux_x + uy_y) * (vx_x + vy_y) + w.mu * (2 * ux_x * vx_x + 2 * uy_y * vy_y
+                                                           + (ux_y + uy_x) * (vx_y + vy_x))
+
+
 def _stiffness(mesh, layers: Layers, order) -> csc_matrix:
-    pairs = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])
-    number = np.full(len(mesh.points), -1)
-    number[order] = np.arange(order.size)
-    parts, first = [], 0
-    for cells, shape, element, degree in ((mesh.triangles, MeshTri, ElementTriP1, 1),
-                                          (mesh.quads, MeshQuad, ElementQuad1, 2)):
-        lam, mu = pairs[mesh.is_coating[first:first + len(cells)].astype(int)].T
-        first += len(cells)
+    """Stiffness (2 n, 2 n) per unit width [N/m per m] of the free nodes `order` (n,), assembled by scikit-fem."""
+    pairs, whole = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)]), 0
+    kinds = (mesh.triangles, MeshTri, ElementTriP1, 1), (mesh.quads, MeshQuad, ElementQuad1, 2)
+    coating = np.split(mesh.is_coating.astype(int), [len(mesh.triangles)])
+    for (cells, shape, element, degree), coated in zip(kinds, coating, strict=True):
         if not len(cells):
             continue
         used, own = np.unique(cells, return_inverse=True)
         part = shape(np.ascontiguousarray(mesh.points[used].T), np.ascontiguousarray(own.reshape(cells.shape).T))
-        basis = Basis(part, element(), intorder=degree)
-        place = np.empty(used.size, np.int64)
-        place[basis.nodal_dofs[0]] = number[used]
-        parts.append((basis, lam, mu, place))
-    rows = stiffness(parts, order.size)
-    return csc_matrix((rows.data, rows.indices, rows.indptr), shape=rows.shape)  # symmetric: its rows are its columns
+        basis = Basis(part, ElementVector(element()), intorder=degree)
+        lam, mu = (np.broadcast_to(one[:, None], basis.dx.shape) for one in pairs[coated].T)
+        found = _elastic_work.coo_data(basis, lam=lam, mu=mu)
+        place = np.empty(2 * used.size, np.int64)
+        place[basis.nodal_dofs.T] = 2 * used[:, None] + [0, 1]
+        whole = whole + coo_matrix((found.data, place[found.indices]), shape=2 * (2 * len(mesh.points),)).tocsc()
+    free = (2 * order[:, None] + [0, 1]).ravel()
+    return whole[free][:, free].tocsc()
 
 
 def condense(piece: Substructure) -> tuple:

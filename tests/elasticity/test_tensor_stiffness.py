@@ -1,19 +1,28 @@
-"""Stiffness from matrices of single lines: that of scikit-fem to round-off, as a stencil, a matrix and a product."""
+"""Stiffness from matrices of single lines: that of scikit-fem's form of linear elasticity to round-off, as a stencil, a
+matrix and a product; and the stiffness of a mesh of any cells, which scikit-fem assembles, beside the same form."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from any_mesh_cases import of_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pieces import CARBIDE, COATED, TITANIUM
+from pieces import CARBIDE, COATED, COATING, TITANIUM
 from scipy.sparse import csr_matrix
-from skfem import Basis, ElementQuad1, ElementVector, MeshQuad
+from skfem import Basis, ElementQuad1, ElementTriP1, ElementVector, MeshQuad, MeshTri
 from skfem.models.elasticity import linear_elasticity
 
-from patchfem.core import PatchfemError
-from patchfem.elasticity.elasticity import Layers, assemble, cell_stress, displacement, interface_compliance, lame
-from patchfem.elasticity.mapped import assemble_nodes
+from patchfem.elasticity.elasticity import (
+    Layers,
+    Piece,
+    assemble,
+    cell_stress,
+    displacement,
+    grid_cells,
+    interface_compliance,
+    lame,
+)
 from patchfem.elasticity.recovery import cells_of, indicator, recovery
 from patchfem.elasticity.substructure import assemble as assemble_mesh
 from patchfem.elasticity.substructure import cell_stress as mesh_stress
@@ -21,12 +30,33 @@ from patchfem.elasticity.substructure import condense as condense_mesh
 from patchfem.elasticity.substructure import displacement as mesh_displacement
 from patchfem.elasticity.tensor_stiffness import applied, matrix_of, stencil_of
 from patchfem.mesh.anymesh import PieceMesh
+from patchfem.mesh.tensor import graded_grid
 
 LINES = st.lists(st.floats(0.01, 10.0), min_size=2, max_size=9)
 
 
 def grid_nodes(x, depth):
     return np.stack(np.meshgrid(x, depth, indexing="ij"), axis=-1)
+
+
+def linear(shape, element, points, cells, coated, layers, degree=2):
+    """Stiffness of all nodes by scikit-fem's linear elasticity, unknowns (along x, inward) node by node."""
+    basis = Basis(shape(points.T.copy(), cells.T.copy()), ElementVector(element()), intorder=degree)
+    pairs = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])
+    lam, mu = (np.broadcast_to(part[:, None], basis.dx.shape) for part in pairs[coated.astype(int)].T)
+    order = basis.nodal_dofs.T.ravel()
+    return linear_elasticity(lam, mu).assemble(basis)[order][:, order]
+
+
+def assemble_nodes(nodes, coating_rows, layers):
+    """A Piece of quadrilaterals whose nodes (nx, ny, 2) stand anywhere, assembled by scikit-fem."""
+    columns, rows = nodes.shape[:2]
+    cells, coat = grid_cells(columns, rows, coating_rows)
+    flat = nodes.reshape(-1, 2)
+    free = (2 * np.flatnonzero(np.arange(len(flat)) % rows < rows - 1)[:, None] + [0, 1]).ravel()
+    matrix = linear(MeshQuad, ElementQuad1, flat, cells, coat, layers)[free][:, free]
+    return Piece(nodes[:, 0, 0].copy(), nodes[columns // 2, :, 1].copy(), flat, stencil_of(matrix, columns), cells,
+                 coat, layers)
 
 
 @settings(max_examples=40, deadline=None)
@@ -79,20 +109,19 @@ def test_exact_a_bent_grid_is_the_same_piece_as_a_mesh_of_any_cells():
     assert np.isfinite(indicator(recovery(cells), u, stress).error).all()
 
 
-def test_exact_a_bent_grid_has_the_stiffness_of_scikit_fem_s_own_form():
-    nodes = bent()
-    piece = assemble_nodes(nodes, 0, COATED)
-    flat = nodes.reshape(-1, 2)
-    basis = Basis(MeshQuad(flat.T.copy(), piece.cells.T.copy()), ElementVector(ElementQuad1()), intorder=2)
-    whole = linear_elasticity(*lame(*COATED.substrate, COATED.plane)).assemble(basis)
-    free = basis.nodal_dofs[:, np.arange(135) % 9 < 8].T.ravel()
+@pytest.mark.parametrize("split", [0.0, 0.4, 1.0])
+def test_exact_a_mesh_of_any_cells_has_the_stiffness_of_scikit_fem_s_own_form(split):
+    mesh = of_grid(graded_grid(4e-3, 2e-3, 3e-4, COATING), split, seed=3)
+    piece, first, whole = assemble_mesh(mesh, COATED), len(mesh.triangles), 0
+    for shape, element, cells, coated, degree in (
+            (MeshTri, ElementTriP1, mesh.triangles, mesh.is_coating[:first], 1),
+            (MeshQuad, ElementQuad1, mesh.quads, mesh.is_coating[first:], 2)):
+        if len(cells):
+            whole = whole + linear(shape, element, mesh.points, cells, coated, COATED, degree)
+    free = (2 * piece.order[:, None] + [0, 1]).ravel()
     assert np.abs((whole[free][:, free] - piece.matrix).toarray()).max() <= 1e-14 * np.abs(whole.data).max()
 
 
-def test_refuses_a_folded_grid_and_a_matrix_that_is_no_grid():
-    nodes = bent()
-    nodes[3, 4] = nodes[4, 5]
-    with pytest.raises(PatchfemError, match=r"cells of the grid are folded, the first at x = "):
-        assemble_nodes(nodes, 0, COATED)
+def test_refuses_a_matrix_that_is_no_grid():
     with pytest.raises(ValueError, match="not neighbours"):
         stencil_of(csr_matrix(np.ones((12, 12))), 3)
