@@ -66,11 +66,24 @@ def groups(model: Model) -> dict:
     return out
 
 
+def assembled(asked) -> str:
+    """The sentence on what assembles the stiffness of the pieces of a `PatchModel`."""
+    if asked.mesh is not None:
+        return "scikit-fem's forms assemble the pieces of contact.mesh, the stencil of a tensor grid those that are one"
+    return "scikit-fem's forms assemble the pieces, whose ends are no tensor grid" if asked.outlined else \
+        "the stencil of a tensor grid assembles the pieces"
+
+
 def verdict(found: dict, asked) -> list:
-    """Sentences on what the tilt group says of a `PatchModel`: full contact, or about which part of it.
+    """Sentences on what the tilt group says of a `PatchModel`, full contact or about which part of it, and on what
+    assembles its pieces.
 
     Only flat pieces: what else opens the gap decides where others touch.
     """
+    return [*_of_tilt(found, asked), assembled(asked)]
+
+
+def _of_tilt(found: dict, asked) -> list:
     tilt, gap = found.get("tilt_over_first_opening"), asked.gap
     if tilt is None:
         return []

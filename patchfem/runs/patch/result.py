@@ -7,6 +7,7 @@ import numpy as np
 
 from ...core import Outcome, say
 from ...mesh.nested import plan_of
+from ...mesh.tensor import TensorGrid
 from ...model.pieces import bodies_of
 from ...model.source import placed
 from ..results.result import Result, at_rest
@@ -104,7 +105,10 @@ def left_out(model, patch, coarse) -> list:
     computed.
     """
     asked = model.patch
-    out = [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
+    by_forms = [side for side, body in (("lower", patch.pair.grid), ("upper", patch.pair.upper_grid))
+                if not isinstance(body, TensorGrid)]
+    out = [f"scikit-fem's forms assemble the {' and the '.join(by_forms)} piece"] if by_forms else []
+    out += [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
     if patch.sharper and patch.averaging is not None:
         out.append(f"static measures come from points {say(patch.averaging, 3)} apart, whose short waves are those of "
                    "layers without ends, where these have the smaller errors; the mesh of "
