@@ -12,7 +12,7 @@ Read the package in this order. A module imports its own entry of the list and t
 8. `scene`        a TOML file becomes SI values, every mistake named at once
 9. `inputs`       files of measurements: columns, slide paths, signals, loops
 10. `mesh`         two coated pieces as tagged meshes
-11. `surface`     measured or made height profiles as a share of the gap
+11. `surface`     measured height profiles as a share of the gap
 12. `elasticity`   the pieces condensed to their interface, fields recovered inside
 13. `contact`     gap shapes, unilateral contact, skins, strips, contact maps
 14. `friction`    laws of friction and the sum over bonds along the path

@@ -1,6 +1,6 @@
-"""Height profiles: read, made, measured, and as a share of the gap.
+"""Height profiles: read, measured, and as a share of the gap.
 
-In: traces x [m], z [m] and areal scans, measured (`files`) or made (`synthetic`). Out: levelled heights averaged over
-the cells of the interface nodes; roughness with intervals (`roughness`); two traces before and after (`compare`). Read
-`profile` first, then `nodes`.
+In: traces x [m], z [m] and areal scans, from `files`. Out: levelled heights averaged over the cells of the interface
+nodes; roughness with intervals (`roughness`); two traces before and after (`compare`). Read `profile` first, then
+`nodes`.
 """

@@ -25,9 +25,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
+from synthetic import report_area
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.surface.synthetic import report_area
 from patchfem.wear.asperities import periodic_amplitude, rub
 
 HERE = Path(__file__).parent

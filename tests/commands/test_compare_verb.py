@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from command_line import ALWAYS, FROM_SHELL, cli, loaded
 from pairs import UM, pair
+from synthetic import report_area
 
 import patchfem as pf
 from patchfem.surface.profile import Profile
-from patchfem.surface.synthetic import report_area
 
 NAMES = ("shift", "worn_depth_max", "worn_depth_mean", "worn_area", "amplitude_ratio", "slope_ratio")
 SCENE = """

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import ALWAYS, FROM_SHELL, cli, loaded
+from synthetic import sine
 
 from patchfem.surface.roughness.report import report_of
 from patchfem.surface.roughness.rows import TABLE
-from patchfem.surface.synthetic import sine
 
 UM = 1e-6
 

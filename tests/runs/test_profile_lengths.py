@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scene_texts import COATING, PIECE
+from synthetic import self_affine
 
 import patchfem as pf
 from patchfem.closed_forms import contact as closed_forms
 from patchfem.model.model import build
 from patchfem.runs.patch import fine as trace
 from patchfem.scene.scene import loads
-from patchfem.surface.synthetic import self_affine
 
 SKIN = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e14 Pa/m"\ntangential_ratio = 0.8\n'
 

@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
+from synthetic import report_trace
 
 from patchfem.core import frozen_array
 from patchfem.surface.profile import Profile
-from patchfem.surface.synthetic import report_trace
 
 UM = 1e-6
 LONG, FINE = 4.096e-3, 2**13  # the surface that both traces are cut from: pieces of it scatter as measured traces do

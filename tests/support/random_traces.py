@@ -17,6 +17,7 @@ from time import process_time
 
 import numpy as np
 from scene_texts import COATING, PIECE
+from synthetic import self_affine
 
 import patchfem as pf
 from patchfem.model.model import build
@@ -24,7 +25,6 @@ from patchfem.runs.patch import ladder
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures
 from patchfem.scene.scene import loads
-from patchfem.surface.synthetic import self_affine
 
 LENGTH, CELLS = 12.7e-3, 1588  # of the interface [m]; of the even mesh beside
 KINDS = ("corner", "roofs", "punch", "wave", "short wave", "rough", "smooth rough", "crowned wave")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from synthetic import self_affine, sine, waves
 
 from patchfem.core import PatchfemError
 from patchfem.surface.fine import element_for, fine_share, spectrum, too_fine
 from patchfem.surface.profile import Profile, level
-from patchfem.surface.synthetic import self_affine, sine, waves
 
 LENGTH = 12.7e-3
 X = np.linspace(0, LENGTH, 4001)

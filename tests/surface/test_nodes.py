@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from synthetic import sine
 
 from patchfem.core import PatchfemError
 from patchfem.surface.nodes import on_nodes, placed
 from patchfem.surface.profile import Profile
-from patchfem.surface.synthetic import sine
 
 HALF = 6.35e-3
 EVEN = np.linspace(-HALF, HALF, 201)

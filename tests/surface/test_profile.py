@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from synthetic import peaks, self_affine, sine
 from traces import UM, bumpy
 
 from patchfem.core import PatchfemError, say
 from patchfem.surface.profile import SPIKE, Profile, cleaned, level, spikes
-from patchfem.surface.synthetic import peaks, self_affine, sine
 
 
 def rough(count=4000, seed=0) -> Profile:

@@ -14,10 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 from scipy.special import erf
-
-import patchfem
-from patchfem.core import PatchfemError
-from patchfem.surface.synthetic import (
+from synthetic import (
     SIGMA,
     peaks,
     report_area,
@@ -28,6 +25,9 @@ from patchfem.surface.synthetic import (
     sine,
     waves,
 )
+
+import patchfem
+from patchfem.core import PatchfemError
 
 LENGTH = 12.7e-3
 STEP, POINTS = 3.2e-6, 320  # a raster of 1.02 mm
@@ -155,12 +155,14 @@ def test_exact_the_factors_of_the_amplitude_kinds():
 
 
 def test_exact_same_seed_same_bytes_on_any_number_of_threads():
-    code = ("import hashlib; from patchfem.surface.synthetic import report_area, report_trace; "
+    code = ("import hashlib; from synthetic import report_area, report_trace; "
             "z = report_area((320, 320), 3.2e-6, 11)[2].tobytes() + report_trace(1e-3, 500, 11).z.tobytes(); "
             "print(hashlib.sha256(z).hexdigest())")
-    root = str(Path(patchfem.__file__).parents[1])
+    root = Path(patchfem.__file__).parents[1]
+    paths = os.pathsep.join(map(str, (root, root / "studies" / "common")))
     seen = {subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root,
-                           env={**os.environ, "OPENBLAS_NUM_THREADS": threads}).stdout for threads in ("1", "2")}
+                           env={**os.environ, "OPENBLAS_NUM_THREADS": threads, "PYTHONPATH": paths}).stdout
+            for threads in ("1", "2")}
     z = report_area((320, 320), 3.2e-6, 11)[2].tobytes() + report_trace(1e-3, 500, 11).z.tobytes()
     assert seen == {hashlib.sha256(z).hexdigest() + "\n"}
     assert report_area((320, 320), 3.2e-6, 12)[2].tobytes() != z[:320 * 320 * 8]

@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from synthetic import SIGMA, report_area
 
 from patchfem.core import PatchfemError
-from patchfem.surface.synthetic import SIGMA, report_area
 from patchfem.wear.asperities import anisotropy, overlap_of, periodic_amplitude, rub
 
 STEP = 3.2e-6

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from pairs import UM, pair
+from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface.areal import Areal
@@ -11,7 +12,6 @@ from patchfem.surface.compare.quantity import Quantity
 from patchfem.surface.compare.ratios import Size, ratio, size_of
 from patchfem.surface.compare.verdict import changed, confidence, verdicts
 from patchfem.surface.profile import Profile
-from patchfem.surface.synthetic import report_area
 
 MANY = pytest.param(40, marks=pytest.mark.slow)
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from synthetic import sine
 
 from patchfem.core import PatchfemError
 from patchfem.surface.profile import Profile
 from patchfem.surface.roughness.filter import ALPHA, even, filtered, mean_line
 from patchfem.surface.roughness.parameters import Heights, root_mean_square
-from patchfem.surface.synthetic import sine
 
 UM = 1e-6
 WAVE = 400 * UM

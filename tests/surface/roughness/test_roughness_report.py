@@ -5,12 +5,12 @@ from time import process_time
 import numpy as np
 import pytest
 from ring_traces import traces
+from synthetic import sine
 
 from patchfem.core import PatchfemError
 from patchfem.surface.areal import Areal
 from patchfem.surface.profile import Printed, Profile
 from patchfem.surface.roughness.report import interval_of, report_of, windowed
-from patchfem.surface.synthetic import sine
 
 UM = 1e-6
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from ring_traces import density, traces
+from synthetic import sine
 
 from patchfem.core import PatchfemError
 from patchfem.surface.profile import Profile
 from patchfem.surface.roughness.spectrum import band_amplitude, spectrum, spectrum_of
-from patchfem.surface.synthetic import sine
 
 UM = 1e-6
 

@@ -6,8 +6,8 @@ or as surface.
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array, say
-from .profile import Profile
+from patchfem.core import PatchfemError, frozen_array, say
+from patchfem.surface.profile import Profile
 
 DOMINANT, SHORTEST = 80e-6, 8e-6  # [m] report, 4.D: 80 micron scale; a stylus of 12.5 um traces no shorter waves
 SIGMA = 6.3e-6  # [m] of the larger swings of 13 to 18 um in 4.D; Fig. 30 prints a range of 30.6 um, Rt is 31 um then
