@@ -28,7 +28,7 @@ def test_exact_a_patch_needs_no_motion(scene):
     absent(modules, "friction", "structure", "dynamics", "response", "runs.rig.march", "dynamics.march.march",
            "dynamics.march.loop_kernels", "compiled", "surface", "contact.skin", "contact.skin_laws", "contact.strips",
            "elasticity.mortar", "elasticity.substructure", "elasticity.fronts", "skfem",
-           "contact.halfspace", "slip.partial_slip",
+           "slip.partial_slip",
            "contact.maps", "elasticity.recovery", "mesh.anymesh", "mesh.rounded", "export", "scipy")
     assert {"patchfem.contact.unilateral", "patchfem.mesh.tensor"} <= modules
 

@@ -111,14 +111,3 @@ def sticks(events: Events, begin: float, end: float, moves) -> list:
             sliding[number - 1] = kind != STOP
         last = when
     return max(found.values(), key=lambda spans: sum(b - a for a, b in spans), default=[])
-
-
-def stuck_time(events: Events, number: int, begin: float, end: float, moves: bool) -> float:
-    """Time [s] within [begin, end] [s] during which an interface sticks, between its events.
-
-    number: of the interface, from 1; moves: whether it slips all the time where it has no event.
-    """
-    mine = events.interface == number
-    one = Events(events.time[mine], np.ones(mine.sum(), np.int32), events.kind[mine], events.slide[mine],
-                 events.count)
-    return sum(b - a for a, b in sticks(one, begin, end, [moves]))

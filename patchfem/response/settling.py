@@ -131,12 +131,6 @@ def left_over(extremes, window: int, decay=0.0):
     return (near * share + np.where(stays, 0.0, spread[..., -1]))[()]
 
 
-def mean_amplitude(extremes, window: int) -> tuple:
-    """Steady amplitude about which a short beat of one motion swings, and its error, as `mean_amplitudes` has them of
-    many; (None, None) where there is no such beat."""
-    return _one(mean_amplitudes(np.asarray(extremes, float)[None], window))
-
-
 def mean_amplitudes(extremes, window: int) -> tuple:
     """Steady amplitudes [m] about which a short beat swings, and their errors, (n,) each; NaN where there is none.
 

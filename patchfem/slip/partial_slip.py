@@ -7,8 +7,7 @@ the holders, normal forces f, shear forces t (resistance to slip > 0) and the ga
     e = q - C_tt t - C_nt^T f - s, |t| <= mu f, e.t >= 0, e = 0 where |t| < mu f; s := s + e.
 
 An open node follows the pieces and so forgets its slip. An increment is exact while no node enters or leaves the
-contact and no slip zone shrinks within it; that holds for any stroke at constant load and gap. `load_path` cuts an
-increment where nodes enter.
+contact and no slip zone shrinks within it; that holds for any stroke at constant load and gap.
 """
 
 from dataclasses import dataclass, field

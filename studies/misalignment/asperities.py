@@ -6,14 +6,18 @@ strain) or as round peaks both ways. `one_each` has one unknown force per peak: 
 `explicit` resolves the ridges themselves; `separate` is Greenwood and Williamson's peaks, which do not feel each other.
 """
 
+import sys
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import norm
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from halfspace import press_periodic, wave_numbers
+
 from patchfem import closed_forms as exact
-from patchfem.contact.halfspace import press_periodic, wave_numbers
 from patchfem.contact.skin_laws import HertzSkin
 from patchfem.contact.unilateral import solve_forces
 

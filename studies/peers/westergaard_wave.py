@@ -8,11 +8,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from halfspace import press_periodic, wave_numbers
 from peer import timed
 from strip import wavy_pair, wavy_press
 
 from patchfem import closed_forms as exact
-from patchfem.contact.halfspace import press_periodic, wave_numbers
 
 WAVE, HIGH, SHARE = 80e-6, 1.5e-6, 0.5
 MATERIAL = (250e9, 0.24)  # of one body; the other is rigid

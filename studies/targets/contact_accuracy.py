@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "peers"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import hertz_pair as hertz
 import strip
+from halfspace import press_periodic, wave_numbers
 
 from patchfem import closed_forms as exact
-from patchfem.contact.halfspace import press_periodic, wave_numbers
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, frozen_array
 from patchfem.elasticity.elasticity import Layers, assemble, interface_compliance

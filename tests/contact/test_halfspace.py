@@ -9,14 +9,16 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM, pair_of
+from study_module import study
 
 from patchfem import closed_forms as exact
 from patchfem.contact.gaps import crown
-from patchfem.contact.halfspace import press_periodic, residuals, wave_numbers
 from patchfem.contact.unilateral import press, solve_forces
 from patchfem.core import NotConverged, PatchfemError
 from patchfem.mesh.tensor import TensorGrid, graded_rows
 
+halfspace = study("common/halfspace.py")
+press_periodic, residuals, wave_numbers = halfspace.press_periodic, halfspace.residuals, halfspace.wave_numbers
 WAVE, HIGH = 80e-6, 1.5e-6
 MODULUS = exact.combined_modulus(*CARBIDE)
 FULL = exact.westergaard_full_pressure(WAVE, HIGH, MODULUS)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from load_path import load_path
 from pieces import (
     COATED,
     COATING,
@@ -34,7 +35,6 @@ from patchfem.mesh.tensor import graded_grid
 from patchfem.slip import partial_slip
 from patchfem.slip import sets as slip_sets
 from patchfem.slip import unlike as slip_unlike
-from patchfem.slip.load_path import load_path
 from patchfem.slip.partial_slip import Step, advance, operators_of, start
 from patchfem.slip.shear_modes import jenkins_set
 

@@ -89,15 +89,6 @@ def rows_of(modes: ModalBasis) -> np.ndarray:
                      for part in (modes.slide, modes.normal, modes.pitch)])
 
 
-def contact_frequencies(modes: ModalBasis, sets: ContactSets) -> np.ndarray:
-    """Natural frequencies [rad/s] of the modes on the preloaded contact set, without friction: what a step must
-    resolve."""
-    rows = rows_of(modes)[1:]
-    q = sets.reference.energy
-    hessian = np.array([[q[3], -q[4]], [-q[4], q[5]]])
-    return np.sqrt(np.maximum(np.linalg.eigvalsh(np.diag(modes.omega**2) + rows.T @ hessian @ rows / modes.mass), 0))
-
-
 def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
     """The fields of a fresh `contacts.arrays.Rub`, as a tuple: points under the nodal forces normal (m,) [N].
 

@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 from scipy.fft import irfft, rfft
 
-from ..core import NotConverged, PatchfemError, frozen_array
+from patchfem.core import NotConverged, PatchfemError, frozen_array
 
 LIMIT = 1e-9  # largest relative residual that still counts as solved
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..core import NotConverged, PatchfemError
-from .partial_slip import Operators, SlipState, Step, advance
-from .sets import press_forces, rigid_columns
+from patchfem.core import NotConverged, PatchfemError
+from patchfem.slip.partial_slip import Operators, SlipState, Step, advance
+from patchfem.slip.sets import press_forces, rigid_columns
 
 CUTS = 4  # cuts of one leg allowed per node of the interface
 AHEAD = 1e-9  # share of the rest of a leg at which the next contact set is looked up
