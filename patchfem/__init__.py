@@ -16,7 +16,7 @@ Read the package in this order. A module imports its own entry of the list and t
 12. `elasticity`   the pieces condensed to their interface, fields recovered inside
 13. `contact`     gap shapes, unilateral contact, skins, strips, contact maps
 14. `friction`    laws of friction and the sum over bonds along the path
-15. `slip`        partial slip of the pieces: elements, shear modes, load paths
+15. `slip`        partial slip of the pieces: elements, shear modes, their tangent
 16. `structure`   the modes of the rig and what drives it
 17. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
 18. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics

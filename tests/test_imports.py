@@ -28,7 +28,7 @@ def test_exact_a_patch_needs_no_motion(scene):
     absent(modules, "friction", "structure", "dynamics", "response", "runs.rig.march", "dynamics.march.march",
            "dynamics.march.loop_kernels", "compiled", "surface", "contact.skin", "contact.skin_laws", "contact.strips",
            "elasticity.mortar", "elasticity.substructure", "elasticity.fronts", "skfem",
-           "slip.partial_slip",
+           "slip.tangent",
            "contact.maps", "elasticity.recovery", "mesh.anymesh", "mesh.rounded", "export", "scipy")
     assert {"patchfem.contact.unilateral", "patchfem.mesh.tensor"} <= modules
 
@@ -40,7 +40,7 @@ def test_exact_a_patch_needs_no_motion(scene):
 def test_exact_an_effect_brings_its_own_module(scene, table, module):
     modules = loaded(FROM_PYTHON, scene(PATCH + table))
     assert f"patchfem.{module}" in modules
-    absent(modules, *{"elasticity.mortar", "surface", "slip.partial_slip"})
+    absent(modules, *{"elasticity.mortar", "surface", "slip.tangent"})
 
 
 def test_exact_a_rubbing_point_needs_no_patch(scene):

@@ -21,8 +21,7 @@ NEEDED = ("numpy", "scipy", "scikit-fem", "meshio", "pyvista", "numba", "matplot
 EXTRAS = {"pyuff": ("lab", "universal files"), "nbclient": ("notebook", "the notebooks of studies/notebooks"),
           "SurfaceTopography": ("profiles", "files of more instruments"),
           "distributed": ("cluster", "sweeps over several machines"), "trame": ("web", "fields in a browser"),
-          "gmsh": ("gmsh", "meshes by gmsh"), "scikit-sparse": ("cholmod", "another factorisation"),
-          "pypardiso": ("pardiso", "another factorisation")}
+          "gmsh": ("gmsh", "meshes by gmsh")}
 
 
 class Finding(NamedTuple):

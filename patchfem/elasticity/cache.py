@@ -26,7 +26,7 @@ def folder() -> Path:
 
 
 GRID_SOURCE = ("elasticity.py", "tensor_stiffness.py", "condense.py", "grid_fronts.py")
-MESH_SOURCE = ("elasticity.py", "dissect.py", "factor.py", "fronts.py", "substructure.py")
+MESH_SOURCE = ("elasticity.py", "dissect.py", "fronts.py", "substructure.py")
 
 
 def key_of(x, depth, coating_rows: int, layers) -> str:
@@ -41,12 +41,12 @@ def key_of(x, depth, coating_rows: int, layers) -> str:
 def key_of_mesh(mesh, layers) -> str:
     """Content hash of one piece of any mesh.
 
-    mesh: mesh.anymesh.PieceMesh with points, cells and tags; layers: its Layers. The factors named for this run take
-    part. Renumbered nodes make another key.
+    mesh: mesh.anymesh.PieceMesh with points, cells and tags; layers: its Layers. Renumbered nodes make
+    another key.
     """
     arrays = (np.asarray(mesh.points, np.float64), *(np.asarray(part, np.int64) for part in (
         mesh.triangles, mesh.quads, mesh.is_coating, mesh.interface, mesh.far)))
-    return _hash(arrays, ("mesh", os.environ.get("PATCHFEM_FACTOR", "")), layers, MESH_SOURCE)
+    return _hash(arrays, ("mesh",), layers, MESH_SOURCE)
 
 
 def _hash(arrays, words: tuple, layers, source: tuple) -> str:

@@ -16,7 +16,7 @@ from ..mesh.anymesh import cell_edges
 from .condense import CORRECTION, RESIDUAL, rough
 from .dissect import dissection
 from .elasticity import Layers, hooke, lame, remedy, von_mises
-from .factor import factorise
+from .fronts import factorise
 from .lapack import one_thread
 
 
@@ -24,13 +24,12 @@ from .lapack import one_thread
 class Substructure:
     """One piece of any mesh, assembled and factorised when first needed.
 
-    A piece whose compliance is kept on disk is never assembled. mesh: mesh.anymesh.PieceMesh; layers: its Layers; name:
-    of the factors, see `factor.factorise`; made: what has been assembled.
+    A piece whose compliance is kept on disk is never assembled. mesh: mesh.anymesh.PieceMesh; layers: its Layers;
+    made: what has been assembled.
     """
 
     mesh: object
     layers: Layers
-    name: str | None = None
     made: dict = field(default_factory=dict)
 
     @property
@@ -48,7 +47,7 @@ class Substructure:
 
     @property
     def factor(self):
-        """Factors of the matrix, with `solve` and `compliance` as `factor` describes them."""
+        """Factors of the matrix, with `solve` and `compliance` as `fronts.Fronts` has them."""
         return self._part("factor")
 
     @property
@@ -58,27 +57,27 @@ class Substructure:
 
     def _part(self, name: str):
         if not self.made:
-            self.made.update(zip(("order", "factor", "rounding"), _assembled(self.mesh, self.layers, self.name)))
+            self.made.update(zip(("order", "factor", "rounding"), _assembled(self.mesh, self.layers)))
         return self.made[name]
 
 
-def assemble(mesh, layers: Layers, factor: str | None = None) -> Substructure:
+def assemble(mesh, layers: Layers) -> Substructure:
     """Assemble and factorise at once one piece held at its far face.
 
     mesh: points (N, 2) as x and depth [m], triangles, quads, is_coating, interface, far as in mesh.anymesh.PieceMesh.
-    factor: name of the factors, see `factor.factorise`. NotConverged when they do not solve the system: one step of
-    refinement moves the solution for a `rough` load by more than 1e-2; a smaller move is its `rounding`.
+    NotConverged when the factors do not solve the system: one step of refinement moves the solution for a `rough` load
+    by more than 1e-2; a smaller move is its `rounding`.
     """
-    piece = Substructure(mesh, layers, factor)
+    piece = Substructure(mesh, layers)
     _ = piece.factor
     return piece
 
 
-def _assembled(mesh, layers: Layers, name: str | None) -> tuple:
+def _assembled(mesh, layers: Layers) -> tuple:
     order, firsts = elimination(mesh)
     matrix = _stiffness(mesh, layers, order)
     with one_thread():
-        found = factorise(matrix, firsts, name)
+        found = factorise(matrix, firsts)
         load = rough(matrix.shape[0])[:, None]
         u = found.solve(load)
         rest = load - matrix @ u

@@ -4,11 +4,35 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import NotConverged, PatchfemError, frozen_array
+from ..core import Compliance, NotConverged, PatchfemError, frozen_array
 from ..elasticity.lapack import one_thread
-from .partial_slip import Operators, operators_of
 
-__all__ = ["OperatingTangent", "operating_tangent", "operators_of"]
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Operators:
+    """Compliance of a pair for normal and shear forces.
+
+    x: (m,) [m]; normal, tangential: (m, m) [m/N] as in `core.Compliance`; coupling: (m, m) [m/N], closing undone per
+    shear force as in `substructure.joined`, None for alike pieces.
+    """
+
+    x: np.ndarray
+    normal: np.ndarray
+    tangential: np.ndarray
+    coupling: np.ndarray | None = None
+
+
+def operators_of(pieces: Compliance, coupling: np.ndarray | None = None) -> Operators:
+    """Operators of a pair; a coupling (m, m) [m/N] that is zero throughout is dropped.
+
+    PatchfemError for a shape or a value that cannot be.
+    """
+    if coupling is not None:
+        coupling = frozen_array(coupling)
+        if coupling.shape != pieces.normal.shape or not np.isfinite(coupling).all():
+            raise PatchfemError(f"contact: the coupling must be {pieces.normal.shape} and finite, has {coupling.shape}")
+        coupling = coupling if coupling.any() else None
+    return Operators(pieces.interface.x, pieces.normal, pieces.tangential, coupling)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

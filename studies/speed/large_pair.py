@@ -56,12 +56,16 @@ def once(name: str, columns: int = COLUMNS, rows: int = ROWS) -> dict:
     """Seconds on the wall and of the processor per step, unknowns, peak resident memory [GB], peak pressure [Pa]."""
     import resource
     from itertools import pairwise
+    from pathlib import Path
     from time import perf_counter, process_time
+
+    sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+    from factors import assemble
 
     from patchfem.contact.unilateral import press
     from patchfem.core import Compliance, Interface
     from patchfem.elasticity.elasticity import Layers
-    from patchfem.elasticity.substructure import assemble, condense, joined
+    from patchfem.elasticity.substructure import condense, joined
 
     bodies = [piece(seed, columns, rows) for seed in (1, 2)]
     layers, clock = Layers((250e9, 0.24), (121e9, 0.32), "strain"), [(perf_counter(), process_time())]

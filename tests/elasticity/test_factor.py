@@ -13,21 +13,23 @@ from pieces import COATED, COATING
 from scipy.sparse import coo_matrix, csc_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay
+from study_module import study
 
-from patchfem.core import Missing, NotConverged, PatchfemError
-from patchfem.elasticity import factor, fronts
+from patchfem.core import NotConverged
+from patchfem.elasticity import fronts
 from patchfem.elasticity.dissect import LEAF, dissection, least_cover
-from patchfem.elasticity.factor import BACKENDS, factorise
-from patchfem.elasticity.substructure import assemble, condense
+from patchfem.elasticity.substructure import condense
 from patchfem.mesh.tensor import graded_grid
 
+factors = study("common/factors.py")
+assemble, factorise, BACKENDS = factors.assemble, factors.factorise, factors.BACKENDS
 NEEDS = {"cholmod": "sksparse", "pardiso": "pypardiso"}
 
 
 def usable(name):
     """The name as a test parameter, skipped by name where its extra is not installed."""
     there = name not in NEEDS or importlib.util.find_spec(NEEDS[name]) is not None
-    return pytest.param(name, marks=pytest.mark.skipif(not there, reason=f"extra {name} is not installed"))
+    return pytest.param(name, marks=pytest.mark.skipif(not there, reason=f"{name} is not installed"))
 
 
 each_backend = pytest.mark.parametrize("name", [usable(name) for name in BACKENDS])
@@ -68,24 +70,6 @@ def test_refuses_a_singular_stiffness(name):
     matrix[0, 0] = 1.0
     with pytest.raises(NotConverged, match="stiffness of the piece"):
         factorise(matrix, [0, 2, 3], name).compliance()
-
-
-def test_refuses_an_unknown_name_and_a_library_that_is_not_there(monkeypatch, capsys):
-    matrix, firsts = csc_matrix(np.eye(4)), [0, 1, 2]
-
-    def broken(matrix, firsts):
-        raise ImportError("libcholmod.so.3: cannot open shared object file")
-
-    monkeypatch.setitem(factor.BACKENDS, "cholmod", broken)
-    with pytest.raises(Missing, match=r"cholmod cannot be used \(libcholmod.*patchfem\[cholmod\]"):
-        factorise(matrix, firsts, "cholmod")
-    with pytest.raises(PatchfemError, match="known are fronts, superlu, cholmod, pardiso"):
-        factorise(matrix, firsts, "mumps")
-    monkeypatch.setenv("PATCHFEM_FACTOR", "cholmod")
-    assert isinstance(factorise(matrix, firsts), fronts.Fronts)
-    assert "cholmod cannot be used" in capsys.readouterr().err
-    monkeypatch.setenv("PATCHFEM_FACTOR", "superlu")
-    assert isinstance(factorise(matrix, firsts), factor.SuperLU)
 
 
 @settings(max_examples=25, deadline=None)

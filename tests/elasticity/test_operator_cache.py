@@ -38,7 +38,7 @@ def test_always_another_piece_has_another_key():
     assert len(keys) == 6
 
 
-def test_always_another_mesh_has_another_key(monkeypatch):
+def test_always_another_mesh_has_another_key():
     points = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]], float)
     mesh = PieceMesh(points, np.array([[0, 1, 4], [0, 4, 3]]), np.array([[1, 2, 5, 4]]),
                      np.array([True, False, False]), np.array([0, 1, 2]), np.array([3, 4, 5]))
@@ -48,8 +48,6 @@ def test_always_another_mesh_has_another_key(monkeypatch):
     keys = {cache.key_of_mesh(one, LAYERS) for one in (mesh, *other)}
     keys |= {cache.key_of_mesh(mesh, Layers((250e9, 0.25), (121e9, 0.32), "strain"))}
     assert cache.key_of_mesh(replace(mesh), LAYERS) in keys and len(keys) == 8
-    monkeypatch.setenv("PATCHFEM_FACTOR", "superlu")
-    assert cache.key_of_mesh(mesh, LAYERS) not in keys
 
 
 def test_always_a_changed_source_text_has_another_key(tmp_path, monkeypatch):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli, loaded
+from partial_slip import Step, advance, operators_of, start
 from pieces import bare, refined_middle
 from scene_texts import COATED, COULOMB, MODE, NONLOCAL, POINT, SHEAR, STRUCTURE, mistakes, only
 
@@ -20,7 +21,6 @@ from patchfem.model.model import build
 from patchfem.runs.patch.result import solve_all
 from patchfem.runs.wear import evolve
 from patchfem.scene.scene import loads
-from patchfem.slip.partial_slip import Step, advance, operators_of, start
 from patchfem.wear.jumps import Wearing, after
 from patchfem.wear.jumps import start as unworn
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import partial_slip
 import pytest
+import slip_sets
+import slip_unlike
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from load_path import load_path
+from partial_slip import Step, advance, operators_of, start
 from pieces import (
     COATED,
     COATING,
@@ -32,10 +36,6 @@ from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, NotConverged, PatchfemError
 from patchfem.mesh.tensor import graded_grid
-from patchfem.slip import partial_slip
-from patchfem.slip import sets as slip_sets
-from patchfem.slip import unlike as slip_unlike
-from patchfem.slip.partial_slip import Step, advance, operators_of, start
 from patchfem.slip.shear_modes import jenkins_set
 
 MU = 0.3

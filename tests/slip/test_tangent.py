@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from partial_slip import Operators, Step, advance, operators_of, start
 from pieces import COATED, COATING, HEIGHT, LENGTH, LOAD, TILTS, WIDTH, bare, coated_pair
 from two_bodies import unlike_pair
 
@@ -11,7 +12,6 @@ from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.unilateral import press, press_by
 from patchfem.core import PatchfemError
 from patchfem.mesh.tensor import graded_grid
-from patchfem.slip.partial_slip import Operators, Step, advance, operators_of, start
 from patchfem.slip.shear_modes import normal_stiffness, tangential_stiffness
 from patchfem.slip.tangent import operating_tangent
 

@@ -1,10 +1,10 @@
 """A path of loads with its history, cut where nodes enter or leave the contact."""
 
 import numpy as np
+from partial_slip import Operators, SlipState, Step, advance
+from slip_sets import press_forces, rigid_columns
 
 from patchfem.core import NotConverged, PatchfemError
-from patchfem.slip.partial_slip import Operators, SlipState, Step, advance
-from patchfem.slip.sets import press_forces, rigid_columns
 
 CUTS = 4  # cuts of one leg allowed per node of the interface
 AHEAD = 1e-9  # share of the rest of a leg at which the next contact set is looked up

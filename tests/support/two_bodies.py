@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from partial_slip import Operators, operators_of
 from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementQuad1, ElementVector, MeshQuad
 from skfem.helpers import ddot, sym_grad, trace
@@ -12,7 +13,6 @@ from skfem.helpers import ddot, sym_grad, trace
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity.elasticity import Layers, assemble, interface_compliance
 from patchfem.mesh.tensor import TensorGrid
-from patchfem.slip.partial_slip import Operators, operators_of
 
 
 @BilinearForm

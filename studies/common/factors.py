@@ -1,14 +1,10 @@
-"""Factors of a piece's stiffness behind one small interface, by the package's own fronts or by another library.
+"""Factors of a piece's stiffness by other libraries, which check the package's own fronts and are timed beside them.
 
 Every kind of factors has `solve(load (n, r)) -> (n, r)` and `compliance() -> (k, k)`, the last diagonal block of the
-inverse. The fronts are the default: they need nothing but LAPACK and are the fastest (studies/speed/large_pair.py). The
-others check them. PATCHFEM_FACTOR names one for a whole run; one that is missing or broken is replaced with a remark on
-stderr.
+inverse. The fronts need nothing but LAPACK and are as fast as the quickest of the others (`speed/large_pair.py`).
 """
 
 import ctypes
-import os
-import sys
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,30 +12,31 @@ from scipy.linalg.lapack import dpotri, dtrtri
 from scipy.sparse import csc_matrix, triu
 from scipy.sparse.linalg import splu
 
-from ..core import Missing, NotConverged, PatchfemError
-from . import fronts
+from patchfem.core import Missing, NotConverged
+from patchfem.elasticity import fronts
+from patchfem.elasticity.lapack import one_thread
+from patchfem.elasticity.substructure import Substructure, elimination
 
-DEFAULT = "fronts"
 
-
-def factorise(matrix: csc_matrix, firsts, name: str | None = None):
+def factorise(matrix: csc_matrix, firsts, name: str):
     """Factorise a symmetric positive definite stiffness in the order it comes, the interface its last front.
 
-    firsts: (f + 1,) first node of every front, two unknowns a node; name: one of BACKENDS, else that of
-    PATCHFEM_FACTOR, else the fronts. PatchfemError for an unknown name, Missing when `name` is given and its library
+    firsts: (f + 1,) first node of every front, two unknowns a node; name: one of BACKENDS. Missing where its library
     cannot be used, NotConverged where the matrix is singular.
     """
-    wanted = name or os.environ.get("PATCHFEM_FACTOR") or DEFAULT
-    if wanted not in BACKENDS:
-        raise PatchfemError(f"PATCHFEM_FACTOR: unknown {wanted!r}; known are {', '.join(BACKENDS)}")
     try:
-        return BACKENDS[wanted](matrix, np.asarray(firsts))
+        return BACKENDS[name](matrix, np.asarray(firsts))
     except (ImportError, OSError, AttributeError) as error:
-        fault = f"{wanted} cannot be used ({error}); {REMEDY.get(wanted, '')}"
-    if name is not None:
-        raise Missing(fault)
-    print(f"patchfem: {fault}; {DEFAULT} used instead", file=sys.stderr, flush=True)
-    return BACKENDS[DEFAULT](matrix, np.asarray(firsts))
+        raise Missing(f"{name} cannot be used ({error}); {REMEDY.get(name, '')}") from None
+
+
+def assemble(mesh, layers, name: str) -> Substructure:
+    """The piece of any mesh as `substructure.assemble` has it, with the factors of this name."""
+    order, firsts = elimination(mesh)
+    piece = Substructure(mesh, layers, {"order": order, "rounding": 0.0})
+    with one_thread():
+        piece.made["factor"] = factorise(piece.matrix, firsts, name)
+    return piece
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -166,4 +163,4 @@ def _pardiso(matrix, firsts) -> Pardiso:
 
 
 BACKENDS = {"fronts": fronts.factorise, "superlu": _superlu, "cholmod": _cholmod, "pardiso": _pardiso}
-REMEDY = {"cholmod": "install libsuitesparse-dev, then patchfem[cholmod]", "pardiso": "install patchfem[pardiso]"}
+REMEDY = {"cholmod": "install libsuitesparse-dev, then scikit-sparse<0.5", "pardiso": "install pypardiso"}

@@ -3,14 +3,14 @@
 Slip increment of node i: e_i = q - s_i - (C_tt t)_i - (C_nt^T f)_i, with s the slip it has already made. Coulomb: |t_i|
 <= mu f_i, e_i = 0 where the node sticks, e_i t_i >= 0 and |t_i| = mu f_i where it slips. Here C_nt = 0, so pressure
 comes first, then the shear, a convex program. A set that is visited twice hands over to a slower method that ends.
-`unlike` solves pressure and shear together.
+`slip_unlike` solves pressure and shear together.
 """
 
 import numpy as np
 
-from ..contact.unilateral import INDEFINITE, solve_forces
-from ..core import NotConverged, PatchfemError
-from ..elasticity.lapack import cho_factor, cho_solve, dpotrf, dpotri
+from patchfem.contact.unilateral import INDEFINITE, solve_forces
+from patchfem.core import NotConverged, PatchfemError
+from patchfem.elasticity.lapack import cho_factor, cho_solve, dpotrf, dpotri
 
 ROUND = 1e-14  # of the largest value: what counts as nothing
 MOST = 100  # sets tried before the slower method

@@ -8,9 +8,9 @@ one and is refused.
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
+from slip_sets import MOST, ROUND, Kept, bounded_shear, press_forces, rigid_columns
 
-from ..core import NotConverged
-from .sets import MOST, ROUND, Kept, bounded_shear, press_forces, rigid_columns
+from patchfem.core import NotConverged
 
 
 def coupled_forces(both: Kept, x, leg, reference, friction: float, spring: float, active, sign) -> tuple:
