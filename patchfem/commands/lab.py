@@ -58,8 +58,8 @@ def import_(file: Path, /, *, out: Annotated[Path, Parameter(
 
 def _table(file: Path, out: Path, asked, zero: bool) -> dict:
     from ..export.lab.write import write_table
-    from ..inputs.lab.read import read_records
-    from ..inputs.lab.records import SI, from_zero, wanted
+    from ..inputs.laboratory import read_records
+    from ..inputs.records import SI, from_zero, wanted
 
     found = read_records(file, wanted(asked))
     values = from_zero(found.values) if zero else found.values
@@ -107,8 +107,8 @@ def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
 
 
 def _records(file: Path, asked) -> tuple:
-    from ..inputs.lab.read import read_records
-    from ..inputs.lab.records import wanted
+    from ..inputs.laboratory import read_records
+    from ..inputs.records import wanted
 
     found = read_records(file, wanted(asked))
     return found.values, found.notes
@@ -116,15 +116,15 @@ def _records(file: Path, asked) -> tuple:
 
 def _shapes(file: Path, asked, how: Estimate) -> tuple:
     """((shapes, places), notes) of a universal file with modes or frequency responses; (None, ()) of any other."""
-    from ..inputs.lab.read import UNIVERSAL
-    from ..inputs.lab.records import UNITS, wanted
+    from ..inputs.laboratory import UNIVERSAL
+    from ..inputs.records import UNITS, wanted
 
     names = {text.partition("=")[0].strip() for text in asked}
     if file.suffix.lower() not in UNIVERSAL or how != Estimate() or names & set(UNITS):
         return None, ()
     from ..core import PatchfemError
     from ..identify.measured_modes import PLACES
-    from ..inputs.lab.universal import sets_of
+    from ..inputs.universal import sets_of
     from ..structure import universal
 
     if not any(one["type"] == 55 or int(one.get("func_type", 0)) == 4 for one in sets_of(file)):

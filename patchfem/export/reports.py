@@ -34,8 +34,8 @@ def report_of(folders: list, out: Path | None = None, measured: Path | None = No
 
 
 def _read(path: Path, runs: list) -> beside.Run:
-    from ..inputs.lab.read import read_records
-    from ..inputs.lab.records import wanted
+    from ..inputs.laboratory import read_records
+    from ..inputs.records import wanted
 
     found = read_records(path, wanted(())).values
     if not found.keys() & beside.KNOWN.keys() - {"time"}:

@@ -1,13 +1,11 @@
 """Measured modes from a universal file: shapes of dataset 55, or frequency responses of dataset 58 to be fitted."""
 
-from pathlib import Path
-
 import numpy as np
 
-from ..core import Missing, PatchfemError
+from ..core import PatchfemError
+from ..inputs.universal import sets_of
 from .places import AXES, Shapes
 
-LARGEST = 256 * 2**20  # bytes of a file
 NORMAL, COMPLEX = 2, (3, 7)  # analysis types of dataset 55
 POWER = {8: 0, 11: 1, 12: 2}  # ordinate type of dataset 58 -> derivatives of displacement
 FORCE = (9, 13)
@@ -20,7 +18,7 @@ def read(path) -> Shapes:
 
     Lengths and forces are turned into SI by dataset 164 where it stands. PatchfemError names what is lacking.
     """
-    sets = _sets(path)
+    sets = sets_of(path, "structure.file: ")
     factors = next(((s["length"], s["force"]) for s in sets if s.get("type") == 164), (1.0, 1.0))
     modes = [s for s in sets if s.get("type") == 55 and s.get("analysis_type") in (NORMAL, *COMPLEX)]
     if modes:
@@ -31,22 +29,6 @@ def read(path) -> Shapes:
         raise PatchfemError(f"structure.file: {path} has neither mode shapes (dataset 55, normal or complex modes) nor "
                             f"frequency responses (58); its datasets: {', '.join(types) or 'none'}")
     return _responses(responses, factors)
-
-
-def _sets(path) -> list:
-    try:
-        import pyuff
-    except ImportError:
-        raise Missing("structure.file: the package pyuff reads universal files; install it") from None
-    if Path(path).stat().st_size > LARGEST:
-        raise PatchfemError(f"structure.file: {path} has more than {LARGEST >> 20} MiB; export fewer responses")
-    try:
-        file = pyuff.UFF(str(path))
-        wanted = [k for k, kind in enumerate(file.get_set_types()) if kind in (55, 58, 164)]
-        found = file.read_sets(wanted) if wanted else [{"type": int(k)} for k in file.get_set_types()]
-    except Exception as error:  # pyuff raises plain Exception for whatever is wrong in a file
-        raise PatchfemError(f"structure.file: {path} cannot be read as a universal file ({error})") from None
-    return found if isinstance(found, list) else [found]
 
 
 def _modes(sets, factors) -> Shapes:

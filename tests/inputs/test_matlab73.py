@@ -11,10 +11,10 @@ import scipy
 from scipy.io import savemat
 
 from patchfem.core import PatchfemError
-from patchfem.inputs.lab.read import read_records
-from patchfem.inputs.lab.records import wanted
+from patchfem.inputs.laboratory import read_records
 from patchfem.inputs.matlab import variables
 from patchfem.inputs.matlab5 import RATIO
+from patchfem.inputs.records import wanted
 from patchfem.structure import arrays
 
 SHIPPED = Path(scipy.__file__).parent / "io/matlab/tests/data"  # written by MATLAB itself

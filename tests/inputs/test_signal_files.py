@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import pyuff
+from lab_files import INCH, record, written
 
 from patchfem.core import PatchfemError
 from patchfem.inputs.signals import read_signal
@@ -25,3 +26,13 @@ def test_exact_a_universal_file_is_read_back(tmp_path):
     assert value == pytest.approx(np.sin(W * t), abs=1e-6)
     with pytest.raises(PatchfemError, match="force is wanted, 0 of 1"):
         read_signal(path, "force")
+
+
+def test_exact_a_recorded_drive_is_in_the_unit_of_its_label_or_of_the_file(tmp_path):
+    """Written in g by its label, and in inch/s^2 by dataset 164, whose factor is 1/0.0254."""
+    t = np.arange(200) / 1e4
+    a = np.sin(W * t)
+    label = written(tmp_path / "a.uff", [record(t, a / 9.80665, 12, ordinate_axis_units_lab="g")])
+    inches = written(tmp_path / "b.uff", [INCH, record(t, a / 0.0254, 12), record(t, a, 8)])
+    for path in (label, inches):
+        assert read_signal(path, "acceleration")[1] == pytest.approx(a, rel=1e-14, abs=1e-15)

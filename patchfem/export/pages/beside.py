@@ -81,8 +81,9 @@ def _arrays(path: Path) -> dict:
 def measured(name: str, values: dict, like: Run) -> Run:
     """A measurement as a Run without measures, shown beside runs like `like`.
 
-    values: name -> (k,) in SI as `inputs.lab` reads them: time, displacement, acceleration, force. Where both move
-    under a sine its time is shifted until the first harmonics of both displacements, or accelerations, agree in phase.
+    values: name -> (k,) in SI as `inputs.laboratory` reads them: time, displacement, acceleration, force. Where both
+    move under a sine its time is shifted until the first harmonics of both displacements, or accelerations, agree in
+    phase.
     """
     arrays = {KNOWN[key]: (np.asarray(rows, float), UNITS[key]) for key, rows in values.items() if key in KNOWN}
     one = Run(name, {"kind": like.summary["kind"], "measures": {}, "outcome": MEASURED}, like.resolved, arrays)

@@ -23,7 +23,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "scene.keys.tables.MOST_MASSES": "masses in a list", "effects.MOST_COORDINATES": "masses or modes of a rig",
     "scene.axes.MOST": "values of one range", "campaigns.sweeps.ask.MOST": "cases of a sweep",
     "inputs.columns.LARGEST": "bytes of a table of text", "inputs.measured.LARGEST": "bytes of a table of rows to fit",
-    "inputs.lab.records.LARGEST": "bytes of a laboratory's file", "inputs.matlab.LARGEST_FILE": "bytes of a .mat file",
+    "inputs.records.LARGEST": "bytes of a laboratory's file", "inputs.matlab.LARGEST_FILE": "bytes of a .mat file",
     "inputs.matlab5.LARGEST": "numbers of a variable of a .mat file", "mesh.files.LARGEST": "bytes of a mesh",
     "surface.files.raw.LARGEST": "bytes of a scan, packed or not", "surface.samples.LONGEST": "length of a trace [m]",
     "model.slide.MOST": "steps per cycle of a bench",

@@ -7,9 +7,9 @@ from lab_files import INCH, SI, loop, record, written
 from scipy.io import savemat
 
 from patchfem.core import PatchfemError
-from patchfem.inputs.lab.read import read_records
-from patchfem.inputs.lab.records import factor_of, wanted
+from patchfem.inputs.laboratory import read_records
 from patchfem.inputs.loops import read_loop
+from patchfem.inputs.records import factor_of, wanted
 from patchfem.inputs.signals import read_signal
 
 TIME, SLIDE, FORCE = loop(20, 1)

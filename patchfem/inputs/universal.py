@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core import Missing, PatchfemError
+from ..core import Missing, PatchfemError
 from .records import LARGEST, UNITS, Channel, plain_unit
 
 KINDS = {8: "displacement", 9: "force", 11: "velocity", 12: "acceleration", 13: "force"}  # ordinate types
@@ -15,29 +15,30 @@ AXES = ("x", "y", "z", "rx", "ry", "rz")
 GENERAL, TIME, TIMES = 0, 1, 17  # function types, abscissa type
 
 
-def sets_of(path: Path) -> list:
+def sets_of(path, where: str = "") -> list:
     """Datasets 55, 58 and 164 of a universal file as pyuff reads them, in their order.
 
-    PatchfemError for a file that is too large or damaged or holds none of them, Missing where there is no file or no
-    pyuff.
+    PatchfemError, which starts with `where`, for a file that is too large or damaged or holds none of them, Missing
+    where there is no file or no pyuff.
     """
     try:
         import pyuff
     except ImportError:
-        raise Missing("universal files: the package pyuff reads them; pip install 'patchfem[lab]'") from None
+        raise Missing(f"{where}universal files: the package pyuff reads them; pip install 'patchfem[lab]'") from None
     path = Path(path)
     if not path.is_file():
-        raise Missing(f"{path}: there is no such file")
+        raise Missing(f"{where}{path}: there is no such file")
     if path.stat().st_size > LARGEST:
-        raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB; export fewer channels or a part of the record")
+        raise PatchfemError(f"{where}{path}: more than {LARGEST >> 20} MiB; export fewer channels or a part of the "
+                            "record")
     try:
         file = pyuff.UFF(str(path))
         types = [int(kind) for kind in file.get_set_types()]
         sets = [file.read_sets(number) for number, kind in enumerate(types) if kind in (55, 58, 164)]
     except Exception as fault:  # pyuff raises plain Exception for whatever is wrong in a file
-        raise PatchfemError(f"{path}: cannot be read as a universal file ({fault})") from None
+        raise PatchfemError(f"{where}{path}: cannot be read as a universal file ({fault})") from None
     if not sets:
-        raise PatchfemError(f"{path}: no dataset 55 (modes) or 58 (records, frequency responses); its datasets: "
+        raise PatchfemError(f"{where}{path}: no dataset 55 (modes) or 58 (records, frequency responses); its datasets: "
                             f"{', '.join(map(str, types)) or 'none'}")
     return sets
 

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array
-from ..paths import RECORDED
-from ..signals import UNITS as SIGNALS
+from ..core import PatchfemError, frozen_array
+from .paths import RECORDED
+from .paths import UNITS as PATHS
 
 LARGEST = 256 * 2**20  # bytes of a file
-UNITS = {"time": SIGNALS["time"] | {"min": 60.0}, **RECORDED}
+UNITS = {"time": PATHS["time"] | {"min": 60.0}, **RECORDED}
 SI = {name: next(unit for unit, factor in units.items() if factor == 1.0 and unit) for name, units in UNITS.items()}
 _ASKED = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
 _SAME = {"sec": "s", "seconds": "s", "newton": "N", "newtons": "N", "µm": "um", "μm": "um", "µs": "us", "μs": "us"}

@@ -1,0 +1,133 @@
+"""Any file of a laboratory as `Records`, by its ending: universal files, .mat files by an explicit map, tables.
+
+A table has a header such as `Time [s],Load cell [lbf]`, then rows; comma, semicolon or tab between. Of a .mat file a
+variable, a field of a structure or a column of either is named for each quantity, with its unit.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ..core import Missing, PatchfemError
+from . import matlab, universal
+from .columns import NUMBER, text_of
+from .loops import own_name
+from .records import LARGEST, UNITS, Channel, Records, Wanted, checked, chosen, factor_of
+
+UNIVERSAL = (".uff", ".unv", ".uf", ".58")
+ENDINGS = (*UNIVERSAL, ".mat", ".csv", ".txt")
+WIDEST = 1000  # columns of a table
+_HEAD = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
+_COLUMN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
+
+
+def read_records(path, asked: list) -> Records:
+    """Records over time of a file, in SI; asked: `Wanted` channels, none to take those that say what they are.
+
+    PatchfemError names the file and what is wanted, Missing where there is no file.
+    """
+    path = Path(path)
+    ending = path.suffix.lower()
+    if ending == ".mat":
+        return _variables(path, asked)
+    if ending in UNIVERSAL:
+        return of_sets(path, universal.sets_of(path), asked)
+    if ending in ENDINGS:
+        return chosen(path, _columns(path), asked, [])
+    raise PatchfemError(f"{path}: files that are imported end in {', '.join(ENDINGS)}")
+
+
+def of_sets(path, sets: list, asked: list) -> Records:
+    """Records over time among the datasets of a universal file; PatchfemError where there is none."""
+    notes = []
+    there = universal.channels(path, sets, notes)
+    if not there:
+        raise PatchfemError(f"{path}: no record over time (dataset 58 of function type 1); what it holds is modes or "
+                            "frequency responses, which become a scene's modes: -o modes.toml")
+    return chosen(path, there, asked, notes)
+
+
+def _columns(path: Path) -> list:
+    """`Channel`s of the columns of numbers; one whose name is a quantity (in any letters), or what `patchfem export`
+    calls it, is taken as it.
+
+    Columns with a text in any row are left out. PatchfemError with file and line for a row of another length and for a
+    header of numbers, Missing where there is no file.
+    """
+    lines = text_of(path, "a measured table").rstrip("\n").split("\n")
+    mark = max(",;\t", key=lines[0].count)
+    heads = [_HEAD.fullmatch(_bare(cell)) for cell in lines[0].split(mark)]
+    names = [one[1] for one in heads]
+    if len(names) > WIDEST or len(lines) < 3 or any(NUMBER.fullmatch(name) for name in names):
+        raise PatchfemError(f"{path}:1: a header like `time [s],displacement [mm],force [N]` over at least two rows is "
+                            f"wanted, not '{lines[0][:80]}'")
+    rows = []
+    for number, line in enumerate(lines[1:], 2):
+        cells = [_bare(cell) for cell in line.split(mark)]
+        if len(cells) != len(names):
+            raise PatchfemError(f"{path}:{number}: {len(cells)} cells under {len(names)} columns")
+        rows.append(cells)
+    found, plain = [], [name.strip().lower().replace(" ", "_") for name in names]
+    ours = [own_name(name, plain) for name in plain]
+    for name, known, head, column in zip(names, ours, heads, zip(*rows)):
+        if not all(map(NUMBER.fullmatch, column)):
+            _refuse_commas(path, name, column)
+            continue
+        found.append(Channel(name, "", known if known in UNITS else "", head[2] or head[3] or "",
+                             np.array(column, float)))
+    return found
+
+
+def _bare(cell: str) -> str:
+    return cell.strip().strip('"').strip()
+
+
+def _refuse_commas(path, name: str, column) -> None:
+    """PatchfemError for numbers that are written with a decimal comma."""
+    odd = next((number, cell) for number, cell in enumerate(column, 2) if not NUMBER.fullmatch(cell))
+    if NUMBER.fullmatch(odd[1].replace(",", ".", 1)):
+        raise PatchfemError(f"{path}:{odd[0]}: {name}: '{odd[1][:40]}' has a decimal comma; export it with points")
+    if name.strip().lower() in UNITS:
+        raise PatchfemError(f"{path}:{odd[0]}: {name}: '{odd[1][:40]}' is not a finite number")
+
+
+def _variables(path: Path, asked: list) -> Records:
+    """`Records` of a .mat file; asked: `Wanted`, each with a variable such as `F`, `data(:,2)` or `run.load.F`.
+
+    Only real arrays are read; nothing in the file is run or unpickled. PatchfemError names what is not there,
+    Missing where there is no file.
+    """
+    if not path.is_file():
+        raise Missing(f"{path}: there is no such file")
+    if path.stat().st_size > LARGEST:
+        raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB; save fewer variables or a part of the record")
+    arrays = {name: one for name, one in matlab.variables(path, matlab.content(path)).items() if one.kind == "number"}
+    held = ", ".join(f"{name} {'x'.join(map(str, one.shape))}" for name, one in list(arrays.items())[:20]) or \
+        "no array of numbers (objects and structures of several elements are not read)"
+    if not asked:
+        raise PatchfemError(f"{path}: say what its variables are, such as --map \"time=t [s]\" --map \"force=F [N]\"; "
+                            f"it holds {held}")
+    return checked(path, {one.quantity: _values(path, arrays, one, held) for one in
+                          sorted(asked, key=lambda one: one.quantity != "time")}, [])
+
+
+def _values(path, arrays: dict, one: Wanted, held: str):
+    found = _COLUMN.fullmatch(one.source)
+    name, column = (found[1], int(found[2]) - 1) if found else (one.source, None)
+    if name not in arrays:
+        raise PatchfemError(f"{path}: no variable '{name[:40]}'; it holds {held}")
+    if not one.unit:
+        raise PatchfemError(f"--map {one.quantity}={one.source}: a .mat file holds no units; write the unit, such as "
+                            f"\"{one.quantity}={one.source} [unit]\"")
+    values = arrays[name].values()
+    if column is None:
+        if values.ndim != 2 or min(values.shape) != 1:
+            raise PatchfemError(f"{path}: {name} is {'x'.join(map(str, values.shape))}; choose a column such as "
+                                f"{name}(:,1)")
+        values = values.ravel()
+    elif values.ndim != 2 or column >= values.shape[1]:
+        raise PatchfemError(f"{path}: {name} is {'x'.join(map(str, values.shape))}; it has no column {column + 1}")
+    else:
+        values = values[:, column]
+    return values * factor_of(one.quantity, one.unit)
