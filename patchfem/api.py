@@ -150,6 +150,7 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
     from .campaigns.sweeps.ask import Request, cases_of
     from .campaigns.sweeps.asked import Asked
     from .export.pages.lead import lead_of
+    from .export.sweeps.folder import key_of
     from .export.sweeps.page import table_of
     from .export.sweeps.run import Place, sweep_into, swept
     from .export.sweeps.tables import contents
@@ -158,10 +159,11 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
     lines = [one if isinstance(one, str) else ",".join(texts(key, one)) for key, one in (over or {}).items()]
     request = Request([f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed)
     cases, by = cases_of(asked, request), executors.of(executor, jobs)
-    found = swept(asked, cases, by, _on_stderr) if out is None else \
-        sweep_into(asked, cases, Place(Path(out), resume), by, _on_stderr)
+    place = None if out is None else Place(Path(out), resume)
+    found = swept(asked, cases, by, _on_stderr) if out is None else sweep_into(asked, cases, place, by, _on_stderr)
+    keys = [] if out is None or place.kept(len(cases)) == "none" else list(map(key_of, cases.names(asked)))
     answer = lead_of(table_of(asked, cases, found, (), Path(out or ""))).answer()
-    return contents(asked, cases, found, cases.keys(asked) if out is not None else (), answer).to_xarray()
+    return contents(asked, cases, found, keys, answer).to_xarray()
 
 
 class SweepPlots:

@@ -69,12 +69,12 @@ class By:
 
 def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out: Out = None, set_: Sets = (),
           resume: flag("go on with what the folder holds") = False,
-          keep: Annotated[Literal["summaries", "results", "pages"], Parameter(
-              help="of each case its summary.json, its results folder, or that with its report.html, such as "
-                   "results")] = "summaries",
+          keep: Annotated[Literal["none", "summaries", "results", "pages"] | None, Parameter(
+              help="of each case its summary.json (of 1000 cases at most, unless asked), its results folder, that with "
+                   "its report.html, or nothing beside its row, such as results")] = None,
           no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
-    """Run SCENE for all combinations of the values of --over, or of its table [sweep]: a folder per case, sweep.csv,
-    sweep.nc and report.html of them all, by default in out/<scene name>-sweep.
+    """Run SCENE for all combinations of the values of --over, or of its table [sweep]: sweep.csv, sweep.nc and
+    report.html of them all, by default in out/<scene name>-sweep.
 
     Example: patchfem sweep rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9" -j 2
     """
@@ -96,7 +96,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
         return
     line = Progress(quiet)
     try:
-        found = sweep_into(asked, cases, Place(target, resume, keep != "summaries", part, keep == "pages", not no_page),
+        found = sweep_into(asked, cases, Place(target, resume, keep or "", part, not no_page),
                            executors.of(by.executor, by.jobs), None if quiet else say, line)
     except (KeyboardInterrupt, Missing) as why:
         line.end()

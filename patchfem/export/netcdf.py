@@ -12,7 +12,9 @@ import h5netcdf
 import h5py
 import numpy as np
 
-from ..disk.whole import write_bytes
+from ..disk.whole import sturdy, whole, write_bytes
+
+LARGE = 100_000_000  # bytes of numbers
 
 LONG = {
     "relative_displacement": ("m", "displacement of the output relative to the base"),
@@ -204,16 +206,26 @@ def described(data: Contents, summary: dict, scene_text: str, versions: dict) ->
 def write(data: Contents, path: Path) -> None:
     """Write contents as netCDF4 to `path`.
 
-    The file is made in memory, so that a full disk is an OSError of one write and nothing is left open.
+    A file is made in memory, so that a full disk is an OSError of one write and nothing is left open; one beyond LARGE
+    is made on the disk, whose faults are held back until it is closed.
     """
     path = Path(path)
+    size = sum(np.asarray(one[1]).nbytes for one in (data.variables | data.coordinates).values())
+    if size > LARGE:
+        with whole(path) as partial, sturdy(partial) as kept, _Opened(kept, "w", track_order=True) as file:
+            _write(file, data)
+        return
     with _Opened(path.name, "w", driver="core", backing_store=False, track_order=True) as memory:
-        with h5netcdf.File(memory, "w") as file:
-            file.attrs.update(data.attributes)
-            _write_variables(file, data)
+        _write(memory, data)
         memory.flush()
         image = memory.id.get_file_image()
     write_bytes(path, image)
+
+
+def _write(opened: h5py.File, data: Contents) -> None:
+    with h5netcdf.File(opened, "w") as file:
+        file.attrs.update(data.attributes)
+        _write_variables(file, data)
 
 
 class _Opened(h5py.File):

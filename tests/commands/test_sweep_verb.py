@@ -112,7 +112,8 @@ def test_exact_the_dataset_has_a_dimension_per_key(swept):
 
 def test_exact_nothing_unfinished_is_left(swept):
     out, _ = swept
-    assert sorted(one.name for one in out.iterdir()) == ["cases", "report.html", "sweep.csv", "sweep.json", "sweep.nc"]
+    assert sorted(one.name for one in out.iterdir()) == ["cases", "chunks", "report.html", "sweep.csv",
+                                                           "sweep.json", "sweep.nc"]
     assert sorted(one.name for one in (out / "cases").iterdir()) == sorted(row["case"] for row in rows(out))
 
 
@@ -160,9 +161,12 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
     out = tmp_path / "swept"
     answer = cli("sweep", scene, *OVER, "-o", out)
     assert answer.code == 130 and "--resume" in answer.err
-    assert 2 <= len(list((out / "cases").iterdir())) < 6 and not (out / "sweep.csv").exists()
+    held = len(list((out / "cases").iterdir()))
+    assert 2 <= held < 6 and sum(row["outcome"] != "" for row in rows(out)) == held  # its tables have what there is
+    assert json.loads((out / "sweep.json").read_text())["cases"]["unfinished"] == 6 - held
+    assert (out / "report.html").is_file()
     monkeypatch.setattr(many, "answers", real)
-    held, text = len(list((out / "cases").iterdir())), "cases have an answer from an interrupted sweep"
+    text = "cases have an answer from an interrupted sweep"
     copied = tmp_path / "copied"
     shutil.copytree(out, copied)
     assert f"note: {held} of 6 {text} and are run again" in cli("sweep", scene, *OVER, "-o", copied).err
@@ -182,11 +186,14 @@ def test_exact_older_tables_are_none_while_cases_are_answered(scene, tmp_path, m
 
     monkeypatch.setattr(many, "answers", stops)
     assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out, "--resume").code == 130
-    assert {one.name for one in out.iterdir()} == {"cases", *(f"{name}.partial" for name in TABLES)}
+    assert {one.name for one in out.iterdir()} == {"cases", "chunks", *TABLES}
+    assert [(row["friction.static"], row["outcome"] != "") for row in rows(out)] == [("0.2", True), ("0.3", False)]
+    assert cli("sweep", scene, "--over", "friction.static=0.4", "-o", out, "--resume").code == 130  # nothing to tell
+    assert {one.name for one in out.iterdir()} == {"cases", "chunks", *(f"{name}.partial" for name in TABLES)}
     monkeypatch.setattr(many, "answers", real)
     assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out, "--resume").code == 0
     assert [row["friction.static"] for row in rows(out)] == ["0.2", "0.3"]
-    assert {one.name for one in out.iterdir()} == {"cases", *TABLES}
+    assert {one.name for one in out.iterdir()} == {"cases", "chunks", *TABLES}
     assert len(list((out / "cases").iterdir())) == 3  # what was found before is kept, as long as it is gone on with
     assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out).code == 0
     assert len(list((out / "cases").iterdir())) == 2
@@ -284,8 +291,8 @@ def test_always_two_shards_may_put_older_tables_aside_at_once(tmp_path, monkeypa
         real(old, new)  # by another process, between the look of this one and its own try
         real(old, new)
 
-    monkeypatch.setattr(os, "replace", second)
-    with Folder(tmp_path, (), True) as folder:
+    with Folder(tmp_path, (), True) as folder, monkeypatch.context() as twice:
+        twice.setattr(os, "replace", second)
         folder.unfinish()
     assert (tmp_path / "sweep.csv.partial").read_text() == "older" and not (tmp_path / "sweep.csv").exists()
 

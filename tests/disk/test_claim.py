@@ -16,6 +16,8 @@ from patchfem.disk import exchange
 from patchfem.disk.claim import HELD, HOST, Claim, alive, started
 from patchfem.export.results import Folder
 from patchfem.export.sweeps.folder import Folder as SweepFolder
+from patchfem.export.sweeps.folder import Writer
+from patchfem.runs.many.answers import Answers
 
 PYTHON = [sys.executable, "-c"]
 # each of several processes tries to own every file, all at the same instants
@@ -145,18 +147,20 @@ def test_exact_a_claim_whose_name_has_no_room_leaves_nothing(tmp_path, monkeypat
     monkeypatch.setattr(os, "pwrite", lambda file, text, at: write(file, text[:5], at))
     with pytest.raises(Missing, match=r"out: cannot be written \(No space left"):
         Claim(tmp_path / "lock", "out", "run").take()
-    with pytest.raises(Missing, match="out: cannot be written"), SweepFolder(tmp_path / "out", ["a"]):
+    with pytest.raises(Missing, match="out: cannot be written"), SweepFolder(tmp_path / "out", [1]):
         pass
     assert not names(tmp_path)
 
 
 def test_refuses_a_second_sweep_and_leaves_the_first_its_folder(tmp_path):
-    """It once removed the folder of the cases, which was empty still, and the first one failed at its first case."""
-    with SweepFolder(tmp_path / "out", ["a"]) as first:
-        with pytest.raises(Missing, match="another sweep"), SweepFolder(tmp_path / "out", ["a"]):
+    """It once removed the folder of the answers, which was empty still, and the first one failed at its first case."""
+    with SweepFolder(tmp_path / "out", [1]) as first:
+        with pytest.raises(Missing, match="another sweep"), SweepFolder(tmp_path / "out", [1]):
             pass
-        first.put([0], ["{}"])
-    assert names(tmp_path / "out" / "cases" / "a") == {"summary.json"}
+        writer = Writer(tmp_path / "out", "out", first.chunks.names, "summaries", first.token)
+        assert writer([0], Answers.blank(1), ["{}"])
+    assert names(tmp_path / "out" / "cases" / f"{1:016x}") == {"summary.json"}
+    assert len(names(tmp_path / "out" / "chunks")) == 1
 
 
 @pytest.mark.parametrize("can", [True, False], ids=["in one step", "in two"])

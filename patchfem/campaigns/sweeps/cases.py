@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from hashlib import sha256
 from math import prod
+
+import numpy as np
 
 from ...scene.axes import Axis
 from .asked import Asked
@@ -86,19 +89,26 @@ class Cases:
 
         return sorted(numbers, key=patch)
 
-    def keys(self, asked: Asked) -> list[str]:
-        """Name of every case, made of what it computes: the same values in other units or another order have the same
-        name, and also as part of another sweep of the same scene, unless all cases of a sweep share a mesh that is
-        chosen for them.
+    def names(self, asked: Asked, numbers: Sequence[int] | None = None) -> np.ndarray:
+        """Names of cases, of all where no numbers are given, (n,) uint64, made of what each computes: the same values
+        in other units or another order have the same name, and also as part of another sweep of the same scene, unless
+        all cases of a sweep share a mesh that is chosen for them.
         """
-        marks = [[json.dumps([axis.key, value, asked.content(value) if isinstance(value, str) else ""])
-                  for value in axis.values] for axis in self.axes]
-        owns = ["\n".join(sorted(mark[place] for mark, place in zip(marks, self.places(number))))
-                for number in range(len(self))]
+        @cache
+        def mark(at: int, place: int) -> str:
+            axis, value = self.axes[at], self.axes[at].values[place]
+            return json.dumps([axis.key, value, asked.content(value) if isinstance(value, str) else ""])
+
+        def signs(shared: str, of: Sequence[int]) -> np.ndarray:
+            marked = mark.__wrapped__ if self.rows else mark  # the values of rows are all others
+            own = (sorted(map(marked, range(len(self.axes)), self.places(number))) for number in of)
+            return np.fromiter((int(sha256("\n".join([shared, *one]).encode()).hexdigest()[:16], 16) for one in own),
+                               np.uint64, len(of))
+
         shared = asked.digest()
         if asked.meshed([axis.key for axis in self.axes]):
-            shared = sha256("\n\n".join([shared, *sorted(owns)]).encode()).hexdigest()
-        return [sha256(f"{shared}\n{own}".encode()).hexdigest()[:16] for own in owns]
+            shared = sha256(np.sort(signs(shared, range(len(self)))).tobytes()).hexdigest()
+        return signs(shared, range(len(self)) if numbers is None else numbers)
 
 
 def product(parts: Sequence[Cases]) -> Cases:

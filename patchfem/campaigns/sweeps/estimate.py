@@ -11,7 +11,8 @@ from .cases import Cases
 LOOKED = 9  # cases that are planned, spread over the sweep
 ONCE = 0.95  # seconds of a plan that a sweep spends once: its start, its files and its page
 TOGETHER = 2e-3  # seconds of a case of a batch from its values to its folder (1.9 ms of 2000 lumped cases)
-DISK = 6000  # bytes of a case in its folder and in the tables
+FEW = 1000  # cases of a sweep that has the summary of each unless it is asked otherwise
+DISK, COLUMNS = 6000, 1600  # bytes of a case with its summary, and without: tables, page and columns of 10 000 cases
 
 
 def estimate(asked: Asked, cases: Cases) -> dict:
@@ -37,6 +38,7 @@ def estimate(asked: Asked, cases: Cases) -> dict:
     compiles = plans[0].compile_seconds if first is None else batch_compile_seconds(first, plans[0].model)
     return plans[0].as_json() | {
         "compile_seconds": compiles, "seconds": round(once + each * len(cases), 2), "seconds_per_case": round(each, 4),
-        "bytes": max(one.bytes for one in plans), "disk_bytes": DISK * len(cases), "cases": len(cases),
+        "bytes": max(one.bytes for one in plans), "cases": len(cases),
+        "disk_bytes": (DISK if len(cases) <= FEW else COLUMNS) * len(cases),
         "values": {axis.key: len(set(axis.texts)) for axis in cases.axes}}
 

@@ -26,14 +26,17 @@ class Work:
     """What every worker needs to answer any case; it is sent to each once.
 
     tell(number, model or error, Answers, place in them): what is made of an answer beside its columns; keep(number,
-    Result): called after each run. Both are functions of a module, or objects that travel. estimate: False leaves out
-    the errors of cases that run one by one. meshes: those that the cases share, made from all of them by `with_meshes`.
+    Result): called after each run; write(numbers, Answers, told) -> whether they were written where the sweep is kept,
+    so that nobody carries them further. All are functions of a module, or objects that travel. estimate: False leaves
+    out the errors of cases that run one by one. meshes: those that the cases share, made from all of them by
+    `with_meshes`.
     """
 
     asked: Asked
     cases: Cases
     tell: Callable | None = None
     keep: Callable | None = None
+    write: Callable | None = None
     estimate: bool = True
     meshes: Shared | None = None
 
@@ -56,14 +59,20 @@ def warmed(work: Work) -> None:
         return
 
 
-def answer(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple[Answers, list]:
-    """Answers of some cases, and of each what `work.tell` makes of it. This is what a worker does with a chunk."""
+def answer(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple[Answers | None, list]:
+    """Answers of some cases, and of each what `work.tell` makes of it; None and nothing where `work.write` has written
+    them. This is what a worker does with a chunk."""
     models = [_model(work, number) for number in numbers]
     keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
     found = many.answers(models, keep, say, work.estimate)
     told = [] if work.tell is None else [work.tell(number, model, found, case)
                                          for case, (number, model) in enumerate(zip(numbers, models))]
-    return found, told
+    return handed(work, numbers, found, told)
+
+
+def handed(work: Work, numbers: Sequence[int], found: Answers, told: list) -> tuple[Answers | None, list]:
+    """What a worker hands on of its answers: nothing of those that `work.write` has written."""
+    return (None, []) if work.write is not None and work.write(numbers, found, told) else (found, told)
 
 
 def _model(work: Work, number: int):
@@ -122,7 +131,8 @@ class Chunks:
 
 
 def solved(work: Work, numbers: Sequence[int], executor, say: Callable | None = None) -> Iterator[tuple]:
-    """(numbers, Answers, told) of chunk after chunk as they come in.
+    """(numbers, Answers or None, told) of chunk after chunk as they come in, as `answer` gives them; told is None of
+    cases that died.
 
     executor: has `workers` and run(work, take, say), which gives (chunk, seconds, what `answer` gives or Died) of
     every chunk that `take` hands out until it hands out none; where it has begin(work, count, say), that is told of the
@@ -149,7 +159,7 @@ def _handed(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
                 failed = Answers.blank(len(lost))
                 for case in range(len(lost)):
                     failed.fail(case, f"{found.reason}, {TRIES} times")
-                yield lost, failed, []
+                yield lost, failed, None
             continue
         chunks.done(chunk, seconds)
         yield chunk, *found

@@ -1,4 +1,4 @@
-"""A sweep on disk: a folder per case, sweep.csv and sweep.nc over all of them.
+"""A sweep on disk: its answers as columns in `chunks/`, sweep.csv and sweep.nc of them all, a folder per case if asked.
 
-In: the cases of a sweep and how to answer them. Out: files, whole at every moment. Read `folder`, then `run`.
+In: the cases of a sweep and how to answer them. Out: files, whole at every moment. Read `chunks`, `folder`, then `run`.
 """

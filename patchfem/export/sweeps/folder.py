@@ -1,4 +1,5 @@
-"""The folder of a sweep: `cases/<key>/` for each case that is answered, named by what it computes, never half written.
+"""The folder of a sweep: answers as columns in `chunks/`, and `cases/<key>/` for each case where these are kept, named
+by what it computes, never half written.
 
 What is not whole has a name that starts with a dot or ends in .partial.
 """
@@ -7,25 +8,31 @@ from __future__ import annotations
 
 import json
 import os
+import secrets
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from ... import __version__
 from ...campaigns.sweeps.cases import Cases
 from ...core import Measure, Missing, PatchfemError
 from ...disk.claim import Claim
 from ...disk.exchange import put
-from ...disk.whole import Unwritten, unmade, write_inside
+from ...disk.whole import Unwritten, unmade, write_bytes, write_inside
 from ...effects import EFFECTS
 from ...model.model import Model
-from ...runs.many.answers import FAILED, Answers
+from ...runs.many.answers import Answers
 from ..folder import save
 from ..results import LOCK, PAGE, refuse_others
-from ..summary import read_summary, summary
+from ..summary import summary
+from . import chunks
+from .chunks import CHUNKS
 
+KEEP = ("none", "summaries", "results", "pages")  # of each case, beside its columns
 CASES, SUMMARY, TABLES = "cases", "summary.json", ("sweep.csv", "sweep.nc", "sweep.json", "report.html")
 
 
@@ -69,62 +76,54 @@ class Whole:
     rest of a short run."""
 
     folder: Path
-    keys: tuple
+    names: np.ndarray
     page: bool = False
 
     def __call__(self, number: int, result) -> None:
         """Write the folder of a case that has been run."""
-        save(result, self.folder / CASES / self.keys[number], self.page)
+        save(result, self.folder / CASES / key_of(self.names[number]), self.page)
 
 
-class Folder:
-    """The folder of a sweep, claimed while it is open unless it is shared by shards.
+def key_of(name: int) -> str:
+    """The folder of a case below cases/."""
+    return f"{int(name):016x}"
 
-    PatchfemError for a place that holds other files, Missing where it cannot be written or is being written.
-    """
 
-    def __init__(self, target: Path, keys: Sequence[str], shared: bool = False):
-        self.target, self.shown, self.keys, self.shared = Path(os.path.abspath(target)), target, keys, shared
-        self.claim = Claim(self.target / LOCK, target, "sweep")
+@dataclass(frozen=True, slots=True)
+class Writer:
+    """Writes answers into the folder of a sweep from wherever it is seen: `token` is a file in it that no other folder
+    of this name has. keep: what is written of each case, one of KEEP."""
 
-    def __enter__(self) -> Folder:
-        refuse_others(self.target, self.shown, (CASES, *TABLES), "those of a sweep", dots=True)
+    target: Path
+    shown: Path
+    names: np.ndarray
+    keep: str
+    token: str = ""
+
+    def __call__(self, numbers: Sequence[int], found: Answers, texts: Sequence[str]) -> bool:
+        """Write what `put` does; False where the folder is not seen from here, or has no room for it."""
         try:
-            (self.target / CASES).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise Missing(f"{self.shown}: the folder of the sweep cannot be made ({unmade(error)})") from None
-        if not self.shared:
-            try:
-                self.claim.take()
-            except Missing:
-                for empty in () if self.claim.path.exists() else (self.target / CASES, self.target):  # or is another's
-                    with suppress(OSError):  # it holds what is older
-                        empty.rmdir()
-                raise
-        return self
+            there = (self.target / CHUNKS / self.token).is_file()
+            if there:
+                self.put(numbers, found, texts)
+            return there
+        except Missing:  # who asked says so
+            return False
 
-    def __exit__(self, *_) -> None:
-        if not self.shared:
-            self.claim.release()
-
-    def whole(self) -> bool:
-        """Whether the folder holds the tables of a sweep that came to its end."""
-        return (self.target / TABLES[0]).is_file()
-
-    def there(self) -> list[int]:
-        """Numbers of the cases that have an answer."""
-        named = {one.name for one in os.scandir(self.target / CASES)}
-        return [number for number, key in enumerate(self.keys) if key in named]
-
-    def put(self, numbers: Sequence[int], texts: Sequence[str]) -> None:
-        """Write the summaries of cases; an older folder of a case is replaced."""
-        for number, text in zip(numbers, texts):
-            self._put(self.target / CASES / self.keys[number], text)
+    def put(self, numbers: Sequence[int], found: Answers, texts: Sequence[str]) -> None:
+        """Write the answers of cases, first their folders where these are kept; Missing where that fails."""
+        for case, (number, text) in enumerate(zip(numbers, texts)):
+            if self.keep == "summaries" or case in found.messages:  # the results folder of another is there
+                self._put(self.target / CASES / key_of(self.names[number]), text)
+        try:
+            chunks.write(self.target / CHUNKS, numbers, self.names[np.asarray(numbers, int)], found)
+        except (OSError, Unwritten) as error:
+            raise self._fault(error) from None
 
     def _put(self, place: Path, text: str) -> None:
         draft = place.with_name(f".{place.name}.{os.getpid()}")
         try:
-            draft.mkdir(exist_ok=True)
+            draft.mkdir(parents=True, exist_ok=True)
             write_inside(draft / SUMMARY, text)
             try:
                 os.rename(draft, place)
@@ -132,26 +131,88 @@ class Folder:
                 put(draft, place)
         except (OSError, Unwritten) as error:
             shutil.rmtree(draft, ignore_errors=True)
-            why = str(error) if isinstance(error, Unwritten) else error.strerror
-            raise Missing(f"{self.shown}: a case cannot be written ({why}); what is whole is kept") from None
+            raise self._fault(error) from None
 
-    def answers(self, numbers: Iterable[int], whole: bool = False, pages: bool = False) -> tuple[list[int], Answers]:
-        """(numbers, Answers) of the cases whose summary is there and can be read; whole: of those alone that have their
-        results folder, or failed; pages: with its page."""
-        asked = (*["scene.resolved.toml"] * whole, *[PAGE] * pages)
-        read = []
-        for number in numbers:
-            place = self.target / CASES / self.keys[number]
+    def _fault(self, error) -> Missing:
+        why = str(error) if isinstance(error, Unwritten) else error.strerror
+        return Missing(f"{self.shown}: a case cannot be written ({why}); what is whole is kept")
+
+
+class Folder:
+    """The folder of a sweep, claimed while it is open unless it is shared by shards.
+
+    names: (n,) uint64, one per case. PatchfemError for a place that holds other files, Missing where it cannot be
+    written or is being written.
+    """
+
+    def __init__(self, target: Path, names: np.ndarray, shared: bool = False):
+        self.target, self.shown, self.shared = Path(os.path.abspath(target)), target, shared
+        self.claim = Claim(self.target / LOCK, target, "sweep")
+        self.token = f".{secrets.token_hex(8)}"
+        self.chunks = chunks.Chunks(self.target / CHUNKS, np.asarray(names, np.uint64))
+
+    def __enter__(self) -> Folder:
+        refuse_others(self.target, self.shown, (CASES, CHUNKS, *TABLES), "those of a sweep", dots=True)
+        try:
+            (self.target / CHUNKS).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise Missing(f"{self.shown}: the folder of the sweep cannot be made ({unmade(error)})") from None
+        if not self.shared:
             try:
-                one = read_summary(place / SUMMARY)
-            except (OSError, ValueError):
-                continue
-            if one["outcome"] == FAILED or all((place / name).is_file() for name in asked):
-                read.append((number, one))
-        found = Answers.blank(len(read))
-        for case, (_, one) in enumerate(read):
-            _read(found, case, one)
-        return [number for number, _ in read], found
+                self.claim.take()
+            except Missing:
+                for empty in () if self.claim.path.exists() else (self.target / CHUNKS, self.target):  # or is another's
+                    with suppress(OSError):  # it holds what is older
+                        empty.rmdir()
+                raise
+        write_bytes(self.target / CHUNKS / self.token, b"")
+        self.chunks.look()
+        return self
+
+    def __exit__(self, *_) -> None:
+        (self.target / CHUNKS / self.token).unlink(missing_ok=True)
+        if not self.shared:
+            self.claim.release()
+
+    def whole(self) -> bool:
+        """Whether the folder holds the tables of a sweep that came to its end."""
+        try:
+            return not json.loads((self.target / "sweep.json").read_bytes())["cases"]["unfinished"]
+        except (OSError, ValueError, KeyError, TypeError):
+            return False
+
+    def there(self, numbers: np.ndarray, keep: str = "none") -> np.ndarray:
+        """Those of the cases that have an answer, and the files of each that `keep` asks for."""
+        numbers = np.asarray(numbers, int)
+        numbers = numbers[self.chunks.held[numbers] >= 0]
+        if keep == "none":
+            return numbers
+        failed = set()
+        if keep != "summaries":
+            for at, part in self.chunks.parts(numbers):
+                failed.update(at[list(part.messages)].tolist() if part.messages else ())
+        return np.array([number for number in numbers.tolist() if self._kept(number, keep, number in failed)], int)
+
+    def _kept(self, number: int, keep: str, failed: bool) -> bool:
+        place = self.target / CASES / key_of(self.chunks.names[number])
+        asked = () if failed or keep == "summaries" else ("scene.resolved.toml", PAGE)[:KEEP.index(keep) - 1]
+        try:
+            text = (place / SUMMARY).read_bytes()
+        except OSError:
+            return False
+        return text[:1] == b"{" and text.rstrip()[-1:] == b"}" and all((place / name).is_file() for name in asked)
+
+    def answers(self, total: Answers) -> Answers:
+        """`total` with the answers of all cases that have one."""
+        self.chunks.look()
+        for at, part in self.chunks.parts(np.arange(len(total))):
+            part.reasons.clear()  # they stand in no table
+            total.place(at, part)
+        return total
+
+    def keys(self) -> list[str]:
+        """Folders of the cases below cases/, none where these are not kept."""
+        return list(map(key_of, self.chunks.names)) if (self.target / CASES).is_dir() else []
 
     def unfinish(self) -> None:
         """Mark the tables of an older sweep as what they are while cases are answered: not those of the folder."""
@@ -159,23 +220,26 @@ class Folder:
             with suppress(FileNotFoundError):  # there is none, or another shard was first
                 os.replace(self.target / name, self.target / f"{name}.partial")
 
-    def tidy(self, others: bool) -> None:
-        """Remove what is left of tables and cases that were never whole; others: the cases of other sweeps as well."""
-        own = set(self.keys)
-        for one in os.scandir(self.target / CASES):
-            if one.name.startswith(".") or one.name.endswith(".partial") or (others and one.name not in own):
-                if one.is_dir(follow_symlinks=False):
-                    shutil.rmtree(one.path, ignore_errors=True)
-                else:  # what says who writes the folder of a case, of a killed one
-                    Path(one.path).unlink(missing_ok=True)
+    def tidy(self, others: bool, keep: str = "") -> None:
+        """Remove what is left of tables and cases that were never whole; others: what is of other sweeps as well;
+        keep: the folders of cases go where it is "none"."""
+        self.chunks.pack(others)
+        for one in os.scandir(self.target / CHUNKS):
+            if one.name.startswith(".") and one.name != self.token and not self.shared:
+                Path(one.path).unlink(missing_ok=True)
+        if (self.target / CASES).is_dir():
+            own = set() if keep == "none" else set(map(key_of, self.chunks.names))
+            for one in os.scandir(self.target / CASES):
+                if one.name.startswith(".") or one.name.endswith(".partial") or (others and one.name not in own):
+                    if one.is_dir(follow_symlinks=False):
+                        shutil.rmtree(one.path, ignore_errors=True)
+                    else:  # what says who writes the folder of a case, of a killed one
+                        Path(one.path).unlink(missing_ok=True)
+            with suppress(OSError):  # cases are in it
+                (self.target / CASES).rmdir()
+        self.finish()
+
+    def finish(self) -> None:
+        """Remove the tables of an older sweep: there are those of this one."""
         for name in TABLES:
             (self.target / f"{name}.partial").unlink(missing_ok=True)
-
-
-def _read(found: Answers, case: int, one: dict) -> None:
-    """Put a summary into the answers."""
-    measures = {name: Measure(m["value"], m["unit"], m["error"], m["floor"], reason=m.get("reason", ""))
-                for name, m in one["measures"].items()}
-    found.put(case, one["outcome"], measures, one["seconds"]["total"])
-    if one["outcome"] == FAILED:
-        found.fail(case, one.get("message", ""))

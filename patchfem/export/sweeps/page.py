@@ -43,15 +43,16 @@ def table_of(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Pat
             "command": command(asked, cases), "scene": asked.text, "seconds": float(np.sum(found.seconds)),
             "grid": not cases.rows, "keys": columns, "measures": measures,
             "outcome": [str(one) for one in found.outcome],
-            "messages": found.messages, "folders": [opened(folder, key) for key in keys]}
+            "messages": found.messages, "folders": [opened(folder, key) for key in keys] if len(keys) else None}
 
 
 def columns_of(cases: Cases) -> list:
     """The swept keys, each with its values in SI and as written in every case."""
-    places = np.array([cases.places(one) for one in range(len(cases))], int).reshape(len(cases), len(cases.axes))
+    every = np.arange(len(cases))
+    places = [every] * len(cases.axes) if cases.rows else np.unravel_index(every, cases.shape)
     return [{"name": axis.key, "unit": axis.unit or "1", "texts": [axis.texts[k] for k in place],
-             "values": numbers([axis.values[k] for k in place]), "log": wide(axis.values)}
-            for axis, place in zip(cases.axes, places.T)]
+             "values": numbers(axis.values)[place], "log": wide(axis.values)}
+            for axis, place in zip(cases.axes, places)]
 
 
 def _shared(held: dict, columns: list) -> dict:

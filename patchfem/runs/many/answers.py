@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import mmap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryFile
 
 import numpy as np
 
+MANY = 50_000  # cases from which on columns may lie on disk: those of a rig are 25 kB a thousand cases and measure
 FAILED = "failed"  # outcome of a case that was refused or that did not come to an end
 
 
@@ -18,7 +22,8 @@ class Answers:
     measure that a case has not, and in `errors` for one that is not estimated. units: measure -> unit. reasons:
     measure -> {case: why it has no value there}, "" where none was given: the measure is in the case, without a value.
     messages: {case: text} of the failed ones. warnings, notes: {case: [sentence]}; numerics: {case: dict}, what was
-    chosen, a dict may be shared by cases. seconds: (n,) of work, that of a batch in equal shares.
+    chosen, a dict may be shared by cases. seconds: (n,) of work, that of a batch in equal shares. room: as `blank` has
+    it.
     """
 
     outcome: np.ndarray
@@ -32,6 +37,7 @@ class Answers:
     notes: dict = field(default_factory=dict)
     numerics: dict = field(default_factory=dict)
     seconds: np.ndarray = None
+    room: Path | None = None
 
     def __post_init__(self) -> None:
         if self.seconds is None:
@@ -41,16 +47,32 @@ class Answers:
         return len(self.outcome)
 
     @classmethod
-    def blank(cls, count: int) -> Answers:
-        """Answers of `count` cases without an outcome and without measures."""
-        return cls(np.full(count, "", object))
+    def blank(cls, count: int, room: Path | None = None) -> Answers:
+        """Answers of `count` cases without an outcome and without measures; room: a folder on whose disk the columns of
+        many cases lie, so that they fill no memory."""
+        return cls(np.full(count, "", object), room=room if count > MANY else None)
 
     def measure(self, name: str, unit: str) -> None:
         """Give the measure its columns, NaN in every case, where it has none yet."""
         if name not in self.values:
             self.units[name] = unit
             for columns in (self.values, self.errors, self.floors):
-                columns[name] = np.full(len(self), np.nan)
+                columns[name] = self._column()
+                columns[name].fill(np.nan)
+
+    def _column(self) -> np.ndarray:
+        if self.room is None:
+            return np.empty(len(self))
+        with TemporaryFile(dir=self.room) as file:  # the column keeps it until it is dropped
+            return np.memmap(file, float, "w+", shape=(len(self),))
+
+    def rest(self) -> None:
+        """Give back the memory of what lies on disk as well."""
+        if self.room is None or not hasattr(mmap, "MADV_DONTNEED"):
+            return
+        for columns in (self.values, self.errors, self.floors):
+            for one in columns.values():
+                one._mmap.madvise(mmap.MADV_DONTNEED)
 
     def fail(self, case: int, message: str) -> None:
         """Mark a case as failed."""
@@ -84,6 +106,18 @@ class Answers:
         for mine, given in ((self.messages, part.messages), (self.warnings, part.warnings), (self.notes, part.notes),
                             (self.numerics, part.numerics)):
             mine.update({int(at[case]): found for case, found in given.items()})
+        self.rest()
+
+    def some(self, cases: np.ndarray) -> Answers:
+        """The answers of some cases, in their order, as `place` takes them."""
+        out, at = Answers(self.outcome[cases], units=self.units, seconds=self.seconds[cases]), \
+            {case: place for place, case in enumerate(np.asarray(cases).tolist())}
+        for mine, columns in ((out.values, self.values), (out.errors, self.errors), (out.floors, self.floors)):
+            mine.update({name: column[cases] for name, column in columns.items()})
+        for name, reasons in self.reasons.items():
+            out.reasons[name] = {at[case]: why for case, why in reasons.items() if case in at}
+        out.messages.update({at[case]: text for case, text in self.messages.items() if case in at})
+        return out
 
     def has(self, name: str, case: int) -> bool:
         """Whether a case has a measure, with a value or with the reason why it has none."""

@@ -43,13 +43,13 @@ def test_exact_rows_beside_lists():
 
 def test_exact_a_name_says_what_is_computed():
     asked = Asked(Path("a.toml"), BENCH)
-    one = cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").keys(asked)
+    one = cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").names(asked).tolist()
     assert len(set(one)) == 4
-    assert cases("friction.static=0.1,0.2", "normal.load=1000e-3 N,0.002 kN").keys(asked) == [one[0], one[2], one[1],
-                                                                                            one[3]]
-    assert set(cases("normal.load=1 N,3 N", "friction.static=0.1,0.2").keys(asked)) & set(one) == set(one[:2])
+    other = cases("friction.static=0.1,0.2", "normal.load=1000e-3 N,0.002 kN").names(asked)
+    assert other.tolist() == [one[0], one[2], one[1], one[3]]
+    assert set(cases("normal.load=1 N,3 N", "friction.static=0.1,0.2").names(asked)) & set(one) == set(one[:2])
     swept = BENCH + '[sweep]\n"normal.load" = "1 N"\n'
-    assert cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").keys(Asked(Path("a.toml"), swept)) == one
+    assert cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").names(Asked(Path("a.toml"), swept)).tolist() == one
 
 
 def test_exact_cases_of_the_same_pieces_follow_each_other():
@@ -65,11 +65,11 @@ def test_exact_cases_of_the_same_pieces_follow_each_other():
 def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
     pinned, chosen = Asked(Path("a.toml"), SMALL_PATCH), Asked(Path("a.toml"), PATCH)
     one, two = cases("contact.load=1 N,2 N"), cases("contact.load=1 N,3 N")
-    assert one.keys(pinned)[0] == two.keys(pinned)[0] and one.keys(chosen)[0] != two.keys(chosen)[0]
-    assert one.keys(chosen) == cases("contact.load=2 N,1e-3 kN").keys(chosen)[::-1]
+    assert one.names(pinned)[0] == two.names(pinned)[0] and one.names(chosen)[0] != two.names(chosen)[0]
+    assert one.names(chosen).tolist() == cases("contact.load=2 N,1e-3 kN").names(chosen)[::-1].tolist()
     sets = Asked(Path("a.toml"), PATCH, ("contact.element_size=1 mm",))
-    assert one.keys(sets)[0] == two.keys(sets)[0]
-    sizes = [cases(f"contact.element_size=1 mm,{other} mm").keys(chosen)[0] for other in (2, 3)]
+    assert one.names(sets)[0] == two.names(sets)[0]
+    sizes = [cases(f"contact.element_size=1 mm,{other} mm").names(chosen)[0] for other in (2, 3)]
     assert sizes[0] == sizes[1]  # each case pins its own
 
 
@@ -77,14 +77,14 @@ def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
                                    Asked(Path("a.toml"), BENCH, ("slide.speed=6 mm/s",))], ids=["text", "set"])
 def test_exact_another_scene_has_other_names(other):
     found = cases("normal.load=1 N,2 N")
-    assert not set(found.keys(other)) & set(found.keys(Asked(Path("a.toml"), BENCH)))
+    assert not set(found.names(other)) & set(found.names(Asked(Path("a.toml"), BENCH)))
 
 
 def test_exact_another_version_has_other_names(monkeypatch):
     asked, found = Asked(Path("a.toml"), BENCH), cases("normal.load=1 N,2 N")
-    before = found.keys(asked)
+    before = found.names(asked)
     monkeypatch.setattr("patchfem.campaigns.sweeps.asked.__version__", "0.0.0")
-    assert not set(found.keys(asked)) & set(before)
+    assert not set(found.names(asked)) & set(before)
 
 
 def test_exact_the_content_of_a_file_is_part_of_the_name(tmp_path):
@@ -93,9 +93,9 @@ def test_exact_the_content_of_a_file_is_part_of_the_name(tmp_path):
     text = BENCH[:BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'
     asked, found = Asked(tmp_path / "a.toml", text), cases("normal.load=1 N")
     asked_beside, beside = Asked(tmp_path / "a.toml", BENCH), cases("slide.file=path.csv")
-    before = found.keys(asked), beside.keys(asked_beside)
+    before = found.names(asked), beside.names(asked_beside)
     path.write_text("time [s],displacement [m]\n0,0\n1,2e-6\n")
-    assert found.keys(asked) != before[0] and beside.keys(asked_beside) != before[1]
+    assert found.names(asked)[0] != before[0][0] and beside.names(asked_beside)[0] != before[1][0]
 
 
 def test_exact_a_case_is_the_scene_with_its_values_set():

@@ -41,7 +41,7 @@ def all_of(asked: Work, executor) -> tuple:
     count = len(asked.cases)
     parts = list(solved(asked, range(count), executor))
     assert sorted(number for numbers, _, _ in parts for number in numbers) == list(range(count))
-    pairs = dict(pair for one in parts for pair in zip(one[0], one[2]))
+    pairs = dict(pair for one in parts for pair in zip(one[0], one[2] or ()))
     return joined_answers(count, [part[:2] for part in parts]), pairs
 
 

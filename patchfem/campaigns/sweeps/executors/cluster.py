@@ -15,7 +15,7 @@ from time import perf_counter
 import numpy as np
 
 from ....core import Missing, PatchfemError
-from ..sweep import Died, Work, answer
+from ..sweep import Died, Work, answer, handed
 
 _TLS = "DASK_DISTRIBUTED__COMM__TLS__"
 CERTIFICATES = f"{_TLS}CA_FILE, {_TLS}CLIENT__CERT and {_TLS}CLIENT__KEY"
@@ -144,7 +144,7 @@ def _answer(work: Work, chunk: list, asked: tuple) -> tuple | dict:
     if (own := own_of(work)) != want:
         return own
     begin = perf_counter()
-    found, told = answer(work, chunk)
+    found, told = answer(replace(work, write=None), chunk)
     folder, named = f"{work.asked.path.parent}{os.sep}", str(path.parent / "_")[:-1]
     found.messages.update({case: text.replace(folder, named) for case, text in found.messages.items()})
-    return perf_counter() - begin, (found, told)
+    return perf_counter() - begin, handed(work, chunk, found, told)

@@ -1,0 +1,166 @@
+"""The answers of a sweep on disk: `chunks/`, each file with the columns of some thousand cases or fewer.
+
+A file is HDF5: `case` (n,) names of the cases as numbers, `values`, `errors`, `floors` (measures, n) in SI, `outcome`
+(n,) places in a list of words, `seconds` (n,); its attribute `about` is JSON with the words, the measures with their
+units, the messages of failed cases and the reasons of what has no value. A file is whole or not there, and its name has
+the sign of its bytes, so that a damaged one is none.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ...disk.whole import write_bytes
+from ...runs.many.answers import Answers
+
+CHUNKS, ENDING = "chunks", ".h5"
+MOST = 4096  # cases of a file
+PARTS = ("values", "errors", "floors")
+
+
+def write(folder: Path, numbers: Sequence[int], names: np.ndarray, found: Answers) -> str:
+    """Write the answers of cases into a folder; the name of the file: numbers of the first and last, and the sign of
+    its bytes.
+
+    names: (n,) uint64, one per case. Unwritten where there is no room.
+    """
+    words = list(dict.fromkeys(map(str, found.outcome)))
+    reasons = [[measure, why, [case for case, one in told.items() if one == why]]
+               for measure, told in found.reasons.items() for why in dict.fromkeys(told.values())]
+    about = {"outcomes": words, "measures": list(found.units.items()), "reasons": reasons,
+             "messages": {str(case): text for case, text in found.messages.items()}}
+    with h5py.File("chunk", "w", driver="core", backing_store=False, libver="latest") as file:
+        file.attrs["about"] = np.void(json.dumps(about, ensure_ascii=False).encode())
+        file["case"] = names
+        file["outcome"] = np.array([words.index(str(one)) for one in found.outcome], np.uint8)
+        file["seconds"] = np.asarray(found.seconds, np.float32)
+        for part in PARTS if found.units else ():
+            held = getattr(found, part)
+            table = np.stack([held[measure] for measure in found.units])
+            file.create_dataset(part, data=table, chunks=(1, table.shape[1]), shuffle=True, compression="gzip",
+                                compression_opts=1)
+        file.flush()
+        image = file.id.get_file_image()
+    name = f"{min(numbers)}-{max(numbers)}-{_sign(image)}{ENDING}"
+    write_bytes(folder / name, image)
+    return name
+
+
+def _sign(image: bytes) -> str:
+    return sha256(image).hexdigest()[:16]
+
+
+def _opened(path: Path) -> h5py.File:
+    """A file as it was written; ValueError where its bytes are others."""
+    image = path.read_bytes()
+    if not path.stem.endswith(f"-{_sign(image)}"):
+        raise ValueError(f"{path.name}: damaged")
+    return h5py.File(BytesIO(image), "r")
+
+
+def read(path: Path) -> tuple[np.ndarray, Answers]:
+    """(names (n,), Answers) of a file; OSError, ValueError, KeyError or TypeError where it is damaged."""
+    with _opened(path) as file:
+        about, names = json.loads(bytes(file.attrs["about"])), _column(file["case"], np.uint64)
+        count = names.size
+        found = Answers.blank(count)
+        found.outcome[:] = np.array(about["outcomes"], object)[_column(file["outcome"], np.uint8, count)]
+        found.seconds[:] = _column(file["seconds"], np.float32, count)
+        measures = [(str(name), str(unit)) for name, unit in about["measures"]]
+        for part in PARTS if measures else ():
+            table = _column(file[part], np.float64, count, len(measures))
+            getattr(found, part).update({name: row for (name, _), row in zip(measures, table)})
+    found.units.update(measures)
+    found.messages.update({int(case): str(text) for case, text in about["messages"].items()})
+    for measure, why, cases in about["reasons"]:
+        found.reasons.setdefault(str(measure), {}).update(dict.fromkeys(map(int, cases), str(why)))
+    return names, found
+
+
+def names_in(path: Path) -> np.ndarray:
+    """The names of the cases of a file (n,) uint64, none where it is damaged."""
+    try:
+        with _opened(path) as file:
+            return _column(file["case"], np.uint64)
+    except (OSError, KeyError, ValueError, TypeError):
+        return np.empty(0, np.uint64)
+
+
+def _column(held, kind, count: int | None = None, rows: int | None = None) -> np.ndarray:
+    """A dataset of the file; ValueError where it has another size or kind."""
+    shape = held.shape if count is None else (count,) if rows is None else (rows, count)
+    if held.dtype != kind or held.shape != shape or len(shape) > 2 or (count is None and held.size > 2 * MOST):
+        raise ValueError(f"{held.name}: {held.dtype} of shape {held.shape}")
+    return held[...]
+
+
+@dataclass(eq=False, slots=True)
+class Chunks:
+    """The files of a folder and the cases that they hold.
+
+    names: (n,) uint64 of the cases that are wanted, in their order. `held`: (n,) place of a case's file in `files`, -1
+    where none has it.
+    """
+
+    folder: Path
+    names: np.ndarray
+    files: list = field(default_factory=list)
+    held: np.ndarray = None
+
+    def look(self) -> None:
+        """Find what the folder has by now."""
+        known, same = np.unique(self.names, return_inverse=True)  # a case may stand twice in a sweep
+        held = np.full(known.size, -1, np.int32)
+        there = [one for one in os.scandir(self.folder) if one.name.endswith(ENDING) and not one.name.startswith(".")]
+        there.sort(key=lambda one: (one.stat().st_mtime_ns, one.name))  # of a case that stands in two, the later counts
+        self.files = [Path(one.path) for one in there]
+        for place, path in enumerate(self.files):
+            names = names_in(path)
+            at = np.minimum(np.searchsorted(known, names), known.size - 1)
+            held[at[known[at] == names] if known.size else at[:0]] = place
+        self.held = held[same]
+
+    def parts(self, numbers: np.ndarray) -> Iterator[tuple[np.ndarray, Answers]]:
+        """(numbers, Answers) of those of the wanted cases that are there, file by file; a damaged file has none."""
+        numbers = np.asarray(numbers, int)
+        for place in np.unique(self.held[numbers]).tolist():
+            own = numbers[self.held[numbers] == place]
+            try:
+                names, found = read(self.files[place]) if place >= 0 else (None, None)
+            except (OSError, KeyError, ValueError, TypeError, IndexError, AttributeError):
+                self.held[self.held == place] = -1
+                continue
+            if place >= 0:
+                order = np.argsort(names)
+                yield own, found.some(order[np.searchsorted(names, self.names[own], sorter=order)])
+
+    def pack(self, others: bool) -> None:
+        """Fill files up where most hold few cases, so that there are no more than the cases want; others: remove files
+        of other sweeps as well."""
+        wanted = np.flatnonzero(self.held >= 0)
+        used = set(np.unique(self.held[wanted]).tolist())
+        old = [self.files[place] for place in sorted(used)]
+        if len(old) > 2 * -(-wanted.size // MOST):
+            kept = set()
+            for first in range(0, wanted.size, MOST):
+                numbers = wanted[first:first + MOST]
+                found = Answers.blank(numbers.size)
+                for at, part in self.parts(numbers):
+                    found.place(np.searchsorted(numbers, at), part)
+                kept.add(write(self.folder, numbers.tolist(), self.names[numbers], found))
+            gone = [path for path in old if path.name not in kept]
+        else:
+            gone = []
+        gone += [path for place, path in enumerate(self.files) if place not in used]
+        for path in gone:
+            if others or np.isin(names_in(path), self.names).all():
+                path.unlink(missing_ok=True)
