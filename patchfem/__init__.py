@@ -14,7 +14,7 @@ Read the package in this order. A module imports its own entry of the list and t
 10. `mesh`         two coated pieces as tagged meshes
 11. `surface`     measured height profiles as a share of the gap
 12. `elasticity`   the pieces condensed to their interface, fields recovered inside
-13. `contact`     gap shapes, unilateral contact, skins, strips, contact maps
+13. `contact`     gap shapes, unilateral contact, skins, strips
 14. `friction`    laws of friction and the sum over bonds along the path
 15. `slip`        partial slip of the pieces: elements, shear modes, their tangent
 16. `structure`   the modes of the rig and what drives it

@@ -29,7 +29,7 @@ def test_exact_a_patch_needs_no_motion(scene):
            "dynamics.march.loop_kernels", "compiled", "surface", "contact.skin", "contact.skin_laws", "contact.strips",
            "elasticity.mortar", "elasticity.substructure", "elasticity.fronts", "skfem",
            "slip.tangent",
-           "contact.maps", "elasticity.recovery", "mesh.anymesh", "mesh.rounded", "export", "scipy")
+           "elasticity.recovery", "mesh.anymesh", "export", "scipy")
     assert {"patchfem.contact.unilateral", "patchfem.mesh.tensor"} <= modules
 
 

@@ -20,8 +20,7 @@ NEEDED = ("numpy", "scipy", "scikit-fem", "meshio", "pyvista", "numba", "matplot
           "xarray", "h5netcdf", "h5py", "threadpoolctl")
 EXTRAS = {"pyuff": ("lab", "universal files"), "nbclient": ("notebook", "the notebooks of studies/notebooks"),
           "SurfaceTopography": ("profiles", "files of more instruments"),
-          "distributed": ("cluster", "sweeps over several machines"), "trame": ("web", "fields in a browser"),
-          "gmsh": ("gmsh", "meshes by gmsh")}
+          "distributed": ("cluster", "sweeps over several machines"), "trame": ("web", "fields in a browser")}
 
 
 class Finding(NamedTuple):

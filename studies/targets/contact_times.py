@@ -7,11 +7,12 @@ from time import process_time
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from contact_accuracy import COATED, COATING
 from contact_identities import HEIGHT, LENGTH, LOAD, MOUNTS, coated_pair
+from maps import press_map
 
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.maps import press_map
 from patchfem.contact.unilateral import press
 from patchfem.core import Outcome
 from patchfem.elasticity.elasticity import assemble, interface_compliance

@@ -56,14 +56,14 @@ def test_exact_the_schema_is_written_as_it_is_printed(tmp_path):
 
 def test_always_the_doctor_tells_what_is_missing(monkeypatch):
     monkeypatch.setattr(examine, "PICTURE", "raise OSError('no display')")
-    monkeypatch.setattr(examine, "_version", lambda name: "" if name in ("scipy", "gmsh") else "1.0")
+    monkeypatch.setattr(examine, "_version", lambda name: "" if name in ("scipy", "trame") else "1.0")
     found = {one["name"]: one for one in json.loads(cli("doctor", "--json").out)}
     assert not found["scipy"]["fine"] and found["scipy"]["cure"] == "pip install scipy" and found["numpy"]["fine"]
-    assert found["gmsh (meshes by gmsh)"]["cure"] == 'pip install "patchfem[gmsh]"'
+    assert found["trame (fields in a browser)"]["cure"] == 'pip install "patchfem[web]"'
     assert "no display" in found["pictures by OpenGL"]["found"] and found["pictures by OpenGL"]["cure"]
     lines = cli("doctor").out.splitlines()
     assert len(lines) == len(found)
-    assert [line.split()[1] for line in lines if line.startswith("--")] == ["scipy", "pictures", "gmsh"]
+    assert [line.split()[1] for line in lines if line.startswith("--")] == ["scipy", "pictures", "trame"]
 
 
 def test_always_the_doctor_names_every_package_of_the_project_and_what_writes_films(monkeypatch):

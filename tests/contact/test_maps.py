@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pieces import LENGTH, LOAD, coated_pair, rough
+from study_module import study
 
-from patchfem.contact import maps
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.maps import press_map
 from patchfem.contact.unilateral import SOLVED, press
 from patchfem.core import NotConverged, Outcome, PatchfemError
 from patchfem.slip.shear_modes import normal_stiffness, tangential_stiffness
+
+maps = study("common/maps.py")
+press_map = maps.press_map
 
 LOADS = LOAD * np.array([1.0, 0.01, 10.0, 0.3])  # in no order
 ANGLES = np.array([1e-4, 0.0, -1e-3, 1e-5])

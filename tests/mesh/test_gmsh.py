@@ -6,6 +6,7 @@ import builtins
 
 import numpy as np
 import pytest
+from rounded import rounded_pair
 
 from patchfem.closed_forms.contact import rounded_punch_half_width, rounded_punch_pressure
 from patchfem.contact.unilateral import press
@@ -13,7 +14,6 @@ from patchfem.core import Compliance, Interface, Missing, PatchfemError
 from patchfem.elasticity.elasticity import Layers
 from patchfem.elasticity.substructure import assemble, condense, joined
 from patchfem.mesh.files import read_pieces, write_mesh
-from patchfem.mesh.rounded import rounded_pair
 
 try:
     import gmsh  # noqa: F401
@@ -83,5 +83,5 @@ def test_refuses_without_gmsh_and_says_what_to_install(monkeypatch):
         return real(name, *rest, **kept)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(Missing, match=r"libGLU.so.1.*patchfem\[gmsh\].*libglu1-mesa"):
+    with pytest.raises(Missing, match=r"libGLU.so.1.*install gmsh.*libglu1-mesa"):
         rounded_pair(**SIZES, radius=20e-3, flat=1e-3)

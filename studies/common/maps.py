@@ -10,10 +10,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..core import Compliance, Outcome, PatchfemError, frozen_array
-from ..elasticity.lapack import one_thread
-from .active_set import Ask, Operator
-from .unilateral import checked, refuse, solve
+from patchfem.contact.active_set import Ask, Operator
+from patchfem.contact.unilateral import checked, refuse, solve
+from patchfem.core import Compliance, Outcome, PatchfemError, frozen_array
+from patchfem.elasticity.lapack import one_thread
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -1,4 +1,4 @@
-"""Two alike coated pieces with rounded edges, meshed by Gmsh (extra `gmsh`), finest where the flat ends.
+"""Two alike coated pieces with rounded edges, meshed by Gmsh, finest where the flat ends.
 
 The interface is the flat and as much of each fillet as is not steep; the coating follows it. The height of the fillet
 is part of the mesh and enters the contact through `PieceMesh.rise`.
@@ -8,8 +8,8 @@ from math import atan, sin
 
 import numpy as np
 
-from ..core import Missing, PatchfemError
-from .anymesh import STEEP, PairMesh, Tagged, pieces
+from patchfem.core import Missing, PatchfemError
+from patchfem.mesh.anymesh import STEEP, PairMesh, Tagged, pieces
 
 NEAR, GROWTH = 16, 0.1  # fine cells around the ends of the flat, growth of their size with the distance beyond
 
@@ -50,7 +50,7 @@ def _gmsh():
     try:
         import gmsh
     except (ImportError, OSError) as error:
-        raise Missing(f"gmsh cannot be used ({error}); install patchfem[gmsh] and the system's libGLU and libXft "
+        raise Missing(f"gmsh cannot be used ({error}); install gmsh and the system's libGLU and libXft "
                       "(Debian: libglu1-mesa libxft2 libxcursor1 libxinerama1)") from None
     return gmsh
 
