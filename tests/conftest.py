@@ -1,6 +1,7 @@
 """For every test: one BLAS thread, so that two cores serve two tests, and no deadline, so that a busy machine fails
-nothing. The examples of the property tests are the same in every run, so that a failure is of the change at hand;
-PATCHFEM_SEARCH=1 draws new ones."""
+nothing. A property test draws 20 examples, 5 where each is costly; with `-m slow` all of them run again, with ten times
+as many. The examples are the same in every run, so that a failure is of the change at hand; PATCHFEM_SEARCH=1 draws new
+ones."""
 
 import gc
 import os
@@ -10,7 +11,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported, here and in child processes
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from patchfem import compiled
 from patchfem.compiled import UNKEPT, cache_folder
@@ -24,8 +25,14 @@ if sys.dont_write_bytecode:  # hundreds of child processes would each compile al
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-settings.register_profile("patchfem", deadline=None, derandomize="PATCHFEM_SEARCH" not in os.environ)
-settings.load_profile("patchfem")
+
+def pytest_configure(config):
+    """How many examples a property test draws; "costly" is for @settings."""
+    often = 10 if config.option.markexpr == "slow" else 1
+    for name, examples in (("patchfem", 20 * often), ("costly", 5 * often)):
+        settings.register_profile(name, max_examples=examples, deadline=None, suppress_health_check=list(HealthCheck),
+                                  derandomize="PATCHFEM_SEARCH" not in os.environ)
+    settings.load_profile("patchfem")
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -39,12 +46,14 @@ def pytest_xdist_auto_num_workers(config):
 
 
 @pytest.hookimpl(hookwrapper=True)
-def pytest_pycollect_makeitem():
-    """The cases of a test marked `share(places)` that stand at other places than these become slow."""
+def pytest_pycollect_makeitem(collector):
+    """The cases of a test marked `share(places)` that stand at other places than these become slow, and with `-m slow`
+    all property tests."""
     made = (yield).get_result()
     for place, case in enumerate(made if isinstance(made, list) else ()):
         mark = case.get_closest_marker("share") if isinstance(case, pytest.Function) else None
-        if mark and place not in [one % len(made) for one in mark.args]:
+        again = collector.config.option.markexpr == "slow" and hasattr(getattr(case, "obj", None), "hypothesis")
+        if again or (mark and place not in [one % len(made) for one in mark.args]):
             case.add_marker("slow")
 
 

@@ -149,7 +149,6 @@ def test_exact_many_pivots_do_not_wear_the_tableau():
 
 
 @pytest.mark.slow
-@settings(max_examples=60)
 @given(st.integers(0, 10**6), st.integers(2, 9))
 def test_always_any_definite_operator_is_solved(seed, m):
     """Random definite matrices, far from those of elastic bodies: block steps may cycle, the search still ends."""
@@ -172,7 +171,7 @@ def test_always_any_definite_operator_is_solved(seed, m):
         assert np.abs(force - sets.at(d, t).forces(d, t)).max() <= 1e-9 * max(force.max(), 1.0)
 
 
-@settings(max_examples=15)
+@settings(settings.get_profile("costly"))
 @given(st.integers(0, 10**6))
 def test_always_rough_surfaces(seed):
     """A rough gap, any motion: complementary to 1e-12 by the definition."""

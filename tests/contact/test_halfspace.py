@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM, pair_of
 from study_module import study
@@ -167,7 +167,6 @@ def test_exact_coated_finite_elements_agree_with_coated_half_planes(radius, load
 # ---- any gap
 
 @example(4, 24476, 1.8125, -9.0, True)  # one point touches on the way, another still overlaps
-@settings(max_examples=60, deadline=None)
 @given(st.integers(4, 120), st.integers(0, 2**32 - 1), st.floats(-3, 6), st.floats(-9, -5), st.booleans())
 def test_always_the_dense_active_set_finds_the_same(points, seed, load, height, smooth):
     """The same circulant operator as a full matrix, solved by the primal-dual active set."""
@@ -186,7 +185,6 @@ def test_always_the_dense_active_set_finds_the_same(points, seed, load, height, 
     assert state.closing == pytest.approx(motion[0], abs=1e-8 * (abs(motion[0]) + compliance[0] * force.max() / step))
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.integers(4, 400), st.integers(0, 2**32 - 1), st.floats(-3, 6), st.floats(-9, -5))
 def test_always_the_conditions_of_contact_hold(points, seed, load, height):
     """Never pulls, never overlaps, carries the load; twice load and gap give twice the pressure; shifts shift."""

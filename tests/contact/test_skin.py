@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 from scipy.integrate import quad
@@ -315,7 +315,6 @@ def holds(skin, c, x, weight, gap, state, load, moment):
     assert np.abs(opening - state.separation)[big].max() <= 1e-9 * np.abs(state.separation[big]).max() + 1e-13 * depth
 
 
-@settings(max_examples=150, deadline=None)
 @given(law=st.sampled_from(["linear", "exponential", "hertz"]), scale=st.floats(-9, 6), stiff=st.floats(9, 18),
        thin=st.floats(-9, -5), angle=st.floats(-6, -2), rough_size=st.floats(-9, -4), jagged=st.booleans(),
        place=st.none() | st.floats(-0.499, 0.499), rigid=st.booleans(), seed=st.integers(0, 2**32 - 1))
@@ -332,7 +331,6 @@ def test_always_any_gap_load_moment_and_skin_converge(law, scale, stiff, thin, a
     holds(skin, c, x, weight, gap, solve(skin, c, x, weight, gap, load, moment), load, moment)
 
 
-@settings(max_examples=40, deadline=None)
 @given(depth=st.floats(-9, -5), sign=st.sampled_from([-1, 1]), seed=st.integers(0, 2**32 - 1),
        law=st.sampled_from(["linear", "exponential", "hertz"]))
 def test_always_any_approach_is_answered(depth, sign, seed, law):

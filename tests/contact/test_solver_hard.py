@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 
@@ -48,7 +48,6 @@ def by_enumeration(c, x, gap, load=None, moment=None, spring=0.0):
 
 # ---- few nodes, against all subsets
 
-@settings(max_examples=60, deadline=None)
 @given(size=st.integers(2, 7), seed=st.integers(0, 2**32 - 1),
        control=st.sampled_from(["load", "line", "spring", "by"]))
 def test_exact_the_only_subset_of_nodes_that_obeys_contact(size, seed, control):
@@ -265,7 +264,6 @@ def test_exact_flat_faces_under_no_moment_do_not_turn():
     assert np.abs(state.sigma_n - state.sigma_n[::-1]).max() <= 1e-11 * state.sigma_n.max()
 
 
-@settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), levels=st.integers(1, 4), line=st.sampled_from([None, 0.0, 1e-3]))
 def test_always_steps_of_equal_height_are_solved(seed, levels, line):
     """Duplicated values are mirrored exactly with their gap."""
@@ -336,7 +334,6 @@ def test_refuses_to_return_what_did_not_converge(monkeypatch):
             press(pair, np.zeros(101), LOAD)
 
 
-@settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), size=st.integers(2, 60))
 def test_exact_nearest_forces_are_a_projection(seed, size):
     """f - y = rigid q on f > 0 and y + rigid q <= 0 elsewhere: the conditions of the nearest point."""
@@ -353,7 +350,6 @@ def test_exact_nearest_forces_are_a_projection(seed, size):
 
 # ---- parts of the start
 
-@settings(max_examples=80, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), line=st.floats(-0.49, 0.49), power=st.floats(-4, 4), held=st.booleans())
 def test_exact_the_rest_position_of_a_rigid_piece(seed, line, power, held):
     """Its lowest points straddle the load line, or with a spring balance what the spring leaves of the moment."""
@@ -379,7 +375,6 @@ def test_always_coarser_nodes_leave_few_sets_to_try(shape, control):
     assert settle(Operator(pair.normal), turned, start)[2] <= 6 and wanted.iterations <= 20
 
 
-@settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), gone=st.integers(0, 9), new=st.integers(0, 9))
 def test_exact_a_changed_factor_solves_as_a_new_one(seed, gone, new):
     rng, pair = np.random.default_rng(seed), coated_pair(200)

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 
@@ -278,7 +278,6 @@ def test_exact_balances_of_a_rolled_pair(skin, control):
     check(state, skin, c, x, weight, gap, 1e-4, LOAD, free=free, **control)
 
 
-@settings(max_examples=40, deadline=None)
 @given(count=st.integers(1, 8), size=st.floats(-9, -5), roll=st.floats(-7, -2), load=st.floats(-3, 2),
        where=st.one_of(st.none(), st.floats(-0.97, 0.97)), spring=st.one_of(st.just(0.0), st.floats(1.0, 1e6)),
        skin=st.sampled_from([*SKINS.values(), LinearSkin(1e16), ExponentialSkin(2e-8)]), seed=st.integers(0, 2**32 - 1))

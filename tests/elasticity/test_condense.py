@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, TITANIUM
 
@@ -35,7 +35,6 @@ def interface_block(inverse, columns):
     return inverse[np.ix_(index, index)]
 
 
-@settings(max_examples=40, deadline=None)
 @given(columns=st.integers(2, 22), rows=st.integers(1, 14), seed=st.none() | st.integers(0, 99))
 def test_exact_compliance_and_solution_of_a_grid_are_those_of_the_dense_inverse(columns, rows, seed):
     piece = of_size(columns, rows, seed)

@@ -7,7 +7,7 @@ import importlib.util
 import numpy as np
 import pytest
 from any_mesh_cases import of_grid
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pieces import COATED, COATING
 from scipy.sparse import coo_matrix, csc_matrix
@@ -72,7 +72,6 @@ def test_refuses_a_singular_stiffness(name):
         factorise(matrix, [0, 2, 3], name).compliance()
 
 
-@settings(max_examples=25, deadline=None)
 @given(count=st.integers(4, 900), seed=st.integers(0, 99))
 def test_always_a_dissection_is_an_order_whose_last_cut_parts_the_mesh_in_halves(count, seed):
     points, pairs = scattered(count, seed)
@@ -89,7 +88,6 @@ def test_always_a_dissection_is_an_order_whose_last_cut_parts_the_mesh_in_halves
     assert cut.size <= 3 * np.sqrt(count)
 
 
-@settings(max_examples=100, deadline=None)
 @given(pairs=st.sets(st.tuples(st.integers(0, 4), st.integers(5, 9)), max_size=12))
 def test_exact_the_least_cover_is_that_of_trying_all(pairs):
     pairs = np.array(sorted(pairs), np.int64).reshape(-1, 2)

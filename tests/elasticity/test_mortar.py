@@ -78,7 +78,6 @@ def pressed(x, nn, gap, load=LOAD):
     return press(Compliance(Interface(x, mortar.tributary(x), 1.0), nn, nn), gap, load)
 
 
-@settings(max_examples=30, deadline=None)
 @given(one=cells, other=cells)
 def test_exact_transfer_is_the_mortar_integral(one, other):
     x, own = nodes(one, 2.0), nodes(other, 2.0)
@@ -91,7 +90,6 @@ def test_exact_transfer_is_the_mortar_integral(one, other):
         assert np.abs(found[i] * mortar.tributary(x)[i] - wanted).max() <= 1e-13
 
 
-@settings(max_examples=100, deadline=None)
 @given(one=cells, other=cells, seed=st.integers(0, 99))
 def test_always_constants_lines_force_and_moment_pass_exactly(one, other, seed):
     x, own = nodes(one), nodes(other)
@@ -106,7 +104,6 @@ def test_always_constants_lines_force_and_moment_pass_exactly(one, other, seed):
     assert uniform == pytest.approx(mortar.tributary(own), rel=1e-12)
 
 
-@settings(max_examples=30, deadline=None)
 @given(one=cells, other=cells, stiff=st.sampled_from([0.01, 1.0, 100.0]), plane=st.sampled_from(["strain", "stress"]))
 def test_exact_patch_test_on_held_blocks_without_poisson_effect(one, other, stiff, plane):
     x_low, x_high = nodes(one), nodes(other)
@@ -134,7 +131,7 @@ def rolling(x, height, young, poisson):
     return np.linalg.inv(stiff[np.ix_(free, free)])[np.ix_(pick, pick)]
 
 
-@settings(max_examples=15, deadline=None)
+@settings(settings.get_profile("costly"))
 @given(one=cells, other=cells, stiff=st.sampled_from([0.01, 1.0, 100.0]))
 def test_exact_patch_test_on_rollers_with_unlike_spreading(one, other, stiff):
     x_low, x_high = nodes(one), nodes(other)
@@ -201,7 +198,6 @@ def test_exact_compliance_is_the_weighted_motion_of_both_bodies(side):
     assert np.abs(joined.tt @ shear + joined.nt.T @ normal - slide).max() <= 1e-11 * np.abs(slide).max()
 
 
-@settings(max_examples=25, deadline=None)
 @given(one=cells, other=cells, stiff=st.floats(0.01, 100.0), seed=st.integers(0, 99))
 def test_always_symmetric_positive_and_balanced_and_the_same_with_the_bodies_swapped(one, other, stiff, seed):
     x_low, x_high = nodes(one), nodes(other)
@@ -324,7 +320,6 @@ def test_exact_where_the_coarser_side_changes_the_grid_changes_over(stiff):
     assert mortar.mortar(low, x_low, high, x_high, "lower").side == joined.side
 
 
-@settings(max_examples=30, deadline=None)
 @given(one=cells, other=cells, left=st.floats(-0.3, 0.3), right=st.floats(-0.3, 0.3))
 def test_always_pieces_that_overhang_touch_where_both_are(one, other, left, right):
     x_low = nodes(one)

@@ -55,7 +55,7 @@ def meshes():
 
 @pytest.mark.parametrize("kind", range(3))
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=10, deadline=None)
+@settings(settings.get_profile("costly"))
 def test_exact_a_linear_stress_in_each_material_is_recovered_at_every_node(kind, seed):
     found = recovery(meshes()[kind])
     slopes = np.random.default_rng(seed).normal(size=(2, 3, 4)) * 1e8  # the materials share nothing
@@ -85,7 +85,7 @@ def test_exact_a_coating_of_one_row_is_fitted_along_itself():
 
 
 @given(seed=st.integers(0, 2**32 - 1), plane=st.sampled_from(["strain", "stress"]))
-@settings(max_examples=15, deadline=None)
+@settings(settings.get_profile("costly"))
 def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(seed, plane):
     """Quadratic motion of one material: the middles of rectangles have the exact stress, the cells miss the rest."""
     layers = bare(TITANIUM, plane)
@@ -111,7 +111,7 @@ def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(see
 
 
 @given(seed=st.integers(0, 2**32 - 1), plane=st.sampled_from(["strain", "stress"]))
-@settings(max_examples=10, deadline=None)
+@settings(settings.get_profile("costly"))
 def test_exact_rectangles_taken_apart_into_modes_are_the_sum_over_the_points_of_integration(seed, plane):
     """Any motion of both materials, on any grid."""
     rng = np.random.default_rng(seed)
@@ -132,7 +132,7 @@ def test_exact_rectangles_taken_apart_into_modes_are_the_sum_over_the_points_of_
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=5, deadline=None)
+@settings(settings.get_profile("costly"))
 def test_always_rounding_to_the_harmless_step_adds_the_wanted_share_of_the_error(seed):
     """Of equal materials with no Poisson ratio the bound is the mean itself."""
     layers = Layers((200e9, 0.0), (200e9, 0.0), "strain")
@@ -252,7 +252,7 @@ def test_exact_bond_line_is_the_stress_at_its_depth():
 
 @pytest.mark.parametrize("kind", ["tensor", "mixed", "triangles"])
 @given(seed=st.integers(0, 2**32 - 1), plane=st.sampled_from(["strain", "stress"]))
-@settings(max_examples=8, deadline=None)
+@settings(settings.get_profile("costly"))
 def test_exact_bond_line_carries_the_load_and_its_moment(kind, seed, plane):
     layers = Layers(CARBIDE, TITANIUM, plane)
     if kind == "tensor":
@@ -277,7 +277,7 @@ def test_exact_bond_line_carries_the_load_and_its_moment(kind, seed, plane):
 
 
 @given(seed=st.integers(0, 2**32 - 1), slope=st.floats(-0.5, 0.5))
-@settings(max_examples=15, deadline=None)
+@settings(settings.get_profile("costly"))
 def test_exact_bond_line_of_a_slanted_coating_under_even_stress(seed, slope):
     """Any even strain of one material: the traction is sigma n on every inner node of the slanted line."""
     mesh = of_grid(SMALL, 0.5, seed=2)
@@ -296,7 +296,6 @@ def test_exact_bond_line_of_a_slanted_coating_under_even_stress(seed, slope):
 
 
 @given(x=st.floats(-4e-4, 4e-4), depth=st.floats(3.5e-4, 6e-4), bend=st.floats(0.5, 2))
-@settings(max_examples=20, deadline=None)
 def test_exact_peak_of_a_paraboloid_is_found_between_the_nodes(x, depth, bend):
     cells = cells_of(tensor(graded_grid(2e-3, 1e-3, 1e-4, COATING)))
     at = cells.middles()

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from any_mesh_cases import of_grid
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, TITANIUM
 from scipy.sparse import csr_matrix
@@ -59,7 +59,6 @@ def assemble_nodes(nodes, coating_rows, layers):
                  coat, layers)
 
 
-@settings(max_examples=40, deadline=None)
 @given(across=LINES, down=LINES, coating=st.integers(0, 9), plane=st.sampled_from(["strain", "stress"]))
 def test_exact_products_of_lines_are_the_stiffness_of_scikit_fem(across, down, coating, plane):
     x, depth = (np.append(0, np.cumsum(part)) * 1e-4 for part in (across, down))

@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 import pytest
 from any_mesh_cases import FORMATS, GRID, blocks, drawn, interface_node, move, stored, write_inp
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
@@ -83,7 +83,6 @@ def test_exact_unlike_grids_are_written_as_the_pieces_they_are(tmp_path):
                                                                                kind="stable")])
 
 
-@settings(max_examples=30, deadline=None)
 @given(order=st.randoms(use_true_random=False), shift=st.floats(-1.0, 1.0), kind=st.sampled_from(KINDS))
 def test_always_numbering_sense_of_rotation_and_place_along_x_do_not_matter(order, shift, kind, tmp_path_factory):
     m = drawn(kind)
@@ -300,26 +299,12 @@ def test_refuses_truncations_in_bounded_time(form, tmp_path):
 
 
 CHANGES = st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=4)
-WITHOUT_HASTE = {"deadline": None, "suppress_health_check": [HealthCheck.function_scoped_fixture]}
 
 
 @pytest.mark.share(0, 3, 4, 6)
 @pytest.mark.parametrize("form", FORMATS)
-@settings(max_examples=20, **WITHOUT_HASTE)
 @given(changes=CHANGES)
 def test_always_a_spoilt_file_is_read_or_refused(form, changes, tmp_path):
-    spoilt(form, changes, tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("form", FORMATS)
-@settings(max_examples=300, **WITHOUT_HASTE)
-@given(changes=CHANGES)
-def test_always_each_of_many_spoilt_files_is_read_or_refused(form, changes, tmp_path):
-    spoilt(form, changes, tmp_path)
-
-
-def spoilt(form: str, changes: list, tmp_path) -> None:
     """Bytes of a file of this form changed at shares of its length: read to a mesh without faults, or refused."""
     ending, write = FORMATS[form]
     path = tmp_path / f"pair{ending}"

@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.mesh.grading import Layout, columns, rows
 from patchfem.mesh.tensor import TensorGrid, coarser, finer, graded_depth, graded_grid
 
 
-@settings(max_examples=60, deadline=None)
 @given(place=st.floats(-0.5, 0.5), least=st.floats(1e-5, 1e-2), slope=st.floats(0.05, 0.6), wide=st.floats(0.01, 0.9))
 def test_always_cells_follow_the_layout(place, least, slope, wide):
     """Cells add up to the length, none is longer than wanted at its farther end, neighbours differ by the slope."""

@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 import pytest
 from any_mesh_cases import drawn, write_msh22
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import Missing, PatchfemError
@@ -110,7 +110,6 @@ def test_exact_vtu_holds_the_same_cells_and_tags(grid, tmp_path):
 
 
 @pytest.mark.slow
-@settings(max_examples=40)
 @given(order=st.randoms(use_true_random=False), shift=st.floats(-1.0, 1.0))
 def test_always_numbering_and_place_along_x_do_not_matter(order, shift, tmp_path_factory):
     pair = pair_mesh(SMALL)
@@ -163,7 +162,6 @@ def test_refuses_every_truncation_in_bounded_time(tmp_path):
         assert time.process_time() - begin < 2
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(changes=st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=6))
 def test_always_a_spoilt_file_is_read_or_refused(changes, tmp_path):
     path = tmp_path / "pair.msh"

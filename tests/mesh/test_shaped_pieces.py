@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.mesh.ends import GENTLE, SHARP, End
@@ -76,7 +76,6 @@ def test_exact_finer_and_coarser_keep_the_outline_and_the_interface_of_the_plan(
     assert np.array_equal(again.points, body.points) and np.array_equal(again.quads, body.quads)
 
 
-@settings(max_examples=30, deadline=None)
 @given(size=st.floats(1e-6, 0.999), shorter=st.floats(0, 0.9), cell=st.floats(1e-6, 1),
        kind=st.sampled_from(["chamfer", "radius"]))
 def test_always_cells_are_convex_and_columns_grow_gently(size, shorter, cell, kind):

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from any_mesh_cases import FORMATS, GRID, drawn, interface_node, move, stored
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
@@ -55,7 +55,6 @@ def test_exact_alike_pieces_match_and_one_node_aside_does_not(tmp_path):
     assert not pair.matching and np.abs(pair.upper.x - pair.lower.x).max() == pytest.approx(1e-7, rel=1e-6)
 
 
-@settings(max_examples=30, deadline=None)
 @given(cells=st.lists(st.floats(0.1, 1.0), min_size=2, max_size=20), shift=st.floats(-1.0, 1.0))
 def test_always_any_nodes_between_the_same_ends_are_read(cells, shift, tmp_path_factory):
     x = np.concatenate([[0.0], np.cumsum(cells)]) / np.sum(cells)

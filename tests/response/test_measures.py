@@ -5,7 +5,7 @@ from math import acos, asin, cos, pi
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import G_N, BaseSine, Response
@@ -106,7 +106,6 @@ def test_exact_slip_of_a_resting_and_of_a_sliding_interface():
     assert steady["stick_fraction"] == 0.0 and "slip_start_phase" not in steady
 
 
-@settings(max_examples=50)
 @given(st.floats(0, pi), st.floats(0, 0.4))
 def test_always_circular_mean(middle, spread):
     found = measures.circular_mean([middle - spread, middle + spread, middle + pi, middle - 3 * pi])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import Outcome
@@ -73,7 +73,6 @@ def test_exact_what_would_grow_twenty_times_has_no_estimate():
         assert (settling.steady_amplitude(a, a)[0] is not None) == known == bool(20 * a[-1] > 2)
 
 
-@settings(max_examples=200)
 @given(st.lists(st.floats(-4e-7, 4e-7), min_size=2, max_size=8), st.floats(0.1, 10))
 def test_always_noise_is_steady(noise, size):
     assert settling.classify(size * (1 + np.array(noise)), 1e-3) is Outcome.STEADY
@@ -138,7 +137,6 @@ def test_exact_a_motion_of_three_cycles_is_steady_where_its_modes_have_died_out(
     assert settling.left_over(extremes, 12, 0.001) == pytest.approx(0.2)  # the run is too short to tell
 
 
-@settings(max_examples=50)
 @given(st.floats(0.1, 3.0), st.floats(0.05, 0.5), st.integers(1, 10))
 def test_always_less_is_left_of_a_longer_run(beat, decay, window):
     short, long = (settling.left_over(swinging(beat, decay, count), window, decay * window) for count in (60, 120))

@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from scene_texts import BENCH, FULL, LINEAR, PATCH, RIG
@@ -163,7 +163,6 @@ def mutated(draw):
     return text
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(mutated(), st.lists(st.sampled_from(ODD_SETS), max_size=2))
 def test_always_a_scene_or_a_scene_error(text, sets):
     try:

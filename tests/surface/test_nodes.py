@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from synthetic import sine
 
@@ -169,7 +169,6 @@ def test_refuses_missing_heights_bad_nodes_and_other_words():
         placed(trace(x, np.where(x == x[50], 0, np.nan)), EVEN)
 
 
-@settings(deadline=None)
 @given(grids(), st.floats(-1e-2, 1e-2), st.sampled_from(["auto", "centred"]))
 def test_always_placing_again_changes_nothing(grid, shift, how):
     nodes, x = grid

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from event_reference import basis_of, march_reference, random_basis, run_reference
 from event_run import combine, rows_of, run, simulate, starts
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import BaseSine, Outcome, PatchfemError, Segment, Start
@@ -79,7 +79,6 @@ def test_order_dependent_interfaces_against_a_march():
 
 # laws that hold for any system
 
-@settings(max_examples=25)
 @given(st.integers(0, 10**6), st.integers(1, 4), st.integers(1, 3), st.floats(0.4, 1.0), st.booleans(), st.booleans())
 def test_always_friction_law_and_energy(seed, n, faces, ratio, coupled, rigid):
     rng = np.random.default_rng(seed)
@@ -188,7 +187,6 @@ def test_exact_seven_interfaces_stop_together():
     assert energy_balance(many.ledger) < 1e-10
 
 
-@settings(max_examples=40)
 @given(st.integers(0, 10**6), st.integers(5, 11), st.floats(0.3, 1.0))
 def test_always_states_of_many_interfaces_satisfy_the_law(seed, faces, ratio):
     """All at rest at once: the accelerations of the choice agree with its signs, the forces with their limits."""

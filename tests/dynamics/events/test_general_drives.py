@@ -145,7 +145,7 @@ def test_always_the_energy_of_a_sweep_and_a_record_balances():
         assert energy_balance(done.ledger) < 1e-12 and done.ledger["friction"] > 0
 
 
-@settings(max_examples=15, deadline=None)
+@settings(settings.get_profile("costly"))
 @given(st.floats(0.2, 0.9), st.floats(0.05, 1.0), st.integers(0, 10**6))
 def test_always_a_record_of_a_force_never_beyond_the_limit_moves_nothing(size, start, seed):
     rng = np.random.default_rng(seed)

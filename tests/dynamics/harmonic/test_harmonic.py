@@ -33,7 +33,7 @@ def harmonics(seed, count, size=1.0):
 
 # ---- the laws along a periodic slide
 
-@settings(max_examples=15)
+@settings(settings.get_profile("costly"))
 @given(st.integers(0, 10**6), st.integers(1, 6), st.floats(0.05, 3.0))
 def test_always_elements_follow_the_plain_loop(seed, count, size):
     """Samples and true turning points in order, two turns, one element at a time."""
@@ -49,7 +49,7 @@ def test_always_elements_follow_the_plain_loop(seed, count, size):
     assert angles.size >= 2 and places.max() == pytest.approx(fine.max(), abs=1e-6 * np.ptp(fine))
 
 
-@settings(max_examples=6)
+@settings(settings.get_profile("costly"))
 @given(st.integers(0, 10**6), st.integers(1, 5), st.floats(0.05, 3.0))
 def test_always_bonds_follow_the_recursion(seed, count, size):
     """Turn after turn of friction.recursion.advance until the stretch repeats."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from event_run import simulate
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from march_paths import ALL
 from scipy.integrate import solve_ivp
@@ -175,7 +175,6 @@ def test_exact_two_alike_interfaces_stop_together():
     assert modes.omega[0] == 0.0
 
 
-@settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10_000))
 def test_always_energy_closes_and_friction_only_takes(seed):
     """Random chains of 2-4 masses with mixed laws and springs: balance at round-off, no law above its limit."""

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 from varying_load_cases import LAWS, LOAD, MASS, STILL, balance, crowned, elastic, mechanical, modes
@@ -137,7 +137,6 @@ def test_exact_no_friction_without_load():
         assert np.abs(r.force).max() > 0.1 * 0.3 * LOAD and np.count_nonzero(np.diff(apart.astype(int)) == -1) >= 3
 
 
-@settings(max_examples=25)
 @given(st.sampled_from(sorted(LAWS)), st.integers(0, 10**6), st.sampled_from([60, 200]))
 def test_always_nothing_creates_energy(name, seed, steps):
     """Random modes that carry all three, random starts and drives, coarse steps, bouncing: the balance closes, friction

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from friction_paths import pulled, triangle, upper_pressure, walk
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.closed_forms.friction import report_loop, reversal_force, stretch_loop, virgin_force
@@ -216,7 +216,6 @@ def test_exact_dwell_heals_the_length_and_leaves_the_force(hold, length, want):
 
 # ---- energy
 
-@settings(max_examples=60, deadline=None)
 @given(st.lists(st.floats(-4, 4), min_size=2, max_size=40), st.floats(0.1, 1), st.floats(0.01, 3), st.floats(0.01, 3))
 def test_always_the_stretch_ledger_closes(steps, ratio, rest, slip):
     """Work = stored + dissipated to 1e-12, and no step gives energy back."""

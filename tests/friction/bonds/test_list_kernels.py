@@ -245,7 +245,7 @@ def test_always_merging_of_growing_bonds_keeps_its_bound_at_small_strokes(order,
     assert got.tally[10] < 0.5 * whole.tally[10]
 
 
-@settings(max_examples=15, deadline=None)
+@settings(settings.get_profile("costly"))
 @given(st.integers(0, 10**6), st.sampled_from([0.01, 0.1, 0.7]), st.sampled_from([0.0, 0.5, 2.0]))
 def test_always_merging_of_any_path_is_close(seed, size, order):
     law = Bonds(1.0, 1.0, order, "stretch", initial=0.0)

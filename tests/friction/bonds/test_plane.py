@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from friction_paths import walk
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import gamma
@@ -129,14 +129,12 @@ def random_path(rng, legs):
                      axis=0)
 
 
-@settings(max_examples=40)
 @given(st.integers(0, 10**6), st.floats(-4, 4))
 def test_always_a_turned_path_turns_the_traction(seed, angle):
     turned(seed, angle)
 
 
 @pytest.mark.slow
-@settings(max_examples=400)
 @given(st.integers(0, 10**6), st.floats(-4, 4))
 def test_always_each_of_many_turned_paths_turns_the_traction(seed, angle):
     turned(seed, angle)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from friction_paths import lower_pressure, sum_by_hand, upper_pressure, walk
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.friction.bonds.parameters import Bonds
@@ -108,7 +108,6 @@ def test_exact_step_may_be_split_at_constant_length():
 
 # ---- passivity
 
-@settings(max_examples=80, deadline=None)
 @given(st.lists(st.tuples(st.floats(-6, 6), st.floats(0, 3), st.floats(0, 3), st.floats(1e-3, 2)), min_size=1,
                 max_size=40), growths(), st.floats(0, 1), st.floats(0.01, 100))
 def test_always_stretch_gives_no_energy_away(rows, growth, initial, length):
@@ -128,7 +127,6 @@ def test_always_stretch_gives_no_energy_away(rows, growth, initial, length):
     assert abs(work - sum(spent) - law.stored(state)[0]) <= 1e-12 * size
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.lists(st.floats(-3, 3), min_size=1, max_size=15), growths())
 def test_always_the_sum_over_bonds_gives_no_energy_away(steps, growth):
     law = Quadrature(Bonds(1.0, 1.0, **growth), tail=0.0)

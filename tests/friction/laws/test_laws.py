@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from friction_paths import triangle, upper_pressure, walk
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.closed_forms.friction import coulomb_loop_area, jenkins_loop
@@ -48,7 +48,6 @@ def test_exact_reversal_unloads_where_the_print_of_3_12_locks():
     assert printed[-1] == printed[21] > 1 and law[20] == 1.0 and law[-1] == -1.0
 
 
-@settings(deadline=None)
 @given(ROWS, st.floats(0.01, 10))
 def test_always_elastic_plastic_creates_no_energy(rows, length):
     """Pressure rising, falling and vanishing between and along the steps: the ledger closes, no loss is negative."""
@@ -96,7 +95,6 @@ def test_exact_a_held_traction_follows_a_falling_pressure_only(law, share):
     assert law.traction(law.press(state, one, 0 * one).state)[0] == 0
 
 
-@settings(deadline=None)
 @given(ROWS)
 def test_always_coulomb_dissipates_its_whole_work(rows):
     law = Coulomb(0.3)

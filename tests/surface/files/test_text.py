@@ -11,7 +11,7 @@ from time import process_time
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from traces import UM, bumpy, text
 
@@ -20,8 +20,6 @@ from patchfem.scene.keys.quantities import KINDS
 from patchfem.surface.files import raw
 from patchfem.surface.files.read import read_profile
 from patchfem.surface.files.text import UNITS
-
-QUIET = settings(deadline=None, suppress_health_check=list(HealthCheck))
 
 
 def read(tmp_path, content, name="before.csv"):
@@ -243,7 +241,6 @@ def attempt(content: bytes) -> None:
         assert process_time() - start < 2.0
 
 
-@QUIET
 @given(st.one_of(st.binary(max_size=300), st.text(max_size=200).map(lambda t: t.encode("utf-8", "surrogatepass")),
                  st.binary(max_size=100).map(lambda b: b"\x1f\x8b" + b),
                  lines_of_junk.map(lambda rows: ("x [um],z [um]\n" + "\n".join(rows)).encode()),
@@ -252,13 +249,11 @@ def test_always_junk_is_refused_by_name(content):
     attempt(content)
 
 
-@QUIET
 @given(st.integers(0, len(SEED)), st.integers(0, 40), st.binary(max_size=6))
 def test_always_a_damaged_file_is_read_or_refused_by_name(at, cut, put):
     attempt(SEED[:at] + put + SEED[at + cut:])
 
 
-@QUIET
 @given(st.lists(st.tuples(st.floats(), st.floats()), max_size=30), st.sampled_from([*UNITS]))
 def test_always_any_numbers_are_read_or_refused_by_name(rows, unit):
     attempt((f"x [{unit}] z [{unit}]\n" + "".join(f"{a!r} {b!r}\n" for a, b in rows)).encode())
