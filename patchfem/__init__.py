@@ -2,37 +2,41 @@
 
 Read the package in this order. A module imports its own entry of the list and the entries before it, nothing after:
 
-1. `faults`       named failures: a sentence for a person, the exit code
-2. `scales`       numbers as people read them: the unit by the size, the digits by the error
-3. `core`         the nouns that travel: interface, compliance, pressure, modal basis, response, measure, outcome
-4. `effects`      which key of a scene needs which module and equation
-5. `disk`         files written whole, folders with one writer
-6. `compiled`     where compiled code is kept
-7. `closed_forms` exact answers that tests, studies and users share
-8. `scene`        a TOML file becomes SI values, every mistake named at once
-9. `inputs`       files of measurements: columns, slide paths, signals, loops
-10. `mesh`         two coated pieces as tagged meshes
-11. `surface`     measured height profiles as a share of the gap
-12. `elasticity`   the pieces condensed to their interface, fields recovered inside
-13. `contact`     gap shapes, unilateral contact, skins, strips
-14. `friction`    laws of friction and the sum over bonds along the path
-15. `slip`        partial slip of the pieces: elements, shear modes, their tangent
-16. `structure`   the modes of the rig and what drives it
-17. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
-18. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
-19. `response`    measures of a run, outcome, events, levels, ringing
-20. `wear`        worn depth over many cycles
-21. `runs`        patch, bench and rig: where the pillars meet
-22. `identify`    values from measurements with intervals
-23. `campaigns`   many runs: fits, error against cost, sweeps
-24. `export`      summary, netCDF, VTK, report
-25. `api`         load, build, plan and run from Python
-26. `commands`    the verbs of the command line
+1. `later`        modules that are loaded at their first use
+2. `faults`       named failures: a sentence for a person, the exit code
+3. `scales`       numbers as people read them: the unit by the size, the digits by the error
+4. `core`         the nouns that travel: interface, compliance, pressure, modal basis, response, measure, outcome
+5. `effects`      which key of a scene needs which module and equation
+6. `disk`         files written whole, folders with one writer
+7. `compiled`     where compiled code is kept
+8. `closed_forms` exact answers that tests, studies and users share
+9. `scene`        a TOML file becomes SI values, every mistake named at once
+10. `inputs`      files of measurements: columns, slide paths, signals, loops
+11. `mesh`        two coated pieces as tagged meshes
+12. `surface`     measured height profiles as a share of the gap
+13. `elasticity`  the pieces condensed to their interface, fields recovered inside
+14. `contact`     gap shapes, unilateral contact, skins, strips
+15. `friction`    laws of friction and the sum over bonds along the path
+16. `slip`        partial slip of the pieces: elements, shear modes, their tangent
+17. `structure`   the modes of the rig and what drives it
+18. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
+19. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
+20. `response`    measures of a run, outcome, events, levels, ringing
+21. `wear`        worn depth over many cycles
+22. `runs`        patch, bench and rig: where the pillars meet
+23. `identify`    values from measurements with intervals
+24. `campaigns`   many runs: fits, error against cost, sweeps
+25. `export`      summary, netCDF, VTK, report
+26. `api`         load, build, plan and run from Python
+27. `commands`    the verbs of the command line
 
-From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used.
+From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used,
+and a module that is taken as a whole, as in `from .contact import halfspace`, is loaded at its first use (`later`).
 """
 
 from typing import TYPE_CHECKING
+
+from .later import modules_of
 
 if TYPE_CHECKING:
     from .api import (
@@ -63,13 +67,13 @@ __version__ = "0.4.0"
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
            "SceneError", "build", "compare", "cost", "demo", "load", "new", "plan", "plot", "run",
            "run_many", "sweep"]
+_later = modules_of(__name__, __path__)
 
 
 def __getattr__(name: str):
     if name not in __all__:
-        raise AttributeError(f"module 'patchfem' has no attribute {name!r}")
-    from . import api
-
+        return _later(name)
+    api = _later("api")
     globals().update({each: getattr(api, each) for each in __all__})
     return globals()[name]
 

@@ -63,28 +63,27 @@ from typing import Annotated, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 from . import __version__
-from .commands.compare import compare
-from .commands.lab import import_
-from .commands.look import export, report, view
-from .commands.profile import profile
-from .commands.run import run
-from .commands.scene import check, mesh, plan
+from .commands import compare, lab, look, profile, run, scene, start, study, sweep
 from .commands.shared import Ended, Refused, say
-from .commands.start import cite, demo, doctor, new, schema
 from .commands.streams import plain, ready
-from .commands.study import cost, fit
-from .commands.sweep import sweep
 
-VERBS = (new, demo, check, plan, run, sweep, profile, compare, cost, fit, mesh, import_, export, view, report, schema,
-         doctor, cite)
+# verb -> the module of its function, which is loaded where the verb is asked for
+VERBS = {"new": start, "demo": start, "check": scene, "plan": scene, "run": run, "sweep": sweep, "profile": profile,
+         "compare": compare, "cost": study, "fit": study, "mesh": scene, "import": lab, "export": look, "view": look,
+         "report": look, "schema": start, "doctor": start, "cite": start}
 
 OUT_OF_MEMORY = "out of memory; `patchfem plan` names what takes most of it and the key that drives it"
 
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
           help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem demo; "
                "for a scene of your own: patchfem new.")
-for verb in VERBS:
-    app.command(verb, name=verb.__name__.rstrip("_"))
+
+
+def known(words: list) -> None:
+    """Make the verb that is asked for known to the command line; all of them where it is none, as for their help."""
+    for verb in words[:1] if words[:1] and words[0] in VERBS else VERBS:
+        if verb not in app:
+            app.command(getattr(VERBS[verb], "import_" if verb == "import" else verb), name=verb)
 
 
 @app.command(name="--install-completion")
@@ -148,6 +147,7 @@ def _guarded(words: list, before=lambda: None) -> int:
         return 2
     try:
         before()
+        known(words)
         try:
             app(words, exit_on_error=False, print_error=False)
         except SystemExit as end:  # how cyclopts ends a verb and its help

@@ -15,17 +15,33 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .campaigns import cost as cost_curves
+from .campaigns.sweeps import ask, executors
+from .campaigns.sweeps import asked as asking
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
+from .export import cost as cost_files
+from .export import folder as results_folder
+from .export import histories, shown
+from .export import summary as summaries
+from .export.drawing import swept
+from .export.pages import lead, released, words
+from .export.surfaces import compare as compared_data
+from .export.sweeps import folder, page, tables
+from .export.sweeps import run as sweep_run
 from .model.model import Model
 from .model.model import build as build_model
+from .runs.many import many, meshes
 from .runs.plan import Plan
 from .runs.plan import plan as plan_model
 from .runs.results import result as found
 from .runs.run import run as run_plan
+from .scene import starting
 from .scene.changed import Base
 from .scene.scene import Scene, SceneError, loads, text_of, with_files
 from .scene.scene import load as load_file
 from .scene.sets import assignments, texts
+from .surface.compare import compare as comparison
+from .surface.compare import measured, verdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -98,17 +114,13 @@ def run(scene: str | Path | Scene | Model | Plan, /, *, say: Callable[[str], Non
 def demo(**sets: Any) -> Result:
     """Run the scene that comes with the program, the rig of the 1985 report at 143 Hz and 5 g; sets as `load` takes
     them."""
-    from .scene.starting import shipped
-
-    return run(shipped(), **sets)
+    return run(starting.shipped(), **sets)
 
 
 def new(kind: str, /) -> str:
     """The text of a scene of this kind to start from, which `load` and `run` take: patch, joint, bench, rig, linear,
     misalignment or wear; PatchfemError for any other word, with those that there are."""
-    from .scene.starting import text_of as starting
-
-    return starting(kind)
+    return starting.text_of(kind)
 
 
 def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Path | None = None,
@@ -121,16 +133,14 @@ def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Pat
     folder for cost.csv and pictures. say: called with one line per run, on
     stderr unless given. {} where the answer is exact; PatchfemError for a knob that the scene does not have.
     """
-    from .campaigns.cost import curve, knobs_of
-    from .export.cost import answer_of, shown, write, write_picture
-
     model, runs = build(scene, **sets), {}
-    for knob in [over] if over else knobs_of(model):
-        runs[knob] = curve(model, knob, _on_stderr if say is None else say)
+    for knob in [over] if over else cost_curves.knobs_of(model):
+        runs[knob] = cost_curves.curve(model, knob, _on_stderr if say is None else say)
         if out is not None:
-            write(Path(out), runs)
-            write_picture(Path(out), knob, runs[knob], model.accuracy.tolerance, shown(runs[knob]))
-    return {knob: answer_of(each, model.accuracy.tolerance) for knob, each in runs.items()}
+            cost_files.write(Path(out), runs)
+            names = cost_files.shown(runs[knob])
+            cost_files.write_picture(Path(out), knob, runs[knob], model.accuracy.tolerance, names)
+    return {knob: cost_files.answer_of(each, model.accuracy.tolerance) for knob, each in runs.items()}
 
 
 def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *, out: str | Path | None = None,
@@ -146,24 +156,17 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
     jobs: processes; executor: "dask" or "dask:ADDRESS". A case that is refused or fails has outcome "failed" and its
     message; SceneError where no case is valid.
     """
-    from .campaigns.sweeps import executors
-    from .campaigns.sweeps.ask import Request, cases_of
-    from .campaigns.sweeps.asked import Asked
-    from .export.pages.lead import lead_of
-    from .export.sweeps.folder import key_of
-    from .export.sweeps.page import table_of
-    from .export.sweeps.run import Place, sweep_into, swept
-    from .export.sweeps.tables import contents
-
-    asked = Asked(*_text_of(scene))
+    asked = asking.Asked(*_text_of(scene))
     lines = [one if isinstance(one, str) else ",".join(texts(key, one)) for key, one in (over or {}).items()]
-    request = Request([f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed)
-    cases, by = cases_of(asked, request), executors.of(executor, jobs)
-    place = None if out is None else Place(Path(out), resume)
-    found = swept(asked, cases, by, _on_stderr) if out is None else sweep_into(asked, cases, place, by, _on_stderr)
-    keys = [] if out is None or place.kept(len(cases)) == "none" else list(map(key_of, cases.names(asked)))
-    answer = lead_of(table_of(asked, cases, found, (), Path(out or ""))).answer()
-    return contents(asked, cases, found, keys, answer).to_xarray()
+    request = ask.Request([f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed)
+    cases, by = ask.cases_of(asked, request), executors.of(executor, jobs)
+    place = None if out is None else sweep_run.Place(Path(out), resume)
+    found = sweep_run.swept(asked, cases, by, _on_stderr) if out is None else \
+        sweep_run.sweep_into(asked, cases, place, by, _on_stderr)
+    named = [] if out is None or place.kept(len(cases)) == "none" else cases.names(asked)
+    keys = [folder.key_of(name) for name in named]
+    answer = lead.lead_of(page.table_of(asked, cases, found, (), Path(out or ""))).answer()
+    return tables.contents(asked, cases, found, keys, answer).to_xarray()
 
 
 class SweepPlots:
@@ -175,9 +178,7 @@ class SweepPlots:
 
         Hollow points miss the tolerance; values over two decades have a logarithmic axis. ax: Axes to draw on.
         """
-        from .export.drawing.swept import draw
-
-        figure = draw.figure(dataset, measure, onto=ax)
+        figure = swept.draw.figure(dataset, measure, onto=ax)
         return figure.axes[0] if ax is None else ax
 
 
@@ -191,12 +192,9 @@ def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[
     that serves all of them, as in a sweep. A model that cannot run has outcome "failed" and its message; SceneError
     for a mistake in a scene. One scene or model alone is a list of one.
     """
-    from .runs.many.many import answers
-    from .runs.many.meshes import meshed
-
     if isinstance(models, str | Path | Scene | Model):
         models = [models]
-    return answers(meshed([build(one) for one in models]), say=_on_stderr if say is None else say)
+    return many.answers(meshes.meshed([build(one) for one in models]), say=_on_stderr if say is None else say)
 
 
 def compare(before: str | Path, after: str | Path, /, *other: str | Path, direction: str = "",
@@ -211,14 +209,9 @@ def compare(before: str | Path, after: str | Path, /, *other: str | Path, direct
     `sentences` are words; `shift`, `worn_depth_mean`, `amplitude_ratio` and so on have `value`, `low`, `high`, `unit`,
     and a `reason` where the value is None. PatchfemError for files that do not fit together.
     """
-    from .export.surfaces.compare import data_of
-    from .surface.compare.compare import directions_of
-    from .surface.compare.measured import compared_files
-    from .surface.compare.verdict import verdicts
-
-    parts = compared_files((before, after, *other), direction, units, shift, keep_spikes)
-    directions = directions_of(parts)
-    return data_of(parts, verdicts(parts, directions), directions)
+    parts = measured.compared_files((before, after, *other), direction, units, shift, keep_spikes)
+    directions = comparison.directions_of(parts)
+    return compared_data.data_of(parts, verdict.verdicts(parts, directions), directions)
 
 
 def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
@@ -273,10 +266,7 @@ class Measures(Mapping):
         return list(self._measures)
 
     def __repr__(self) -> str:
-        from .export.pages.words import table_of
-        from .export.summary import measure_object
-
-        return "\n".join(table_of({name: measure_object(one) for name, one in self._measures.items()}))
+        return "\n".join(words.table_of({name: summaries.measure_object(one) for name, one in self._measures.items()}))
 
 
 class Plots:
@@ -314,9 +304,7 @@ class Plots:
             if self._result.plan.kind == "patch" else "no motion was computed"
 
     def _drawn(self, ax: Axes | None, names: tuple, lack: str) -> Axes:
-        from .export.shown import axes
-
-        found = axes(self._result, names, ax)
+        found = shown.axes(self._result, names, ax)
         if found is not None:
             return found
         raise PatchfemError(f"plot.{names[0]}: nothing to draw: {lack}")
@@ -332,12 +320,8 @@ class Result(found.Result):
 
     def _repr_html_(self) -> str:
         """The answer as a notebook shows it: outcome, headline, every measure in its group, warnings."""
-        from .export.pages.released import released
-        from .export.pages.words import fragment, verdict
-        from .export.summary import cycles_of, summary_of
-
-        summary = summary_of(self)
-        return fragment(summary, verdict(summary), cycles_of(self), released(self))
+        summary = summaries.summary_of(self)
+        return words.fragment(summary, words.verdict(summary), summaries.cycles_of(self), released.released(self))
 
     @property
     def notes(self) -> list[str]:
@@ -351,16 +335,12 @@ class Result(found.Result):
 
     def to_xarray(self) -> Dataset:
         """Histories and fields with units and the scene they came from: the Dataset that result.nc holds."""
-        from .export.histories import contents
-
-        return contents(self).to_xarray()
+        return histories.contents(self).to_xarray()
 
     def save(self, folder: str | Path) -> Path:
         """Write the results folder that `patchfem run -o` writes, and give its path; an older one is replaced.
 
         PatchfemError for a folder that holds other files.
         """
-        from .export.folder import save
-
-        save(self, Path(folder))
+        results_folder.save(self, Path(folder))
         return Path(folder)

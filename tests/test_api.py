@@ -60,7 +60,7 @@ def runs() -> dict:
 def test_exact_importing_imports_nothing_of_weight():
     modules = loaded(f"import patchfem as pf; dir(pf), pf.__version__\n{MODULES}")
     assert not {"numpy", "pydantic", "scipy", "xarray", "matplotlib"} & modules
-    assert {name for name in modules if name.startswith("patchfem")} == {"patchfem"}
+    assert {name for name in modules if name.startswith("patchfem")} == {"patchfem", "patchfem.later"}
 
 
 def test_exact_what_the_scene_does_not_name_is_not_imported():

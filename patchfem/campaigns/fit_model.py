@@ -13,6 +13,8 @@ from ..model.source import placed
 from ..runs.bench import bench as law_bench
 from ..runs.bench.engine import smooth_sum_of
 from ..runs.bench.ledger import Watch
+from ..runs.many import meshes
+from ..runs.patch import ladder
 from ..scene.changed import Base
 from ..scene.scene import Scene, SceneError
 from .fit_path import lead_in, whole_cycles
@@ -98,10 +100,8 @@ class BenchModel:
         if model.patch is None:
             return None
         if self.patch is None or self.moving:
-            from ..runs.patch.ladder import solve_all
-
             model = self._shared().given(model) if self.moving else model
-            self.patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]
+            self.patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]
             if self.patch.pressure.outcome is Outcome.NO_CONTACT:
                 raise PatchfemError(self.patch.pressure.outcome.sentence, "")
         return self.patch
@@ -109,8 +109,6 @@ class BenchModel:
     def _shared(self):
         """The meshes of the ends and the middle of every range of a key of [contact], the others in their middle."""
         if self.meshes is None:
-            from ..runs.many.meshes import Shared
-
             middle = [(one.low + one.high) / 2 for one in self.wanted]
             moved = [k for k, one in enumerate(self.wanted) if one.key.startswith("contact.")]
             ends = product(*((self.wanted[k].low, middle[k], self.wanted[k].high) for k in moved[:MOST_MOVED]))
@@ -123,7 +121,7 @@ class BenchModel:
                     models.append(build(self.scene_at(at)))
                 except PatchfemError:  # the descent will be told
                     continue
-            self.meshes, self.refused = Shared(models, False), refused
+            self.meshes, self.refused = meshes.Shared(models, False), refused
         return self.meshes
 
     def _on_lower(self) -> bool:

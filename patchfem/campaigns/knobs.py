@@ -5,7 +5,9 @@ from typing import NamedTuple
 
 from ..effects import has
 from ..model.model import Model
+from ..runs.bench import engine
 from ..runs.plan import plan
+from ..runs.rig import numerics
 from ..scene.rules.draft import acts
 
 KNOBS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
@@ -104,12 +106,9 @@ def _middle(model: Model, knob: str) -> int:
     if knob != "steps_per_cycle":
         return _pinned(model, knob) or MIDDLE[knob]
     if model.kind == "bench":
-        from ..runs.bench.engine import steps_of
+        return engine.steps_of(model)
 
-        return steps_of(model)
-    from ..runs.rig.numerics import choose
-
-    return choose(model).steps
+    return numerics.choose(model).steps
 
 
 def _with(model: Model, knob: str, value: int) -> Model:

@@ -14,6 +14,8 @@ from scipy.interpolate import PchipInterpolator
 
 from ..core import Missing, NotConverged, PatchfemError
 from ..model.model import Model
+from ..runs.patch import ladder
+from ..runs.wear import evolve
 from ..scene.keys.quantities import parse
 from ..scene.ranges import Range, ranges
 from ..scene.scene import SceneError
@@ -97,9 +99,8 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
     bounds, target = _bounds(free), measured_of(to)
     if model.patch is None:
         raise PatchfemError(f"--to {target.name}: one point under [normal] has no depth; name [contact]", "normal")
-    from ..runs.patch.ladder import solve_all
 
-    patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]  # no coefficient changes it
+    patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]  # no coefficient changes it
     curve, most = _curve(model, patch, bounds.high, target.name, progress)
     if not curve[1][-1] >= target.value:
         raise PatchfemError(f"--free {KEY}: with {bounds.high:.4g} m^2/N the scene reaches {target.name} = "
@@ -135,10 +136,8 @@ def _curve(model: Model, patch, coefficient: float, name: str, progress) -> tupl
 
     patch: that of the model as it is new.
     """
-    from ..runs.wear.evolve import evolve
-
     model = replace(model, wear=replace(model.wear, coefficient=coefficient))
-    found = evolve(model, patch, (None, None), progress)
+    found = evolve.evolve(model, patch, (None, None), progress)
     if found.stopped:
         raise PatchfemError(f"fit {KEY}: {found.stopped}")
     area = patch.pieces.interface.weight

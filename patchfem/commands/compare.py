@@ -6,6 +6,13 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..campaigns import compare as pressing
+from ..export import results, summary
+from ..export.surfaces import compare as paper
+from ..scene.keys import quantities
+from ..surface import profile
+from ..surface.compare import compare as comparison
+from ..surface.compare import measured, verdict
 from .shared import Json, Out, Quiet, Refused, Sets, Units, flag, model_of, note, say, scene_of, word
 
 
@@ -25,24 +32,18 @@ def compare(before: Path, after: Path, /, *other: Path,
     """
     if direction not in ("", "x", "y"):
         raise Refused(f"compare --direction {direction}: x or y is wanted")
-    from ..surface.compare.compare import directions_of
-    from ..surface.compare.measured import compared_files
-    from ..surface.compare.verdict import verdicts
 
     told = _length("shift", shift) if shift else None
     named = tuple(word.strip() for word in units.split(",")) if units else None
-    parts = compared_files((before, after, *other), direction, named, told, keep_spikes)
-    directions = directions_of(parts)
-    found = verdicts(parts, directions)
+    parts = measured.compared_files((before, after, *other), direction, named, told, keep_spikes)
+    directions = comparison.directions_of(parts)
+    found = verdict.verdicts(parts, directions)
     target = out if out is not None else Path("out") / f"{before.stem}-{after.stem}"
-    from ..export.results import Folder
-    from ..export.summary import write_json
-    from ..export.surfaces import compare as paper
 
-    with Folder(target) as folder:
+    with results.Folder(target) as folder:
         pressing = _pressed(scene, set_, parts[0], folder.path, quiet) if scene is not None else None
         data = paper.data_of(parts, found, directions, pressing)
-        write_json(data, folder.path / "compare.json")
+        summary.write_json(data, folder.path / "compare.json")
         paper.write_page(folder.path / "report.html", parts, found, pressing)
     for text in data["notes"]:
         note(text)
@@ -54,26 +55,20 @@ def compare(before: Path, after: Path, /, *other: Path,
 
 
 def _length(name: str, text: str) -> float:
-    from ..scene.keys.quantities import parse
-
     try:
-        return parse(text, "length")
+        return quantities.parse(text, "length")
     except ValueError as fault:
         raise Refused(f"compare --{name}: {fault}") from None
 
 
 def _pressed(scene: Path, sets, part, target: Path, quiet: bool):
     """The scene with each surface as its profile; the traces are written beside the page."""
-    from ..campaigns.compare import pressed
-    from ..export.surfaces.compare import surfaces, write_trace
-    from ..surface.profile import Profile
-
-    if not isinstance(part.before, Profile):
+    if not isinstance(part.before, profile.Profile):
         raise Refused("compare --scene: a scene presses traces; write one row of each scan to a file")
     if scene_of(scene, sets).contact is None:
         raise Refused(f"compare --scene {scene}: no [contact] in it; a surface is pressed into a patch")
     models = []
-    for name, trace in zip(("before", "after"), surfaces(part)):
-        path = write_trace(target / f"surface_{name}.csv", trace).resolve()
+    for name, trace in zip(("before", "after"), paper.surfaces(part)):
+        path = paper.write_trace(target / f"surface_{name}.csv", trace).resolve()
         models.append(model_of(scene, (*sets, f"contact.profile.file={path}", "contact.profile.heights=surface")))
-    return pressed(*models, scene.name, None if quiet else say)
+    return pressing.pressed(*models, scene.name, None if quiet else say)

@@ -8,6 +8,8 @@ from importlib.metadata import PackageNotFoundError, version
 from shutil import which
 from typing import NamedTuple
 
+from .. import __version__, compiled
+
 PICTURE = """\
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(32, 32))
@@ -38,7 +40,6 @@ def examined() -> list[Finding]:
 
 
 def _packages() -> Iterator[Finding]:
-    from .. import __version__
 
     yield Finding("python", sys.version_info >= (3, 11), sys.version.split()[0], "")
     yield Finding("patchfem", True, __version__, "")
@@ -56,9 +57,7 @@ def _version(name: str) -> str:
 
 def _cache() -> Finding:
     """Compiled code: a folder that cannot be written makes every command compile anew."""
-    from ..compiled import cache_folder, why_elsewhere
-
-    folder, why = cache_folder(), why_elsewhere()
+    folder, why = compiled.cache_folder(), compiled.why_elsewhere()
     sizes = [one.stat().st_size for one in folder.rglob("*") if one.is_file()]
     return Finding("compiled code", not why, f"{len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}",
                    why and f"{why}; name another folder in PATCHFEM_CACHE")

@@ -7,6 +7,16 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from .. import core
+from ..disk import whole
+from ..export.lab import modes as mode_lines
+from ..export.lab import write
+from ..identify import measured_modes
+from ..identify import measured_modes as measured
+from ..inputs import laboratory, records
+from ..inputs import universal as universal_files
+from ..scene.keys import quantities
+from ..structure import universal as universal_modes
 from .shared import Json, Refused, flag, note, texts, word
 
 
@@ -57,16 +67,12 @@ def import_(file: Path, /, *, out: Annotated[Path, Parameter(
 
 
 def _table(file: Path, out: Path, asked, zero: bool) -> dict:
-    from ..export.lab.write import write_table
-    from ..inputs.laboratory import read_records
-    from ..inputs.records import SI, from_zero, wanted
-
-    found = read_records(file, wanted(asked))
-    values = from_zero(found.values) if zero else found.values
-    units = {name: SI[name] for name in values}
-    write_table(out, values, units)
+    found = laboratory.read_records(file, records.wanted(asked))
+    values = records.from_zero(found.values) if zero else found.values
+    units = {name: records.SI[name] for name in values}
+    write.write_table(out, values, units)
     rows = len(next(iter(values.values())))
-    moved = [f"{name} starts at {values[name][0]:g} {SI[name]}" for name in ("time", "displacement", "lateral")
+    moved = [f"{name} starts at {values[name][0]:g} {records.SI[name]}" for name in ("time", "displacement", "lateral")
              if "displacement" in values and name in values and values[name][0] != 0]
     notes = [*found.notes, *([f"{', '.join(moved)}: slide.file wants a table that starts at 0; --zero counts from the "
                               "first row"] if moved else [])]
@@ -74,10 +80,6 @@ def _table(file: Path, out: Path, asked, zero: bool) -> dict:
 
 
 def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
-    from ..disk.whole import write_text
-    from ..export.lab.modes import fragment
-    from ..identify import measured_modes as measured
-
     shapes, notes = _shapes(file, asked, how)
     if shapes is not None:
         found = measured.of_shapes(*shapes)
@@ -85,7 +87,7 @@ def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
         values, notes = _records(file, asked)
         found = measured.of_decay(values, _second(how.begin, "--begin")) if how.decay else \
             measured.of_drive(values, _second(how.segment, "--segment"), _window(how.window), _band(how.band))
-    write_text(out, fragment(found, file.name))
+    whole.write_text(out, mode_lines.fragment(found, file.name))
     listed = [{"frequency": f, "damping": zeta, "about": about} for f, zeta, about in
               zip(found.frequency.tolist(), found.damping.tolist(), found.about)]
     told = "; ".join(f"{one['frequency']:.5g} Hz with a damping of {one['damping']:.4g}" for one in listed)
@@ -93,47 +95,35 @@ def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
 
 
 def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
-    from ..export.lab.write import write_response
-    from ..identify.measured_modes import estimated
-
     if how.decay or how.begin or how.band:
         raise Refused("--decay, --begin and --band belong to modes (-o modes.toml)")
     values, notes = _records(file, asked)
-    found, step, drive, response = estimated(values, _second(how.segment, "--segment"), _window(how.window))
-    write_response(out, found, drive, response)
+    segment, window = _second(how.segment, "--segment"), _window(how.window)
+    found, step, drive, response = measured_modes.estimated(values, segment, window)
+    write.write_response(out, found, drive, response)
     return {"lines": found.frequency.size, "segments": found.segments, "window": found.window, "notes": notes,
             "told": f"{response} over {drive}, {found.frequency.size} lines from {found.segments} segments of "
                     f"{found.segment * step:.4g} s, window {found.window}"}
 
 
 def _records(file: Path, asked) -> tuple:
-    from ..inputs.laboratory import read_records
-    from ..inputs.records import wanted
-
-    found = read_records(file, wanted(asked))
+    found = laboratory.read_records(file, records.wanted(asked))
     return found.values, found.notes
 
 
 def _shapes(file: Path, asked, how: Estimate) -> tuple:
     """((shapes, places), notes) of a universal file with modes or frequency responses; (None, ()) of any other."""
-    from ..inputs.laboratory import UNIVERSAL
-    from ..inputs.records import UNITS, wanted
-
     names = {text.partition("=")[0].strip() for text in asked}
-    if file.suffix.lower() not in UNIVERSAL or how != Estimate() or names & set(UNITS):
+    if file.suffix.lower() not in laboratory.UNIVERSAL or how != Estimate() or names & set(records.UNITS):
         return None, ()
-    from ..core import PatchfemError
-    from ..identify.measured_modes import PLACES
-    from ..inputs.universal import sets_of
-    from ..structure import universal
 
-    if not any(one["type"] == 55 or int(one.get("func_type", 0)) == 4 for one in sets_of(file)):
+    if not any(one["type"] == 55 or int(one.get("func_type", 0)) == 4 for one in universal_files.sets_of(file)):
         return None, ()
     try:
-        shapes = universal.read(file)
-    except PatchfemError as error:
+        shapes = universal_modes.read(file)
+    except core.PatchfemError as error:
         raise type(error)(str(error).removeprefix("structure.file: ")) from None
-    return (shapes, {one.quantity: one.source for one in wanted(asked, PLACES)}), ()
+    return (shapes, {one.quantity: one.source for one in records.wanted(asked, measured_modes.PLACES)}), ()
 
 
 def _second(text: str, option: str) -> float | None:
@@ -142,10 +132,8 @@ def _second(text: str, option: str) -> float | None:
 
 
 def _quantity(text: str, kind: str, option: str) -> float:
-    from ..scene.keys.quantities import parse
-
     try:
-        return parse(text, kind)
+        return quantities.parse(text, kind)
     except ValueError as error:
         raise Refused(f"{option} {text}: {error}") from None
 

@@ -5,6 +5,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..export import lab, reports
+from ..export.drawing import paraview
+from ..export.drawing import view as viewer
+from ..export.fields import vtu
+from ..export.lab import write
 from .shared import Refused, flag, out_in, say
 
 Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0, the pressed state; the last one unless "
@@ -21,28 +26,23 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
 
     Example: patchfem export out/rig -o histories.uff
     """
-    from ..export.lab import ENDINGS, FIELDS
-
-    fields = (folder / FIELDS).is_file() or not folder.is_dir()
-    if out.suffix.lower() in ENDINGS and (out.suffix != ".csv" or histories or not fields):
+    fields = (folder / lab.FIELDS).is_file() or not folder.is_dir()
+    if out.suffix.lower() in lab.ENDINGS and (out.suffix != ".csv" or histories or not fields):
         if frame is not None:
             raise Refused("--frame: belongs to fields (.vtu, .csv); histories have all their times in one file")
-        from ..export.lab.write import export as write_histories
 
-        print(write_histories(folder, out))
+        print(write.export(folder, out))
         return
     if histories:
-        raise Refused(f"--histories: they are written as {', '.join(ENDINGS)}, not as {out.suffix or out}")
+        raise Refused(f"--histories: they are written as {', '.join(lab.ENDINGS)}, not as {out.suffix or out}")
     if out.suffix == ".py":
         if frame is not None:
             raise Refused("--frame: a script plays the whole last cycle")
-        from ..export.drawing.paraview import write_script
 
-        print(write_script(folder, out))
+        print(paraview.write_script(folder, out))
         return
-    from ..export.fields.vtu import export as write
 
-    print(write(folder, out, frame))
+    print(vtu.export(folder, out, frame))
 
 
 def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif, .mp4, .html: the last cycle") = None,
@@ -52,9 +52,7 @@ def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif
 
     Example: patchfem view out/rig -o cycle.gif
     """
-    from ..export.drawing.view import view as show
-
-    show(folder, out, frame, magnify, say)
+    viewer.view(folder, out, frame, magnify, say)
 
 
 def report(*folders: Path, out: out_in("page.html, by default report.html here") = None,
@@ -65,8 +63,6 @@ def report(*folders: Path, out: out_in("page.html, by default report.html here")
 
     Example: patchfem report out/rig out/six --measured loop.csv -o both.html
     """
-    from ..export.reports import report_of
-
     if not folders:
         raise Refused("report: name at least one results folder")
-    print(report_of(list(folders), out, measured))
+    print(reports.report_of(list(folders), out, measured))

@@ -3,6 +3,12 @@
 import json
 from pathlib import Path
 
+from .. import __version__
+from ..export import results, summary
+from ..export.surfaces import roughness
+from ..scene.keys import quantities
+from ..surface.files import read
+from ..surface.roughness import report as roughness_report
 from .shared import Json, Refused, Units, flag, note, out_in, word
 
 
@@ -22,27 +28,19 @@ def profile(file: Path, /, *more: Path,
     for name in ("cutoff", "tip"):
         if asked[name] is not None and asked[name] <= 0:
             raise Refused(f"profile --{name} {cutoff if name == 'cutoff' else tip}: a length above zero is wanted")
-    from ..export.surfaces.roughness import data_of, lines_of, write_page
-    from ..surface.files.read import read_surface
-    from ..surface.roughness.report import report_of
 
     named = tuple(word.strip() for word in units.split(",")) if units else None
-    reports = [report_of(read_surface(path, named), **asked) for path in (file, *more)]
+    reports = [roughness_report.report_of(read.read_surface(path, named), **asked) for path in (file, *more)]
     for report in reports:
         if not json_:
-            print("\n".join(lines_of(report, verbose)))
+            print("\n".join(roughness.lines_of(report, verbose)))
         for text in report.notes:
             note(text)
-    from .. import __version__
-
-    answer = {"patchfem": __version__, "profiles": [data_of(one) for one in reports]}
+    answer = {"patchfem": __version__, "profiles": [roughness.data_of(one) for one in reports]}
     if out is not None:
-        from ..export.results import Folder
-        from ..export.summary import write_json
-
-        with Folder(out) as folder:
-            write_page(folder.path / "report.html", reports)
-            write_json(answer, folder.path / "profile.json")
+        with results.Folder(out) as folder:
+            roughness.write_page(folder.path / "report.html", reports)
+            summary.write_json(answer, folder.path / "profile.json")
     if json_:
         print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
     elif out is not None:
@@ -50,10 +48,8 @@ def profile(file: Path, /, *more: Path,
 
 
 def _length(name: str, text: str) -> float:
-    from ..scene.keys.quantities import parse
-
     try:
-        return parse(text, "length")
+        return quantities.parse(text, "length")
     except ValueError as error:
         raise Refused(f"profile --{name}: {error}") from None
 

@@ -5,6 +5,10 @@ import shlex
 import sys
 from pathlib import Path
 
+from ..disk import whole
+from ..export import folder, summary
+from ..export.pages import released, words
+from ..runs import plan
 from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, note, progress_bar, say, scene_of
 
 
@@ -17,21 +21,17 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
 
     Example: patchfem run rig.toml --set "drive.acceleration=6 g" -o out/six
     """
-    from ..export.folder import keeps, run_into
-    from ..runs.plan import compile_words
-    from ..runs.plan import plan as make
-
     talk = (lambda text: None) if quiet else say
-    what = make(scene_of(scene, set_))
-    if resume and not keeps(what):
+    what = plan.plan(scene_of(scene, set_))
+    if resume and not folder.keeps(what):
         raise Refused("run --resume: only a run with [wear] on a patch or a march in time keeps its state; run the "
                       "scene again")
     if verbose:
-        compiles = compile_words(what.compile_seconds)
+        compiles = plan.compile_words(what.compile_seconds)
         talk(f"about {what.seconds:.1f} s{compiles}, {what.steps} steps, engine {what.engine}")
     target = out if out is not None else Path("out") / what.model.source.path.stem
     with progress_bar(quiet or json_) as progress:
-        written = run_into(what, target, talk, progress, fresh, resume)
+        written = folder.run_into(what, target, talk, progress, fresh, resume)
     answer = written.summary
     try:
         if quiet and not json_:
@@ -53,13 +53,10 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
 
 def _draw(written, target: Path) -> None:
     """Draw the page last: whatever stops it, the results are in place and their place is said."""
-    from ..disk.whole import Unwritten
-    from ..export.folder import write_page
-
     try:
-        write_page(written, target)
-    except (OSError, MemoryError, Unwritten) as error:
-        why = str(error) if isinstance(error, Unwritten) else \
+        folder.write_page(written, target)
+    except (OSError, MemoryError, whole.Unwritten) as error:
+        why = str(error) if isinstance(error, whole.Unwritten) else \
             f"{target / 'report.html'}: {getattr(error, 'strerror', None) or 'out of memory'}"
         say(f"{why}; the results are whole, only their page is missing")
         raise Ended(4) from None
@@ -67,22 +64,18 @@ def _draw(written, target: Path) -> None:
 
 def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     """The verdict first, then what is known least well, every measure in its group, and where all of it is."""
-    from ..export.pages.released import released
-    from ..export.pages.words import headline, least_known, table_of, verdict
-    from ..export.summary import cycles_of
-
     answer = written.summary
     if answer["title"]:
         print(answer["title"])
-    print(f"{answer['outcome']}: {verdict(answer)}")
-    if text := headline(answer, cycles_of(written.result), released=released(written.result)):
+    print(f"{answer['outcome']}: {words.verdict(answer)}")
+    if text := words.headline(answer, summary.cycles_of(written.result), released=released.released(written.result)):
         print(text)
     sys.stdout.flush()
-    if text := least_known(written.result):
+    if text := words.least_known(written.result):
         print(text, flush=True)
     for text in answer["warnings"]:
         say(f"warning: {text}")
-    print("\n".join(table_of(answer["measures"])), flush=True)
+    print("\n".join(words.table_of(answer["measures"])), flush=True)
     for text in answer["notes"]:
         note(text)
     if verbose:

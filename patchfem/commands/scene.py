@@ -6,8 +6,14 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..campaigns.sweeps import ask, estimate
 from ..effects import shown_absent
+from ..mesh import files as mesh_files
+from ..model import files as model_files
+from ..runs import plan as plans
+from ..runs.patch import result
 from ..scales import tidied
+from ..scene import scene as scenes
 from .shared import Json, Refused, Sets, flag, model_of, note, say, scene_of
 from .sweep import Over
 
@@ -35,21 +41,16 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
 
 def _swept(scene: Path, sets, what: Over) -> tuple:
     """(what all cases share, the cases) of a sweep."""
-    from ..campaigns.sweeps.ask import asked_of
-
-    return asked_of(scene, sets, what.request())
+    return ask.asked_of(scene, sets, what.request())
 
 
 def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
     """Faults of the files that a scene names, and into `notes` what a run would say of them; without such files
     nothing is imported for them."""
-    from ..scene.scene import files_of
-
-    if not files_of(tables):
+    if not scenes.files_of(tables):
         return []
-    from ..model.files import faults
 
-    return faults(tables, folder, whole, notes)
+    return model_files.faults(tables, folder, whole, notes)
 
 
 def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Json = False,
@@ -59,8 +60,6 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
 
     Example: patchfem plan rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9"
     """
-    from ..runs.plan import plan as make
-
     over = what if what is not None and what.given() else None
     read = scene_of(scene, set_) if over is None else None
     if over is not None or read.sweep:
@@ -68,12 +67,10 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
             raise Refused("--probe solves the patch of one scene; name its values by --set and leave out what is swept")
         _plan_sweep(scene, set_, over or Over(), json_)
         return
-    found = make(read)
+    found = plans.plan(read)
     answer, asked = found.as_json(), found.model.patch
     if probe and asked is not None:
-        from ..runs.patch.result import probed
-
-        solved = probed(found.model)
+        solved = result.probed(found.model)
         answer["stiffness_chain"]["pieces_shear"] = solved["tangential_stiffness"] if asked.shear else "rigid"
         answer["probe"] = solved
     if json_:
@@ -84,9 +81,7 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
 
 def _plan_sweep(scene: Path, sets, what: Over, json_: bool) -> None:
     """The plan of a sweep."""
-    from ..campaigns.sweeps.estimate import estimate
-
-    answer = estimate(*_swept(scene, sets, what))
+    answer = estimate.estimate(*_swept(scene, sets, what))
     if json_:
         print(json.dumps(answer))
         return
@@ -96,14 +91,12 @@ def _plan_sweep(scene: Path, sets, what: Over, json_: bool) -> None:
 
 
 def _print_plan(answer: dict, probe: bool) -> None:
-    from ..runs.plan import compile_words
-
     print(f"kind     {answer['kind']}, engine {answer['engine']}")
     for effect in answer["effects"]:
         print(f"  runs   {effect['effect']:<28} {effect['equations']}")
     print(f"  not    {', '.join(shown_absent(answer['not_in_scene'], answer['engine']))}")
     print("sizes    " + ", ".join(f"{k} {v}" for k, v in answer["unknowns"].items()) + f", steps {answer['steps']}")
-    print(f"cost     about {answer['seconds']:.1f} s{compile_words(answer['compile_seconds'])} and "
+    print(f"cost     about {answer['seconds']:.1f} s{plans.compile_words(answer['compile_seconds'])} and "
           f"{answer['bytes'] / 1e6:.0f} MB")
     print("chain    " + " -> ".join(f"{k} {v:.4g} N/m" if not isinstance(v, str) else f"{k} {v}"
                                    for k, v in answer["stiffness_chain"].items()))
@@ -123,10 +116,8 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"],
     found = model_of(scene, set_)
     if found.patch is None:
         raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")
-    from ..mesh.files import write_mesh
-    from ..runs.patch.result import bodies
 
-    low, high = bodies(found)
-    write_mesh(low, out, high)
+    low, high = result.bodies(found)
+    mesh_files.write_mesh(low, out, high)
     for name, body in (("lower", low), ("upper", high or low)):
         print(f"{out}: {name} piece, {body.x.size} interface nodes, {body.length:.6g} m long, {body.height:.6g} m tall")

@@ -7,6 +7,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..model import model
+from ..scene import scene
 from .streams import plain
 
 
@@ -75,16 +77,12 @@ def scene_of(path: Path, sets, faults=None):
 
     faults: (tables, folder, whole) -> (key, message) of more mistakes.
     """
-    from ..scene.scene import load
-
-    return load(path, sets, faults)
+    return scene.load(path, sets, faults)
 
 
 def model_of(path: Path, sets):
     """What the scene of a file means, built once; SceneError names every mistake."""
-    from ..model.model import build
-
-    return build(scene_of(path, sets))
+    return model.build(scene_of(path, sets))
 
 
 class progress_bar:

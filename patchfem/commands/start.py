@@ -3,6 +3,11 @@
 import json
 from pathlib import Path
 
+from ..disk import whole
+from ..scene import scene as scenes
+from ..scene import schema as schemas
+from ..scene import starting
+from . import examine, sources
 from .run import run
 from .shared import Json, NoPage, Out, Refused, out_in, say
 
@@ -12,22 +17,19 @@ def new(kind: str = "", /, *, out: out_in("mine.toml in place of the screen") = 
 
     Example: patchfem new joint -o mine.toml
     """
-    from ..scene.starting import KINDS, text_of
-
     if not kind:
-        width = max(map(len, KINDS))
-        print("\n".join(f"{name:<{width}}  {about}" for name, about in KINDS.items()))
+        width = max(map(len, starting.KINDS))
+        print("\n".join(f"{name:<{width}}  {about}" for name, about in starting.KINDS.items()))
         return
-    text = text_of(kind)
+    text = starting.text_of(kind)
     if out is None:
         print(text, end="")
         return
     if out.exists():
         raise Refused(f"{out}: is there already; name another file by -o, or remove it")
-    from ..disk.whole import write_text
 
-    write_text(out, text)
-    print(f"{out}: {KINDS[kind]}\nnext: patchfem {'sweep' if '[sweep]' in text else 'run'} {out}")
+    whole.write_text(out, text)
+    print(f"{out}: {starting.KINDS[kind]}\nnext: patchfem {'sweep' if '[sweep]' in text else 'run'} {out}")
 
 
 def demo(*, out: Out = None, no_page: NoPage = False):
@@ -35,9 +37,7 @@ def demo(*, out: Out = None, no_page: NoPage = False):
 
     Example: patchfem demo
     """
-    from ..scene.starting import shipped
-
-    scene = shipped()
+    scene = starting.shipped()
     say(f"scene: {scene}; another to start from: patchfem new")
     run(scene, out=out if out is not None else Path("out") / "demo", no_page=no_page)
 
@@ -48,14 +48,11 @@ def schema(*, out: out_in("scene.json in place of the screen") = None):
 
     Example: patchfem schema -o scene.json
     """
-    from ..disk.whole import write_text
-    from ..scene.schema import schema as make
-
-    text = json.dumps(make(), indent=1, ensure_ascii=False) + "\n"
+    text = json.dumps(schemas.schema(), indent=1, ensure_ascii=False) + "\n"
     if out is None:
         print(text, end="")
         return
-    write_text(out, text)
+    whole.write_text(out, text)
     print(f"{out}: begin a scene with the line #:schema {out}")
 
 
@@ -65,9 +62,7 @@ def doctor(*, json_: Json = False):
 
     Example: patchfem doctor
     """
-    from .examine import examined
-
-    found = examined()
+    found = examine.examined()
     if json_:
         print(json.dumps([one._asdict() for one in found]))
         return
@@ -81,7 +76,4 @@ def cite(scene: Path | None = None, /):
 
     Example: patchfem cite rig.toml
     """
-    from ..scene.scene import load
-    from .sources import bibtex
-
-    print(bibtex(load(scene).named() if scene is not None else ()), end="")
+    print(sources.bibtex(scenes.load(scene).named() if scene is not None else ()), end="")

@@ -7,7 +7,20 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from .. import scales
+from ..campaigns import cost as cost_curves
+from ..campaigns import fit as loop_fits
+from ..campaigns import fit_path, wear_coefficient
+from ..campaigns.rows import asked as asking
+from ..campaigns.rows import fit as row_fits
 from ..effects import unbuilt
+from ..export import cost as cost_files
+from ..export import fit as fit_lines
+from ..export import fit_folder, results, wear_fit
+from ..export import fit_rows as written
+from ..model import model
+from ..scene import ranges
+from ..scene import scene as scenes
 from .shared import (
     Json,
     NotReached,
@@ -31,24 +44,21 @@ def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle,
 
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
-    from ..campaigns import cost as campaign
-
     found = model_of(scene, set_)
-    if over and over not in campaign.KNOBS:
+    if over and over not in cost_curves.KNOBS:
         raise Refused(unbuilt(f"cost --over {over}: no knob of this name",
-                              f"the knobs are {', '.join(campaign.KNOBS)}"))
-    knobs = [over] if over else campaign.knobs_of(found)
+                              f"the knobs are {', '.join(cost_curves.KNOBS)}"))
+    knobs = [over] if over else cost_curves.knobs_of(found)
     if not knobs:
         raise Refused(f"{scene}: no knob changes what this scene computes")
-    from ..export.cost import answer_of, shown, write, write_picture
 
     target, curves, answer = out if out is not None else Path("out") / f"{found.source.path.stem}-cost", {}, {}
     for knob in knobs:
-        runs = curves[knob] = campaign.curve(found, knob, None if quiet else say)
-        names = shown(runs)
-        table = write(target, curves)
-        picture = write_picture(target, knob, runs, found.accuracy.tolerance, names)
-        answer[knob] = answer_of(runs, found.accuracy.tolerance)
+        runs = curves[knob] = cost_curves.curve(found, knob, None if quiet else say)
+        names = cost_files.shown(runs)
+        table = cost_files.write(target, curves)
+        picture = cost_files.write_picture(target, knob, runs, found.accuracy.tolerance, names)
+        answer[knob] = cost_files.answer_of(runs, found.accuracy.tolerance)
         if not json_:
             _print_cost(knob, runs, names, answer[knob]["sentence"])
             print(f"results: {table} {picture}")
@@ -103,19 +113,14 @@ def fit(scene: Path, /, *, to: Annotated[str, Parameter(
     if found.wear is not None:
         _fit_wear(found, to, free, out, json_, quiet)
         return
-    from ..campaigns.fit import fit_loop
-    from ..campaigns.fit_path import Beside
-    from ..export.fit_folder import fit_into
 
-    fitted = fit_loop(found, Path(to), free, hold, None if quiet else say, Beside(offset, warm_up))
+    fitted = loop_fits.fit_loop(found, Path(to), free, hold, None if quiet else say, fit_path.Beside(offset, warm_up))
     target = out if out is not None else Path("out") / f"{found.path.stem}-fit"
-    answer = fit_into(fitted, target)
+    answer = fit_folder.fit_into(fitted, target)
     if json_:
         print(json.dumps(answer, ensure_ascii=False))
     else:
-        from ..export.fit import lines_of
-
-        print("\n".join(lines_of(answer)))
+        print("\n".join(fit_lines.lines_of(answer)))
         for text in answer["warnings"]:
             say(f"warning: {text}")
         print(f"results: {target}")
@@ -125,28 +130,22 @@ def fit(scene: Path, /, *, to: Annotated[str, Parameter(
 
 def _fit_rows(found, to: str, asked: tuple, out: Path | None, json_: bool, quiet: bool) -> None:
     """Fit a rig to rows; asked: (free, hold, Rows) as they stand on the command line."""
-    from ..campaigns.rows.asked import Question
-    from ..campaigns.rows.fit import Beside, Search, fit_rows
-    from ..export import fit_rows as written
-    from ..export.results import STARTS, Folder
-    from ..scene.ranges import ranges
-    from ..scene.scene import SceneError
-
     free, hold, rows = asked
-    wanted, wrong = ranges(free)
+    wanted, wrong = ranges.ranges(free)
     if wrong:
-        raise SceneError(wrong)
+        raise scenes.SceneError(wrong)
     if rows.starts < 1:
         raise Refused(f"--starts {rows.starts}: one at least is wanted")
     target, path = out if out is not None else Path("out") / f"{found.path.stem}-fit", Path(to)
-    with Folder(target, rows.resume) as folder, progress_bar(quiet or json_) as progress:
+    with results.Folder(target, rows.resume) as folder, progress_bar(quiet or json_) as progress:
         if folder.dropped and not quiet:
             say(folder.dropped)
         question = (found.resolved(), free, hold, rows.leave_out, rows.placebo, rows.seed, rows.unstable,
                     path.read_bytes() if path.is_file() else "")
-        how = Search(rows.starts, rows.seed, rows.unstable, written.Starts(folder.path / STARTS, question, rows.resume))
-        fitted = fit_rows(Question(found, wanted, path), Beside(hold, rows.leave_out, rows.placebo, how),
-                          None if quiet else say, progress)
+        starts = written.Starts(folder.path / results.STARTS, question, rows.resume)
+        how = row_fits.Search(rows.starts, rows.seed, rows.unstable, starts)
+        beside = row_fits.Beside(hold, rows.leave_out, rows.placebo, how)
+        fitted = row_fits.fit_rows(asking.Question(found, wanted, path), beside, None if quiet else say, progress)
         answer = written.fit_into(fitted, folder.path, folder.target)
     if json_:
         print(json.dumps(answer, ensure_ascii=False))
@@ -160,22 +159,16 @@ def _fit_rows(found, to: str, asked: tuple, out: Path | None, json_: bool, quiet
 
 
 def _fit_wear(found, to: str, free, out: Path | None, json_: bool, quiet: bool) -> None:
-    from ..campaigns.wear_coefficient import wear_coefficient
-    from ..export.wear_fit import fit_into
-    from ..model.model import build
-    from ..scales import plain
-    from ..scene.scene import loads
-
     with progress_bar(quiet or json_) as progress:
-        fitted = wear_coefficient(build(found), to, free, progress)
+        fitted = wear_coefficient.wear_coefficient(model.build(found), to, free, progress)
     target = out if out is not None else Path("out") / f"{found.path.stem}-fit"
-    text = loads(found.text, found.path, [*found.sets, fitted.bounds.assigned(fitted.value)]).resolved()
-    answer = fit_into(fitted, found.title, text, target)
+    text = scenes.loads(found.text, found.path, [*found.sets, fitted.bounds.assigned(fitted.value)]).resolved()
+    answer = wear_fit.fit_into(fitted, found.title, text, target)
     if json_:
         print(json.dumps(answer, ensure_ascii=False))
         return
     one = answer["values"]["wear.coefficient"]
-    value, low, high = (plain(number, 4) for number in (one["value"], *one["interval"]))
+    value, low, high = (scales.plain(number, 4) for number in (one["value"], *one["interval"]))
     print(f"wear.coefficient {value} {one['unit']}, {low} to {high} by the interval of {fitted.measured.name}")
     print(f"results: {target}")
 

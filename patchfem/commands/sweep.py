@@ -10,6 +10,12 @@ from typing import Annotated, Literal, NamedTuple
 
 from cyclopts import Parameter
 
+from .. import core
+from ..campaigns.sweeps import ask, executors
+from ..campaigns.sweeps import sweep as sweeping
+from ..export.pages import lead as leading
+from ..export.sweeps import page as sweep_page
+from ..export.sweeps import run
 from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, say, texts, word
 
 FIRST = 5  # messages of failed cases that are printed
@@ -35,15 +41,13 @@ class Over:
 
     def request(self):
         """The request; Refused where its parts do not stand together."""
-        from ..campaigns.sweeps.ask import Request
-
         if self.random and self.sobol:
             raise Refused("--random and --sobol: one of them draws the cases")
         if min(self.random, self.sobol, self.seed) < 0:
             raise Refused("--random, --sobol and --seed are whole numbers from 0 on")
         if (self.random or self.sobol) and not self.over:
             raise Refused("--random and --sobol want --over table.key=low..high to draw from")
-        return Request(self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed)
+        return ask.Request(self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed)
 
 
 @Parameter(name="*")
@@ -78,29 +82,24 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
 
     Example: patchfem sweep rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9" -j 2
     """
-    from ..campaigns.sweeps import executors
-    from ..campaigns.sweeps.ask import asked_of
-    from ..core import Missing
-    from ..export.sweeps.run import Place, collect, sweep_into
-
     if no_page and keep == "pages":
         raise Refused("sweep: --no-page leaves out every report.html, --keep pages asks for one of each case; name one "
                       "of them")
     by = by or By()
     begin, part = perf_counter(), by.part()
-    asked, cases = asked_of(scene, set_, (what or Over()).request())
+    asked, cases = ask.asked_of(scene, set_, (what or Over()).request())
     target = out if out is not None else Path("out") / f"{scene.stem}-sweep"
     tells = "json" if json_ else "faults" if quiet else "words"
     if by.collect:
-        _answer(asked, cases, collect(asked, cases, target, not no_page), Told(target, not no_page, tells, begin))
+        _answer(asked, cases, run.collect(asked, cases, target, not no_page), Told(target, not no_page, tells, begin))
         return
     line = Progress(quiet)
     try:
-        found = sweep_into(asked, cases, Place(target, resume, keep or "", part, not no_page),
+        found = run.sweep_into(asked, cases, run.Place(target, resume, keep or "", part, not no_page),
                            executors.of(by.executor, by.jobs), None if quiet else say, line)
-    except (KeyboardInterrupt, Missing) as why:
+    except (KeyboardInterrupt, core.Missing) as why:
         line.end()
-        if isinstance(why, Missing) and not line.done:
+        if isinstance(why, core.Missing) and not line.done:
             raise
         say(f"{str(why) or 'interrupted'}; {line.done} of {len(cases)} cases are kept; go on with: patchfem "
             f"{shlex.join([word for word in sys.argv[1:] if word != '--resume'])} --resume")
@@ -132,10 +131,8 @@ class Progress:
         self.open = sys.stderr.isatty()
 
     def __call__(self, done: int, total: int) -> None:
-        from ..campaigns.sweeps.sweep import Clock
-
         if self.clock is None:
-            self.clock = Clock(total, done)
+            self.clock = sweeping.Clock(total, done)
         text, self.done = self.clock(done - self.clock.done), done
         if self.silent or perf_counter() - self.said < (0.2 if self.open else 10.0):
             return
@@ -152,13 +149,11 @@ def _answer(asked, cases, found, told: Told) -> None:
     """What came out, the worst first."""
     from collections import Counter
 
-    from ..export.pages.lead import lead_of
-    from ..export.sweeps.page import table_of
 
     counts, target = dict(Counter(map(str, found.outcome)).most_common()), told.target
     failed = sorted(found.messages)
     if told.tells != "faults":
-        lead = lead_of(table_of(asked, cases, found, [], target))
+        lead = leading.lead_of(sweep_page.table_of(asked, cases, found, [], target))
     if told.tells == "json":
         print(json.dumps({"cases": len(found), "outcomes": counts, "failed": len(failed), "answer": lead.answer(),
                           "over_tolerance": lead.missed, "folder": str(target),

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, Pressure, frozen_array, say
 from ..elasticity.lapack import one_thread
+from . import gradients
 from .active_set import ROUND, Ask, Found, Operator, factor, flaw, nested_set, rest, settle
-from .gradients import descend, gradients
 
 LIMIT = 1e-9  # largest relative residual of a skin that still counts as solved
 SOLVED = 1e-12  # of a contact without a skin
@@ -49,12 +49,12 @@ def _fallen_back(operator: Operator, ask: Ask, limit: int) -> tuple:
     found, _, first = settle(operator, ask, np.ones(ask.x.size, bool), limit)
     if found is not None and flaw(found) <= SOLVED:
         return found, first
-    force, second = gradients(operator, ask)
+    force, second = gradients.gradients(operator, ask)
     # less is what the gradients did not yet clear
     found, _, third = settle(operator, ask, force > 1e-9 * force.max(), limit)
     if found is not None and flaw(found) <= SOLVED:
         return found, first + second + third
-    found, fourth = descend(operator, ask, force)
+    found, fourth = gradients.descend(operator, ask, force)
     return found, first + second + third + fourth
 
 

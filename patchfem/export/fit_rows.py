@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
+from ..campaigns.rows import cells as row_cells
 from ..campaigns.rows.fit import FittedRows
 from ..campaigns.rows.nulls import NULLS
 from ..core import G_N
@@ -91,10 +92,8 @@ def _starts(found, wanted) -> list:
 
 def _folds(fitted: FittedRows) -> list:
     """Every value left out: the training score of its fit, what it says of the readings left out, and its values."""
-    from ..campaigns.rows.cells import scores
-
     return [{"left_out": one.name, "training": one.found.fit.rms,
-             "scores": scores(fitted.cells, fitted.left, one.readings),
+             "scores": row_cells.scores(fitted.cells, fitted.left, one.readings),
              "values": dict(zip((free.key for free in fitted.asked.wanted), one.found.fit.values.tolist())),
              "starts": [rms if math.isfinite(rms) else None for rms in one.found.rms.tolist()]} for one in fitted.folds]
 

@@ -11,8 +11,10 @@ from ..core import Missing, NotConverged
 from ..disk.whole import write_text
 from ..runs.results.result import Result, without_folders
 from ..runs.run import KeptState, marches, run
-from . import netcdf
+from . import netcdf, shown
+from .fields import bodies as body_fields
 from .histories import contents
+from .pages import player
 from .results import PAGE, STATE, Folder
 from .summary import summary_of, write_json
 
@@ -69,9 +71,7 @@ def write(result: Result, path: Path) -> Written:
     write_text(path / "scene.resolved.toml", text)
     netcdf.write(contents(result), path / "result.nc")
     if result.patch is not None:
-        from .fields.bodies import write_fields
-
-        bodies = write_fields(result, path / "fields.vtkhdf")
+        bodies = body_fields.write_fields(result, path / "fields.vtkhdf")
     result.seconds["files"] = perf_counter() - begin
     answer = summary_of(result)
     write_json(answer, path / "summary.json")
@@ -83,10 +83,7 @@ def write_page(written: Written, folder: Path) -> Path:
 
     Missing where another run has replaced the folder in the meantime.
     """
-    from .pages.player import reel
-    from .shown import page_of
-
-    text, path = page_of(written.result, written.bodies, reel(folder)), Path(folder) / PAGE
+    text, path = shown.page_of(written.result, written.bodies, player.reel(folder)), Path(folder) / PAGE
     if not path.parent.is_dir() or _place(path.parent) != written.place:
         raise Missing(f"{folder}: replaced by another run while the page was drawn")
     write_text(path, text)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..model.structure import motions
+from ..model import structure
 from ..response.events import MEANINGS
 from ..response.levels import KEPT
 from ..response.rows import TABLE
@@ -64,7 +64,7 @@ def histories(result: Result) -> tuple:
         out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
         if not np.array_equal(r.slide, r.output):  # modes move the interface otherwise than the output
             out["slide"] = r.slide
-    return out, (list(rig.modes.names), motions(rig.modes, r.modal))
+    return out, (list(rig.modes.names), structure.motions(rig.modes, r.modal))
 
 
 def _between(result: Result) -> dict:

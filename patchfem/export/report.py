@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import scales
 from ..effects import shown_absent
-from .drawing import curves, pictures
+from .drawing import curves, pictures, wear
 from .pages import charts, player
 from .pages.document import Section, document
 from .pages.words import SHARP, G, headline, linked, others, pair, texts, units
@@ -116,7 +116,6 @@ def _levels(data: dict) -> Picture | None:
 def _wear(data: dict) -> Picture | None:
     if "wear" not in data:
         return None
-    from .drawing import wear
 
     states, history = data["wear"]["states"], data["wear"]["history"]
     profiles = (states["time"] / data["wear"]["period"], states["normal_stress"], states["worn_depth"])

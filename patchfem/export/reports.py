@@ -4,6 +4,7 @@ from pathlib import Path
 
 from ..core import PatchfemError
 from ..disk.whole import fault, write_text
+from ..inputs import laboratory, records
 from .pages import beside, sweep
 from .sweeps import page as sweeps
 
@@ -34,10 +35,7 @@ def report_of(folders: list, out: Path | None = None, measured: Path | None = No
 
 
 def _read(path: Path, runs: list) -> beside.Run:
-    from ..inputs.laboratory import read_records
-    from ..inputs.records import wanted
-
-    found = read_records(path, wanted(())).values
+    found = laboratory.read_records(path, records.wanted(())).values
     if not found.keys() & beside.KNOWN.keys() - {"time"}:
         raise PatchfemError(f"--measured {path}: none of {', '.join(beside.KNOWN)} in it (there: {', '.join(found)})")
     return beside.measured(path.name, found, runs[0])

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from ..core import BaseSine, PatchfemError
+from ..inputs import loops, measured
+from ..response import spectrum
 from ..runs.results.result import Result
 from ..structure.drive_sizes import largest
 from .histories import largest_multiplier
@@ -55,19 +57,16 @@ def report_data(result: Result) -> dict:
                               "base": w.base_acceleration, "force": w.force, "slide": w.slide}
             data["loop"] |= {"period": result.extra["period"]}
     if model.measured is not None:
-        from ..inputs.measured import read_table
-
         path, gain, kind, cutoff = model.measured
         rig = model.rig
-        data["measured"] = {"rows": read_table(path), "frequency": rig.frequency if rig is not None else None,
+        data["measured"] = {"rows": measured.read_table(path), "frequency": rig.frequency if rig is not None else None,
                             "gain": gain, "reading": "peak", "share": 1.0}
         if rig is not None:
             data["measured"]["input"] = largest(rig.drive)
             if kind != "peak" and isinstance(rig.drive, BaseSine) and "absolute_acceleration_peak" in result.measures:
-                from ..response.spectrum import reading
-
                 peak = result.measures["absolute_acceleration_peak"].value
-                data["measured"] |= {"reading": kind, "share": reading(w, rig.drive, peak, kind, cutoff) / peak}
+                share = spectrum.reading(w, rig.drive, peak, kind, cutoff) / peak
+                data["measured"] |= {"reading": kind, "share": share}
     return data
 
 
@@ -75,10 +74,9 @@ def _recorded(folder: Path, slide: dict, response) -> tuple | None:
     """Times [s], slides [m] and forces [N] that the file of a slide holds beside it; None where it holds no force."""
     if slide["kind"] != "file":
         return None
-    from ..inputs.loops import read_loop
 
     try:
-        read = read_loop(folder / slide["file"])
+        read = loops.read_loop(folder / slide["file"])
     except PatchfemError:  # a path alone; its own faults were found when it was read as one
         return None
     if read.time is None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core import PatchfemError
+from ..structure import places as structure_places
 from ..structure.places import Shapes
 from .decay import decay
 from .driven_modes import POWER, SAMPLES, Modes, driven_modes
@@ -141,15 +142,13 @@ def of_shapes(shapes: Shapes, places: dict) -> Listed:
 
     The mass is that which the modes hold at the place that slides (or `base`), 1 / sum phi^2: no less is possible.
     """
-    from ..structure.places import AXES
-
     if "slide" not in places:
         if len(shapes.motion) != 1:
             first = next(iter(shapes.motion))
             raise PatchfemError(f"the file has {len(shapes.motion)} places; say where the contact slides, such as "
-                                f"--map slide={first[0]}:+{AXES[first[1]]}")
+                                f"--map slide={first[0]}:+{structure_places.AXES[first[1]]}")
         node, axis = next(iter(shapes.motion))
-        places = {"slide": f"{node}:+{AXES[axis]}", **places}
+        places = {"slide": f"{node}:+{structure_places.AXES[axis]}", **places}
     motion = {key: shapes.at(text, key) for key, text in places.items()}
     held = float(np.sum(motion.get("base", motion["slide"])**2))
     if not held > 0:

@@ -3,6 +3,7 @@
 import os
 
 from ..core import PatchfemError
+from . import matlab73
 from .matlab5 import DAMAGED
 from .matlab5 import variables as of_version_5
 
@@ -28,7 +29,5 @@ def variables(path, data: bytes) -> dict:
     path: for messages; data: the bytes of the file. PatchfemError where it is damaged or too large.
     """
     if data.startswith((HDF5, b"MATLAB 7.3")) or data[512:520] == HDF5:
-        from .matlab73 import variables as of_hdf5  # h5py takes 0.1 s
-
-        return of_hdf5(path, data)
+        return matlab73.variables(path, data)
     return of_version_5(path, data)

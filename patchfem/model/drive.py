@@ -6,6 +6,8 @@ import numpy as np
 
 from ..core import BaseSine, ModalBasis, PatchfemError
 from ..effects import module_of
+from ..inputs import signals
+from ..structure import drives
 from ..structure.drive_sizes import Asked, level_cycles, own_period
 
 
@@ -14,9 +16,7 @@ def drive_of(scene, modes: ModalBasis):
     modal mass F/m. `modes` gives the cycle of what has no frequency of its own."""
     drive = scene.drive
     if drive.kind == "free":
-        from ..structure.drives import release
-
-        return release(own_period(modes))
+        return drives.release(own_period(modes))
     asked = Asked(drive, modes.mass, own_period(modes), lambda: recorded(scene))
     if drive.waveform == "sine":
         omega = 2 * np.pi * drive.frequency
@@ -62,6 +62,4 @@ def record(path, kind: str) -> tuple:
 
 @lru_cache(maxsize=4)
 def _read(path, name: str, _changed: int) -> tuple:
-    from ..inputs.signals import read_signal
-
-    return read_signal(path, name)
+    return signals.read_signal(path, name)

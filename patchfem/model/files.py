@@ -8,7 +8,11 @@ check otherwise.
 from pathlib import Path
 
 from ..faults import PatchfemError
+from ..inputs import measured
+from ..mesh import files
+from ..scene.rules import limits
 from ..scene.scene import files_of, is_there
+from . import drive, patch, profile, slide, structure_files
 
 WHOLE = 2 * 2**20  # bytes of a mesh that is read whole
 STARTS = {".msh": (b"$MeshFormat",), ".vtu": (b"<?xml", b"<VTKFile"), ".inp": (b"*",), ".unv": (b"-1", b"    -1")}
@@ -38,9 +42,7 @@ def faults(tables, folder: Path, whole: bool = True, notes: list | None = None) 
 def _mesh(path: Path, tables, whole: bool) -> None:
     start = STARTS.get(path.suffix)
     if start is None or path.stat().st_size <= WHOLE:
-        from ..mesh.files import read_pieces
-
-        read_pieces(path)
+        files.read_pieces(path)
         return
     with open(path, "rb") as file:
         if not file.read(4096).lstrip().startswith(start):
@@ -51,53 +53,42 @@ def _profile(path: Path, tables, whole: bool) -> tuple:
     """A trace that covers the interface and is no finer than the patch can show; what is done to it."""
     import numpy as np
 
-    from .patch import AUTOMATIC_CELLS, interface_of, pieces_asked, profile_lengths
-    from .profile import profile_gap, trace_of
 
-    trace_of(path)
+    profile.trace_of(path)
     contact = tables.contact
     if not whole or contact.mesh is not None:
         return ()
-    pieces = pieces_asked(contact)
-    length = interface_of(pieces)
-    size = contact.element_size or length / AUTOMATIC_CELLS
+    pieces = patch.pieces_asked(contact)
+    length = patch.interface_of(pieces)
+    size = contact.element_size or length / patch.AUTOMATIC_CELLS
     x = np.linspace(-length / 2, length / 2, max(1, round(length / size)) + 1)
-    return profile_gap(path, x, profile_lengths(contact, pieces), contact.asperities is not None,
+    return profile.profile_gap(path, x, patch.profile_lengths(contact, pieces), contact.asperities is not None,
                        contact.profile.heights == "surface")[1]
 
 
 def _slide(path: Path, tables, whole: bool) -> None:
     """A path that the law and the contact can follow, sideways too where it goes there."""
-    from ..scene.rules.limits import sideways
-    from .slide import rows_of
-
-    across = len(rows_of(path)) == 3
-    if whole and across and (reason := sideways(tables)):
+    across = len(slide.rows_of(path)) == 3
+    if whole and across and (reason := limits.sideways(tables)):
         raise PatchfemError(reason)
 
 
 def _drive(path: Path, tables, whole: bool) -> None:
-    from .drive import record
-
     if whole or tables.drive.kind is not None:
-        record(path, tables.drive.kind)
+        drive.record(path, tables.drive.kind)
 
 
 def _structure(path: Path, tables, whole: bool) -> None:
     """The arrays of the file as a basis; a universal file is only read, its responses are not fitted here."""
-    from .structure_files import built, content
-
     if path.suffix.lower() in (".uff", ".unv") or not whole:
-        content(path)
+        structure_files.content(path)
         return
     rubs = tables.friction is not None or bool(tables.structure.interface)
-    built(path, tables.structure, tables.drive, rubs)
+    structure_files.built(path, tables.structure, tables.drive, rubs)
 
 
 def _measured(path: Path, tables, whole: bool) -> None:
-    from ..inputs.measured import read_table
-
-    read_table(path)
+    measured.read_table(path)
 
 
 READERS = {"contact.mesh": _mesh, "contact.profile.file": _profile, "slide.file": _slide, "drive.file": _drive,

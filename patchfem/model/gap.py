@@ -14,6 +14,7 @@ import numpy as np
 from ..contact import gaps
 from ..effects import SHAPES
 from ..scene.keys.contact import Contact
+from . import profile as profile_gaps
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -65,11 +66,10 @@ class Gap:
         beside one of them, or what the scene or the file allows at least; None without a profile."""
         if self.profile is None:
             return None
-        from .profile import spacing_of
 
         beside = loaded[1:] | loaded[:-1]
         longest = np.diff(x)[beside].max(initial=0.0) or np.diff(x).max()
-        return float(max(longest, self.average or spacing_of(self.profile)))
+        return float(max(longest, self.average or profile_gaps.spacing_of(self.profile)))
 
     def rim(self, x) -> np.ndarray:
         """Half the height of the steps whose edge is a node, (m,) [m] at x (m,) [m]; 0 elsewhere."""
@@ -85,10 +85,9 @@ class Gap:
             gap = gap + getattr(gaps, name)(x, **keys)
             seconds[name] = perf_counter() - begin
         if self.profile is not None:
-            from .profile import profile_gap
-
             begin = perf_counter()
-            heights, notes = profile_gap(self.profile, x, (self.average, self.limit), self.rough, self.material)
+            heights, notes = profile_gaps.profile_gap(self.profile, x, (self.average, self.limit), self.rough,
+                                                      self.material)
             gap = gap + heights
             seconds["profile"] = perf_counter() - begin
         return gap, notes, seconds

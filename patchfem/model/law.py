@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ..core import PatchfemError
 from ..effects import module_of
+from ..friction.bonds import parameters, spread
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -48,9 +49,7 @@ def acting(f, width: float | None, where):
         except PatchfemError as error:
             raise PatchfemError(f"{where('friction.temperature')}: {error}") from None
     if f.spread is not None:
-        from ..friction.bonds.spread import pad_factor
-
-        share = pad_factor(width, f.spread)
+        share = spread.pad_factor(width, f.spread)
         new |= {"static": f.static * share, "kinetic": None if f.kinetic is None else f.kinetic * share}
     return f.model_copy(update=new)
 
@@ -60,10 +59,8 @@ def bonds_of(f, speed: float, least: float = 0.0):
 
     The floor v_h of the speed defaults to 1e-3 of the peak speed [m/s], but not below `least`.
     """
-    from ..friction.bonds.parameters import Bonds
-
     ratio = f.kinetic / f.static if f.static > 0 else 1.0
-    return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
+    return parameters.Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
                  f.rest_speed or max(1e-3 * speed, least), f.initial_bonds, f.breakaway)
 
 

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core import Missing
+from ..friction import grooves
 from .slide import SlidePath
 
 if TYPE_CHECKING:
-    from ..friction.grooves import Grooves
+    pass
 
 MOST_SAMPLES = 5_000_000
 
@@ -59,15 +60,13 @@ class PointLoad:
         return grid, np.interp(grid, time, place)
 
 
-def grooves_asked(scene) -> Grooves | None:
+def grooves_asked(scene) -> grooves.Grooves | None:
     """The grooves of [contact] or [normal] that the load climbs; None without them, and where they are flat."""
     for name in ("contact", "normal"):
         table = getattr(scene, name)
         if table is not None and table.grooves is not None and table.grooves.amplitude:
-            from ..friction.grooves import Grooves
-
             g = table.grooves
-            return Grooves(g.wavelength, g.amplitude, g.phase, g.lifted_mass, f"{name}.grooves")
+            return grooves.Grooves(g.wavelength, g.amplitude, g.phase, g.lifted_mass, f"{name}.grooves")
     return None
 
 

@@ -12,6 +12,11 @@ from ..core import PatchfemError
 from ..effects import absent
 from ..scene.keys.tables import Accuracy, Friction, Temperature
 from ..scene.scene import Scene
+from . import load as of_load
+from . import patch as of_patch
+from . import rig as of_rig
+from . import slide as of_slide
+from . import wear as of_wear
 from .law import acting, bonds_of, pad_width
 from .source import Source
 
@@ -107,21 +112,13 @@ def build(scene: Scene) -> Model:
                             "leave [sweep] out")
     patch = point = slide = rig = grooves = None
     if scene.contact is not None:
-        from .patch import patch_asked
-
-        patch = patch_asked(scene.contact, scene.kind, scene.beside)
+        patch = of_patch.patch_asked(scene.contact, scene.kind, scene.beside)
     if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
-        from .load import grooves_asked, point_asked
-
-        point, grooves = point_asked(scene), grooves_asked(scene)
+        point, grooves = of_load.point_asked(scene), of_load.grooves_asked(scene)
     if scene.slide is not None:
-        from .slide import slide_asked
-
-        slide = slide_asked(scene)
+        slide = of_slide.slide_asked(scene)
     if scene.structure is not None:
-        from .rig import rig_asked
-
-        rig = rig_asked(scene)
+        rig = of_rig.rig_asked(scene)
     if patch is not None and (scene.wear is not None or (rig is not None and rig.load_varies)):
         patch = replace(patch, sweeps="wear" if scene.wear is not None else "load")
     friction, heat, spread, pad = _law(scene)
@@ -146,9 +143,8 @@ def _measured(scene: Scene, table) -> tuple:
 def _wear(scene: Scene) -> WearModel | None:
     if scene.wear is None:
         return None
-    from .wear import wear_asked
 
-    return wear_asked(scene.wear)
+    return of_wear.wear_asked(scene.wear)
 
 
 def _law(scene: Scene) -> tuple:

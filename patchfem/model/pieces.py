@@ -1,8 +1,9 @@
 """Grids and elastic layers of the two pieces of a patch: made, or read from a mesh file."""
 
-from ..closed_forms.contact import rounded_punch_half_width
+from ..closed_forms import contact
 from ..core import PatchfemError
 from ..elasticity.elasticity import Layers
+from ..mesh import files, shaped
 from ..mesh.tensor import GROWTH, TensorGrid, graded_grid
 from .patch import OnePiece, PatchModel
 
@@ -25,9 +26,8 @@ def outlined(patch: PatchModel, piece: OnePiece, grid: TensorGrid, growth: float
     """
     if not patch.outlined:
         return grid
-    from ..mesh.shaped import shaped_grid
 
-    return shaped_grid(grid, piece.length, piece.end, growth)
+    return shaped.shaped_grid(grid, piece.length, piece.end, growth)
 
 
 def rounded_edges(patch: PatchModel) -> tuple:
@@ -44,7 +44,7 @@ def rounded_edges(patch: PatchModel) -> tuple:
     flat = min(piece.length / 2 - piece.end.size for piece in (patch.lower, patch.upper))
     faces = [piece.coating.material if piece.coating else piece.substrate for piece in (patch.lower, patch.upper)]
     modulus = 1 / sum((1 - face.poisson**2) / face.young for face in faces)
-    half = rounded_punch_half_width(load, flat, 1 / sum(1 / radius for radius in rounded), modulus)
+    half = contact.rounded_punch_half_width(load, flat, 1 / sum(1 / radius for radius in rounded), modulus)
     half = min(half, patch.length / 2)
     return (-half, -flat, flat, half), half - flat
 
@@ -57,10 +57,9 @@ def bodies_of(patch: PatchModel) -> tuple:
     """
     if patch.mesh is None:
         return grid_of(patch, patch.lower), None if patch.alike else grid_of(patch, patch.upper)
-    from ..mesh.files import read_bodies
 
     try:
-        low, high = read_bodies(patch.mesh)
+        low, high = files.read_bodies(patch.mesh)
     except PatchfemError as error:
         error.key = error.key or "contact.mesh"
         raise

@@ -11,8 +11,9 @@ import numpy as np
 from ..core import ModalBasis, PatchfemError, Start, frozen_array
 from ..effects import module_of
 from ..scene.keys.same import once
-from ..structure import starts
+from ..structure import masses, starts
 from ..structure.modes import basis
+from . import structure_files
 
 
 def modes_of(scene, own: ModalBasis | None = None) -> ModalBasis:
@@ -61,8 +62,6 @@ def own_modes(scene) -> ModalBasis:
     if structure.mode:
         return _of_modes(structure, forced)
     if structure.masses:
-        from ..structure import masses
-
         return masses.basis(structure.masses, [(s.between, s.stiffness) for s in structure.spring],
                             [(d.between, d.coefficient) for d in structure.damper],
                             [i.between for i in structure.interface], structure.output_mass or 1,
@@ -88,9 +87,7 @@ def notes_of(scene) -> list:
 
 def _read(scene) -> tuple:
     """(basis, notes) of structure.file."""
-    from .structure_files import found_in_file
-
-    return found_in_file(scene)
+    return structure_files.found_in_file(scene)
 
 
 def pushed_mass(structure, drive) -> int:

@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import compiled
+
 LEAST_PERIODS = 1.5  # of the ring in a stick; below them frequency and decay cannot be told apart
 LEAST_SAMPLES = 16
 MOST_SAMPLES, MOST_STICKS, MOST_TERMS = 600, 20, 3
@@ -145,12 +147,10 @@ def _fitted(time, value, forced, poles, *ends) -> tuple:
     """(times that a fit was looked at, the sum of squares that the best one leaves, its room as
     `ringing_kernels.fitted` has it, until the next call); poles (2 r,) move to the best ones, not at all without
     `ends`."""
-    from ..compiled import kernels  # runs in which nothing rings load no compiled code
-
     room = _room(forced.shape[1] + poles.size, poles.size, time.size)
     room[0][0, :forced.shape[1]] = forced.T
     ends = np.array([*ends, STEPS] if ends else [0.0] * 4)
-    return *kernels(KERNELS).fitted(time, value, poles, np.abs(poles) + 1 / time[-1], ends, room), room
+    return *compiled.kernels(KERNELS).fitted(time, value, poles, np.abs(poles) + 1 / time[-1], ends, room), room
 
 
 @lru_cache(maxsize=16)

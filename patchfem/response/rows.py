@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from ..core import Response, Row
+from ..dynamics import work_check as work_checks
 from ..dynamics.integrated import Integrated
-from ..dynamics.work_check import gap
-from ..structure.drive_sizes import largest, whole
+from ..structure import drive_sizes
 from .loops import Turn, drift, half_range, interface_loop, secant_stiffness, turns_of
 from .measures import REST, acceleration_peak, circular_mean, energy_balance, ledger_measures, slip_measures
 from .spectrum import FLOOR, odd_harmonics, wave_measures
@@ -59,7 +59,7 @@ class Seen:
     @cached_property
     def whole(self) -> bool:
         """Whether the window holds whole cycles of the drive."""
-        return whole(self.span, self.drive)
+        return drive_sizes.whole(self.span, self.drive)
 
     @cached_property
     def slip(self) -> dict:
@@ -115,7 +115,7 @@ class Seen:
             return {}
         if self.own.waves is None:
             return wave_measures(*odd_harmonics(self.window, self.drive))
-        return wave_measures(*self.own.waves, largest(self.drive))
+        return wave_measures(*self.own.waves, drive_sizes.largest(self.drive))
 
     @cached_property
     def energies(self) -> dict:
@@ -127,7 +127,7 @@ class Seen:
         """Gap [1] of the two books of friction work; None where the engine has no second one."""
         if self.load is None or self.own.books is None:
             return None
-        return gap(*self.own.books, self.book["power"] + self.book["peak_stored"])
+        return work_checks.gap(*self.own.books, self.book["power"] + self.book["peak_stored"])
 
     def others(self) -> list:
         """The interfaces after the first as last cycles of their own; of the work of each the samples tell."""

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..dynamics.events import event_list as listed
+from . import ringing
 from .events import BORDER, MOST, RELEASE_UP, REVERSAL_UP, STOP, Events, detected, states, sticks, table
 from .measures import slip_noise
-from .ringing import ringing
 
 OF_LOG = {0: STOP, 1: RELEASE_UP, -1: RELEASE_UP + 1, 2: REVERSAL_UP, -2: REVERSAL_UP + 1, 9: BORDER}
 LEAST = -min(OF_LOG)
@@ -87,7 +87,7 @@ def rings(window, modes, drive, log=None, held: float = 0.0, repeats: bool = Fal
         spans = of_a_cycle(spans, window.time[-1], drive.period)
     if not spans:
         return {}, {}
-    return ringing(window.time, window.acceleration, spans, last.omega if last.amplitude else 0.0)
+    return ringing.ringing(window.time, window.acceleration, spans, last.omega if last.amplitude else 0.0)
 
 
 def with_own(measures: dict, own: dict | None) -> dict:

@@ -4,8 +4,12 @@ import os
 from pathlib import Path
 from typing import NamedTuple
 
+from .. import compiled
 from ..core import Missing
+from ..dynamics.events import cost as events_cost
+from ..dynamics.march import capacity
 from ..model.model import Model
+from .rig import costs, engines
 
 PACKAGES = 80e6  # bytes of what every run imports
 FULL = 125.0  # per pair of coordinates: matrices, shapes and what diagonalises them
@@ -44,9 +48,8 @@ def code(model: Model, engine: str) -> EngineCode:
     rig = model.rig
     if rig is None:
         return CODES.get(engine, STEPS)
-    from .rig.engines import ENGINES, steady_by
 
-    return CODES.get(steady_by(model).like if ENGINES[engine].steady else engine, STEPS)
+    return CODES.get(engines.steady_by(model).like if engines.ENGINES[engine].steady else engine, STEPS)
 
 
 def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
@@ -65,9 +68,7 @@ def compile_seconds(model: Model, engine: str, unknowns: dict) -> float:
     """CPU seconds in which the first run of this kind compiles; 0 where one has run, or nothing of it is compiled."""
     seconds = code(model, engine).compile
     if seconds:
-        from ..compiled import has_run
-
-        return 0.0 if _short(model, engine) or has_run(compiled_kind(model, engine, unknowns)) else seconds
+        return 0.0 if _short(model, engine) or compiled.has_run(compiled_kind(model, engine, unknowns)) else seconds
     return 0.0
 
 
@@ -75,27 +76,21 @@ def _short(model: Model, engine: str) -> bool:
     """Whether this is a run from event to event that is over soon as Python."""
     if engine not in OF_EVENTS:
         return False
-    from ..compiled import PATIENCE
 
-    return _as_python(model) <= PATIENCE
+    return _as_python(model) <= compiled.PATIENCE
 
 
 def _loop_is_kept() -> bool:
     """Whether the loop from event to event is kept compiled, which a short run takes too."""
-    from ..compiled import is_kept
-
-    return is_kept("dynamics.events.march_kernels.march")
+    return compiled.is_kept("dynamics.events.march_kernels.march")
 
 
 def _as_python(model: Model) -> float:
     """CPU seconds of a run from event to event as Python, which is not compiled where they are few; of a density all
     its cells, which its error may ask for."""
-    from ..dynamics.events.cost import python_seconds
-    from .rig.costs import expected_elements, pairs_of
-
-    count, stiffness = expected_elements(model)
-    each = python_seconds(model.rig.modes, model.rig.drive, stiffness, count if stiffness else 0)
-    return model.rig.cycles * each * 2**pairs_of(model)
+    count, stiffness = costs.expected_elements(model)
+    each = events_cost.python_seconds(model.rig.modes, model.rig.drive, stiffness, count if stiffness else 0)
+    return model.rig.cycles * each * 2**costs.pairs_of(model)
 
 
 class Need(NamedTuple):
@@ -131,9 +126,7 @@ def needs(model: Model, engine: str, steps: int, unknowns: dict, numerics=None, 
     if model.rig is not None:
         parts += _of_rig(model, engine, steps, numerics)
     if "bond_list_about" in unknowns:
-        from ..dynamics.march.capacity import most_bytes
-
-        parts.append(Need(most_bytes(unknowns["bond_list_about"]), "the list of bonds", "accuracy.tail"))
+        parts.append(Need(capacity.most_bytes(unknowns["bond_list_about"]), "the list of bonds", "accuracy.tail"))
     return tuple(sorted((part for part in parts if part.bytes > 0), reverse=True))
 
 
@@ -144,14 +137,12 @@ def _samples_key(model: Model) -> str:
 
 
 def _of_rig(model: Model, engine: str, steps: int, numerics) -> list:
-    from .rig.engines import ENGINES
-
     rig, n = model.rig, len(model.rig.frequencies)
     width = 2.0 * n + 12 + 6 * len(rig.interfaces)
     parts = [Need(FULL * n**2, f"{n} modes", "structure")]
-    if ENGINES[engine].keeps:
+    if engines.ENGINES[engine].keeps:
         parts.append(Need(GRID * width * steps / 1.75, f"{steps} steps, all of them kept", "drive.cycles"))
-    elif ENGINES[engine].steady:
+    elif engines.ENGINES[engine].steady:
         if model.accuracy.harmonics:
             size = 2.0 * model.accuracy.harmonics * max(1, len(rig.interfaces))
             parts.append(Need(WAVE * size**2, f"{model.accuracy.harmonics} harmonics", "accuracy.harmonics"))

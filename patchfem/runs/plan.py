@@ -4,9 +4,19 @@ from dataclasses import dataclass
 
 from ..core import Missing, PatchfemError, say
 from ..effects import EFFECTS, has
+from ..friction import record
+from ..friction.bonds import spread
+from ..inputs import measured
 from ..model.model import Model, build
 from ..model.source import placed
 from . import memory
+from .bench import engine as of_bench
+from .patch import grids as patch_grids
+from .patch import plan as of_patch
+from .rig import engines
+from .rig import numerics as rig_numerics
+from .rig import plan as of_rig
+from .wear import plan as of_wear
 
 START = 0.7  # seconds of CPU until a run begins, and of its files and its page
 LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
@@ -71,10 +81,8 @@ def plan(asked, per_point: bool = False) -> Plan:
 
 def _planned(model: Model, per_point: bool) -> Plan:
     if model.measured is not None:
-        from ..inputs.measured import read_table
-
         try:
-            read_table(model.measured[0])  # a broken table is named before anything runs
+            measured.read_table(model.measured[0])  # a broken table is named before anything runs
         except PatchfemError as error:
             error.key = error.key or "measured.file"
             raise
@@ -82,35 +90,24 @@ def _planned(model: Model, per_point: bool) -> Plan:
     engine, steps, seconds, more, said = "static", 0, 0.0, 0.0, [[], [], []]
     numerics, pressed = None, 0.0
     if model.rig is not None:
-        from .rig import plan as of_rig
-        from .rig.engines import engine_of, knobs_idle
-        from .rig.numerics import choose
-
         unknowns["modes"], chain = len(model.rig.frequencies), of_rig.chain(model.rig) | chain
         groups |= of_rig.groups(model) if model.kind == "rig" else {}
-        said[0] = knobs_idle(model, engine_of(model, per_point).name)
+        said[0] = engines.knobs_idle(model, engines.engine_of(model, per_point).name)
         said[2] = of_rig.sum_words(model) if model.kind == "rig" else []
     if model.patch is not None:
-        from .patch import plan as of_patch
-        from .patch.grids import expected_grids as of_grids
-
         tolerance = model.patch.mesh_tolerance or model.accuracy.tolerance
-        grids = of_grids(model.patch, tolerance)
+        grids = patch_grids.expected_grids(model.patch, tolerance)
         unknowns, chain = of_patch.sizes(grids) | unknowns, chain | of_patch.chain(model.patch)
         seconds, pressed = of_patch.effort(model.patch, grids, tolerance)
         groups |= of_patch.groups(model)
         said[1] = of_patch.verdict(groups, model.patch)
     if model.rig is not None:
         engine, steps, more = of_rig.cost(model, per_point, unknowns)
-        seconds, numerics = seconds + more, choose(model, per_point)
+        seconds, numerics = seconds + more, rig_numerics.choose(model, per_point)
     elif model.kind == "bench":
-        from .bench import engine as of_bench
-
         engine, steps, more = of_bench.cost(model, unknowns)
         seconds, groups = seconds + more, of_bench.groups(model) | groups
     if model.wear is not None and model.patch is not None:
-        from .wear import plan as of_wear
-
         seconds += of_wear.cost(model, unknowns["interface_points"], more)
         said[2] = [*said[2], of_wear.verdict(model)]
     seconds += START + memory.code(model, engine).seconds
@@ -172,9 +169,8 @@ def _of_law(f, load: float) -> dict:
         return {"bonds": f.static * load / f.bond_length}
     if has(f.law, "averaged"):
         return {"bonds": rigid}
-    from ..friction.record import law_from
 
-    one = law_from(f, load).element(load)
+    one = record.law_from(f, load).element(load)
     return {"bonds": one.limit / one.length if one.length else rigid}
 
 
@@ -182,9 +178,8 @@ def _law_groups(model: Model) -> dict:
     """Dimensionless groups of the law by name."""
     if model.spread is None:
         return {}
-    from ..friction.bonds.spread import pad_factor
 
-    return {"share_of_the_spread": pad_factor(model.pad, model.spread)}
+    return {"share_of_the_spread": spread.pad_factor(model.pad, model.spread)}
 
 
 def _groove_words(model: Model) -> list:

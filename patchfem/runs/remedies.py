@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 from ..core import say
 from ..effects import has
-from .results.notes import FARTHEST, more_harmonics
-from .results.patch_rows import DECISIVE, TABLE
+from .patch import high_order, ladder
+from .results import notes, patch_rows
+from .rig import costs, engines
 
 MOST = 1e9  # times that an error exceeds what is allowed, beyond which it does not matter
 TIGHTER = 0.1  # times the tolerance: a mesh of at least one halving more
@@ -45,7 +46,7 @@ def beyond_tolerance(seen: Seen, coarse=()) -> list:
     wide = {name: min(m.error / max(tolerance * abs(m.value) + m.floor, 1e-300), MOST)
             for name, m in seen.measures.items()
             if m.value is not None and m.error is not None and m.error > tolerance * abs(m.value) + m.floor}
-    pressed = TABLE if seen.patch is not None else ()
+    pressed = patch_rows.TABLE if seen.patch is not None else ()
     static = {name: times for name, times in wide.items() if name in pressed}
     moving = {name: times for name, times in wide.items() if name not in pressed}
     out = [_said(seen, static, _finer_mesh(seen, static, coarse))] if static else []
@@ -94,7 +95,7 @@ def _finer_mesh(seen, wide: dict, coarse) -> str:
         return f"the mesh ({nodes} interface nodes) and the strips share it; {_more_strips(asked, wide)}"
     if not asked.chosen:
         return f"leave out {SIZE}"
-    if not wide.keys() - set(DECISIVE):
+    if not wide.keys() - set(patch_rows.DECISIVE):
         return f"a mesh finer than {nodes} interface nodes would take too long; {wider}"
     if asked.chosen and _locks(seen, wide):
         return "cells of any mesh leave that in plane strain at this Poisson's ratio; read it by its error"
@@ -108,9 +109,7 @@ def _finer_mesh(seen, wide: dict, coarse) -> str:
 
 def _locks(seen, wide: dict) -> bool:
     """Whether the measures that speak for `wide` are known as well as Poisson's ratio allows."""
-    from .patch.high_order import locked
-
-    share, known = locked(seen.model.patch), seen.measures
+    share, known = high_order.locked(seen.model.patch), seen.measures
     return all(known[name].error <= share * abs(known[name].value) for name in _first(seen, wide))
 
 
@@ -133,9 +132,8 @@ def _climbing(seen, coarse) -> float | None:
     asked, tolerance = seen.model.patch, seen.model.accuracy.tolerance
     if not any(coarse) or asked.meshes is not None:
         return TIGHTER * tolerance
-    from .patch.ladder import climbs_at
 
-    return climbs_at(asked, [seen.patch, *coarse], asked.mesh_tolerance or tolerance)
+    return ladder.climbs_at(asked, [seen.patch, *coarse], asked.mesh_tolerance or tolerance)
 
 
 def _finer_motion(seen, wide: dict, coarse) -> str:
@@ -160,7 +158,7 @@ def _finer_motion(seen, wide: dict, coarse) -> str:
         return _finer_bonds(seen.model.accuracy)
     balanced = seen.extra.get("harmonics")  # None where a steady motion is exact between yields
     return READ if balanced is None or name.startswith(OF_SAMPLES) else \
-        more_harmonics(balanced, _sharp(seen))
+        notes.more_harmonics(balanced, _sharp(seen))
 
 
 def _cause(seen, name: str) -> str:
@@ -185,7 +183,7 @@ def _more_steps(seen, name: str, wide: dict, steps: int) -> str:
     share = of_steps / max(allowed - rest, LEAST_LEFT * allowed)  # by which that of the steps is to fall
     halvings = max(1, ceil(log2(share) / order))
     exact = _stepless(model) if halvings > MOST_HALVINGS and not name.startswith(RINGS) else ""
-    return exact or f"set accuracy.steps_per_cycle = {steps * 2**min(halvings, FARTHEST)}"
+    return exact or f"set accuracy.steps_per_cycle = {steps * 2**min(halvings, notes.FARTHEST)}"
 
 
 def _to_a_sample(cycles: float, steps: int) -> str:
@@ -215,12 +213,10 @@ def _unproven(model, steps: int, name: str, wide: dict) -> str:
 
     Steps that are left out are doubled until the displacement is met.
     """
-    from .rig.costs import MOST_STEPS
-
     seen = f"the change of {name} did not fall from {steps // 4} to {steps} steps per cycle"
     if exact := _stepless(model):
         return f"{seen}, so more steps are not known to cure it; {exact}"
-    if model.kind == "rig" and model.accuracy.steps_per_cycle is not None and 2 * steps <= MOST_STEPS and \
+    if model.kind == "rig" and model.accuracy.steps_per_cycle is not None and 2 * steps <= costs.MOST_STEPS and \
             "relative_displacement_amplitude" in wide:
         return f"{seen}; leave out accuracy.steps_per_cycle, and they are doubled until the displacement meets the " \
                "tolerance"
@@ -244,9 +240,7 @@ def _finer_under(seen, coarse) -> str:
 def _stepless(model) -> str:
     """The exact engine where it follows a motion that steps do not resolve; "" where none does."""
     if model.kind == "rig":
-        from .rig.engines import inexact
-
-        if model.accuracy.method != "exact" and not inexact(model):
+        if model.accuracy.method != "exact" and not engines.inexact(model):
             pinned = "leave out accuracy.steps_per_cycle and " * (model.accuracy.steps_per_cycle is not None)
             return f'{pinned}set accuracy.method = "exact", which has no steps'
     return ""

@@ -10,13 +10,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import compiled
 from ..core import Measure, NotConverged, Outcome, PatchfemError
+from ..dynamics import resume
 from ..model.model import Model
 from ..model.source import placed
 from . import memory
+from .patch import result as of_patch
 from .plan import Plan, plan, refuse_size
 from .remedies import Seen, beyond_tolerance
 from .results.result import Result, with_meanings, without_folders
+from .rig import engines
+from .wear import evolve, measures
 
 __all__ = ["KeptState", "Plan", "Result", "plan", "run"]
 KINDS = {"patch": "patch.result static", "bench": "bench.result prescribed", "rig": "rig.rig coupled",
@@ -54,12 +59,8 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
     seconds, warnings, notes = {}, list(model.source.remarks), list(model.source.notes)
     patch, coarse = None, (None, None)
     if model.rig is not None:
-        from .rig.engines import knobs_idle
-
-        warnings += knobs_idle(model, what.engine)
+        warnings += engines.knobs_idle(model, what.engine)
     if model.patch is not None:
-        from .patch import result as of_patch
-
         patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance, estimate, fresh)
         seconds["contact"] = perf_counter() - begin
         warnings += [*of_patch.strained(model.patch, patch), *patch.notes]
@@ -77,16 +78,12 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
     else:
         evolved, here = None, what
         if model.wear is not None and patch is not None:
-            from .wear.evolve import evolved_with
-
             key = kept and state_key(model, patch, kept.version)
-            evolved = evolved_with(kept, key, model, patch, coarse[:2], progress)
+            evolved = evolve.evolved_with(kept, key, model, patch, coarse[:2], progress)
             progress = None  # it has told of all cycles
             patch, coarse = evolved.patch, evolved.coarse
             if model.grooves is not None and evolved.state is not None:
-                from .wear.evolve import lowered
-
-                here = replace(what, model=lowered(model, patch, evolved.state.depth))
+                here = replace(what, model=evolve.lowered(model, patch, evolved.state.depth))
         module, function = KINDS[what.kind].split()
         solve = getattr(import_module(f"patchfem.runs.{module}"), function)
         try:
@@ -101,13 +98,9 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
             result = replace(result, measures=of_patch.measured(model, patch, coarse) | found)
         if model.wear is not None:
-            from .wear.measures import worn
-
-            result = replace(worn(result, evolved, estimate), plan=what)
+            result = replace(measures.worn(result, evolved, estimate), plan=what)
     if what.compile_seconds and estimate:
-        from ..compiled import ran
-
-        ran(memory.compiled_kind(model, what.engine, what.unknowns))
+        compiled.ran(memory.compiled_kind(model, what.engine, what.unknowns))
     return _whole(result, notes, begin, coarse)
 
 
@@ -128,14 +121,13 @@ def _keeping(kept: KeptState | None, what: Plan, patch):
     model = what.model
     if kept is None or not marches(what):
         return nullcontext()
-    from ..dynamics.resume import Keeper, keeping
 
     def path(number: int) -> Path:
         return kept.path.parent / f"march_{number}.npz"
 
     if kept.resume and model.wear is None and not path(1).is_file():
         raise PatchfemError(f"{kept.path.parent.name}: no interrupted run is kept there; run without --resume")
-    return keeping(Keeper(path, state_key(model, patch, kept.version), kept.resume))
+    return resume.keeping(resume.Keeper(path, state_key(model, patch, kept.version), kept.resume))
 
 
 def state_key(model, patch, version: str) -> str:
@@ -151,9 +143,8 @@ def marches(what: Plan) -> bool:
     """Whether a run is a march in time, which keeps its state on the way."""
     if what.model.rig is None:
         return False
-    from .rig.engines import ENGINES
 
-    return ENGINES[what.engine].resumes
+    return engines.ENGINES[what.engine].resumes
 
 
 def _unloaded(model: Model) -> bool:

@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
 
+from . import meant
 from .keys import quantities
 from .keys.contact import Material
 from .keys.tables import Tables
@@ -289,8 +290,6 @@ def _nested(draft: Draft, model: type[Table], name: str, inner: type[Table], val
 
 
 def _unknown(draft: Draft, model: type[Table], raw: dict[str, Any], key: str, path: str) -> None:
-    from .meant import key_meant, table_meant  # of a scene with a mistake alone
-
     value = raw[key]
     tables = [name for name, at in keys(model).items() if model_of(model, at) and not is_value(model, at)]
     is_table = isinstance(value, dict) or (isinstance(value, list) and value and isinstance(value[0], dict))
@@ -300,7 +299,7 @@ def _unknown(draft: Draft, model: type[Table], raw: dict[str, Any], key: str, pa
     there = path in draft.sets
     written = {name: raw[name] for name in (*keys(model), key)
                if name in raw and (not there or f"{at}.{name}".strip(".") in draft.sets)}
-    near = table_meant(model, written, key) if is_table else key_meant(model, at, written, key, there)
+    near = meant.table_meant(model, written, key) if is_table else meant.key_meant(model, at, written, key, there)
     # one that stands outside of every table, as --set may be given it, is meant where a table has it
     deeper = [] if at or is_table else [f"{name}.{key}" for name in tables
                                         if key in keys(model_of(model, keys(model)[name]))]

@@ -18,6 +18,7 @@ from typing import Any
 from ..disk.opened import reading
 from ..effects import MOST_COORDINATES, takes
 from ..faults import PatchfemError
+from . import axes
 from .keys import tables
 from .keys.same import once
 from .keys.types import keys as keys_of
@@ -247,9 +248,7 @@ def _refuse_crowds(raw: dict, text: str, path: str | Path) -> None:
 
 def _axes(draft: Draft, table: Any) -> list:
     """The axes of [sweep]; mistakes are said."""
-    from .axes import of_table
-
-    found, wrong = of_table(table)
+    found, wrong = axes.of_table(table)
     for key, message in wrong:
         draft.say(key, message)
     return found

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import compiled
 from ..contact.unilateral import INDEFINITE
 from ..core import PatchfemError, frozen_array
 from ..elasticity.lapack import dpotrf, dpotri, one_thread
@@ -64,8 +65,6 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
     local_length [m]: bond length of the elastic-plastic law (3.12), a local stiffness limit/length in series; 0 for
     Coulomb points. PatchfemError when no point carries load.
     """
-    from ..compiled import kernels  # a static patch has no slip and loads no compiled code
-
     limit = np.asarray(limit, float)
     if not (limit > 0).any():
         raise PatchfemError("contact.shear: no point carries friction")
@@ -78,8 +77,8 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
                           frozen_array(force), frozen_array(force[:, None] / at), 0)
     c = tangential[np.ix_(points, points)] + np.diag(local_length / force)
     inverse, at, rates = inverse_of(c), np.empty(force.size), np.zeros((force.size + 1, force.size))
-    count, reluctant = kernels(KERNELS).yields(inverse, inverse.sum(axis=0), force.copy(), np.arange(force.size), at,
-                                               rates)
+    yields = compiled.kernels(KERNELS).yields
+    count, reluctant = yields(inverse, inverse.sum(axis=0), force.copy(), np.arange(force.size), at, rates)
     if reluctant < 0:
         raise PatchfemError(INDEFINITE)
     drop, at = np.ascontiguousarray((rates[:count] - rates[1:count + 1]).T), at[:count]

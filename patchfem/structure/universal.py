@@ -4,6 +4,7 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..inputs.universal import sets_of
+from . import identify
 from .places import AXES, Shapes
 
 NORMAL, COMPLEX = 2, (3, 7)  # analysis types of dataset 55
@@ -77,8 +78,6 @@ def _rotated(values) -> tuple:
 
 
 def _responses(sets, factors) -> Shapes:
-    from .identify import modes_from_responses
-
     length, force = factors
     wrong = [s for s in sets if s["func_type"] != FRF]
     sets = [s for s in sets if s["func_type"] == FRF]
@@ -101,7 +100,7 @@ def _responses(sets, factors) -> Shapes:
         unit = _unit(one["ordinate_axis_units_lab"], notes) / _unit(one["orddenom_axis_units_lab"], notes)
         scale = unit * (force / length if (force, length) != (1.0, 1.0) else 1.0)
         measured[place, ref] = (sign_out * sign_in * scale * np.asarray(one["data"]), POWER[kind])
-    return modes_from_responses(x, measured, notes)
+    return identify.modes_from_responses(x, measured, notes)
 
 
 def _unit(label, notes) -> float:

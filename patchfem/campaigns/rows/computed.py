@@ -6,6 +6,7 @@ from ...core import Outcome, PatchfemError
 from ...model.source import placed
 from ...response.spectrum import reading
 from ...runs.many.watched import Watcher
+from ...runs.patch import ladder
 from .asked import Asked
 
 
@@ -77,9 +78,7 @@ class Computed:
         if model.patch is None:
             return None
         if self.patch is None or self.asked.moves_pieces:
-            from ...runs.patch.ladder import solve_all
-
-            self.patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]
+            self.patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]
             if self.patch.pressure.outcome is Outcome.NO_CONTACT:
                 raise PatchfemError(self.patch.pressure.outcome.sentence, "")
         return self.patch

@@ -10,6 +10,7 @@ from pathlib import Path
 from ...scene.axes import Axis, read
 from ...scene.lines import pieces_of
 from ...scene.scene import SceneError, text_of
+from . import samples, table
 from .asked import Asked
 from .cases import Cases, product
 
@@ -77,9 +78,7 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         raise SceneError([f"{asked.path}: {count} cases are more than one sweep holds ({MOST}); sweep parts of the "
                           "ranges, or draw from them with --sobol N"])
     if request.count and axes:
-        from .samples import drawn
-
-        parts.append(drawn(axes, request.count, request.sobol, request.seed))
+        parts.append(samples.drawn(axes, request.count, request.sobol, request.seed))
     elif axes:
         parts.append(Cases(tuple(axes)))
     cases = product(parts)
@@ -88,9 +87,7 @@ def cases_of(asked: Asked, request: Request) -> Cases:
 
 
 def _rows(path: Path) -> tuple:
-    from .table import read as read_rows
-
-    return read_rows(path)
+    return table.read(path)
 
 
 def _same(asked: Asked, keys: Sequence[str]) -> list[str]:

@@ -9,6 +9,7 @@ from time import perf_counter
 
 from ...core import PatchfemError
 from ...model.model import Model
+from ...runs import plan
 from ...runs.many import many
 from ...runs.many.answers import Answers
 from ...runs.many.meshes import Shared
@@ -51,10 +52,8 @@ class Died:
 def warmed(work: Work) -> None:
     """Bring up what the first case of a work needs, though its meshes are not chosen yet; what is wrong with it is told
     by its own run."""
-    from ...runs.plan import plan
-
     try:
-        many.batch_of(model := work.asked.model(work.cases.sets(0))) or plan(model)
+        many.batch_of(model := work.asked.model(work.cases.sets(0))) or plan.plan(model)
     except Exception:
         return
 

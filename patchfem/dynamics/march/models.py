@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...compiled import load
+from ...friction.bonds import list_numbers as numbers
 from ...friction.laws.coulomb import Coulomb
 from ...friction.laws.elastic_plastic import parallel
 from ...friction.laws.stretch import bonds_of, growth_numbers, points_element
@@ -147,8 +148,6 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
 
     reach: cut-off in bond lengths; merge: widest merged strip in bond lengths at zero age, 0 merges nothing.
     """
-    from ...friction.bonds import list_numbers as numbers
-
     fields = {"force": [limit], "bondlist": np.zeros((10, numbers.room(law, reach, merge))),
               "now": [0.0, 0.0, 0.0, 0.0, law.length, 0.0], "tally": np.zeros(12),
               "law": numbers.law_numbers(law, reach, merge), "table": numbers.share_table(law),

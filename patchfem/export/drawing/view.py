@@ -15,7 +15,7 @@ from ...core import Missing, PatchfemError
 from ...disk.whole import whole
 from ...scales import axis_unit
 from ..fields.series import Frame, Series
-from . import reels
+from . import film, flat, reels
 from .panels import Panel, borders, curves, panels
 
 ENDINGS = (".png", ".svg", ".pdf")
@@ -67,20 +67,18 @@ def _picture(one: Frame, head: str, magnify, out: Path, say) -> None:
         else:
             if why is not None:
                 say(f"no working OpenGL ({why}); {out} is drawn by matplotlib")
-            from .flat import draw
 
-            draw(one, head, magnify, partial)
+            flat.draw(one, head, magnify, partial)
 
 
 def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> None:
     if frame is not None:
         raise PatchfemError(f"--frame: {out.suffix} shows the whole last cycle; name a .png for one frame")
-    from .film import shoot
 
     reels.ready(out)
     with Series(folder) as series:
         with whole(out) as partial:
-            said = shoot(series, series.path.parent.resolve().name, magnify, partial)
+            said = film.shoot(series, series.path.parent.resolve().name, magnify, partial)
     print(f"{out}: {said}")
 
 

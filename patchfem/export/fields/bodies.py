@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...elasticity import coating_bond, elasticity
+from ...elasticity import coating_bond, elasticity, substructure
 from ...elasticity.elasticity import Piece, von_mises
 from ...elasticity.recovery import (
     Cells,
@@ -88,7 +88,6 @@ def _solver(piece):
     """The module that solves inside a piece, loaded where one is of its kind."""
     if isinstance(piece, Piece):
         return elasticity
-    from ...elasticity import substructure
 
     return substructure
 

@@ -12,8 +12,8 @@ import numpy as np
 from ...core import G_N
 from ...scales import axis_unit, wide_scale
 from ..drawing import curves
+from ..drawing import wear as wear_curves
 from ..drawing.pictures import closer, envelope, part_in_contact, whole_from
-from ..drawing.wear import MEASURES, SHOWN
 
 LINE, FRAMES = 6000, 24  # points of a line, frames of the shear stress behind the largest one
 FAINT, FEWEST = 400, 200  # points of such a frame, and those that every line keeps
@@ -262,7 +262,7 @@ def levels(rows: list) -> list:
 def wear(x, cycles, pressure, depth, history: dict) -> list:
     """Pressure and worn depth over x at some of the cycles, and measures over their first value."""
     (along, size), out = axis_unit(x, "m"), []
-    pick = np.unique(np.linspace(0, len(cycles) - 1, SHOWN).round().astype(int))
+    pick = np.unique(np.linspace(0, len(cycles) - 1, wear_curves.SHOWN).round().astype(int))
     for values, unit, title in ((pressure, "Pa", "Pressure"), (depth, "m", "Worn depth")):
         name, scale = axis_unit(values, unit)
         lines = [line(x * size, values[k] * scale, colour, "new" if cycles[k] == 0 else f"{cycles[k]:.6g} cycles")
@@ -271,6 +271,6 @@ def wear(x, cycles, pressure, depth, history: dict) -> list:
     top = float(np.max(pressure[-1])) * axis_unit(pressure, "Pa")[1]
     out[0]["y"]["range"] = [0.0, min(2.5 * top, 1.05 * float(np.max(pressure)) * axis_unit(pressure, "Pa")[1])]
     over = [line(history["cycle"], history[name] / history[name][0], colour, text)
-            for colour, (name, (text, *_)) in zip(COLOURS, MEASURES.items())
+            for colour, (name, (text, *_)) in zip(COLOURS, wear_curves.MEASURES.items())
             if history.get(name) is not None and history[name][0]]
     return [*out, chart("Over the cycles", axis("cycles"), axis("over its first value"), over)]

@@ -8,6 +8,7 @@ from ...core import say
 from ...disk.whole import write_text
 from ...scales import LADDERS, plain, step_of
 from ...surface.roughness.report import RoughnessReport, Value
+from ..drawing import inline
 from ..drawing.inline import CSS
 from . import pictures
 
@@ -156,10 +157,8 @@ def figures(report: RoughnessReport) -> list:
 
 
 def _figure(number: str, svg: str, caption: str, alternative: str) -> str:
-    from ..drawing.inline import placed
-
     svg = svg.replace("<svg", f'<svg role="img" aria-label="{escape(alternative, quote=True)}"', 1)
-    return placed(number, svg, caption)
+    return inline.placed(number, svg, caption)
 
 
 def _table(report: RoughnessReport) -> str:

@@ -7,6 +7,8 @@ import numpy as np
 
 from ...response.loops import at_turns, half_range, interface_loop, secant_stiffness, turns_of
 from ...response.measures import harmonic, ledger_measures, step_harmonic, work_check
+from . import rigid, shear
+from . import stepped as stepping
 from .closed import closed_form
 from .engine import CLOSED, STEPPED, BenchEngine, bench_engine
 from .ledger import UNWATCHED, Watch
@@ -61,20 +63,15 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
 def _slid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Watch) -> tuple:
     """(Slid, histories of the other direction by name) of a pass along path = (time, slide)."""
     if model.slide.across is not None:
-        from .stepped import run_plane
-
-        return run_plane(model, patch, *path, frames, watch)
+        return stepping.run_plane(model, patch, *path, frames, watch)
     if model.soft:
-        from .shear import with_shear
-
-        return with_shear(model, patch, *path, frames, watch), {}
+        return shear.with_shear(model, patch, *path, frames, watch), {}
     if engine.kind == STEPPED:
         return stepped(model, patch, *path, frames, watch), {}
     if engine.kind == CLOSED:
         return closed_form(model, patch, path, frames, watch), {}
-    from .rigid import rigid
 
-    return rigid(model, patch, path, frames, engine, watch), {}
+    return rigid.rigid(model, patch, path, frames, engine, watch), {}
 
 
 def _values(model, time, slide, out, first, omega) -> dict:

@@ -14,6 +14,7 @@ from ...effects import has, listed
 from ...friction.bonds.engines import Choice
 from ...friction.bonds.engines import choose as choose_sum
 from ...friction.bonds.parameters import LONGEST
+from ...slip import shear_modes
 
 CLOSED, ELEMENTS, POINTS, RECURSION, LIST, STEPPED, PLANE = range(7)
 NAMES = {CLOSED: "closed form", ELEMENTS: "parallel elements", POINTS: "bond points", RECURSION: "recursion",
@@ -50,9 +51,7 @@ def bench_engine(model, slide, points: int = 1, choice: Choice | None = None) ->
     if model.slide.across is not None:
         return BenchEngine(PLANE, _stepped_seconds(model, slide, 1))
     if soft and (has(f.law, "bonds") or model.grooves is not None):
-        from ...slip.shear_modes import SHEAR_MODES
-
-        modes = model.accuracy.shear_modes or SHEAR_MODES
+        modes = model.accuracy.shear_modes or shear_modes.SHEAR_MODES
         return BenchEngine(POINTS, 4e-8 * points * (1 + modes / 4))
     if soft:
         return BenchEngine(ELEMENTS, 3e-9 * points + 1e-7)

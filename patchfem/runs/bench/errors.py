@@ -9,7 +9,7 @@ import numpy as np
 from ...effects import listed
 from ...response.coarser import Rung, estimate, left_open, space_rung
 from ...response.errors import change, step_error
-from . import bench
+from . import bench, shear
 from .engine import LIST, PLANE, STEPPED, slips_by_elements
 from .law import tail_of
 from .ledger import Watch
@@ -55,9 +55,7 @@ def ladder_of(model, patch, coarse, fine, steps: int) -> list:
 
     out, meshed = [Rung((half, few), rule, of="steps")], coarse is not None
     if meshed and slips_by_elements(model):
-        from .shear import mesh_rung
-
-        out.append(mesh_rung(model, patch, coarse, few))
+        out.append(shear.mesh_rung(model, patch, coarse, few))
     elif meshed:
         out.append(space_rung(few._replace(rough=True), few))
     if fine.engine.kind == LIST and choice.merge > 0:

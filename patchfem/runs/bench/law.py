@@ -3,17 +3,17 @@
 import numpy as np
 
 from ...effects import has
+from ...friction.bonds import quadrature
 from ...friction.bonds.recursion import Recursion
 from ...friction.record import law_from
+from . import averaged
 
 
 def law_for(model, patch=None):
     """The NumPy law object of a bench; only an averaged law looks at the patch."""
     f = model.friction
     if has(f.law, "averaged"):
-        from .averaged import law_on
-
-        return law_on(model, patch)
+        return averaged.law_on(model, patch)
     if not has(f.law, "bonds"):
         return law_from(f, patch.pressure.load if patch is not None else model.point.load)
 
@@ -21,9 +21,8 @@ def law_for(model, patch=None):
     engine = model.accuracy.quadrature
     if engine == "recursion" or (engine == "auto" and law.reading == "stretch" and law.order == 1):
         return Recursion(law)
-    from ...friction.bonds.quadrature import Quadrature
 
-    return Quadrature(law, tail_of(model))
+    return quadrature.Quadrature(law, tail_of(model))
 
 
 def tail_of(model) -> float:

@@ -8,8 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...dynamics.grooves import climbing as flank_climbing
+from ...dynamics.march import varying_load
 from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
 from ...effects import carries, has
+from ...friction import grooves
 from ...friction.record import law_from
 from .engine import ELEMENTS, BenchEngine
 from .follow import follow_path
@@ -42,24 +45,20 @@ def climbing(model, load: float, patch=None, count: int | None = None):
     patch: the solved Patch where its pieces give way, count: how many shear modes stand for them, None: by the
     tolerance.
     """
-    from ...dynamics.grooves.climbing import giving, model_of
-    from ...dynamics.march.varying_load import bonds, plastic
-
     f, modes = model.friction, model.rig.modes if model.rig is not None else None
     grooves = model.grooves if modes is not None else replace(model.grooves, lifted_mass=0.0)
     varies = carries(f, "varying-load")
     law = law_from(f, load).element(load) if not varies else \
-        bonds(model.bonds) if has(f.law, "bonds") else plastic(f.static, f.bond_length or 0.0)
-    found = replace(model_of(grooves, load, f.static, law, modes), swing=swing_of(model))
-    return giving(found, patch, count, model.accuracy.tolerance) if model.soft and varies else found
+        varying_load.bonds(model.bonds) if has(f.law, "bonds") else varying_load.plastic(f.static, f.bond_length or 0.0)
+    found = replace(flank_climbing.model_of(grooves, load, f.static, law, modes), swing=swing_of(model))
+    return flank_climbing.giving(found, patch, count, model.accuracy.tolerance) if model.soft and varies else found
 
 
 def swing_of(model):
     """How the load of a point swings about its mean, a `friction.grooves.Swing`."""
-    from ...friction.grooves import STEADY, Swing
-
     point = model.point
-    return Swing(point.amplitude, 2 * np.pi * point.frequency, point.phase) if model.load_varies else STEADY
+    return grooves.Swing(point.amplitude, 2 * np.pi * point.frequency, point.phase) if model.load_varies \
+        else grooves.STEADY
 
 
 def one_point(model, load: float, engine: BenchEngine) -> ContactModel:

@@ -7,6 +7,7 @@ from functools import partial
 from importlib import import_module
 from typing import NamedTuple
 
+from ... import compiled
 from ...core import PatchfemError
 from ...model.model import Model
 from . import one_by_one
@@ -47,9 +48,7 @@ BATCHES: tuple[Batch, ...] = (_batch("patches", "patch"), _batch("lumped.lumped"
 def batch_compile_seconds(batch: Batch, model: Model) -> float:
     """CPU seconds in which a batch compiles for a model like this; 0 where one like it has been answered."""
     if batch.compile:
-        from ...compiled import has_run
-
-        return 0.0 if has_run(_kind(batch, model)) else batch.compile
+        return 0.0 if compiled.has_run(_kind(batch, model)) else batch.compile
     return 0.0
 
 
@@ -103,9 +102,7 @@ def _solved(batch: Batch | None, models: list, alone: Callable, say: Callable | 
         try:
             out = batch.solve(models, say)
             if batch.compile and batch_compile_seconds(batch, models[0]):
-                from ...compiled import ran
-
-                ran(_kind(batch, models[0]))
+                compiled.ran(_kind(batch, models[0]))
             return out
         except Exception as error:  # the case at fault is named by its own run
             if say is not None:

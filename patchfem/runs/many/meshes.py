@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from ...core import PatchfemError
 from ...model.model import Model
+from ..patch import meshes as patch_meshes
 
 
 class Shared:
@@ -24,10 +25,9 @@ class Shared:
         for key, patches in groups.items():
             if len(patches) < 2:
                 continue
-            from ..patch.meshes import shared_meshes
 
             try:
-                self.meshes[key] = shared_meshes(patches, key[1], all_)
+                self.meshes[key] = patch_meshes.shared_meshes(patches, key[1], all_)
             except PatchfemError:  # each case is told by its own run what is wrong
                 continue
 
@@ -49,6 +49,4 @@ def _wants(model: Model | PatchfemError) -> bool:
 
 
 def _key(model: Model) -> tuple:
-    from ..patch.meshes import geometry_of
-
-    return geometry_of(model.patch), model.accuracy.tolerance
+    return patch_meshes.geometry_of(model.patch), model.accuracy.tolerance

@@ -12,9 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core import NotConverged, Outcome, Response
+from ...dynamics.events import orbits as event_orbits
+from ...dynamics.harmonic import balance as point_balance
+from ...dynamics.harmonic import harmonic, point
+from ...response import measures
 from ...response.measures import half_swing
+from ..rig import march, pieces
 from ..rig.engines import ENGINES, MARCH, steady_by
 from ..rig.numerics import choose
+from ..rig.steady import balance as rig_balance
+from ..rig.steady import maps
 
 SAMPLES = 400  # of a cycle without friction
 UNBOUNDED = Outcome.GROWS, Outcome.NOT_CONVERGED, Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES
@@ -74,10 +81,8 @@ class Watcher:
 
     def _line(self, drive, near) -> Watched | None:
         """Without friction: z = (Omega^2 - omega^2 + i omega D)^-1 (i a base)."""
-        from ...dynamics.harmonic.harmonic import linear_part
-
         modes, omega = self.model.rig.modes, drive.omega
-        found = linear_part(modes, omega, 1)
+        found = harmonic.linear_part(modes, omega, 1)
         if any(k == 1 for k, *_ in found.free):
             return None
         z = found.inverse[1] @ (1j * drive.acceleration * modes.base)
@@ -103,28 +108,19 @@ class Watcher:
         return Watched(window, seen.acceleration, seen.displacement, seen.point, seen.fundamental)
 
     def _orbits(self):
-        from ...dynamics.events.orbits import Orbits
-        from ..rig.pieces import YieldingElements
-
-        modes, groups = self.model.rig.modes, YieldingElements(self.model, self.numerics, self.patch).groups
+        modes, groups = self.model.rig.modes, pieces.YieldingElements(self.model, self.numerics, self.patch).groups
         found = self.before.pop("yields", None)
-        return found if found is not None and found.renewed(modes, groups) else Orbits(modes, groups)
+        return found if found is not None and found.renewed(modes, groups) else event_orbits.Orbits(modes, groups)
 
     def _balance(self, drive, near) -> Watched:
-        from ...dynamics.harmonic.balance import periodic_response
-        from ...dynamics.harmonic.point import point
-        from ...response.measures import acceleration_peak
-        from ..rig.steady.balance import SAMPLES, BalanceFinder
-
-        one = self._once("balance", lambda: BalanceFinder(self.model, self.numerics, self.patch, 0, self.say))
-        found = point(one.modes, drive, one.group, one.harmonics, one.tolerance, start=near)
-        window = periodic_response(found, one.modes, drive, SAMPLES)
-        return Watched(window, acceleration_peak(window), found.amplitude(one.modes.output), found)
+        one = self._once("balance", lambda: rig_balance.BalanceFinder(self.model, self.numerics, self.patch, 0,
+                                                                      self.say))
+        found = point.point(one.modes, drive, one.group, one.harmonics, one.tolerance, start=near)
+        window = point_balance.periodic_response(found, one.modes, drive, rig_balance.SAMPLES)
+        return Watched(window, measures.acceleration_peak(window), found.amplitude(one.modes.output), found)
 
     def _events(self, drive, near) -> Watched | None:
-        from ..rig.steady.maps import EventFinder
-
-        one = self._once("events", lambda: EventFinder(self.model, self.numerics, self.patch, 0, self.say))
+        one = self._once("events", lambda: maps.EventFinder(self.model, self.numerics, self.patch, 0, self.say))
         return _seen(one.point(drive)[0])
 
     def _run(self, drive, near) -> Watched | None:
@@ -132,12 +128,11 @@ class Watcher:
         few = replace(self.numerics, whole=False)  # what is before the window is neither kept nor measured
         if ENGINES[self.numerics.engine] is not MARCH:
             return _seen(ENGINES[self.numerics.engine].run(model, few, self.patch, 0, self.say, None))
-        from ..rig.march import MarchReader, marched
 
-        contact, done, *_ = marched(model, few, self.patch, 0, self.say)
+        contact, done, *_ = march.marched(model, few, self.patch, 0, self.say)
         if done.outcome in UNBOUNDED:
             return None
-        values = MarchReader(model, few, self.patch, contact).values(done)
+        values = march.MarchReader(model, few, self.patch, contact).values(done)
         return _measured(done.window, values)
 
 

@@ -7,7 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from ...core import Compliance, Interface, frozen_array
-from ...elasticity import cache
+from ...elasticity import cache, mortar, substructure
 from ...elasticity.elasticity import Layers, Piece, assemble, interface_compliance
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import layers_of
@@ -67,8 +67,6 @@ def finite_elements(body, layers: Layers):
 
 def _any_cells():
     """elasticity.substructure, for meshes of any cells alone."""
-    from ...elasticity import substructure
-
     return substructure
 
 
@@ -100,9 +98,7 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
     joint, x, share = None, grid.x, grid.tributary()
     if upper_grid is not None and not _match(x, upper_grid.x):
-        from ...elasticity.mortar import mortar
-
-        joint = mortar(low, x, high, upper_grid.x)
+        joint = mortar.mortar(low, x, high, upper_grid.x)
         x, share, parts = joint.x, joint.tributary, (joint.nn, joint.tt, joint.nt)
     else:  # shear of the upper piece moves the interface up where that of a like lower piece moves it down: nt cancels
         parts = (low[0] + high[0], low[1] + high[1], low[2] - high[2])

@@ -17,6 +17,7 @@ from ...core import NotConverged
 from ...elasticity.elasticity import assemble
 from ...elasticity.lapack import one_thread
 from ...mesh.grading import Layout, columns, rows
+from ...model import profile
 from ...model.pieces import layers_of
 from .measures import OFFSET, Hidden, combined, least_of
 from .values import peak_pressure
@@ -69,9 +70,7 @@ def sharper_by_points(asked, enough) -> tuple:
 
 
 def _first(asked) -> int:
-    from ...model.profile import spacing_of
-
-    return max(POINTS, min(round(asked.length / spacing_of(asked.gap.profile) / 4), MOST_POINTS // 4))
+    return max(POINTS, min(round(asked.length / profile.spacing_of(asked.gap.profile) / 4), MOST_POINTS // 4))
 
 
 def _dear(last: PointLevel) -> bool:

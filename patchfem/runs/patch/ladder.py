@@ -4,9 +4,10 @@ from dataclasses import replace
 from functools import lru_cache, partial
 
 from ...core import NotConverged, Outcome
+from ...mesh import anymesh
 from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import bodies_of
-from . import high_order
+from . import fine, high_order
 from .condensed import Keyed, condensed, shared_pairs
 from .grids import LEAST_LEVELS, SPENT, base_grids, seconds_of
 from .kept import KEPT, by_content, shares
@@ -29,9 +30,8 @@ def solve_split(asked, level: int, estimate: bool) -> tuple:
 def _halved(body):
     if plan_of(body) is not None:
         return finer(body)
-    from ...mesh.anymesh import halved
 
-    return halved(body)
+    return anymesh.halved(body)
 
 
 def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
@@ -138,16 +138,13 @@ def _finer(asked) -> bool:
     """Whether a trace may be solved on points finer than any cells."""
     if asked.gap.profile is None:
         return False
-    from .fine import takes_points
 
-    return takes_points(asked)
+    return fine.takes_points(asked)
 
 
 def _on_points(asked, patches: list, tolerance: float) -> tuple:
     """Sharper measures of patches, fine to coarse, from points as fine as a trace, and the finest patch with them."""
-    from .fine import sharper_by_points
-
-    found, apart = sharper_by_points(asked, partial(_enough, patches, tolerance))
+    found, apart = fine.sharper_by_points(asked, partial(_enough, patches, tolerance))
     first = patches[0]
     return found, replace(first, sharper=found, averaging=apart or first.averaging)
 

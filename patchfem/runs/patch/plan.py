@@ -4,6 +4,7 @@ from math import log10, sqrt
 
 from ...model.model import Model
 from ...model.patch import bars, block_shear
+from . import skin
 from .grids import Sizes
 from .high_order import takes_cells
 
@@ -44,10 +45,8 @@ def chain(asked) -> dict:
     out = {"holder": asked.slide_spring or "rigid", "pieces_shear": block_shear(asked) if asked.shear else "rigid",
            "asperities": "rigid"}
     if asked.skin is not None and asked.skin.tangential_ratio is not None:
-        from .skin import mean_stiffness
-
         area = asked.length * asked.width * asked.pairs
-        out["asperities"] = asked.skin.tangential_ratio * mean_stiffness(asked, asked.nominal_load / area) * area
+        out["asperities"] = asked.skin.tangential_ratio * skin.mean_stiffness(asked, asked.nominal_load / area) * area
     return out
 
 

@@ -8,6 +8,8 @@ import numpy as np
 from ...contact import edges
 from ...contact.unilateral import press, press_by
 from ...core import Compliance, Pressure, frozen_array
+from . import skin as skin_press
+from . import strips as strip_press
 from .approach import closed_by
 from .condensed import Pair, condensed
 
@@ -162,13 +164,9 @@ def _under(asked, pieces: Compliance, gap) -> tuple:
     strips = skin = None
     angle, moment, spring = asked.gap.angle, asked.moment, asked.spring
     if asked.strips is not None:
-        from .strips import in_strips
-
-        pieces, pressure, skin, strips = in_strips(asked, pieces, gap, angle, moment, spring)
+        pieces, pressure, skin, strips = strip_press.in_strips(asked, pieces, gap, angle, moment, spring)
     elif asked.skin is not None and asked.skin.law != "linear":
-        from .skin import behind_skin
-
-        pieces, pressure, skin = behind_skin(asked, pieces, gap, angle, moment, spring)
+        pieces, pressure, skin = skin_press.behind_skin(asked, pieces, gap, angle, moment, spring)
     else:
         if asked.skin is not None:
             pieces = with_linear_skin(asked.skin, pieces)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...core import Outcome, say
+from ...mesh import recognise
 from ...mesh.nested import plan_of
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import bodies_of
@@ -168,13 +169,12 @@ def drawn_otherwise(pair) -> list:
     for side, body in (("lower", pair.grid), ("upper", pair.upper_grid)):
         if plan_of(body) is not None:  # whole, and all of its last row is held
             continue
-        from ...mesh.recognise import held_share, holes
 
-        count, area = holes(body)
+        count, area = recognise.holes(body)
         if count:
             out.append(f"contact.mesh: the {side} piece has {count} hole{'s' * (count > 1)} inside, {area:.3g} m2 in "
                        "all; draw the cells that are missing if none was meant")
-        held, whole = held_share(body)
+        held, whole = recognise.held_share(body)
         if held < WHOLE * whole:
             out.append(f"contact.mesh: {side}_far holds {held:.6g} m of a face of {whole:.6g} m, {held / whole:.3g} of "
                        "its length; the rest of it is free")

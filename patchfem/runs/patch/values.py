@@ -9,6 +9,8 @@ from ...closed_forms.contact import rounded_corner
 from ...contact import edges
 from ...core import Outcome
 from ...elasticity.lapack import one_thread
+from ...slip import tangent
+from . import strips
 from .press import Patch
 
 LIKE = 2.0  # times less bent than its neighbour is still one smooth curve with it
@@ -86,9 +88,7 @@ def _values(patch: Patch) -> dict:
             with one_thread():
                 out |= _on_edges(patch)
     if patch.strips is not None:
-        from .strips import strip_values
-
-        out |= strip_values(patch, partial(peak_pressure, skin=patch.skin_share))
+        out |= strips.strip_values(patch, partial(peak_pressure, skin=patch.skin_share))
     return out
 
 
@@ -129,7 +129,6 @@ def shear_stiffness(patch: Patch, found: list) -> float:
     """
     if not patch.pair.closing.any():
         return edges.stiffness(patch.pieces.tangential, patch.active, np.ones(patch.x.size), found)
-    from ...slip import tangent
 
     operators = tangent.operators_of(patch.pieces, patch.pair.closing)
 

@@ -5,6 +5,8 @@ from math import ceil, log2
 import numpy as np
 
 from ...core import Outcome, say
+from ...friction.bonds import parameters, temperature
+from ...scene.keys import materials
 
 BOOKS = 1e-3  # relative gap of the two books of energy beyond which a run says so
 RIPE = 0.3  # of their length, over which bonds may ripen before a run says so
@@ -38,9 +40,7 @@ def warming(model, patch, response, work: float | None = None) -> list:
 
 def unripe(law, speed: float) -> list:
     """Warning that a printed law's bonds break before they are grown, as a list of sentences."""
-    from ...friction.bonds.parameters import ripening
-
-    a = ripening(law, speed) if law.reading == "report" else 0.0
+    a = parameters.ripening(law, speed) if law.reading == "report" else 0.0
     if a <= RIPE:
         return []
     least = law.ratio / (1 / (RIPE * law.length) - law.rest_growth / speed**2)  # ripening(law, speed) = RIPE with it
@@ -128,25 +128,22 @@ def heating(model, patch, work: float, duration: float) -> list:
     work [J] of the friction over `duration` [s]. All of the heat goes into one half-space of the substrate through the
     loaded area: two alike pieces share it and warm by half as much.
     """
-    from ...friction.bonds.temperature import surface_rise
-    from ...scene.keys.materials import MATERIALS, THERMAL
-
     if patch is None:
         return ["the warming by friction is not estimated: [normal] has no contact area"]
     kind = model.patch.substrate
-    known = THERMAL.get(kind.name) if kind.name in MATERIALS else None
+    known = materials.THERMAL.get(kind.name) if kind.name in materials.MATERIALS else None
     if known is None:
         return ["the warming by friction is not estimated: the conductivity of contact.substrate is not known; name a "
-                f"material of the table ({', '.join(THERMAL)})"]
+                f"material of the table ({', '.join(materials.THERMAL)})"]
 
     area = float(patch.pieces.interface.weight[patch.active].sum())
     if not (area > 0 and duration > 0 and np.isfinite(work)):
         return []
     period = _cycle(model)
     flux, stuff = work / duration / area, (known.conductivity, known.heat_capacity * kind.density)
-    rises = [f"{surface_rise(flux, duration, *stuff):.2g} K after {duration:.3g} s"]
+    rises = [f"{temperature.surface_rise(flux, duration, *stuff):.2g} K after {duration:.3g} s"]
     if period is not None:
-        rises.insert(0, f"{surface_rise(flux, period, *stuff):.2g} K in a cycle")
+        rises.insert(0, f"{temperature.surface_rise(flux, period, *stuff):.2g} K in a cycle")
     return [f"friction of {work / duration:.2g} W on {1e6 * area:.3g} mm2 warms the face of one half-space that takes "
             f"it all by {', '.join(rises)}; friction.temperature.surface stays as given"]
 

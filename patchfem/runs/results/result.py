@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Outcome
+from ...response import rows
 from ...scales import tidied
-from .patch_rows import TABLE as STATIC
+from . import patch_rows
 
 FRAMES = 16  # of the interface, in the last cycle
 COUNTS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
@@ -54,9 +55,8 @@ def meaning(name: str, apart: str = "interface") -> str:
 
     slip_amplitude_2 is that of the second interface, or of what `apart` names.
     """
-    if name in STATIC:
-        return STATIC[name].text
-    from ...response import rows
+    if name in patch_rows.TABLE:
+        return patch_rows.TABLE[name].text
 
     first = rows.of_first(name)
     return rows.row_of(name).text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")

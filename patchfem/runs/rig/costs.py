@@ -7,19 +7,22 @@ where the friction limit exceeds the push of the drive, hardly any where it is h
 
 from functools import lru_cache
 from math import inf, log2, pi, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...core import Missing
-from ...dynamics.events.plant import plant_of
+from ...dynamics.events import plant
 from ...effects import has
-from ...friction.bonds.engines import impossible
-from ...friction.bonds.parameters import LONGEST
-from ...friction.laws.stretch import points_element
-from ...friction.protocol import Element
-from ...friction.record import law_from
+from ...friction import record
+from ...friction.bonds import engines, parameters
+from ...friction.laws import stretch
+from ...model import patch as patch_model
 from ...model.model import Model
 from ...structure.drive_sizes import fastest, largest, omega_of, sinusoidal, slowest
+
+if TYPE_CHECKING:
+    from ...friction.protocol import Element
 
 # seconds of a piece of the motion, of each further mode and interface in it, of each element
 PIECE, PIECE_MODE, PIECE_FACE, PIECE_ELEMENT = 2.5e-7, 1.5e-7, 3e-7, 3e-9
@@ -75,15 +78,13 @@ def expected_elements(model: Model) -> tuple:
         if has(one.numbers.law, "set-valued"):
             most, mine = inf, 1
         else:
-            element = law_from(one.numbers, load).element(load)
+            element = record.law_from(one.numbers, load).element(load)
             mine = int(element.numbers[1]) >> pairs_of(model)
             most = float(element.numbers[2:2 + int(element.numbers[1])].sum())
         if model.soft:
-            from ...model.patch import CHOSEN_POINTS, block_shear
-
             patch = model.patch
-            most = 1 / (1 / most + 1 / block_shear(patch))
-            mine = CHOSEN_POINTS if patch.chosen else round(patch.length / patch.size) + 1
+            most = 1 / (1 / most + 1 / patch_model.block_shear(patch))
+            mine = patch_model.CHOSEN_POINTS if patch.chosen else round(patch.length / patch.size) + 1
         count, stiff = count + mine, max(stiff, most if most < inf else 0.0)
     return count, stiff
 
@@ -104,7 +105,7 @@ def _ringing_and_events(model: Model) -> tuple:
     rows = 0 if drive.segments else len(drive.breaks) / model.rig.cycles
     ringing, quick = max(rate * drive.period, 2 * pi * fastest(drive)) / REACH, fastest(drive)
     events = 2 * max(count, len(faces)) * quick + 2 + rows
-    if 2 * pi * quick <= plant_of(modes).slow * drive.period:
+    if 2 * pi * quick <= plant.plant_of(modes).slow * drive.period:
         dying = DYING / min(slowest(modes), float(modes.omega.min())**2 / damping)
         times = events + _jumps(model) if model.rig.interfaces else 1 / model.rig.cycles  # that it rings
         ringing = min(ringing, times * dying * rate / REACH + 4 * quick)
@@ -162,10 +163,10 @@ def dear_elements(model: Model) -> str:
 def refuse_endless(model: Model, numerics=None) -> None:
     """Raise Missing when a run from event to event would take longer than LONGEST seconds."""
     seconds = seconds_of_pieces(model)
-    if seconds > LONGEST:
+    if seconds > parameters.LONGEST:
         raise Missing(f"the exact motion (about {pieces_per_cycle(model):.2g} pieces per cycle, between events, rows "
                       f"of the drive and the fastest ringing) would take about {seconds:.0f} s, more than "
-                      f"{LONGEST:.0f} s; lower drive.cycles or the stiffness of modes and elements, or use "
+                      f"{parameters.LONGEST:.0f} s; lower drive.cycles or the stiffness of modes and elements, or use "
                       "accuracy.method = \"march\"", "")
 
 
@@ -198,7 +199,7 @@ def not_smooth(model: Model) -> str:
     return "in so many steps" if smooth_steps(model, element) > MORE * max(steps_per_cycle(model), 400) else ""
 
 
-def smooth_element(model: Model) -> Element | None:
+def smooth_element(model: Model) -> "Element | None":
     """The law of the interface as compiled code takes it, None where its bonds have no state or it asks for the
     pressure behind each point."""
     f = model.friction
@@ -206,13 +207,13 @@ def smooth_element(model: Model) -> Element | None:
     if has(f.law, "averaged"):
         return None
     if not has(f.law, "bonds"):
-        return law_from(f, load).element(load)
-    if impossible("recursion", f.reading, 1.0 if f.order is None else f.order):
+        return record.law_from(f, load).element(load)
+    if engines.impossible("recursion", f.reading, 1.0 if f.order is None else f.order):
         return None
-    return points_element(model.bonds, [1.0], [load])
+    return stretch.points_element(model.bonds, [1.0], [load])
 
 
-def smooth_steps(model: Model, element: Element) -> float:
+def smooth_steps(model: Model, element: "Element") -> float:
     """Steps per cycle to expect: some per radian of the fastest motion, some at every reversal, and those that keep a
     state of the law which relaxes over a short path or time stable."""
     rig, modes = model.rig, model.rig.modes
@@ -229,7 +230,7 @@ def smooth_steps(model: Model, element: Element) -> float:
     return 24 + 1.2 * pace * period + (states + rigid * period) / STABLE
 
 
-def clings(model: Model, element: Element) -> float:
+def clings(model: Model, element: "Element") -> float:
     """Share [1] of the time that a law of the speed spends at speeds over which it turns, where it is stiff.
 
     One mode is held all the time by a force r of the limit up to 1, and less of the time the more is left to slide.

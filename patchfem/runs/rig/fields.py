@@ -2,9 +2,12 @@
 
 import numpy as np
 
+from ...dynamics.march import varying_load
 from ...effects import has, listed
-from ...friction.record import law_from
-from ..bench.averaged import limit_tractions
+from ...friction import record
+from ...slip import fields
+from ..bench import averaged
+from ..bench import shear as bench_shear
 from ..results.result import FRAMES, at_rest, frames_of
 
 
@@ -20,26 +23,24 @@ def fields_of(model, numerics, patch, raw) -> dict:
                          len(raw.window.time) - 1, FRAMES).round().astype(int)
         tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
         if f is not None and has(f.law, "averaged"):
-            tau = limit_tractions(model, patch, raw.window.force[at])
+            tau = averaged.limit_tractions(model, patch, raw.window.force[at])
         slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
         return frames_of(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
-    from ...slip.fields import element_fields, point_fields
 
     shots = raw.snapshots
     if model.soft and model.grooves is not None:
-        from ..bench.shear import climbed_fields
-
-        tau, local = climbed_fields(patch, raw.contact, [(s["slide"], s["nodes"]) for s in shots])
+        tau, local = bench_shear.climbed_fields(patch, raw.contact, [(s["slide"], s["nodes"]) for s in shots])
         return frames_of(patch, np.array([s["time"] for s in shots]), tau, local, np.array([s["slide"] for s in shots]))
     time = np.array([s["time"] for s in shots])
     shear = bool(model.soft)
     pointed = shear or (numerics.per_point and model.grooves is None)
     if has(f.law, "bonds") and not listed(f) and pointed:
-        tau, local = point_fields(patch, model.bonds, raw.contact.reduction, [(s["slide"], s["bonds"]) for s in shots])
+        moments = [(s["slide"], s["bonds"]) for s in shots]
+        tau, local = fields.point_fields(patch, model.bonds, raw.contact.reduction, moments)
     elif shear:
-        length = 0.0 if raw.contact.reduction is None else law_from(f).element(1.0).length
+        length = 0.0 if raw.contact.reduction is None else record.law_from(f).element(1.0).length
         states = [(s["slide"], s["stretch"]) for s in shots]
-        tau, local = element_fields(patch, raw.contact.reduction, states, length)
+        tau, local = fields.element_fields(patch, raw.contact.reduction, states, length)
     else:
         tau = np.array([s["force"] / patch.pressure.load * sigma for s in shots])
         local = np.array([np.full(sigma.size, s["slip"]) for s in shots])
@@ -70,8 +71,6 @@ def _under_changing_load(patch, raw) -> dict:
 
 def _shear(law, shot, nodal) -> tuple:
     """(friction forces (m,) [N], stretches (m,) [m]) of the nodes in a snapshot."""
-    from ...dynamics.march import varying_load
-
     top, bottom, _ = shot["memory"]
     if law.kind == varying_load.PLASTIC:
         return law.static * top, law.length * np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0)

@@ -5,7 +5,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ...dynamics.march import models
+from ...dynamics.grooves import climbing, periodic, run
+from ...dynamics.march import joints, models
 from ...effects import has
 from ...friction.laws.elastic_plastic import parallel
 from ...friction.laws.stretch import points_element
@@ -15,11 +16,12 @@ from ...model.law import Rubbing, bonds_of
 from ...model.model import Model
 from ...slip.fields import shear_of
 from ...structure.drive_sizes import omega_of
+from ..bench import rigid
 from ..bench.averaged import limit_share
 from ..patch.kept import elements, strip_elements
+from . import strips, varying_load
 from .lists import quadrature_of
 from .numerics import Numerics
-from .strips import strip_loads
 
 
 def contact_of(model: Model, numerics: Numerics, patch):
@@ -34,11 +36,10 @@ def contact_of(model: Model, numerics: Numerics, patch):
     alone = None if many else contact_model(model, numerics, patch)
     if not many and not rig.bends:
         return alone
-    from ...dynamics.march import joints
 
     rows, found = [*rig.modes.interfaces], []
     if many:
-        loads = strip_loads(patch) if patch is not None else [one.load for one in rig.interfaces]
+        loads = strips.strip_loads(patch) if patch is not None else [one.load for one in rig.interfaces]
         parts = [_element(rig.interfaces[k if patch is None else 0], load, rig.speed) for k, load in enumerate(loads)]
         if model.soft:  # strips, each with the elements of its own
             f = model.friction
@@ -59,27 +60,21 @@ def _climbing(model: Model, patch, count: int | None = None):
     """The model of a rig whose load climbs grooves."""
     f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
     if model.soft or not has(f.law, "memoryless"):
-        from ..bench.rigid import climbing
-
-        return climbing(model, load, patch, count)
-    from ...dynamics.grooves.run import model_of
-    from ..bench.rigid import swing_of
+        return rigid.climbing(model, load, patch, count)
 
     speed = None if has(f.law, "set-valued") else f.reference_speed
     kinetic = f.static if f.kinetic is None else f.kinetic
-    return replace(model_of(model.grooves, load, f.static, kinetic, speed, model.rig.modes), swing=swing_of(model))
+    climbs = run.model_of(model.grooves, load, f.static, kinetic, speed, model.rig.modes)
+    return replace(climbs, swing=rigid.swing_of(model))
 
 
 def flank_of(model: Model, patch):
     """The law along the flanks of grooves of a harmonic balance."""
-    from ...dynamics.grooves.climbing import refuse_heavy
-    from ...dynamics.grooves.periodic import ElasticFlank, PacedFlank
-
     f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
     if has(f.law, "memoryless"):
-        refuse_heavy(model.grooves, f.static, model.rig.modes)
-        return PacedFlank(model.grooves, load, f.static, f.reference_speed)
-    return ElasticFlank(_climbing(model, patch))
+        climbing.refuse_heavy(model.grooves, f.static, model.rig.modes)
+        return periodic.PacedFlank(model.grooves, load, f.static, f.reference_speed)
+    return periodic.ElasticFlank(_climbing(model, patch))
 
 
 def _element(one: Rubbing, load: float, speed: float) -> Element:
@@ -99,9 +94,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
     if f is None:
         return models.free_model()
     if model.rig.load_varies:
-        from .varying_load import varying_load_model
-
-        return varying_load_model(model, patch, numerics.shear_modes)
+        return varying_load.varying_load_model(model, patch, numerics.shear_modes)
     load = patch.pressure.load if patch is not None else model.point.load
     if has(f.law, "bonds"):
         return _bonds(model, numerics, patch, load)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core import Missing
 from ...effects import has
+from ...friction.bonds import engines
 from ...friction.bonds.list_numbers import AGED, SHARES, form_of
 from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
@@ -44,14 +45,12 @@ def quadrature_of(model: Model, numerics: Numerics):
 
 def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
     """The Choice of `quadrature_of` by an engine, or "auto", for a block that bonds let move by `stretch` lengths."""
-    from ...friction.bonds.engines import choose as engine_for
-
     law, accuracy = model.bonds, model.accuracy
     once = model.rig.kind == "free" or model.rig.waveform == "step"
     left = HELD if chatters(model) else DECAYED if once else 1.0
     stroke = max(4 * left * min(model.speed / omega_of(model.rig.drive) / law.length, stretch), 1e-9)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
-    return engine_for(law, accuracy.tolerance, stroke, numerics.steps / 2, engine, tail, accuracy.merge)
+    return engines.choose(law, accuracy.tolerance, stroke, numerics.steps / 2, engine, tail, accuracy.merge)
 
 
 def _stretch(model: Model, least: float = FAST) -> float:

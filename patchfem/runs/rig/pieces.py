@@ -9,6 +9,7 @@ import numpy as np
 from ...core import BaseSine, NotConverged
 from ...dynamics.events import elements, histories
 from ...dynamics.events import names_kernels as at
+from ...dynamics.events import steady as steady_events
 from ...dynamics.events.reading import Reading
 from ...dynamics.integrated import Integrated, Loop
 from ...dynamics.work_check import gap
@@ -21,11 +22,11 @@ from ...response.ringing import held_ring
 from ...response.rows import stuck_share
 from ...response.spectrum import distorted
 from ...structure.drive_sizes import largest, omega_of, sinusoidal, whole
-from ..bench.averaged import limit_share
+from ..bench import averaged
+from . import interface, strips
 from .levels import by_levels, without_part_of_cycle
 from .reading import Reader
 from .solution import Solution, borne, mode_stiffness
-from .strips import as_one, strip_loads
 
 OF_MOTION = ("relative_displacement_amplitude", "absolute_acceleration_peak", "absolute_acceleration_fundamental",
              "acceleration_distortion")  # what is known without an interface
@@ -74,8 +75,9 @@ class Pieces(Reader):
         """The run as that of the patch, where its strips slide apart."""
         if not self.apart:
             return run
-        loads, offsets = strip_loads(self.patch), self.patch.strips.offsets
-        return replace(run, response=as_one(run.response, loads, offsets), window=as_one(run.window, loads, offsets))
+        loads, offsets = strips.strip_loads(self.patch), self.patch.strips.offsets
+        response, window = (strips.as_one(one, loads, offsets) for one in (run.response, run.window))
+        return replace(run, response=response, window=window)
 
     def sticks(self, run) -> bool:
         """Of strips that slide apart every one has to stick."""
@@ -160,15 +162,13 @@ def settles(modes, drive, groups, done) -> tuple | None:
 
     None where the run does not end with a period of a sine, or where no such motion was found.
     """
-    from ...dynamics.events.steady import settled  # scipy's linear algebra, which few runs want
-
     last = drive.segments[-1] if drive.segments else None
     if last is None or not sinusoidal(drive) or last.constant != 0 \
             or abs(done.cycles_done - round(done.cycles_done)) > 1e-9:
         return None
     sine = BaseSine(last.amplitude, last.omega, drive.moving)
     try:
-        one = settled(modes, sine, groups, *done.end)
+        one = steady_events.settled(modes, sine, groups, *done.end)
     except NotConverged:
         return None
     amplitude, error = settled_of(one.amplitude, one.residual, one.multipliers)
@@ -194,13 +194,11 @@ class YieldingElements:
     rigid = False
 
     def __init__(self, model, numerics, patch):
-        from .interface import contact_model  # brings patches, which Coulomb friction does not want
-
         rig, self.contact, begin = model.rig, None, perf_counter()
         if len(rig.modes.interfaces) > 1:
             parts = [law_from(one.numbers, one.load).element(one.load) for one in rig.interfaces]
         else:
-            self.contact = contact_model(model, numerics, patch)
+            self.contact = interface.contact_model(model, numerics, patch)
             parts = [self.contact.element]
         self.held = 1e-3 * min(one.length for one in parts)
         self.groups = tuple(elements_of_law(one) for one in parts)
@@ -222,13 +220,13 @@ def coulomb_limits(model, patch) -> list:
     """(static, kinetic) friction [N] of every interface, 0 where nothing rubs."""
     rig, share = model.rig, 1.0
     if rig.strips_slide_apart:
-        return [tuple(map(float, model.limits(load))) for load in strip_loads(patch)]
+        return [tuple(map(float, model.limits(load))) for load in strips.strip_loads(patch)]
     if model.friction is None:
         return [(0.0, 0.0)] * len(rig.modes.interfaces)
     if rig.names:
         return [tuple(map(float, one.limits(one.load))) for one in rig.interfaces]
     if has(model.friction.law, "averaged"):
-        share = limit_share(model, patch)
+        share = averaged.limit_share(model, patch)
     static, kinetic = model.limits(borne(model, patch))
     return [(float(static * share), float(kinetic if model.friction.kinetic is not None else static * share))]
 

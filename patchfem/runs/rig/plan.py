@@ -5,12 +5,13 @@ from math import inf, pi
 import numpy as np
 
 from ...effects import has
-from ...friction.bonds.parameters import LONGEST
+from ...friction.bonds import parameters
 from ...model.model import Model
+from ...slip import shear_modes
 from ...structure.drive_sizes import largest, omega_of
+from . import lists
 from .costs import exact_words
 from .engines import ENGINES, PIECES, steady_by
-from .lists import bonds_cost, chatters, halvings, limp, lists_grow, quadrature_of, stalls
 from .numerics import choose
 
 STEP, STEP_MODE = 7e-7, 1e-7  # seconds of a step of one mode, and of each further one
@@ -38,8 +39,8 @@ def march_cost(model: Model, numerics, unknowns: dict) -> tuple:
     if model.grooves is not None:
         each = CLIMB + (4 * _of_modes(numerics, points, unknowns) if soft else 0.0)  # the normal force is searched
     elif f is not None and has(f.law, "bonds"):
-        if quadrature_of(model, numerics).engine != "recursion":
-            entries, seconds = bonds_cost(model, numerics)
+        if lists.quadrature_of(model, numerics).engine != "recursion":
+            entries, seconds = lists.bonds_cost(model, numerics)
             each, unknowns["bond_list_about"] = seconds / steps, int(entries)
         elif soft:
             each = _of_modes(numerics, points, unknowns)
@@ -49,7 +50,7 @@ def march_cost(model: Model, numerics, unknowns: dict) -> tuple:
         each = _of_modes(numerics, points, unknowns)
     elif soft:
         each = 3e-9 * points + 5e-7
-    passes = 0.75 + 2**(halvings(model) + 1) - 1  # a half and a quarter of the steps, and each halving of them
+    passes = 0.75 + 2**(lists.halvings(model) + 1) - 1  # a half and a quarter of the steps, and each halving of them
     return int(steps * passes), steps * passes * each
 
 
@@ -63,9 +64,7 @@ def _step(rig, f) -> float:
 
 def _of_modes(numerics, points: int, unknowns: dict) -> float:
     """Seconds of a step behind shear modes, whose number goes into `unknowns`."""
-    from ...slip.shear_modes import SHEAR_MODES
-
-    unknowns["shear_modes"] = numerics.shear_modes or SHEAR_MODES
+    unknowns["shear_modes"] = numerics.shear_modes or shear_modes.SHEAR_MODES
     return 4e-8 * points * (1 + unknowns["shear_modes"] / 4)
 
 
@@ -134,25 +133,26 @@ def summed_words(model: Model, numerics) -> list:
     """Sentences on how the bonds of law 'nonlocal' are summed, or on which engine takes elements that stick or slip."""
     if not has(model.friction.law, "bonds"):
         return [] if PIECES.lacks(model) else exact_words(model, numerics.engine)
-    found = quadrature_of(model, numerics)
+    found = lists.quadrature_of(model, numerics)
     out = ["sum over bonds by " + found.said()]
     if found.engine == "recursion":
         return out
-    if lists_grow(model):
-        stiff = "an order above 0 gives it one" if limp(model) else "reading = \"stretch\" gives it a stiffness"
+    if lists.lists_grow(model):
+        stiff = "an order above 0 gives it one" if lists.limp(model) else "reading = \"stretch\" gives it a stiffness"
         out.append(f"{_held_words(model)}; {stiff}")
-    if (seconds := bonds_cost(model, numerics)[1]) > LONGEST:
-        out.append(f"run will refuse: the bond list would take about {seconds:.0f} s, more than {LONGEST:.0f} s")
+    if (seconds := lists.bonds_cost(model, numerics)[1]) > parameters.LONGEST:
+        out.append(f"run will refuse: the bond list would take about {seconds:.0f} s, more than "
+                   f"{parameters.LONGEST:.0f} s")
     return out
 
 
 def _held_words(model: Model) -> str:
     """How bonds hold the block whose list of them grows."""
     turns = "it turns back in almost every step, and the list grows by a strip with each"
-    if stalls(model):
+    if lists.stalls(model):
         return "the printed law holds the block from its release on: it swings on its bonds, or turns back in almost " \
             "every step, which takes longest and is counted here"
-    if limp(model):
+    if lists.limp(model):
         return f"bonds of order 0 hold the block, but give it no stiffness: {turns}"
-    return f"the printed law holds the block, however small its stroke: {turns}" if chatters(model) else \
+    return f"the printed law holds the block, however small its stroke: {turns}" if lists.chatters(model) else \
         "the printed law holds the block at some level, or just: the list grows with every step"

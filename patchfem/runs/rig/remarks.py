@@ -8,6 +8,7 @@ from ...effects import has
 from ...response.outcome import changing_note
 from ..results.notes import climbing_as_one, creeping, of_growth, unbounded_bonds, unripe, warming, work_check_warning
 from ..results.travel import travelled
+from . import pieces
 from .costs import dear_elements
 from .engines import ENGINES, PIECES
 from .solution import borne
@@ -85,10 +86,9 @@ def unmoved_elements(model, numerics, patch, raw) -> list:
     """The note of a steady motion on elements that it never moves."""
     if PIECES.lacks(model) or raw.outcome not in (Outcome.STEADY, Outcome.STUCK):
         return []
-    from .pieces import YieldingElements
 
     slides = raw.window.extra.get("slides", raw.window.slide[:, None])
-    for group, slide in zip(YieldingElements(model, numerics, patch).groups, slides.T):
+    for group, slide in zip(pieces.YieldingElements(model, numerics, patch).groups, slides.T):
         most, half = float(group.yield_slide.max(initial=0.0)), float(np.ptp(slide)) / 2
         if most > half:
             return [f"part of the joint yields only at {length(most)} and never slips in this motion of "

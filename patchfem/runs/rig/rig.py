@@ -16,14 +16,12 @@ from ...response.settling import slip_period
 from ...structure.drive_sizes import sinusoidal, slowest
 from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_errors
 from ..results.travel import outcome_on_piece
-from . import levels, remarks
+from . import levels, lists, remarks, start_ring
 from .costs import MOST_STEPS
 from .engines import ENGINES, Variant, unbalanced
 from .fields import fields_of
-from .lists import crowded
 from .numerics import choose
 from .solution import Solution, curve_measures
-from .start_ring import StartRing, start_ring
 
 ENDED = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)  # of a run before its time
 FINEST = 1e-12  # error of a step below which round-off rules
@@ -45,7 +43,7 @@ class Coupled:
     estimated: bool
     measures: dict
     outcome: Outcome | None = None
-    rings: StartRing | None = None
+    rings: "start_ring.StartRing | None" = None
 
     @property
     def rubs(self) -> bool:
@@ -97,9 +95,9 @@ def _settled(run: Coupled) -> Coupled:
 
 def _started(run: Coupled) -> Coupled:
     """With what the ringing of the start leaves open behind a patch that holds."""
-    rings = StartRing(run.measures, {}, [])
+    rings = start_ring.StartRing(run.measures, {}, [])
     if run.patch is not None and not run.raw.levels:
-        rings = start_ring(run.outcome, run.measures, run.raw.window, run.drive, run.numerics.cycles,
+        rings = start_ring.start_ring(run.outcome, run.measures, run.raw.window, run.drive, run.numerics.cycles,
                            run.model.accuracy.tolerance)
     return replace(run, measures=rings.measures, rings=rings)
 
@@ -216,4 +214,4 @@ def _enough(model, numerics, found, measures) -> bool:
     if numerics.local:
         return met or numerics.local < FINEST
     return met or "steps_per_cycle" in numerics.pinned or again > MOST_STEPS or again * numerics.cycles > 1e7 \
-        or crowded(model, numerics, found.book) or found.outcome in ENDED
+        or lists.crowded(model, numerics, found.book) or found.outcome in ENDED

@@ -5,6 +5,7 @@ hands out. `of` finds one by its name; read `here` first.
 """
 
 from ....core import PatchfemError
+from . import cluster, here, pool
 
 
 def of(name: str = "", jobs: int = 1):
@@ -17,15 +18,10 @@ def of(name: str = "", jobs: int = 1):
         raise PatchfemError(f"-j {jobs}: at least one process is wanted")
     kind, _, address = name.partition(":")
     if kind == "dask":
-        from .cluster import Cluster
-
-        return Cluster(address, jobs if jobs > 1 else 0)
+        return cluster.Cluster(address, jobs if jobs > 1 else 0)
     if name:
         raise PatchfemError(f"--executor {name}: unknown; dask or dask:ADDRESS is wanted, or -j N without it")
     if jobs == 1:
-        from .here import Here
+        return here.Here()
 
-        return Here()
-    from .pool import Pool
-
-    return Pool(jobs)
+    return pool.Pool(jobs)

@@ -14,6 +14,7 @@ from time import perf_counter
 
 import numpy as np
 
+from .... import __version__
 from ....core import Missing, PatchfemError
 from ..sweep import Died, Work, answer, handed
 
@@ -124,8 +125,6 @@ def _source() -> str:
 def own_of(work: Work | None = None) -> dict:
     """What whoever answers a work must have as who asks has it: versions by name, and as `files` the sign of the scene
     with the files that it names."""
-    from .... import __version__
-
     own = {"patchfem": f"{__version__} (sources {_source()})", "numpy": np.__version__,
            "python": "{}.{}".format(*sys.version_info)}
     return own if work is None else own | {"files": work.asked.digest()}

@@ -4,6 +4,8 @@ import signal
 import sys
 from multiprocessing.connection import Connection
 
+from .. import sweep
+
 
 def main() -> None:
     """Answer the chunks of a work that come through the pipe whose number is the first word of the command line; a
@@ -14,15 +16,14 @@ def main() -> None:
     pipe = Connection(int(sys.argv[1]))
     try:
         work = pipe.recv()
-        from ..sweep import Work, answer, warmed
 
-        warmed(work)
+        sweep.warmed(work)
         while True:
             asked = pipe.recv()
-            if isinstance(asked, Work):  # the same with what was made of all cases
+            if isinstance(asked, sweep.Work):  # the same with what was made of all cases
                 work = asked
             else:
-                pipe.send(answer(work, asked, None if sys.argv[2] else _say))
+                pipe.send(sweep.answer(work, asked, None if sys.argv[2] else _say))
     except (EOFError, BrokenPipeError, ConnectionResetError):  # who asked is gone
         return
 

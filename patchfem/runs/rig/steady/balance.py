@@ -7,6 +7,7 @@ import numpy as np
 
 from ....compiled import load
 from ....core import BaseSine, NotConverged, Outcome, Start, say
+from ....dynamics.grooves import climbing
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.balance import cycle_energy, periodic_response
 from ....dynamics.harmonic.balance import regime as balanced_regime
@@ -119,11 +120,9 @@ class BalanceFinder:
         elif not stable.stable:
             outcome, message = Outcome.NOT_CONVERGED, unlasting(stable.multipliers)
         if load is not None and load.min() <= 0:
-            from ....dynamics.grooves.climbing import lifts
-
             if (gone := self._left(drive, Start(response.modal[0], response.modal_rate[0]))) is not None:
                 return gone, None
-            outcome, message = Outcome.NOT_CONVERGED, lifts(grooves, response.time[int(np.argmin(load))])
+            outcome, message = Outcome.NOT_CONVERGED, climbing.lifts(grooves, response.time[int(np.argmin(load))])
         return Solution(values, response, response, amplitude, (None, None), outcome, [], book, perf_counter() - begin,
                         message=message, errors=errors, extra=extra, notes=notes), found
 

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....core import Outcome, PatchfemError, Start
-from ....dynamics.events import histories
+from ....dynamics.events import elements as event_elements
+from ....dynamics.events import histories, steady, stick_steady
 from ....dynamics.periodic import is_stable
 from ....response.measures import half_swing
 from ....response.spectrum import wave_measures
@@ -123,15 +124,11 @@ class YieldFinder(Maps):
 
     def begun(self, memory):
         """As of `Maps.begun`."""
-        from ....dynamics.events.elements import books_begin
-
-        return books_begin(memory)
+        return event_elements.books_begin(memory)
 
     def repeating(self, drive, near) -> Repeating:
         """The motion that repeats, from the Point `near` it or from rest."""
-        from ....dynamics.events.steady import steady
-
-        one = steady(self.modes, drive, self.groups, near)
+        one = steady.steady(self.modes, drive, self.groups, near)
         return Repeating(one.start, one.memory, one.point, one.regime, one.multipliers, one.residual, one.error,
                          one.iterations, True, is_stable(one.multipliers))
 
@@ -149,10 +146,8 @@ class EventFinder(Maps):
     def repeating(self, drive, near) -> Repeating:
         """The motion that repeats: where friction falls with the first slip there are several, and one starts from the
         state `near`. Multipliers of two events at once hold for one order of them, so they tell nothing."""
-        from ....dynamics.events.stick_steady import steady
-
         falls = bool(np.any(self.forces[0] > self.forces[1]))
-        one = steady(self.modes, drive, self.groups, start=near if falls else None)
+        one = stick_steady.steady(self.modes, drive, self.groups, start=near if falls else None)
         bounded = one.regime != "unbounded"
         return Repeating(one.start, None, one.start, one.regime, one.multipliers, one.residual, one.residual,
                          one.iterations, bounded, not bounded or not one.alone or is_stable(one.multipliers))
