@@ -41,7 +41,7 @@ from .scene.scene import Scene, SceneError, loads, text_of, with_files
 from .scene.scene import load as load_file
 from .scene.sets import assignments, texts
 from .surface.compare import compare as comparison
-from .surface.compare import measured, verdict
+from .surface.compare import verdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -209,7 +209,7 @@ def compare(before: str | Path, after: str | Path, /, *other: str | Path, direct
     `sentences` are words; `shift`, `worn_depth_mean`, `amplitude_ratio` and so on have `value`, `low`, `high`, `unit`,
     and a `reason` where the value is None. PatchfemError for files that do not fit together.
     """
-    parts = measured.compared_files((before, after, *other), direction, units, shift, keep_spikes)
+    parts = comparison.compared_files((before, after, *other), direction, units, shift, keep_spikes)
     directions = comparison.directions_of(parts)
     return compared_data.data_of(parts, verdict.verdicts(parts, directions), directions)
 

@@ -12,7 +12,7 @@ from ..export.surfaces import compare as paper
 from ..scene.keys import quantities
 from ..surface import profile
 from ..surface.compare import compare as comparison
-from ..surface.compare import measured, verdict
+from ..surface.compare import verdict
 from .shared import Json, Out, Quiet, Refused, Sets, Units, flag, model_of, note, say, scene_of, word
 
 
@@ -35,7 +35,7 @@ def compare(before: Path, after: Path, /, *other: Path,
 
     told = _length("shift", shift) if shift else None
     named = tuple(word.strip() for word in units.split(",")) if units else None
-    parts = measured.compared_files((before, after, *other), direction, named, told, keep_spikes)
+    parts = comparison.compared_files((before, after, *other), direction, named, told, keep_spikes)
     directions = comparison.directions_of(parts)
     found = verdict.verdicts(parts, directions)
     target = out if out is not None else Path("out") / f"{before.stem}-{after.stem}"

@@ -3,11 +3,10 @@
 import numpy as np
 
 from ..core import PatchfemError, say
-from .profile import Profile, level
+from .profile import Profile, even, level
 
 ELEMENTS = 2  # a wave shorter than this many elements has no place on the nodes
 LIMIT = 0.1  # share of the height in such waves from which something is really lost
-_MOST = 1 << 20  # samples of an evened trace
 
 
 def spectrum(profile: Profile) -> tuple:
@@ -22,21 +21,12 @@ def spectrum(profile: Profile) -> tuple:
 
     if profile.missing.any():
         raise PatchfemError(f"{profile.source}: {profile.missing.sum()} heights are missing; clean the trace first")
-    z = level(_even(profile)).z
+    z = level(even(profile)).z
     count = z.size - 1
     amplitude = dct(z, type=1) / count
     power = amplitude[1:] ** 2 / 2
     power[-1] /= 2  # the wave of two samples: its transform counts twice, its mean square is the square
     return 2 * profile.length / np.arange(1, count + 1), power
-
-
-def _even(profile: Profile) -> Profile:
-    steps = np.diff(profile.x)
-    if np.ptp(steps) <= 1e-6 * steps.mean():  # even but for printed digits
-        return profile
-    step = max(float(np.percentile(steps, 10)), profile.length / _MOST)  # as fine as the fine stretches
-    x = np.linspace(profile.x[0], profile.x[-1], int(np.ceil(profile.length / step)) + 1)
-    return Profile(x, np.interp(x, profile.x, profile.z), profile.source)
 
 
 def fine_share(profile: Profile, length: float) -> float:

@@ -11,6 +11,7 @@ WINDOW = 7  # samples of the running median; what is three samples wide or less 
 SPIKE = 8.0  # robust standard deviations from the running median
 WIDE, FOOT = (15, 31), 3.0  # samples of the medians that wider specks stand above; deviations at which their feet end
 _BLOCK = 1 << 17  # windows sorted at a time
+_MOST = 1 << 21  # samples of an evened trace
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +65,32 @@ def level(profile: Profile) -> Profile:
     s = (x - x[there].mean()) / profile.length
     z = z - z[there].mean()
     return replace(profile, z=frozen_array(z - s * (s[there] @ z[there] / (s[there] @ s[there]))))
+
+
+def even(profile: Profile) -> Profile:
+    """A trace without gaps on an even step, which filter and spectrum want; the notes tell what that took.
+
+    A trace that is even and whole comes back as it is. Missing heights are bridged by straight lines. An uneven trace
+    is read off along its straight lines at its 10th percentile step, so that nothing between its samples is lost.
+    """
+    there, steps = ~profile.missing, np.diff(profile.x)
+    whole, regular = bool(there.all()), bool(np.ptp(steps) <= 1e-6 * steps.mean())
+    if whole and regular:
+        return profile
+    known, heights = profile.x[there], profile.z[there]
+    if known.size < 2:
+        raise PatchfemError(f"{profile.source}: {known.size} heights; a trace wants two at least")
+    x, notes = profile.x[(profile.x >= known[0]) & (profile.x <= known[-1])], profile.notes
+    if not whole:
+        notes += (f"{profile.source}: {(~there).sum()} of {there.size} heights are missing; straight lines stand in "
+                  f"their place, the longest over {say(float(np.diff(known).max()))}",)
+    if not regular:
+        step = max(float(np.percentile(steps, 10)), float(x[-1] - x[0]) / _MOST)
+        count = int(np.ceil((x[-1] - x[0]) / step * (1 - 1e-9))) + 1
+        x = np.linspace(x[0], x[-1], count)
+        notes += (f"{profile.source}: samples lie {say(float(steps.min()))} to {say(float(steps.max()))} apart; the "
+                  f"trace is read off every {say(float(x[1] - x[0]))} along its straight lines",)
+    return replace(profile, x=frozen_array(x), z=frozen_array(np.interp(x, known, heights)), notes=notes)
 
 
 def cleaned(profile: Profile, longest: float) -> Profile:

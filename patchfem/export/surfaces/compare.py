@@ -13,10 +13,9 @@ from ...scales import LADDERS, plain, step_of
 from ...surface.areal import level_plane
 from ...surface.compare.carried import NO_LIMIT
 from ...surface.compare.compare import Comparison
-from ...surface.compare.quantity import LEVEL, Quantity
-from ...surface.profile import Profile, level
+from ...surface.profile import Profile, even, level
+from ...surface.quantity import LEVEL, Quantity
 from ...surface.roughness.bearing import abbott
-from ...surface.roughness.filter import even
 from ...surface.roughness.parameters import Heights
 from ...surface.roughness.spectrum import BAND
 from ..drawing.inline import CSS, placed

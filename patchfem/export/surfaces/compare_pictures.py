@@ -3,8 +3,7 @@
 import numpy as np
 
 from ...scales import axis_unit
-from ...surface.profile import level
-from ...surface.roughness.filter import even
+from ...surface.profile import even, level
 from ..drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
 from .pictures import thinned
 

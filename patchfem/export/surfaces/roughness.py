@@ -7,7 +7,8 @@ from ... import __version__
 from ...core import say
 from ...disk.whole import write_text
 from ...scales import LADDERS, plain, step_of
-from ...surface.roughness.report import RoughnessReport, Value
+from ...surface.quantity import Quantity
+from ...surface.roughness.report import RoughnessReport
 from ..drawing import inline
 from ..drawing.inline import CSS
 from . import pictures
@@ -20,7 +21,7 @@ INTERVAL = ("Interval: 5 to 95 %, of the mean over all traces of this length on 
             "from place to place.")
 
 
-def shown(one: Value) -> tuple:
+def shown(one: Quantity) -> tuple:
     """Value, interval and unit as texts, in the unit that suits the value; no interval is an empty text."""
     if one.value is None:
         return "-", "", "" if one.unit == "1" else one.unit
@@ -126,7 +127,7 @@ def verdict(report: RoughnessReport) -> str:
                      for one in known if one.value is not None) + "."
 
 
-def _said(one: Value) -> str:
+def _said(one: Quantity) -> str:
     value, interval, unit = shown(one)
     return f"{value} {unit}".rstrip() + (f" ({interval})" if interval else "")
 

@@ -7,7 +7,7 @@ import numpy as np
 from ...core import say
 from ...scales import plain
 from ..profile import runs_of
-from .quantity import SIDE, Quantity, refused
+from ..quantity import SIDE, Quantity, refused
 from .registration import REACH, Registration
 
 PART, SAMPLES, FILLED = 0.05, 40, 0.7  # of the length, samples, and share of unworn heights of a part that carries

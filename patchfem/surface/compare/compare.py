@@ -6,15 +6,15 @@ import numpy as np
 
 from ...core import PatchfemError, say
 from ..areal import Areal
-from ..profile import Profile, despiked
-from ..roughness.filter import even
+from ..files.read import read_surface
+from ..profile import Profile, despiked, even
+from ..quantity import SIDE, Quantity, around, refused
 from ..roughness.spectrum import BAND
 from . import depth as worn_depth
 from .carried import Carried, carried, hidden_wear, raised
 from .depth import Worn
 from .flanks import Flanks, flanks_of
 from .place import Match
-from .quantity import SIDE, Quantity, around, refused
 from .ratios import BEYOND, Size, at_step, likeness, loose, of_noise, ratio, scattered, size_along, size_of
 from .registration import Registration, gain_of, register
 from .same import Place, found_place
@@ -248,3 +248,31 @@ def directions_of(parts: list) -> list:
         sizes = [tuple(size_of(one, step) for one in pair) for pair in sides]
     return [(when, *(ratio(part, f"{part} along x over along y, {when}", *pair) for part in ("amplitude", "slope")))
             for when, pair in zip(("before", "after"), sizes)]
+
+
+def compared_files(paths: tuple, direction: str = "", units: tuple | None = None,
+                   shift: float | None = None, keep_spikes: bool = False) -> list[Comparison]:
+    """One `Comparison` for each direction that the files show.
+
+    paths: of the surface before and after, along one direction; two more for the other direction, of traces only. An
+    areal scan shows both. direction: "x", "y" or "" for two traces of no told direction; with four files or a scan it
+    is that of the first pair, x unless told. units: of x and of z as `read_surface` takes them. shift [m]: where it
+    is known, as `compared` takes it, of two traces alone; keep_spikes as there. PatchfemError for another number of
+    files, another direction, a trace beside a scan, four scans, and a shift of other than two traces.
+    """
+    if direction not in ("", "x", "y"):
+        raise PatchfemError(f"compare: direction {direction!r}: x or y is wanted")
+    if len(paths) not in (2, 4):
+        raise PatchfemError(f"compare: {len(paths)} files; two are wanted, or four: before and after along one "
+                            "direction, then before and after along the other")
+    files = [read_surface(path, units) for path in paths]
+    scans = {isinstance(one, Areal) for one in files}
+    if shift is not None and len(files) != 2:
+        raise PatchfemError("compare: a shift is that of two traces; compare each direction by itself")
+    if len(scans) > 1 or (True in scans and len(files) == 4):
+        raise PatchfemError("compare: two or four traces are wanted, or two areal scans")
+    if len(files) == 2 and True not in scans:
+        return [compared(*files, direction, shift=shift, keep_spikes=keep_spikes)]
+    first = direction or "x"
+    return [compared(*pair, along, keep_spikes=keep_spikes) for pair, along in
+            ((files[:2], first), (files[-2:], "y" if first == "x" else "x"))]

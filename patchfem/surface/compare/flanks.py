@@ -4,12 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..profile import Profile, level
-from ..roughness.filter import even
+from ..profile import Profile, even, level
+from ..quantity import LEVEL
 from ..roughness.intervals import made_traces
 from ..roughness.parameters import Heights
 from ..roughness.spectrum import spectrum_of
-from .quantity import LEVEL
 
 PARTS = 40  # of the trace, in which the track is looked for
 LEAST = 4  # parts of each flank

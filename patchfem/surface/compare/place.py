@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ..profile import Profile
-from ..roughness.filter import even, mean_line
+from ..profile import Profile, even
+from ..roughness.filter import mean_line
 
 COARSE = 1 << 13  # samples of a trace in the search
 OVERLAP = 0.5  # of the shorter trace, at least, lies on the other one

@@ -6,12 +6,11 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ..areal import Areal, level_plane
-from ..profile import Profile, level
-from ..roughness.filter import even
+from ..profile import Profile, even, level
+from ..quantity import LEVEL, SIDE, Quantity, refused
 from ..roughness.intervals import Intervals
 from ..roughness.parameters import Heights
 from ..roughness.spectrum import BAND, Spectrum, amplitude_of, refuse_band, spectrum_of
-from .quantity import LEVEL, SIDE, Quantity, refused
 
 BEYOND = 0.004  # standard deviation of a ratio by what noise does not tell: the tip, interpolation, the datum
 PLACES = 6  # parts of a trace whose mean squares scatter from place to place

@@ -12,8 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
-from ..profile import Profile, level
-from ..roughness.filter import even
+from ..profile import Profile, even, level
 from ..roughness.levelling import one_sided_line
 
 REACH = 2.5  # standard deviations of the noise within which a height counts as unworn

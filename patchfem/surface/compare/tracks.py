@@ -7,12 +7,11 @@ import numpy as np
 
 from ...core import frozen_array
 from ..profile import Profile, runs_of
+from ..quantity import SIDE, Quantity, around, refused
 from ..roughness.filter import mean_line
 from .carried import median_of_five
-from .depth import summed, widths
-from .extent import edge
+from .depth import edge, summed, widths
 from .flanks import PARTS, Flanks
-from .quantity import SIDE, Quantity, around, refused
 from .registration import REACH, Registration
 
 LONG = 3.0  # longest waves of the band, and a track is longer; so is a piece of the traces whose roughness is compared

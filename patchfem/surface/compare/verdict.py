@@ -4,9 +4,9 @@ import numpy as np
 
 from ...core import say
 from ..profile import Profile
+from ..quantity import SIDE, Quantity
 from .carried import may_hide, told
 from .compare import Comparison, identical
-from .quantity import SIDE, Quantity
 
 EXCHANGED = "material grew, or the files are in the wrong order"
 ELSEWHERE = "not comparable place by place"

@@ -7,11 +7,12 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal, level_plane
-from ..profile import Profile, level, spikes
+from ..profile import Profile, even, level, spikes
+from ..quantity import Quantity, refused
 from . import rows
 from .areal import areal_intervals, areal_parameters
 from .bearing import abbott, core_of
-from .filter import even, filtered
+from .filter import filtered
 from .intervals import Intervals
 from .parameters import Heights
 from .spectrum import BAND, amplitude_of, refuse_band, spectrum_of
@@ -22,19 +23,6 @@ UNTOLD = "the trace does not tell its interval"
 ROUND = 1e-14  # of the largest height: what levelling leaves of a straight line
 PRINTED = {"Ra": "Pa", "Rq": "Pq", "Skew": "Psk", "RzDin": "RzDin", "MaxDev": "MaxDev", "ASH": "ASH",
            "Wa": "Pa", "Wq": "Pq", "WMaxDev": "MaxDev"}  # names of a Dektak, which filters nothing unless asked
-
-
-class Value(NamedTuple):
-    """A parameter [SI] with its interval, 5 to 95 %, its unit and definition; reason: why there is no value, or
-    no interval of one."""
-
-    name: str
-    value: float | None
-    low: float | None
-    high: float | None
-    unit: str
-    text: str
-    reason: str = ""
 
 
 class Reread(NamedTuple):
@@ -50,11 +38,11 @@ class Reread(NamedTuple):
 class RoughnessReport:
     """What `report_of` found.
 
-    values: tuple of Value; length [m]; shape: samples, along y first; step [m] between samples; cutoff, window [m] or
-    None; band: wavelengths [m] of band_amplitude; notes: sentences about the file and what was done to it; tip: the
-    stylus against the valleys, or None; printed: tuple of Reread. Of traces only: primary, the levelled trace;
-    waviness, roughness, None without a cut-off; abbott: (ratio, height) of the roughness, of the primary without one,
-    and its core; spectrum of the primary. scan: the levelled areal scan.
+    values: tuple of Quantity, each with its name; length [m]; shape: samples, along y first; step [m] between samples;
+    cutoff, window [m] or None; band: wavelengths [m] of band_amplitude; notes: sentences about the file and what was
+    done to it; tip: the stylus against the valleys, or None; printed: tuple of Reread. Of traces only: primary, the
+    levelled trace; waviness, roughness, None without a cut-off; abbott: (ratio, height) of the roughness, of the
+    primary without one, and its core; spectrum of the primary. scan: the levelled areal scan.
     """
 
     source: str
@@ -77,7 +65,7 @@ class RoughnessReport:
     spectrum: object | None = None
     scan: Areal | None = None
 
-    def __getitem__(self, name: str) -> Value:
+    def __getitem__(self, name: str) -> Quantity:
         """The parameter of this name."""
         return next(one for one in self.values if one.name == name)
 
@@ -132,7 +120,7 @@ def windowed(profile: Profile, first: float, last: float) -> Profile:
     return replace(profile, x=x[low:high + 1], z=profile.z[low:high + 1])
 
 
-def interval_of(name: str, profile: Profile, cutoff: float | None = None, band: tuple = BAND) -> Value:
+def interval_of(name: str, profile: Profile, cutoff: float | None = None, band: tuple = BAND) -> Quantity:
     """One parameter of a trace with its interval; names as in `rows`, those of the roughness need a cut-off [m]."""
     row = rows.TABLE.get(name)
     if row is None or row in rows.AREAL or row in rows.WINDOW:
@@ -185,7 +173,7 @@ def _primary(trace: Profile, band: tuple) -> tuple:
     return flat, Intervals(heights, True, spectrum_of(heights.z, heights.step), band)
 
 
-def _value(row, value, found: Intervals) -> Value:
+def _value(row, value, found: Intervals) -> Quantity:
     low, high = found.of(row, value)
     reason = ""
     if value is None:
@@ -195,10 +183,10 @@ def _value(row, value, found: Intervals) -> Value:
     elif row.kind == "wave" and low is not None and not (
             found.heights.step <= low <= value <= high <= found.heights.length):
         low, high, reason = None, None, UNTOLD
-    return Value(row.name, value, low, high, row.unit, row.text, reason)
+    return Quantity(value, low, high, row.unit, row.text, reason, row.name)
 
 
-def _waves(row, source: str, found: Intervals) -> Value:
+def _waves(row, source: str, found: Intervals) -> Quantity:
     if row.name == "dominant_wavelength":
         return _value(row, found.spectrum.dominant, found)
     low, high = found.band
@@ -206,7 +194,7 @@ def _waves(row, source: str, found: Intervals) -> Value:
     try:
         refuse_band(source, low, high, found.heights.length, found.heights.step)
     except PatchfemError as error:
-        return Value(row.name, None, None, None, row.unit, text, str(error))
+        return refused(row.unit, text, str(error))._replace(name=row.name)
     return _value(row._replace(text=text), amplitude_of(found.spectrum, low, high), found)
 
 
@@ -240,8 +228,8 @@ def _of_scan(scan: Areal) -> RoughnessReport:
     flat = level_plane(scan)
     found = areal_parameters(flat.z)
     bounds = areal_intervals(flat.z, found)
-    values = tuple(Value(row.name, found[row.name], *bounds[row.name], row.unit, row.text,
-                         "" if found[row.name] is not None else "the scan is flat") for row in rows.AREAL)
+    values = tuple(Quantity(found[row.name], *bounds[row.name], row.unit, row.text,
+                            "" if found[row.name] is not None else "the scan is flat", row.name) for row in rows.AREAL)
     lost = int(scan.missing.sum())
     notes = scan.notes + ((f"{scan.source}: {lost} of {scan.z.size} heights are missing and do not count",) if lost
                           else ())

@@ -6,8 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from ...core import PatchfemError, frozen_array, say
-from ..profile import Profile, level
-from .filter import even
+from ..profile import Profile, even, level
 
 TAPERS = 3  # of the first look, and the fewest
 MOST = 16

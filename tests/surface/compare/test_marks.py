@@ -9,8 +9,7 @@ import pytest
 from pairs import UM, pair
 
 from patchfem.core import PatchfemError, frozen_array
-from patchfem.surface.compare.compare import compared
-from patchfem.surface.compare.measured import compared_files
+from patchfem.surface.compare.compare import compared, compared_files
 from patchfem.surface.compare.same import placed
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile

@@ -8,10 +8,10 @@ from synthetic import report_area
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface.areal import Areal
 from patchfem.surface.compare.compare import compared, directions_of
-from patchfem.surface.compare.quantity import Quantity
 from patchfem.surface.compare.ratios import Size, ratio, size_of
 from patchfem.surface.compare.verdict import changed, confidence, verdicts
 from patchfem.surface.profile import Profile
+from patchfem.surface.quantity import Quantity
 
 MANY = pytest.param(40, marks=pytest.mark.slow)
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from synthetic import sine
 
 from patchfem.core import PatchfemError
-from patchfem.surface.profile import Profile
-from patchfem.surface.roughness.filter import ALPHA, even, filtered, mean_line
+from patchfem.surface.profile import Profile, even
+from patchfem.surface.roughness.filter import ALPHA, filtered, mean_line
 from patchfem.surface.roughness.parameters import Heights, root_mean_square
 
 UM = 1e-6
