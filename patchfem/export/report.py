@@ -8,8 +8,8 @@ import numpy as np
 
 from .. import scales
 from ..effects import shown_absent
-from .drawing import curves, pictures, wear
-from .pages import charts, player
+from .drawing import charts
+from .pages import player
 from .pages.document import Section, document
 from .pages.words import SHARP, G, headline, linked, others, pair, texts, units
 
@@ -38,7 +38,7 @@ def verdict(data: dict) -> str:
     answer = f"<b>{escape(data['summary']['outcome'])}</b>: {escape(data['sentence'])}"
     text = headline(data["summary"], data.get("cycles"), lambda number, name: linked(number, name, " class=v"),
                     data.get("released", ""))
-    return f"{answer}{escape(curves.regime(data.get('steady')))} {text}".strip()
+    return f"{answer}{escape(charts.regime(data.get('steady')))} {text}".strip()
 
 
 def page(data: dict) -> str:
@@ -77,8 +77,8 @@ def figures(data: dict) -> tuple:
     for found in (picture(name, data) for name in PICTURES):
         if found is None:
             continue
-        made = getattr(charts, found.draw.__name__)(*found.values)
-        made = [one | {"anchor": f"chart{len(drawn) + number}"} for number, one in enumerate(made)]
+        made = [one | {"anchor": f"chart{len(drawn) + number}"} for number, one in
+                enumerate(found.charts(*found.values))]
         cells = "".join(f'<div id="{one["anchor"]}" class=chart role=img aria-label="{escape(one["title"])}"></div>'
                         for one in made)
         places.append(f"<figure><div class=row>{cells}</div><figcaption>{escape(found.caption)}</figcaption></figure>")
@@ -87,9 +87,9 @@ def figures(data: dict) -> tuple:
 
 
 class Picture(NamedTuple):
-    """A picture that a run can be shown in: a function of `pictures` or `curves`, its arguments, a caption."""
+    """A picture that a run can be shown in: a function of `charts`, its arguments, a caption."""
 
-    draw: Callable
+    charts: Callable
     values: tuple
     caption: str
 
@@ -102,24 +102,23 @@ def picture(name: str, data: dict) -> Picture | None:
 def _curve(data: dict) -> Picture | None:
     found = data.get("curve")
     text = data.get("driven", "")
-    return None if found is None else Picture(curves.curve, (found,), curves.caption(found) + (
+    return None if found is None else Picture(charts.curve, (found,), charts.caption(found) + (
         f" {text[0].upper()}{text[1:]}." if text else ""))
 
 
 def _levels(data: dict) -> Picture | None:
     if "levels" not in data:
         return None
-    return Picture(curves.levels, (data["levels"],), "Amplitude at the end of every level, the state carried from one "
+    return Picture(charts.levels, (data["levels"],), "Amplitude at the end of every level, the state carried from one "
                    f"to the next; arrows show the order of the test.{_under(data)}")
 
 
 def _wear(data: dict) -> Picture | None:
     if "wear" not in data:
         return None
-
     states, history = data["wear"]["states"], data["wear"]["history"]
     profiles = (states["time"] / data["wear"]["period"], states["normal_stress"], states["worn_depth"])
-    return Picture(wear.wear, (data["x"], *profiles, history),
+    return Picture(charts.wear, (data["x"], *profiles, history),
                    f"The patch as it wears over {history['cycle'][-1]:.6g} cycles: pressure and worn depth of both "
                    "pieces together, and measures of patch and motion over their values on the new patch. All other "
                    "pictures show the worn patch.")
@@ -132,10 +131,10 @@ def _interface(data: dict) -> Picture | None:
     if np.any(fields.get("shear_stress", 0.0)):
         span = "the last cycle" if data["summary"]["kind"] == "rig" and not part_of_cycle(data) else "the run"
         caption += f"; shear stress in {len(fields['time']) - 1} frames of {span}, the largest resultant in colour"
-    if pictures.part_in_contact(data["x"], fields["normal_stress"][0]):
+    if charts.part_in_contact(data["x"], fields["normal_stress"][0]):
         length, scale = scales.axis_unit(data["x"], "m")
         caption += f". Shown is the part in contact, of {(data['x'][-1] - data['x'][0]) * scale:.4g} {length} in all"
-    return Picture(pictures.interface, (data["x"], fields), caption + ".")
+    return Picture(charts.interface, (data["x"], fields), caption + ".")
 
 
 def _bodies(data: dict) -> Picture | None:
@@ -148,7 +147,7 @@ def _bodies(data: dict) -> Picture | None:
     mises = data["bodies"]["mises"]
     largest = max(float(np.max(part)) for part in mises)
     unit, scale = scales.axis_unit([largest], "Pa")
-    return Picture(pictures.bodies, (data["x"], data["bodies"]["depth"], mises, data["fields"]["normal_stress"][0]),
+    return Picture(charts.bodies, (data["x"], data["bodies"]["depth"], mises, data["fields"]["normal_stress"][0]),
                    f"Both pieces {coated}{cause}{alone}. The largest value of a cell is {largest * scale:.3g} {unit}.")
 
 
@@ -162,7 +161,7 @@ def _loop(data: dict) -> Picture | None:
     title = "Friction force against slide" if part_of_cycle(data) or data.get("cycles") is None else "Friction loop"
     read = data.get("recorded")
     beside = "" if read is None else f" Grey: the force measured in {read['file']}."
-    return Picture(pictures.loop, (own["slide"], own["force"], title, read and (read["slide"], read["force"])),
+    return Picture(charts.loop, (own["slide"], own["force"], title, read and (read["slide"], read["force"])),
                    f"Resultant friction force against the slide of the interface, over {span}.{_under(data)}{beside}")
 
 
@@ -172,7 +171,7 @@ def _histories(data: dict) -> Picture | None:
     history, period, window, title = data["history"], data["loop"].get("period"), None, ""
     if "window" not in data:
         force = " and friction force" if np.any(history["force"]) else ""
-        return Picture(pictures.histories, (history, None, None), f"Slide{force} over the whole run.{_under(data)}"
+        return Picture(charts.histories, (history, None, None), f"Slide{force} over the whole run.{_under(data)}"
                        + (" Grey: the measured force." if "measured" in history else ""))
     w = data["window"]
     late = w["time"] >= w["time"][-1] - 3 * period * (1 + 1e-9)
@@ -182,7 +181,7 @@ def _histories(data: dict) -> Picture | None:
     title = f"The run: {count:.2g} of a cycle" if part_of_cycle(data) else title
     bodies = "output and base" if np.any(window["base"]) else "the output"
     caption = f"Displacement over the whole run; displacement, and acceleration of {bodies}, at its end.{_under(data)}"
-    begin, swings = pictures.whole_from(history["time"], period, w["time"][0]), bool(data.get("released"))
+    begin, swings = charts.whole_from(history["time"], period, w["time"][0]), bool(data.get("released"))
     kept = int(np.sum(history["time"] < begin))
     if kept:
         what = "reversals were kept: a band from the lowest to the highest of each cycle." \
@@ -191,7 +190,7 @@ def _histories(data: dict) -> Picture | None:
         unit, scale = scales.axis_unit(history["time"], "s")
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
     # a swing that dies down has no band per cycle: its turns are kept, and the line through them shows it
-    return Picture(pictures.histories, (history, window, period, title, swings), caption)
+    return Picture(charts.histories, (history, window, period, title, swings), caption)
 
 
 def _under(data: dict) -> str:
@@ -213,7 +212,7 @@ def _measured(data: dict) -> Picture | None:
                       (one["value"] * gain, None if one["error"] is None else one["error"] * gain))
     factor = f" (reading factor {m['gain']:g})" if m["gain"] != 1 else ""
     factor += f" (read as {m['reading']}, {m['share']:.4g} of the peak)" if m.get("reading", "peak") != "peak" else ""
-    return Picture(pictures.measured, (m["rows"], m["frequency"], m["input"], *points),
+    return Picture(charts.measured, (m["rows"], m["frequency"], m["input"], *points),
                    f"Measured responses at the drive frequency and the computed point{factor}.{_unsettled(data)}")
 
 

@@ -97,10 +97,12 @@ def axes(result: Result, names: tuple, onto=None):
     onto: Axes to draw the first panel on; without them the Axes are the first of a new figure with all panels.
     """
     data = report_data(result)
+    from .drawing.pictures import draw
+
     shown = next((one for one in (picture(name, data) for name in names) if one is not None), None)
     if shown is None:
         return None
     if onto is None:
-        return shown.draw.figure(*shown.values).axes[0]
-    shown.draw.figure(*shown.values, onto=onto)
+        return draw.figure(shown.charts(*shown.values)).axes[0]
+    draw.figure(shown.charts(*shown.values), onto=onto)
     return onto

@@ -12,8 +12,7 @@ from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import Outcome
 from patchfem.export import netcdf, report
-from patchfem.export.drawing import curves
-from patchfem.export.pages import charts
+from patchfem.export.drawing import charts, pictures
 
 FOLDED = {"frequency": np.array([10.0, 11, 12, 13, 12.5, 12, 11.5, 12.5, 14]),
           "level": np.full(9, 5.0), "amplitude": 1e-5 * np.array([1.0, 2, 4, 7, 6, 5, 3, 2, 1]),
@@ -62,15 +61,15 @@ def written(tmp_path_factory):
 
 
 def test_exact_spans_of_a_curve():
-    assert curves.spans(FOLDED) == [("stable", 0, 4), ("unstable", 4, 7), ("stable", 7, 9)]
+    assert charts.spans(FOLDED) == [("stable", 0, 4), ("unstable", 4, 7), ("stable", 7, 9)]
 
 
 def test_exact_a_picture_of_a_folded_curve():
-    text = curves.curve(FOLDED)
+    text = pictures.draw(charts.curve(FOLDED))
     for word in ("stable", "unstable", "fold", "drive frequency [Hz]", "half peak-to-peak [um]"):
         assert f">{word}<" in text, word
-    assert "stroke-dasharray" in text and curves.curve(FOLDED) == text
-    said = curves.caption(FOLDED)
+    assert "stroke-dasharray" in text and pictures.draw(charts.curve(FOLDED)) == text
+    said = charts.caption(FOLDED)
     assert "9 points" in said and "stable, unstable" in said and "2 folds" in said and "drive frequency" in said
 
 
@@ -78,15 +77,15 @@ def test_exact_a_curve_over_the_level_with_no_bounded_motion_at_its_end():
     found = {"frequency": np.full(4, 10.0), "level": 9.80665 * np.arange(1.0, 5),
              "amplitude": np.array([1e-6, 2e-6, 3e-6, np.nan]),
              "regime": np.array(["stuck", "2 stops", "sliding", "unbounded"]), "multiplier": np.zeros(4)}
-    assert curves.axis_of(found)[0] == pytest.approx([1, 2, 3, 4]) and curves.axis_of(found)[1:] == ("drive level", "g")
-    assert "no bounded motion" in curves.caption(found) and ">unbounded<" in curves.curve(found)
+    assert charts.axis_of(found)[0] == pytest.approx([1, 2, 3, 4]) and charts.axis_of(found)[1:] == ("drive level", "g")
+    assert "no bounded motion" in charts.caption(found) and ">unbounded<" in pictures.draw(charts.curve(found))
 
 
 def test_exact_the_regime_in_words():
-    assert curves.regime(None) == ""
-    assert "dies out" in curves.regime({"regime": "2 stops", "multiplier": 0.2})
-    assert "does not die out" in curves.regime({"regime": "unstable", "multiplier": 1.2})
-    assert curves.regime({"regime": "stuck", "multiplier": 0.0}) == \
+    assert charts.regime(None) == ""
+    assert "dies out" in charts.regime({"regime": "2 stops", "multiplier": 0.2})
+    assert "does not die out" in charts.regime({"regime": "unstable", "multiplier": 1.2})
+    assert charts.regime({"regime": "stuck", "multiplier": 0.0}) == \
         " Regime: stuck; largest Floquet multiplier 0."
 
 
@@ -163,7 +162,7 @@ def test_exact_the_arrows_of_the_levels_point_along_the_test(monkeypatch):
         return plain(self, text, xy=xy, xytext=xytext, **more)
 
     monkeypatch.setattr(Axes, "annotate", told)
-    curves.levels(rows)
+    pictures.draw(charts.levels(rows))
     assert seen == [(True, True), (True, True), (False, False)]
 
 
@@ -190,5 +189,5 @@ def test_exact_levels_over_more_than_three_decades_are_drawn_over_their_logarith
     assert not charts.levels(few)[0]["y"]["log"]
     for some, scale in ((rows, "log"), (few, "linear")):
         axes = Figure().subplots()
-        curves.levels(some, onto=axes)
+        pictures.draw(charts.levels(some), onto=axes)
         assert axes.get_yscale() == scale

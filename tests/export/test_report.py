@@ -18,8 +18,8 @@ from patchfem import scales
 from patchfem.__main__ import main
 from patchfem.core import G_N, Outcome
 from patchfem.export import report
-from patchfem.export.drawing import pictures
-from patchfem.export.pages import charts, words
+from patchfem.export.drawing import charts
+from patchfem.export.pages import words
 from patchfem.scene.keys.quantities import KINDS
 
 PERIOD, MIL = 1 / 143, 25.4e-6
@@ -268,7 +268,7 @@ def test_exact_the_band_joins_the_reversals_of_each_cycle():
     number = np.arange(20)
     time, high = (number / 2 + 0.25) * PERIOD, 1 + number // 2
     gone = (number // 2 != 3) & (number // 2 != 4)
-    middle, low, top = pictures.envelope(time[gone], ((-1.0)**number * high)[gone], PERIOD)
+    middle, low, top = charts.envelope(time[gone], ((-1.0)**number * high)[gone], PERIOD)
     assert middle == pytest.approx((np.arange(10) + 0.5) * PERIOD)
     assert np.isnan(low[3:5]).all() and np.isnan(top[3:5]).all()
     kept = np.array([0, 1, 2, 5, 6, 7, 8, 9])
@@ -277,18 +277,18 @@ def test_exact_the_band_joins_the_reversals_of_each_cycle():
 
 def test_exact_the_line_begins_where_the_samples_show_the_motion():
     sparse, dense = np.arange(0, 10, 0.5), np.arange(10, 14.05, 0.01)
-    assert pictures.whole_from(np.concatenate([sparse, dense]), 1.0, 12.0) == 10.0
-    assert pictures.whole_from(np.concatenate([sparse, dense]), 1.0, 9.0) == 9.0  # the window is kept whole
-    assert pictures.whole_from(dense, 1.0, 12.0) == dense[0]
-    assert pictures.whole_from(np.linspace(0, 0.3, 5), 1.0, 0.0) == 0.0
+    assert charts.whole_from(np.concatenate([sparse, dense]), 1.0, 12.0) == 10.0
+    assert charts.whole_from(np.concatenate([sparse, dense]), 1.0, 9.0) == 9.0  # the window is kept whole
+    assert charts.whole_from(dense, 1.0, 12.0) == dense[0]
+    assert charts.whole_from(np.linspace(0, 0.3, 5), 1.0, 0.0) == 0.0
 
 
 def test_exact_the_framed_part_holds_the_contact():
     x, depth = np.linspace(-6, 6, 241), np.linspace(0, 6, 50)
     for left, right in ((-6, -3), (-1, 1), (5, 6)):
-        a, b, height = pictures.closer(x, depth, np.where((x >= left) & (x <= right), 1.0, 0.0), 1.2)
+        a, b, height = charts.closer(x, depth, np.where((x >= left) & (x <= right), 1.0, 0.0), 1.2)
         assert -6 <= a <= left + 1e-9 and right - 1e-9 <= b <= 6 and b - a == pytest.approx(2.4 * height)
-    a, b, _ = pictures.closer(x, depth, 1 + x**2, 1.2)  # a flat punch: the corner with its peak
+    a, b, _ = charts.closer(x, depth, 1 + x**2, 1.2)  # a flat punch: the corner with its peak
     assert a == -6 and b - a == pytest.approx(0.4 * 12)
 
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...scales import LADDERS, axis_unit
+from ..drawing.charts import COLOURS, mark
 from ..readback import numeric, readable, variables, wanted
 from ..summary import read_summary
 from ..written import NUMBER
-from .charts import COLOURS, mark
 from .document import Section, document
 from .sweep import label
 from .words import linked, meaning, pair

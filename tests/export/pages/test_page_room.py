@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.export.pages import charts
+from patchfem.export.drawing import charts
 from patchfem.export.pages.document import document
 
 

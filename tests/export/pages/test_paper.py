@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from chromium import Chromium
 
-from patchfem.export.pages import charts
+from patchfem.export.drawing import charts
 from patchfem.export.pages.document import Section, document
 from patchfem.export.pages.sweep import page
 

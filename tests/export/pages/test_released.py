@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from command_line import cli
 
-from patchfem.export.pages.charts import histories
+from patchfem.export.drawing.charts import histories
+from patchfem.export.drawing.pictures import draw
 from patchfem.export.pages.released import swung
 from patchfem.export.pages.words import headline
 from patchfem.export.report import _histories
@@ -72,5 +73,5 @@ def test_exact_the_picture_of_the_whole_run_shows_every_turn():
     early, last = histories(*found.values)[0]["marks"]
     assert {early["kind"], last["kind"]} == {"line"} and early["x"].size == 7 and early["x"][-1] == last["x"][0]
     assert np.allclose(early["y"][:6], 1e6 * swing) and "turns and stops were kept" in found.caption
-    whole = found.draw.figure(*found.values).axes[0].lines[0].get_ydata()
+    whole = draw.figure(found.charts(*found.values)).axes[0].lines[0].get_ydata()
     assert np.allclose(whole[:6], 1e6 * swing)

@@ -1,8 +1,9 @@
-"""The pictures of a run as data that `curves.js` draws: the same arguments as the functions of `drawing` take.
+"""The figures of a run as data: `pictures` draws them on matplotlib Axes, `curves.js` on a page.
 
 A chart is a dict: `title`; `x`, `y`: {label, unit, log}, and `range` [low, high] where not all is shown; `marks`: what
-is drawn, from back to front. A mark has a `kind` (line, dots, band, span, rule, arrow, cells), a `name` for the legend
-("" for none), a `colour` (accent, warm, soft, or #rrggbb) and its numbers, in the units of the axes.
+is drawn, from back to front; `frame`: its size [pixel] where both axes have one scale. A mark has a `kind` (line, dots,
+band, span, rule, arrow, cells), a `name` for the legend ("" for none), a `colour` (accent, warm, soft, or #rrggbb) and
+its numbers, in the units of the axes.
 """
 
 from itertools import pairwise
@@ -11,9 +12,6 @@ import numpy as np
 
 from ...core import G_N
 from ...scales import axis_unit, wide_scale
-from ..drawing import curves
-from ..drawing import wear as wear_curves
-from ..drawing.pictures import closer, envelope, part_in_contact, whole_from
 
 LINE, FRAMES = 6000, 24  # points of a line, frames of the shear stress behind the largest one
 FAINT, FEWEST = 400, 200  # points of such a frame, and those that every line keeps
@@ -22,6 +20,11 @@ NUMBER = 13  # characters of a number in a page
 REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded": "dotted"}
 COLOURS = ("accent", "warm", "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86")
 MIL = 25.4e-6
+SPARSE, BANDS = 20, 1500  # kept samples per cycle below which a line through them is no motion; cycles of an envelope
+WORN = {"pressure_peak": "peak pressure", "contact_fraction": "contact fraction",
+        "normal_stiffness": "normal stiffness", "loop_area": "loop area",
+        "relative_displacement_amplitude": "amplitude"}  # measures over the cycles of wear
+PROFILES = 6  # of a patch that wears
 TALL, WIDEST = 270, 300  # pixels of a frame in which both axes have one scale
 
 
@@ -79,6 +82,16 @@ def _slim(one: dict, share: float) -> dict:
     return one | {name: np.asarray(one[name], float)[keep] for name in rows}
 
 
+def part_in_contact(x, sigma) -> tuple | None:
+    """Ends (first, last) x [m] of the part to show where less than half the length is pressed, None where all is worth
+    showing."""
+    used = np.flatnonzero(sigma > 0)
+    if not used.size or used.size >= 0.5 * x.size:
+        return None
+    pad = 0.15 * (x[used[-1]] - x[used[0]]) + (x[1] - x[0])
+    return max(x[0], x[used[0]] - pad), min(x[-1], x[used[-1]] + pad)
+
+
 def interface(x, fields: dict) -> list:
     """Pressure, and shear stress in every frame with that of the largest resultant in colour."""
     sigma, tau = fields["normal_stress"][0], fields.get("shear_stress")
@@ -101,8 +114,29 @@ def interface(x, fields: dict) -> list:
     return out
 
 
+def closer(x, depth, sigma, ratio: float) -> tuple:
+    """Part (left, right, height) [m] of both pieces that shows the contact, right - left = 2 height ratio.
+
+    x: (m,) and depth: (ny,) [m] of the mesh; sigma: (m,) [Pa], somewhere > 0; ratio: width of the picture over its
+    height.
+    """
+    used = np.flatnonzero(sigma > 0)
+    first, last, length = x[used[0]], x[used[-1]], x[-1] - x[0]
+    width = min(1.6 * (last - first) + 2 * (x[1] - x[0]), 0.4 * length)
+    middle = (first + last) / 2
+    if last - first > width:
+        middle = x[np.flatnonzero(sigma >= (1 - 1e-6) * sigma.max())[0]]
+    height = min(width / ratio / 2, depth[-1])
+    left = min(max(middle - width / 2, x[0]), x[-1] - width)
+    return left, left + width, height
+
+
 def bodies(x, depths, mises, sigma) -> list:
-    """Von Mises stress of both pieces: the whole pair, and the part around the contact."""
+    """Von Mises stress [Pa] of both pieces, pressed: the whole pair, and the part around the contact.
+
+    depths, mises: (ny,) rows and (nx - 1, ny - 1) cells of the lower and of the upper piece; colours end at all but the
+    sharpest cells.
+    """
     depth = max(depths, key=lambda rows: rows[-1])
     box = closer(x, depth, sigma, 1.3)
     (unit, scale), top, out = axis_unit(np.concatenate([np.ravel(part) for part in mises]), "Pa"), 0.0, []
@@ -153,11 +187,39 @@ def loop(slide, force, title: str, measured: tuple | None = None) -> list:
                   [read, line(slide * size, force * scale, "accent", "computed" if read else "")])]
 
 
+def envelope(time, value, period: float) -> tuple:
+    """Middle, lowest and highest value of the samples of each cycle; a cycle without samples is a gap of NaN.
+
+    time, value: (k,), ascending. Cycles are put together where there are more than a picture can show.
+    """
+    many = int(np.ceil(max(1.0, (time[-1] - time[0]) / period / BANDS)))
+    number = np.floor(time / (many * period) + 1e-9).astype(int)
+    count = number[-1] + 1
+    low, high = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(low, number, value)
+    np.maximum.at(high, number, value)
+    empty = low > high
+    low[empty] = high[empty] = np.nan
+    return (np.arange(count) + 0.5) * many * period, low, high
+
+
+def whole_from(time, period: float, window_start: float) -> float:
+    """Time [s] from which the kept samples show the motion itself: every later cycle holds at least SPARSE of them.
+
+    The last window is always kept whole, so the answer is never later than its start.
+    """
+    counts = np.bincount(np.floor(time / period + 1e-9).astype(int))[:-1]
+    thin = np.flatnonzero(counts < SPARSE)
+    return min((thin[-1] + 1) * period, window_start) if thin.size else float(time[0])
+
+
 def histories(history: dict, window: dict | None, period: float | None, title: str = "Last cycles",
               joined: bool = False) -> list:
     """The whole run, and its last cycles (a rig) or its friction force (a bench).
 
-    joined: the turns that were kept before are drawn as a line through them, not as a band per cycle.
+    history: time, displacement, force, (k,) each; window: the last cycles alone, with base and block acceleration;
+    period [s] of the drive, None where every sample was kept; joined: the turns that were kept before are drawn as a
+    line through them, not as a band per cycle. `measured` in history: times [s] and forces [N] read.
     """
     time, value, (name, per) = history["time"], history["displacement"], axis_unit(history["time"], "s")
     unit, scale = axis_unit(value, "m")
@@ -191,7 +253,10 @@ def histories(history: dict, window: dict | None, period: float | None, title: s
 
 
 def measured(rows: list, frequency: float, level: float, acceleration, displacement) -> list:
-    """Measured readings against the input at one frequency, with the computed point."""
+    """Measured readings against the input at one frequency, with the computed point.
+
+    rows: objects of the measured table; acceleration, displacement: (value, error) computed, in SI, or None.
+    """
     near, out = [r for r in rows if abs(r.frequency - frequency) < 0.5], []
     for name, unit, scale, found in (("acceleration", "g", G_N, acceleration),
                                      ("displacement", "mil", MIL, displacement)):
@@ -211,12 +276,48 @@ def measured(rows: list, frequency: float, level: float, acceleration, displacem
     return out
 
 
+def spans(curve: dict) -> list:
+    """Stretches [(regime, first, last + 1)] of neighbouring points of a curve of steady motions that share a regime."""
+    regime = np.asarray(curve["regime"], str)
+    edges = [0, *(np.flatnonzero(regime[1:] != regime[:-1]) + 1), regime.size]
+    return [(str(regime[a]), int(a), int(b)) for a, b in pairwise(edges)]
+
+
+def axis_of(curve: dict) -> tuple:
+    """Horizontal axis of a curve: (values along it, their name, unit)."""
+    if np.ptp(curve["frequency"]) > 0:
+        return np.asarray(curve["frequency"]), "drive frequency", "Hz"
+    return np.asarray(curve["level"]) / G_N, "drive level", "g"
+
+
+def regime(steady: dict | None) -> str:
+    """A sentence on the regime and the stability of the steady motion, empty where it is not known."""
+    if steady is None:
+        return ""
+    size = steady["multiplier"]
+    text = f" Regime: {steady['regime']}; largest Floquet multiplier {size:.4g}"
+    if steady["regime"] in ("stuck", "unbounded") or size == 0:
+        return text + "."
+    return text + (", so a disturbance dies out." if size < 1 else ", so a disturbance does not die out.")
+
+
+def caption(found: dict) -> str:
+    """Caption of the picture of a curve of steady motions: what it shows, its regimes, folds and gaps."""
+    what, parts = axis_of(found)[1], [regime for regime, _, _ in spans(found)]
+    count, folds = np.asarray(found["amplitude"]).size, len(found.get("folds", ()))
+    text = f"Half peak-to-peak of the steady motion over the {what}, {count} points; "
+    text += "colour and line tell the regime: " + ", ".join(dict.fromkeys(parts)) + "."
+    if folds:
+        text += f" The curve turns back at {folds} fold{'s' if folds > 1 else ''}."
+    return text + (" Shaded: no bounded motion." if not np.all(np.isfinite(found["amplitude"])) else "")
+
+
 def curve(found: dict) -> list:
     """Amplitude of the steady motion over frequency or level, the regime by colour and line, folds marked; its largest
     acceleration and the first harmonic of that."""
-    along, what, unit = curves.axis_of(found)
+    along, what, unit = axis_of(found)
     name, scale = axis_unit(found["amplitude"], "m")
-    value, parts = np.asarray(found["amplitude"]) * scale, curves.spans(found)
+    value, parts = np.asarray(found["amplitude"]) * scale, spans(found)
     colours = dict(zip(dict.fromkeys(part[0] for part in parts), COLOURS * 9))
     lost = np.concatenate([[False], ~np.isfinite(value), [False]]).astype(int)
     marks = [mark("span", "soft", left=along[max(first - 1, 0)], right=along[min(last, along.size - 1)])
@@ -237,7 +338,10 @@ def curve(found: dict) -> list:
 
 def levels(rows: list) -> list:
     """Amplitude after every level, in the order of the test, with arrows upwards and downwards; over more than three
-    decades on a logarithmic axis, on which a level without any motion is not drawn."""
+    decades on a logarithmic axis, on which a level without any motion is not drawn.
+
+    rows: dicts with drive [m s-2], or [N] where "unit" says so, stuck, values and errors by name, as in result.nc.
+    """
     forced = rows[0].get("unit") == "N"
     drive = np.array([row["drive"] for row in rows]) / (1.0 if forced else G_N)
     amplitude = np.array([row["values"]["relative_displacement_amplitude"] for row in rows])
@@ -260,9 +364,13 @@ def levels(rows: list) -> list:
 
 
 def wear(x, cycles, pressure, depth, history: dict) -> list:
-    """Pressure and worn depth over x at some of the cycles, and measures over their first value."""
+    """Pressure and worn depth over x at some of the cycles, and measures over their first value.
+
+    x (m,) [m]; cycles (k,) of the profiles, pressure (k, m) [Pa] and depth (k, m) [m] at them; history: name -> (j,)
+    with `cycle`.
+    """
     (along, size), out = axis_unit(x, "m"), []
-    pick = np.unique(np.linspace(0, len(cycles) - 1, wear_curves.SHOWN).round().astype(int))
+    pick = np.unique(np.linspace(0, len(cycles) - 1, PROFILES).round().astype(int))
     for values, unit, title in ((pressure, "Pa", "Pressure"), (depth, "m", "Worn depth")):
         name, scale = axis_unit(values, unit)
         lines = [line(x * size, values[k] * scale, colour, "new" if cycles[k] == 0 else f"{cycles[k]:.6g} cycles")
@@ -271,6 +379,6 @@ def wear(x, cycles, pressure, depth, history: dict) -> list:
     top = float(np.max(pressure[-1])) * axis_unit(pressure, "Pa")[1]
     out[0]["y"]["range"] = [0.0, min(2.5 * top, 1.05 * float(np.max(pressure)) * axis_unit(pressure, "Pa")[1])]
     over = [line(history["cycle"], history[name] / history[name][0], colour, text)
-            for colour, (name, (text, *_)) in zip(COLOURS, wear_curves.MEASURES.items())
+            for colour, (name, text) in zip(COLOURS, WORN.items())
             if history.get(name) is not None and history[name][0]]
     return [*out, chart("Over the cycles", axis("cycles"), axis("over its first value"), over)]
