@@ -10,6 +10,7 @@ from ..inputs import loops, measured
 from ..response import spectrum
 from ..runs.results.result import Result
 from ..structure.drive_sizes import largest
+from .drawing import pictures
 from .histories import largest_multiplier
 from .pages.driven import command, driven
 from .pages.released import released
@@ -97,12 +98,10 @@ def axes(result: Result, names: tuple, onto=None):
     onto: Axes to draw the first panel on; without them the Axes are the first of a new figure with all panels.
     """
     data = report_data(result)
-    from .drawing.pictures import draw
-
     shown = next((one for one in (picture(name, data) for name in names) if one is not None), None)
     if shown is None:
         return None
     if onto is None:
-        return draw.figure(shown.charts(*shown.values)).axes[0]
-    draw.figure(shown.charts(*shown.values), onto=onto)
+        return pictures.draw.figure(shown.charts(*shown.values)).axes[0]
+    pictures.draw.figure(shown.charts(*shown.values), onto=onto)
     return onto

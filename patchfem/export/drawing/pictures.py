@@ -85,7 +85,7 @@ def draw(made: list, onto=None):
         axis.set_title(one["title"])
         handles = dict(zip(*axis.get_legend_handles_labels()[::-1]))
         if handles:
-            axis.legend(handles.values(), handles.keys())
+            axis.legend(handles.values(), handles.keys(), frameon=True, framealpha=0.7, edgecolor="none")
     return figure
 
 
