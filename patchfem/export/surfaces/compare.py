@@ -15,8 +15,7 @@ from ...surface.compare.carried import NO_LIMIT
 from ...surface.compare.compare import Comparison
 from ...surface.profile import Profile, even, level
 from ...surface.quantity import LEVEL, Quantity
-from ...surface.roughness.bearing import abbott
-from ...surface.roughness.parameters import Heights
+from ...surface.roughness.parameters import Heights, abbott
 from ...surface.roughness.spectrum import BAND
 from ..drawing.inline import CSS, placed
 from ..pages.words import pair

@@ -21,7 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .parameters import Heights, kurtosis
+from .parameters import Heights, moment
 from .rows import Parameter
 from .spectrum import BAND, Spectrum, spectrum_of
 
@@ -46,7 +46,7 @@ class Intervals:
     @cached_property
     def _wider(self) -> tuple:
         """Factors of the intervals of heights and of slopes for what scatters more than Gaussian ones."""
-        found = [kurtosis(one) for one in (self.heights, Heights(np.diff(self.heights.z), self.heights.step))]
+        found = [moment(one, 4) for one in (self.heights, Heights(np.diff(self.heights.z), self.heights.step))]
         return tuple(1.0 if high is None else float(np.sqrt(max(1.0, (high - 1) / 2))) for high in found)
 
     def of(self, row: Parameter, value: float | None) -> tuple:

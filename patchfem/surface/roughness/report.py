@@ -11,10 +11,9 @@ from ..profile import Profile, even, level, spikes
 from ..quantity import Quantity, refused
 from . import rows
 from .areal import areal_intervals, areal_parameters
-from .bearing import abbott, core_of
 from .filter import filtered
 from .intervals import Intervals
-from .parameters import Heights
+from .parameters import Heights, abbott
 from .spectrum import BAND, amplitude_of, refuse_band, spectrum_of
 from .tip import Tip, tip_check
 
@@ -102,7 +101,7 @@ def report_of(surface: Profile | Areal, cutoff: float | None = None, window: tup
     return RoughnessReport(
         trace.source, "profile", trace.length, (trace.x.size,), heights.step, tuple(values),
         trace.notes + _spiky(cut) + _skewed(trace.source, values), cutoff, window, band, stylus, reread(surface),
-        primary, waviness, roughness, abbott(shown), core_of(shown), spectrum)
+        primary, waviness, roughness, abbott(shown), shown.core, spectrum)
 
 
 def windowed(profile: Profile, first: float, last: float) -> Profile:

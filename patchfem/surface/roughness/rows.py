@@ -5,12 +5,12 @@ serve the primary profile, whose names begin with P, and the roughness profile, 
 """
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple
 
-from . import parameters as height
-from .bearing import core_of
-from .parameters import Heights
-from .spacing import mean_spacing
+import numpy as np
+
+from .parameters import Heights, mean_spacing, moment, of_sections, peak_to_valley, root_mean_square
 from .spectrum import spectrum_of
 
 
@@ -30,30 +30,37 @@ class Parameter(NamedTuple):
 
 
 def _core(part: str) -> Callable:
-    def of(heights: Heights):
-        found = core_of(heights)
-        return None if found is None else getattr(found, part)
-    return of
+    return lambda heights: None if heights.core is None else getattr(heights.core, part)
 
 
-def dominant_wavelength(heights: Heights) -> float | None:
-    """Wavelength [m] at which an octave of frequencies holds most height."""
-    return spectrum_of(heights.z, heights.step).dominant
+def _slope(heights: Heights) -> float:
+    rise = np.diff(heights.z)
+    return float(np.sqrt(rise @ rise / rise.size) / heights.step)
+
+
+def _five_parts(heights: Heights) -> float:
+    edges = np.linspace(0, heights.z.size, 6).astype(int)
+    return float(np.mean([np.ptp(heights.z[a:b]) for a, b in pairwise(edges)]))
 
 
 _BASE = (  # name without its letter
-    ("a", "m", "mean of the absolute heights about the mean line", height.mean_deviation, "ratio"),
-    ("q", "m", "root mean square of the heights about the mean line", height.root_mean_square, "power"),
-    ("p", "m", "height of the highest peak above the mean line", height.peak, "ratio"),
-    ("v", "m", "depth of the deepest valley below the mean line", height.valley, "ratio"),
-    ("z", "m", "height from the deepest valley to the highest peak", height.peak_to_valley, "ratio"),
-    ("t", "m", "height from the deepest valley to the highest peak of the whole trace", height.total_height, "extreme"),
-    ("sk", "1", "skewness: mean cube of the heights over the cube of their root mean square", height.skewness, "shift"),
+    ("a", "m", "mean of the absolute heights about the mean line", lambda heights: float(np.abs(heights.z).mean()),
+     "ratio"),
+    ("q", "m", "root mean square of the heights about the mean line", root_mean_square, "power"),
+    ("p", "m", "height of the highest peak above the mean line",
+     lambda heights: of_sections(heights, lambda z: z.max(axis=1)), "ratio"),
+    ("v", "m", "depth of the deepest valley below the mean line",
+     lambda heights: of_sections(heights, lambda z: -z.min(axis=1)), "ratio"),
+    ("z", "m", "height from the deepest valley to the highest peak", peak_to_valley, "ratio"),
+    ("t", "m", "height from the deepest valley to the highest peak of the whole trace",
+     lambda heights: float(heights.z.max() - heights.z.min()), "extreme"),
+    ("sk", "1", "skewness: mean cube of the heights over the cube of their root mean square",
+     lambda heights: moment(heights, 3), "shift"),
     ("ku", "1", "kurtosis: mean fourth power of the heights over that of their root mean square, 3 for a Gaussian "
-     "surface", height.kurtosis, "ratio"),
+     "surface", lambda heights: moment(heights, 4), "ratio"),
     ("Sm", "m", "mean length of a hill with its neighbouring dale; those lower than 10 % of the height from valley to "
      "peak or, with a cut-off, narrower than 1 % of it do not count", mean_spacing, "ratio"),
-    ("dq", "1", "root mean square of the slope between neighbouring samples (two points)", height.slope, "slope"),
+    ("dq", "1", "root mean square of the slope between neighbouring samples (two points)", _slope, "slope"),
     ("k", "m", "core height: fall of the straight line through the flattest 40 % of the Abbott curve, over all of it",
      _core("core"), "ratio"),
     ("pk", "m", "reduced peak height: a triangle over Mr1 with the area of the peaks above the core",
@@ -72,15 +79,15 @@ ROUGH = tuple(Parameter(name if name.startswith("Mr") else "R" + name, unit,
                         + ", of the roughness profile", of, kind) for name, unit, text, of, kind in _BASE)
 WAVES = (
     Parameter("dominant_wavelength", "m", "wavelength at which an octave of frequencies holds most height, of the "
-              "levelled trace", dominant_wavelength, "wave"),
+              "levelled trace", lambda heights: spectrum_of(heights.z, heights.step).dominant, "wave"),
     Parameter("band_amplitude", "m", "amplitude of the sine with the mean square of the waves of the band, of the "
               "levelled trace", None, "band"),
 )
 WINDOW = (
     Parameter("RzDin", "m", "height from the deepest valley to the highest peak, mean over five equal parts of the "
-              "window (DIN 4768), of the levelled trace", height.five_sections, "ratio"),
+              "window (DIN 4768), of the levelled trace", _five_parts, "ratio"),
     Parameter("MaxDev", "m", "largest distance from the mean line to either side, of the levelled trace",
-              height.largest_deviation, "extreme"),
+              lambda heights: float(np.abs(heights.z).max()), "extreme"),
     Parameter("ASH", "m", "average step height: height of the window's last sample over its first, before levelling",
               None, ""),
 )

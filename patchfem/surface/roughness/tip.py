@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import say
-from .parameters import Heights
-from .spacing import mean_spacing
+from .parameters import Heights, mean_spacing
 
 SHARP = 1 / 6  # share of the valleys that is sharper than the one that is named
 ENOUGH = 0.05  # share of the valleys narrower than the tip from which depths suffer

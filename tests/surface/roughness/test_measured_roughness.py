@@ -12,9 +12,8 @@ import pytest
 
 from patchfem.surface.areal import Areal
 from patchfem.surface.profile import Profile
-from patchfem.surface.roughness.bearing import core
 from patchfem.surface.roughness.filter import filtered
-from patchfem.surface.roughness.parameters import Heights
+from patchfem.surface.roughness.parameters import Heights, core
 from patchfem.surface.roughness.report import interval_of, report_of
 from patchfem.surface.roughness.spectrum import spectrum
 

@@ -6,11 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from patchfem.surface.roughness import parameters as height
-from patchfem.surface.roughness.bearing import abbott, core
-from patchfem.surface.roughness.parameters import Heights
+from patchfem.surface.roughness.parameters import Heights, abbott, core, crossings, mean_spacing
 from patchfem.surface.roughness.rows import PRIMARY, ROUGH, TABLE
-from patchfem.surface.roughness.spacing import crossings, mean_spacing
 
 UM = 1e-6
 
@@ -22,12 +19,12 @@ def wave(count=8000, length=400.0, amplitude=UM, section=None) -> Heights:
 
 def test_exact_a_sine():
     sine = wave()
-    assert height.mean_deviation(sine) == pytest.approx(2 / np.pi * UM, rel=1e-4)
-    assert height.root_mean_square(sine) == pytest.approx(UM / np.sqrt(2), rel=1e-12)
-    assert height.skewness(sine) == pytest.approx(0, abs=1e-12) and height.kurtosis(sine) == pytest.approx(1.5)
-    assert height.total_height(sine) == pytest.approx(2 * UM, rel=1e-4)
+    assert TABLE["Ra"].of(sine) == pytest.approx(2 / np.pi * UM, rel=1e-4)
+    assert TABLE["Rq"].of(sine) == pytest.approx(UM / np.sqrt(2), rel=1e-12)
+    assert TABLE["Rsk"].of(sine) == pytest.approx(0, abs=1e-12) and TABLE["Rku"].of(sine) == pytest.approx(1.5)
+    assert TABLE["Rt"].of(sine) == pytest.approx(2 * UM, rel=1e-4)
     chord = 2 * np.sin(np.pi / 400) / UM  # of the slope between two samples
-    assert height.slope(sine) == pytest.approx(UM / np.sqrt(2) * chord, rel=1e-4)
+    assert TABLE["Rdq"].of(sine) == pytest.approx(UM / np.sqrt(2) * chord, rel=1e-4)
     assert mean_spacing(sine) == pytest.approx(400 * UM, rel=1e-6)
 
 
@@ -38,9 +35,9 @@ def test_exact_sections_of_a_growing_sine():
     assert found.sections.shape == (5, 200)
     trace = Heights(found.z[:999], 1.0, 200.0)
     assert trace.sections.shape == (4, 200)  # what is left belongs to none
-    assert height.peak_to_valley(trace) == pytest.approx(2 * np.mean([1, 2, 3, 4]), rel=1e-12)
-    assert height.peak(trace) + height.valley(trace) == pytest.approx(height.peak_to_valley(trace), rel=1e-14)
-    assert height.total_height(trace) == pytest.approx(198, rel=1e-9)
+    assert TABLE["Rz"].of(trace) == pytest.approx(2 * np.mean([1, 2, 3, 4]), rel=1e-12)
+    assert TABLE["Rp"].of(trace) + TABLE["Rv"].of(trace) == pytest.approx(TABLE["Rz"].of(trace), rel=1e-14)
+    assert TABLE["Rt"].of(trace) == pytest.approx(198, rel=1e-9)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(20, 300), st.floats(0.1, 10))
