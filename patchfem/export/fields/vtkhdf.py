@@ -13,6 +13,7 @@ frame as well: what a killed process leaves (`.fields.*.vtkhdf`) holds every fra
 """
 
 import math
+import zlib
 from functools import partial
 from pathlib import Path
 
@@ -24,7 +25,7 @@ from .blocks import CODES, MEANINGS, Block
 
 NAME = "fields.vtkhdf"
 VERSION = np.array([2, 2], np.int64)  # of the format; later ones add nothing that stands here
-PACKED = 1 << 22  # bytes of all arrays: the shipped rig keeps 2.6 of 9.6 MB for .1 s more
+PACKED = 1 << 22  # bytes of all arrays: the shipped rig keeps 2.8 of 9.6 MB for .06 s more
 LARGE = 1 << 28  # bytes of all arrays
 BITS = {"stress_error": 5}  # kept of 23 behind the leading one, where packed: an estimate is good to some 10 %
 MOST_BITS = 14  # of every other array without a step: 3e-5 of a value, far below what the elements err by
@@ -77,8 +78,14 @@ def _frames(file, steps: list, later: list, count: int) -> None:
 
 
 def _frame(dataset, values, nearest, number: int) -> None:
+    """Write a frame, a chunk for each component (the bytes of its numbers side by side, then deflated, as HDF5 does it)
+    but for those that are 0, which a reader is given for a chunk that is not there."""
     size = values.shape[1]
-    dataset[number * size:(number + 1) * size] = nearest(values[number])
+    for place, part in enumerate(nearest(values[number]).reshape(size, -1).T):
+        if part.any():
+            packer = zlib.compressobj(1, strategy=zlib.Z_RLE)  # behind the shuffle 3/4 of the time of all matches
+            raw = np.ascontiguousarray(part).view(np.uint8).reshape(size, -1).T.tobytes()
+            dataset.id.write_direct_chunk((number * size, place)[:dataset.ndim], packer.compress(raw) + packer.flush())
 
 
 def _counted(steps: list, times: list, count: int) -> None:
@@ -105,9 +112,11 @@ def stepped(values, step: float) -> np.ndarray:
     Infinities, NaN and what is too large to have parts of a step stay.
     """
     values = np.asarray(values, np.float32)
-    step = np.float32(step)
+    step, each = np.float32(step), np.float32(1 / step)
+    if max(values.max(initial=0.0), -values.min(initial=0.0)) < step * np.float32(1 << 23):  # without a NaN
+        return np.rint(values * each) * step
     with np.errstate(over="ignore"):
-        return np.where(np.abs(values) < step * np.float32(1 << 23), np.rint(values / step) * step, values)
+        return np.where(np.abs(values) < step * np.float32(1 << 23), np.rint(values * each) * step, values)
 
 
 def _nearest(dataset, step: float, bits: int):
