@@ -23,11 +23,12 @@ class Cases:
     """Cases numbered from 0.
 
     axes: the keys with their values. rows: case k has the k-th value of every axis; otherwise the cases are all
-    combinations, the last axis fastest.
+    combinations, the last axis fastest. drawn: the rows are drawn at chance.
     """
 
     axes: tuple[Axis, ...]
     rows: bool = False
+    drawn: bool = False
 
     def __len__(self) -> int:
         return len(self.axes[0].texts) if self.rows else prod(self.shape)
@@ -122,5 +123,5 @@ def product(parts: Sequence[Cases]) -> Cases:
         for at, axis in enumerate(part.axes):
             axes.append(Axis(axis.key, tuple(axis.texts[one[at]] for one in picked),
                              tuple(axis.values[one[at]] for one in picked), axis.unit))
-    return Cases(tuple(axes), True)
+    return Cases(tuple(axes), True, all(part.drawn for part in parts))
 

@@ -19,7 +19,7 @@ def drawn(parts: Sequence[Axis | Span], count: int, sobol: bool, seed: int) -> C
     """
     shares = _sobol(len(parts), count, seed) if sobol else np.random.default_rng(seed).random((count, len(parts)))
     return Cases(tuple(part.axis(column.tolist()) if isinstance(part, Span) else _picked(part, column)
-                       for part, column in zip(parts, shares.T)), True)
+                       for part, column in zip(parts, shares.T)), True, True)
 
 
 def _sobol(width: int, count: int, seed: int) -> np.ndarray:

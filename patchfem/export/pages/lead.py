@@ -1,5 +1,7 @@
 """What a sweep says first: how many cases miss the tolerance, how far its key may go, where its main measure runs."""
 
+from collections.abc import Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -7,7 +9,7 @@ import numpy as np
 from ...scales import plain, short
 from .. import missed
 from ..written import NUMBER, label
-from . import allowed
+from . import allowed, peaks, ranked
 from .changes import changes, shown_of
 from .words import zero_below
 
@@ -19,7 +21,8 @@ FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", 
 class Lead(NamedTuple):
     """missed: as `missed.counted`; misses: that in a sentence; limits: what the key allows; limit: that in a sentence;
     span: from where to where the main measure runs; turns: what changes as the key grows. "" where there is nothing to
-    say."""
+    say. ranks, spread, peaks: as `ranked.ranks_of`, `ranked.quantiles` and `peaks.found` give them; rank, scatter,
+    peak: what matters most, where nine in ten drawn cases lie, where a swept frequency has its peak, in sentences."""
 
     missed: dict
     misses: str
@@ -27,15 +30,23 @@ class Lead(NamedTuple):
     limit: str
     span: str
     turns: str
+    ranks: dict = MappingProxyType({})
+    rank: str = ""
+    spread: dict = MappingProxyType({})
+    scatter: str = ""
+    peaks: Sequence = ()
+    peak: str = ""
 
     def sentences(self) -> list:
         """What people read, the worst first."""
-        return [one for one in (self.misses, self.limit, self.span, self.turns) if one]
+        rank = self.rank if self.scatter or not (self.limit or self.peak) else ""  # of a grid they say more
+        return [one for one in (self.misses, self.limit, self.peak, rank, self.scatter, self.span, self.turns) if one]
 
     def answer(self) -> str:
-        """One sentence: how far the key may go or where the main measure runs, and before it how many cases miss the
-        tolerance."""
-        text = self.limit or self.span or self.turns
+        """One sentence, two of drawn cases: how far the key may go, where the peak is, what matters most and how far
+        the answers scatter, or where the main measure runs; before it how many cases miss the tolerance."""
+        drawn = " ".join(one for one in (self.rank, self.scatter) if one)
+        text = self.limit or self.peak or drawn or self.span or self.turns
         return f"{self.misses.rstrip('.')}; {text[0].lower() if text[1:2].islower() else text[0]}{text[1:]}" \
             if self.missed and text else text or self.misses
 
@@ -46,7 +57,8 @@ def lead_of(table: dict) -> Lead:
     keys = [one | {"words": not any(NUMBER.match(str(text)) for text in one["texts"])} for one in table["keys"]]
     outcome = np.asarray(table["outcome"], str)
     settled = np.isin(outcome, SETTLED)
-    trusted = {name: ~missed.over(one, tolerance) & (settled | ~np.isfinite(one["values"])[settled].any())
+    trusted = {name: ~missed.over(one, tolerance) & (settled | name.endswith("_steady")
+                                                     | ~np.isfinite(one["values"])[settled].any())
                for name, one in measures.items()}
     limits = allowed.allowed(keys, columns(table), trusted, table["grid"], table.get("patch"))
     shown = {one["name"]: shown_of(one) for one in keys if not one["words"]}
@@ -55,9 +67,11 @@ def lead_of(table: dict) -> Lead:
         return ", ".join(f"{one['name']} {shown[one['name']](case) if one['name'] in shown else one['texts'][case]}"
                          for one in keys if len(set(one["texts"])) > 1 or len(keys) == 1)
 
+    tops = peaks.found(keys, columns(table), trusted, table["grid"])
     return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
                 allowed.sentence(limits), span(columns(table), trusted, settled),
-                changes(keys, columns(table), outcome, table["grid"]))
+                changes(keys, columns(table), outcome, table["grid"]), *ranked.told(table, trusted),
+                tops, peaks.sentence(tops))
 
 
 def span(measures: dict, trusted: dict, settled: np.ndarray) -> str:

@@ -10,7 +10,7 @@ from ...core import Outcome
 from ...scales import LADDERS, axis_unit, rounded
 from ..missed import over
 from ..written import NUMBER, brief, label
-from . import allowed
+from . import allowed, peaks, ranked
 from .document import Section, document
 from .lead import FIRST, SETTLED, Lead, columns, lead_of
 from .words import linked, zero_below
@@ -42,6 +42,10 @@ def page(table: dict) -> str:
     sections = [Section("answers", "What came out", _explorer(number, len(drawn)) if measures else
                         "<p>No case has a value to draw.</p>"),
                 *_change(table, told.limits),
+                *(Section(*one) for one in (("peaks", "Where the peaks are", peaks.table(told.peaks)),
+                                            ("ranking", "What matters most", ranked.picture(told.ranks)),
+                                            ("scatter", "How far the answers scatter", ranked.spread(told.spread)))
+                  if one[2]),
                 Section("cases", "Cases", _cases(table)),
                 Section("measures", "What the measures mean", _meanings(table)),
                 Section("again", "The same again", _again(table))]

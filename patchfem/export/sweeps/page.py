@@ -41,7 +41,7 @@ def table_of(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Pat
     return {**titles(columns, tomllib.loads(asked.text).get("title") or asked.path.stem), "version": __version__,
             **_shared(facts(asked, cases), columns),
             "command": command(asked, cases), "scene": asked.text, "seconds": float(np.sum(found.seconds)),
-            "grid": not cases.rows, "keys": columns, "measures": measures,
+            "grid": not cases.rows, "drawn": cases.drawn, "keys": columns, "measures": measures,
             "outcome": [str(one) for one in found.outcome],
             "messages": found.messages, "folders": [opened(folder, key) for key in keys] if len(keys) else None}
 
@@ -165,7 +165,8 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
             "version": str(file.attrs["source"]).removeprefix("patchfem "), "scene": text, "seconds": float("nan"),
             "command": shlex.join(["patchfem", "sweep", str(file.attrs["scene_file"]),
                                    *(word for one in sets for word in ("--set", one)), *overs]),
-            "grid": "case" not in file.dimensions, "keys": columns, "measures": measures,
+            "grid": "case" not in file.dimensions, "drawn": bool(file.attrs.get("drawn", 0)),
+            "keys": columns, "measures": measures,
             "outcome": [row["outcome"] for row in rows],
             "messages": {number: row["message"] for number, row in enumerate(rows) if row["message"]},
             "folders": [opened(folder, row["case"]) for row in rows] if rows and "case" in rows[0] else None}

@@ -1,0 +1,131 @@
+"""What matters most in a sweep and how far its answers scatter: sentences, a picture of the shares, a table."""
+
+from html import escape
+
+import numpy as np
+
+from ...campaigns.sweeps.ranking import ranking
+from ...scales import fitting, plain, short
+from ..written import label
+from .words import linked, zero_below
+
+RANKED = ("relative_displacement_amplitude", "loop_area", "equivalent_damping", "absolute_acceleration_peak",
+          "friction_ratio_peak", "onset_level", "pressure_peak", "contact_fraction", "normal_stiffness",
+          "tangential_stiffness", "stick_fraction")
+SPREAD = ("relative_displacement_amplitude", "loop_area", "equivalent_damping", "pressure_peak")
+ENDS = 0.05, 0.5, 0.95
+FEW = 20  # drawn cases, below which nine in ten of them are no share
+SETTLED = 0.95  # of the drawn cases, below which those left out may be one of its ends
+NAMED = 3  # keys in the sentence
+
+
+def told(table: dict, trusted: dict) -> tuple:
+    """(ranks, rank, quantiles, scatter) of the Lead of a sweep; trusted: as `lead` makes it."""
+    ranks, found = ranks_of(table), quantiles(table, trusted)
+    return ranks, sentence(ranks), found, scatter(found, len(table["outcome"]))
+
+
+def ranks_of(table: dict) -> dict:
+    """{measure: [Share]} of a grid or of drawn cases, {} of others; found once for a table, which then has it."""
+    if "ranks" not in table:
+        keys = [(one["name"], one["values"]) for one in table["keys"]]
+        shape = tuple(len(set(one["texts"])) for one in table["keys"]) if table["grid"] else None
+        fits = table.get("drawn") or (table["grid"] and np.prod(shape) == len(table["outcome"]))
+        measures = {name: (table["measures"][name]["values"], table["measures"][name]["errors"])
+                    for name in RANKED if name in table["measures"]}
+        table["ranks"] = ranking(keys, measures, shape) if fits else {}
+    return table["ranks"]
+
+
+def sentence(ranks: dict) -> str:
+    """Which keys matter how much for the first measure that is ranked; "" where none is."""
+    name = next(iter(ranks), None)
+    if name is None:
+        return ""
+    first, *others = ranks[name]
+    said = [f"depends most on {first.key}, which takes part in {percent(first)} of its variance{_between(first)}"]
+    said += [f"then on {one.key} ({percent(one)})" for one in others[:NAMED - 1]]
+    if len(others) >= NAMED:
+        said.append(f"least on {others[-1].key} ({percent(others[-1])})")
+    return f"{label(name).capitalize()} {', '.join(said)}."
+
+
+def percent(one) -> str:
+    """The total share of a key as people read it."""
+    return "below 1 %" if one.total < 0.01 else f"{100 * one.total:.0f} %"
+
+
+def _between(one) -> str:
+    low, high = round(100 * one.low), round(100 * one.high)
+    return f" ({low} to {high} %)" if low != high else ""
+
+
+def quantiles(table: dict, trusted: dict) -> dict:
+    """{measure: (unit, quantiles of ENDS, number of cases)} of the drawn cases that have a value and can be trusted."""
+    out = {}
+    for name in RANKED if table.get("drawn") and len(table["outcome"]) >= FEW else ():
+        one = table["measures"].get(name)
+        if one is None:
+            continue
+        values = np.asarray(one["values"], float)
+        values = values[np.isfinite(values) & trusted[name]]
+        if values.size >= FEW and np.ptp(values) > 1e-9 * np.abs(values).max():
+            out[name] = one["unit"], np.quantile(values, ENDS), values.size
+    return out
+
+
+def scatter(found: dict, of: int) -> str:
+    """Where nine in ten of `of` drawn cases lie; found: as `quantiles` gives them; "" where there are none."""
+    said, counts = [], set()
+    for name in [name for name in SPREAD if name in found]:
+        unit, (low, _, high), count = found[name]
+        counts.add(count)
+        low, high = (short(one, unit, 3, zero_below(name)) for one in (low, high))
+        said.append(f"{'an' if name[0] in 'aeio' else 'a'} {label(name)} from {low} to {high}")
+    least = min(counts, default=0)
+    if said and least < SETTLED * of:
+        return (f"{of - least} of {of} drawn cases have not settled within the tolerance, perhaps those that move "
+                "most: how far the answers scatter is not known.")
+    whose = f"{of} drawn cases" if least == of else f"{least} of {of} drawn cases that settled"
+    return f"Nine in ten of the {whose} have {', '.join(said)}." if said else ""
+
+
+def picture(ranks: dict) -> str:
+    """Bars of the shares of the keys for each measure, in HTML: no scripts; "" without any."""
+    if not ranks:
+        return ""
+    parts = []
+    for name, shares in ranks.items():
+        rows = "".join(
+            f"<tr><td>{escape(one.key)}</td><td class=n>{100 * one.first:.0f} %</td><td class=n>{100 * one.total:.0f} %"
+            f"</td><td class=n>{_range(one)}</td><td class=bars>{_bar(one)}</td></tr>" for one in shares)
+        parts.append(f"<h3>{linked(label(name), name)}</h3><div class=wide><table class=shares><thead><tr><th>key</th>"
+                     f"<th class=n>alone</th><th class=n>total</th><th class=n>from, to</th><th></th></tr></thead>"
+                     f"<tbody>{rows}</tbody></table></div>")
+    return ("<p class=soft>Shares of the variance over the cases: what a key makes alone (dark) and with all that it "
+            "takes part in (light). The line is the interval of the total.</p>" + "".join(parts))
+
+
+def _bar(one) -> str:
+    first, total, low, high = (f"{100 * part:.1f}" for part in one[1:])
+    return (f"<svg viewBox='0 0 100 8' preserveAspectRatio=none role=img aria-label='{percent(one)}'>"
+            f"<rect class=total y=1 height=6 width={total} /><rect class=first y=1 height=6 width={first} />"
+            f"<path class=range d='M{low} 4H{high}'/></svg>")
+
+
+def _range(one) -> str:
+    return "&ndash;" if one.low == one.high else f"{100 * one.low:.0f} to {100 * one.high:.0f} %"
+
+
+def spread(found: dict) -> str:
+    """Quantiles, as `quantiles` gives them, as a table; "" where there are none."""
+    rows = ""
+    for name, (unit, values, count) in found.items():
+        of, scale = fitting(float(np.abs(values).max()), unit)
+        cells = "".join(f"<td class=n>{plain(one * scale, 4)}</td>" for one in values.tolist())
+        rows += f"<tr><td>{linked(label(name), name)}</td>{cells}<td>{escape(of)}</td><td class=n>{count}</td></tr>"
+    if not rows:
+        return ""
+    return ("<div class=wide><table><thead><tr><th>measure</th><th class=n>5 %</th><th class=n>half</th>"
+            f"<th class=n>95 %</th><th>unit</th><th class=n>cases</th></tr></thead><tbody>{rows}</tbody></table></div>"
+            "<p class=soft>So many of the drawn cases, of those that settled within the tolerance, have less.</p>")

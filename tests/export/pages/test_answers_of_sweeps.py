@@ -1,0 +1,93 @@
+"""What a page of a sweep answers: which input matters most, how far drawn answers scatter, where the resonance is."""
+
+import json
+
+import numpy as np
+import pytest
+from command_line import cli
+from scene_texts import COULOMB, POINT, SHORT
+
+from patchfem.export.pages import peaks, ranked
+from patchfem.export.pages.lead import lead_of
+
+RIG = POINT + COULOMB + SHORT
+
+
+def key(name, values, texts=None):
+    return {"name": name, "values": np.asarray(values, float), "unit": "Hz", "log": False, "words": False,
+            "texts": texts or [f"{one:.12g} Hz" for one in values]}
+
+
+def curve(x, centre, damping):
+    return 1e-6 / np.sqrt((1 - (x / centre)**2)**2 + (2 * damping * x / centre)**2)
+
+
+@pytest.mark.parametrize("damping", [0.02, 0.05])
+def test_exact_the_peak_and_width_of_a_resonance(damping):
+    """Of one mode: peak at w sqrt(1 - 2 z^2), half-power width 2 z w to the order of z^2."""
+    x = np.linspace(80, 120, 161)
+    both = np.concatenate([curve(x, 100, damping), curve(x, 95, damping)])
+    keys = [key("drive.frequency", np.tile(x, 2)), key("drive.acceleration", np.repeat([1.0, 2.0], 161), ["1 g"] * 161
+                                                       + ["2 g"] * 161)]
+    name = "relative_displacement_amplitude"
+    found = peaks.found(keys, {name: (both, 0 * both, "m")}, {name: np.ones(322, bool)}, True)
+    for one, centre in zip(found, (100, 95)):
+        assert one.frequency == pytest.approx(centre * np.sqrt(1 - 2 * damping**2), abs=1e-3)
+        assert one.height == pytest.approx(1e-6 / (2 * damping * np.sqrt(1 - damping**2)), rel=1e-9)
+        assert one.width == pytest.approx(2 * damping * centre, rel=5 * damping**2 + 0.005)
+    said = peaks.sentence(found)
+    assert "with drive.acceleration 1 g" in said and "with drive.acceleration 2 g" in said and "0.25 Hz apart" in said
+
+
+def test_always_a_peak_at_an_end_is_none_and_a_side_that_stays_up_has_no_width():
+    name, x = "relative_displacement_amplitude", np.linspace(80, 120, 41)
+    for values in (x, -x + 200, np.where(x < 99, np.nan, curve(x, 98, 0.05))):
+        assert peaks.found([key("drive.frequency", x)], {name: (values, 0 * x, "m")}, {name: np.ones(41, bool)},
+                           True) == []
+    narrow = x[(x > 97) & (x < 130)]
+    found, = peaks.found([key("drive.frequency", narrow)], {name: (curve(narrow, 100, 0.05), 0 * narrow, "m")},
+                         {name: np.ones(narrow.size, bool)}, True)
+    assert np.isnan(found.width) and "width" not in peaks.sentence([found])
+    assert peaks.found([key("drive.frequency", x)], {}, {}, True) == []
+    unsettled = {name: x < 90, f"{name}_steady": np.ones(41, bool)}  # by its steady estimate
+    steady = {name: (np.where(x < 90, curve(x, 100, 0.05), 1.0), 0 * x, "m"),
+              f"{name}_steady": (np.where(x < 90, np.nan, curve(x, 100, 0.05)), 0 * x, "m")}
+    found, = peaks.found([key("drive.frequency", x)], steady, unsettled, True)
+    assert found.frequency == pytest.approx(99.75, abs=0.02)
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    out = tmp_path_factory.mktemp("drawn")
+    (out / "rig.toml").write_text(RIG, encoding="utf-8")
+    answer = cli("sweep", out / "rig.toml", "--over", "friction.static=0.25..0.3", "--over",
+                 "drive.acceleration=8 g..9 g", "--over", "structure.mode.0.damping=0.05..0.1", "--set",
+                 "drive.cycles=150", "--sobol", "128", "-o", out / "swept")
+    assert answer.code == 0
+    return out / "swept", answer
+
+
+def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
+    out, answer = drawn
+    told = json.loads((out / "sweep.json").read_text())
+    shares = told["ranking"]["loop_area"]
+    assert {one["key"] for one in shares} == {"friction.static", "drive.acceleration", "structure.mode.0.damping"}
+    assert all(set(one) == {"key", "first", "total", "low", "high"} and one["low"] <= one["total"] <= one["high"]
+               for one in shares)
+    assert "depends most on" in told["answer"] and "Nine in ten of the 128 drawn cases have" in told["answer"]
+    page = (out / "report.html").read_text("utf-8")
+    assert "What matters most" in page and "How far the answers scatter" in page and "<svg viewBox" in page
+    from patchfem.export.sweeps.page import read_table
+
+    again = lead_of(read_table(out))  # what `patchfem report` draws from the files
+    assert again.rank in answer.out and again.scatter in answer.out
+    loops = read_table(out)["measures"]["loop_area"]["values"]
+    low, _, high = again.spread["loop_area"][1]
+    assert np.mean((loops >= low) & (loops <= high)) == pytest.approx(0.9, abs=0.02)
+
+
+def test_always_a_scatter_that_unsettled_cases_hide_is_not_told():
+    found = {"loop_area": ("J", np.array([1.0, 2.0, 3.0]), 60)}
+    assert "is not known" in ranked.scatter(found, 100) and "40 of 100" in ranked.scatter(found, 100)
+    assert ranked.scatter(found, 60).startswith("Nine in ten of the 60 drawn cases have a loop area from 1 J to 3 J")
+    assert ranked.scatter({}, 100) == ""
