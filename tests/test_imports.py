@@ -25,11 +25,10 @@ def scene(tmp_path):
 
 def test_exact_a_patch_needs_no_motion(scene):
     modules = loaded(FROM_PYTHON, scene(PATCH))
-    absent(modules, "friction", "structure", "dynamics", "response", "runs.rig.march", "dynamics.march.march",
-           "dynamics.march.loop_kernels", "compiled", "surface", "contact.skin", "contact.skin_laws", "contact.strips",
-           "elasticity.mortar", "elasticity.substructure", "elasticity.fronts", "skfem",
-           "slip.tangent",
-           "elasticity.recovery", "mesh.anymesh", "export", "scipy")
+    absent(modules, "friction", "structure", "dynamics", "response", "inputs", "wear", "identify", "runs.bench",
+           "runs.rig", "runs.wear", "model.slide", "model.structure", "compiled", "surface", "contact.skin",
+           "contact.skin_laws", "contact.strips", "contact.gradients", "elasticity.mortar", "elasticity.substructure",
+           "elasticity.fronts", "skfem", "slip.tangent", "elasticity.recovery", "mesh.anymesh", "export", "scipy")
     assert {"patchfem.contact.unilateral", "patchfem.mesh.tensor"} <= modules
 
 
@@ -45,8 +44,7 @@ def test_exact_an_effect_brings_its_own_module(scene, table, module):
 
 def test_exact_a_rubbing_point_needs_no_patch(scene):
     modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE))
-    absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
-           "dynamics.march.loop_kernels")
+    absent(modules, "contact", "mesh", "elasticity", "slip", "skfem", "runs.patch", "runs.bench", "dynamics.march")
     assert {"patchfem.dynamics.events.histories", "patchfem.structure.modes"} <= modules
 
 
@@ -79,10 +77,10 @@ def test_exact_a_rig_brings_what_it_names(scene, lines, module):
     assert not {f"patchfem.{name}" for name in others} & modules
 
 
-def test_exact_a_linear_structure_needs_no_patch_and_no_march(scene):
+def test_exact_a_linear_structure_needs_no_patch_no_friction_and_no_march(scene):
     modules = loaded(FROM_PYTHON, scene(STRUCTURE))
-    absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
-           "dynamics.march.loop_kernels")
+    absent(modules, "contact", "mesh", "elasticity", "slip", "skfem", "friction", "inputs", "runs.patch", "runs.bench",
+           "dynamics.march")
     assert "patchfem.dynamics.events.histories" in modules
 
 
@@ -97,10 +95,10 @@ def test_exact_a_short_history_compiles_nothing(scene, tmp_path, monkeypatch, te
 
 
 def test_exact_a_bench_needs_no_structure(scene):
+    """Of the engines the noun for what one integrated and the check of its work alone."""
     modules = loaded(FROM_PYTHON, scene(BENCH))
-    absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
-           "dynamics.march.loop_kernels", "compiled",
-           "dynamics.events.march_kernels", "dynamics.events.histories")
+    absent(modules - {"patchfem.dynamics.integrated", "patchfem.dynamics.work_check"}, "contact", "mesh", "elasticity",
+           "slip", "skfem", "runs.patch", "runs.rig", "structure", "dynamics", "compiled")
     assert "patchfem.friction.laws.coulomb" in modules
 
 

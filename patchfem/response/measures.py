@@ -6,7 +6,7 @@ Everything works on samples: values of an exact run and of a march differ only i
 import numpy as np
 
 from ..core import Response
-from ..dynamics.work_check import gap, sampled_work, share
+from ..dynamics import work_check as work_checks
 
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate
@@ -22,7 +22,7 @@ def energy_balance(book: dict):
     holds still. book: energies [J] by name.
     """
     miss = np.abs(book["work_in"] - book["stored"] - book["friction"] - book["viscous"])
-    return share(miss * (miss > NOTHING), book["power"] + book["peak_stored"])
+    return work_checks.share(miss * (miss > NOTHING), book["power"] + book["peak_stored"])
 
 
 def harmonic(time, weight, values, omega) -> complex:
@@ -102,8 +102,8 @@ def work_check(work, pairs, jumps: bool = False) -> float:
     for slide, force in pairs:
         move = np.diff(slide)
         after = np.divide(parts, move, out=np.zeros_like(move), where=move != 0) if jumps else None
-        total += float(sampled_work(slide, force, after).sum())
-    return gap(total, float(work[-1]), float(np.abs(parts).sum()))
+        total += float(work_checks.sampled_work(slide, force, after).sum())
+    return work_checks.gap(total, float(work[-1]), float(np.abs(parts).sum()))
 
 
 def acceleration_peak(window: Response) -> float:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core import Measure, Outcome
-from ..structure.drive_sizes import largest, omega_of, sinusoidal
+from ..structure import drive_sizes
 from .settling import CLASSES, GROWS, classes, classify, left_over, mean_amplitudes, steady_amplitude
 
 SMALL = 1e-12  # of the displacement a/omega^2 of the drive: a change of the amplitude that is round-off
@@ -31,7 +31,7 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
         return Outcome.TRANSIENT, measures
     amplitudes, extremes, last = raw.amplitudes, raw.extremes, drive.segments[-1]
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
-    floor = SMALL * largest(drive) / omega_of(drive)**2
+    floor = SMALL * drive_sizes.largest(drive) / drive_sizes.omega_of(drive)**2
     if level_cycles:
         amplitudes = amplitudes[-max(1, int(level_cycles / window)):]
         extremes = None if extremes is None else extremes[-int(level_cycles):]
@@ -154,4 +154,4 @@ def steady_of(drive, amplitudes, phasors) -> tuple:
 
     A released or struck rig comes to rest, whatever the tail of its amplitudes looks like.
     """
-    return steady_amplitude(amplitudes, phasors) if sinusoidal(drive) else (None, None)
+    return steady_amplitude(amplitudes, phasors) if drive_sizes.sinusoidal(drive) else (None, None)

@@ -30,6 +30,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "runs.rig.costs.MOST_STEPS": "steps per cycle of a march, unnamed",
     "dynamics.march.capacity.MOST_STRIPS": "strips of a list of bonds",
     "friction.bonds.parameters.LONGEST": "seconds that a list of bonds may take by its estimate",
+    "runs.rig.costs.LONGEST": "seconds that a motion from event to event may take by its estimate",
     "dynamics.comparison.comparison.MOST_NUMBERS": "numbers that a comparison method keeps",
     "dynamics.resume.MOST_KEPT": "samples kept of a run outside its last cycles; more are thinned"}
 LEFT_OUT = f"""\

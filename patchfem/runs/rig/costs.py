@@ -15,7 +15,7 @@ from ...core import Missing
 from ...dynamics.events import plant
 from ...effects import has
 from ...friction import record
-from ...friction.bonds import engines, parameters
+from ...friction.bonds import engines
 from ...friction.laws import stretch
 from ...model import patch as patch_model
 from ...model.model import Model
@@ -32,6 +32,7 @@ SMOOTH_STEP, SMOOTH = 2e-6, 0.02  # of a step of high order, and of such a run b
 CURVE, POINT, BALANCE = 0.1, 0.05, 8e-10  # of steady motions: of all, of a point, per cubed number of its unknowns
 WORTH = 5.0  # that an exact motion may take where steps would take less, and be off by their bars
 PATIENCE = 60.0  # that it may take where the finest march does not resolve the modes
+LONGEST = 600.0  # seconds that an exact motion may take before it is refused
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
 HELD = 6  # power of the limit over the push that gives the share of the time in which an element holds (measured .01)
 MOST_PAIRS, AT = 4, 1e-3  # 49 of 769 cells at this tolerance and above: 2e-4 of the motion behind a joint that slips
@@ -163,10 +164,10 @@ def dear_elements(model: Model) -> str:
 def refuse_endless(model: Model, numerics=None) -> None:
     """Raise Missing when a run from event to event would take longer than LONGEST seconds."""
     seconds = seconds_of_pieces(model)
-    if seconds > parameters.LONGEST:
+    if seconds > LONGEST:
         raise Missing(f"the exact motion (about {pieces_per_cycle(model):.2g} pieces per cycle, between events, rows "
                       f"of the drive and the fastest ringing) would take about {seconds:.0f} s, more than "
-                      f"{parameters.LONGEST:.0f} s; lower drive.cycles or the stiffness of modes and elements, or use "
+                      f"{LONGEST:.0f} s; lower drive.cycles or the stiffness of modes and elements, or use "
                       "accuracy.method = \"march\"", "")
 
 

@@ -14,7 +14,7 @@ from ...dynamics.events.reading import Reading
 from ...dynamics.integrated import Integrated, Loop
 from ...dynamics.work_check import gap
 from ...effects import has
-from ...friction.record import law_from
+from ...friction import record
 from ...response import run_events
 from ...response.loops import interface_loops
 from ...response.measures import REST, harmonic, window_amplitudes
@@ -196,7 +196,7 @@ class YieldingElements:
     def __init__(self, model, numerics, patch):
         rig, self.contact, begin = model.rig, None, perf_counter()
         if len(rig.modes.interfaces) > 1:
-            parts = [law_from(one.numbers, one.load).element(one.load) for one in rig.interfaces]
+            parts = [record.law_from(one.numbers, one.load).element(one.load) for one in rig.interfaces]
         else:
             self.contact = interface.contact_model(model, numerics, patch)
             parts = [self.contact.element]
