@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core import Missing, PatchfemError
 from . import matlab, universal
-from .columns import NUMBER, text_of
+from .cells import NUMBER, text_of
 from .loops import own_name
 from .records import LARGEST, UNITS, Channel, Records, Wanted, checked, chosen, factor_of
 

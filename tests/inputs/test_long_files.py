@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
-from patchfem.inputs import columns, measured
+from patchfem.inputs import cells, measured
 from patchfem.inputs.columns import read_columns
 from patchfem.mesh import files as meshes
 from patchfem.structure import arrays, universal
@@ -43,7 +43,7 @@ def peak_of(call) -> tuple:
 @pytest.mark.parametrize("block", [7, 64, 2**17])
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 def test_exact_blocks_change_no_number(table, monkeypatch, block, end):
-    monkeypatch.setattr(columns, "BLOCK", block)
+    monkeypatch.setattr(cells, "BLOCK", block)
     rng = np.random.default_rng(3)
     rows = np.column_stack([np.arange(50.0), rng.standard_normal(50) * 10.0**rng.integers(-9, 9, 50)])
     found = read(table([f" {a!r},\t{b!r} " for a, b in rows.tolist()] + ["", "  ", ""], end=end))
@@ -58,7 +58,7 @@ def test_exact_blocks_change_no_number(table, monkeypatch, block, end):
     ("1 2,1", "'1 2' is not"), ("--1,1", "'--1' is not"), ("1,", "'' is not"), ("1", "two cells"), ("", "two cells"),
     ("1,2,3", "two cells"), ("1e999,1", "not a finite"), ("0x1,1", "'0x1' is not")])
 def test_refuses_a_cell_at_its_line(table, monkeypatch, block, cell, says):
-    monkeypatch.setattr(columns, "BLOCK", block)
+    monkeypatch.setattr(cells, "BLOCK", block)
     with pytest.raises(PatchfemError) as caught:
         read(table([*(f"{k},0" for k in range(20)), cell, "21,0"]))
     assert str(caught.value).partition("a.csv:")[2].startswith("22: ") and says in str(caught.value)
@@ -109,7 +109,7 @@ def test_exact_arrays_of_a_file_are_those_that_were_saved(tmp_path):
 
 
 @pytest.mark.parametrize("name, reader, says", [
-    ("a.csv", measured.read_table, "more than 4 MiB"), ("a.msh", meshes.read_pieces, "more than 256 MiB"),
+    ("a.csv", measured.read_table, "more than 64 MiB of text"), ("a.msh", meshes.read_pieces, "more than 256 MiB"),
     ("a.uff", universal.read, "more than 256 MiB"), ("a.mat", arrays.read, "is damaged or of version 4"),
     ("a.csv", read, "more than 64 MiB of text")])
 def test_refuses_gigabytes_of_zeros_at_once(tmp_path, name, reader, says):
@@ -117,11 +117,11 @@ def test_refuses_gigabytes_of_zeros_at_once(tmp_path, name, reader, says):
     with open(path, "wb") as file:
         file.truncate(3 << 30)  # no block of the disk is taken
     said, peak = peak_of(lambda: reader(path))
-    assert says in said and peak < 4.5 * columns.LARGEST
+    assert says in said and peak < 4.5 * cells.LARGEST
 
 
 def test_exact_a_text_is_its_lines(tmp_path):
     path = tmp_path / "a.txt"
     path.write_bytes("\ufeffa\r\nü\rb\n\nc".encode())
-    assert columns.text_of(path, "a text") == "a\nü\nb\n\nc"
-    assert io.StringIO(columns.text_of(path, "a text")).readlines()[1] == "ü\n"
+    assert cells.text_of(path, "a text") == "a\nü\nb\n\nc"
+    assert io.StringIO(cells.text_of(path, "a text")).readlines()[1] == "ü\n"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from patchfem.core import G_N, PatchfemError
+from patchfem.core import G_N, Missing, PatchfemError
 from patchfem.inputs.measured import FLAGS, read_table
 
 TABLE_1 = Path(__file__).parents[2] / "studies" / "rig" / "table1.csv"
@@ -44,31 +44,43 @@ def test_exact_units_of_a_table(tmp_path):
 
 
 @pytest.mark.parametrize("text, wanted", [
-    ("", ":1: the measured table is empty"),
-    ("frequency,input [g]\n", ":1: column 'frequency'"),
-    ("frequency [Hz],input [lb]\n", ":1: column 'input [lb]'"),
-    ("frequency [Hz],speed [m/s]\n", ":1: column 'speed [m/s]'"),
-    ("frequency [Hz],flag\n", ":1: no column input"),
-    ("flag\n", ":1: no column frequency, input"),
-    (HEAD + "143,5,6.0,,\n143,6\n", ":3: 2 cells under 5 columns"),
-    (HEAD + "143,5,six,,\n", ":2: acceleration: 'six' is not a number"),
-    (HEAD + "143,5,\"6,0\",,\n", ":2: acceleration: '6,0' is not a number"),
+    ("", ":1: {like}, not ''"),
+    ("frequency,input [g]\n", ":1: {like}, not 'frequency,input [g]' (frequency without a unit)"),
+    ("frequency [Hz],input [lb]\n", ":1: input [lb]: the unit is not known; one of g, m/s^2"),
+    ("frequency [Hz],speed [m/s]\n", ":1: {like}, not 'frequency [Hz],speed [m/s]' (with a unit are known: "),
+    ("frequency [Hz],flag\n", ":1: {like}, not 'frequency [Hz],flag' (no column input)"),
+    ("flag\n", ":1: {like}, not 'flag' (no column frequency, input)"),
+    (HEAD + "143,5,6.0,,\n143,6\n", ":3: five cells are wanted, frequency, input"),
+    (HEAD + "143,5,six,,\n", ":2: acceleration: 'six' is not a finite number"),
+    (HEAD + "143,5,\"6,0\",,\n", ":2: acceleration: '6,0' is not a finite number"),
     (HEAD + "143,5,6.0,,\n143,5,6.0,,X\n", ":3: flag 'X'"),
     (HEAD + ",5,6.0,,\n", ":2: frequency and input are wanted"),
     (HEAD + "143,,6.0,,\n", ":2: frequency and input are wanted"),
-    (HEAD + "143,5,1e999,,\n", ":2: acceleration: '1e999' is not a number"),
-    (HEAD + "1" * 200_000 + ",5,6,,\n", ": the measured table cannot be read (field larger than field limit"),
+    (HEAD + "143,5,1e999,,\n", ":2: acceleration: '1e999' is not a finite number"),
+    (HEAD + "1" * 200_000 + ",5,6,,\n", ":2: frequency: '1111"),
+    (HEAD + "1" * 200_000 + ",\"5\",6,,\n", ":2: its quotes cannot be read (field larger than field limit"),
+    (HEAD + "143,-5,6,,\n", ":2: input: '-5' is below 0"),
+    ("frequency [Hz],input [g],flags\n143,5,U\n", ":1: column 'flags' is not known; known are flag and frequency"),
 ])  # fmt: skip
 def test_refuses_a_faulty_table(tmp_path, text, wanted):
     path = tmp_path / "t.csv"
     path.write_text(text, "utf-8")
     with pytest.raises(PatchfemError) as caught:
         read_table(path)
+    wanted = wanted.replace("{like}", "a header like `frequency [Hz],input [g],flag` is wanted")
     assert str(caught.value).startswith(f"{path}{wanted}")
 
 
 def test_refuses_a_file_that_cannot_be_read(tmp_path):
     (tmp_path / "t.csv").write_bytes(b"frequency [Hz],input [g]\n\xff")
-    for path in (tmp_path / "t.csv", tmp_path / "none.csv", tmp_path):
+    for path in (tmp_path / "t.csv", tmp_path):
         with pytest.raises(PatchfemError, match="cannot be read"):
             read_table(path)
+    with pytest.raises(Missing, match=r"none\.csv: no such table"):
+        read_table(tmp_path / "none.csv")
+
+
+def test_exact_cells_may_stand_in_quotes(tmp_path):
+    (tmp_path / "t.csv").write_text(HEAD + '"143",5,"6.0",,"UR"\n')
+    row, = read_table(tmp_path / "t.csv")
+    assert (row.frequency, row.acceleration, row.flag) == (143.0, 6.0 * G_N, "UR")

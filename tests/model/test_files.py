@@ -48,7 +48,7 @@ FAULTS = {
               "d.csv:3: time 0 s does not follow 0 s"),
     "structure": (ARRAYS, "a.npz", b"PK\x03\x04 no archive", "structure.file", "a.npz cannot be read"),
     "measured": (MEASURED, "m.csv", "frequency [Hz],output [g]\n1,1\n", "measured.file",
-                 "m.csv:1: column 'output [g]' is not known"),
+                 "not 'frequency [Hz],output [g]' (with a unit are known: frequency, input"),
     "mesh": (mesh_text(), "a.msh", "$MeshFormat\nnonsense\n", "contact.mesh", "a.msh: not a readable .msh file"),
     "mesh, lying": (mesh_text(), "a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n9999999\n1 0 0 0\n$EndNodes\n",
                     "contact.mesh", "a.msh: Nodes announces 9999999 entries"),

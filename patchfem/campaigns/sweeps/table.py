@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 
 from ...disk.opened import reading
-from ...inputs.columns import NUMBER
+from ...inputs.cells import NUMBER
 from ...scene.axes import Axis, values_of
 from .cases import Cases
 

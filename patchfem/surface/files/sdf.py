@@ -9,7 +9,7 @@ import struct
 import numpy as np
 
 from ...core import PatchfemError
-from ...inputs.columns import NUMBER
+from ...inputs.cells import NUMBER
 from ..areal import Areal
 from ..profile import Profile
 from .raster import areal

@@ -13,7 +13,7 @@ from array import array
 import numpy as np
 
 from ...core import PatchfemError
-from ...inputs.columns import NUMBER
+from ...inputs.cells import NUMBER
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import checked
