@@ -16,14 +16,25 @@ from hypothesis import HealthCheck, settings
 from patchfem import compiled
 from patchfem.compiled import UNKEPT, cache_folder
 
+HERE = Path(__file__).parent
+
 os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))  # else an edited kernel runs as its old self
 
+COMPILING = ("dynamics", "model", "campaigns", "response", "runs", "commands", "friction")  # folders whose runs compile
 compiled.PATIENCE = -1.0  # a test runs what is compiled, also where nothing is kept and little would have to run
 
 if sys.dont_write_bytecode:  # hundreds of child processes would each compile all that they import
     sys.dont_write_bytecode, sys.pycache_prefix = False, str(cache_folder() / "bytecode")
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+
+def kept() -> set:
+    """Files of compiled functions."""
+    return set((cache_folder() / "code").glob("*.code"))
+
+
+KEPT = kept()
 
 
 def pytest_configure(config):
@@ -55,6 +66,20 @@ def pytest_pycollect_makeitem(collector):
         again = collector.config.option.markexpr == "slow" and hasattr(getattr(case, "obj", None), "hypothesis")
         if again or (mark and place not in [one % len(made) for one in mark.args]):
             case.add_marker("slow")
+
+
+def pytest_collection_modifyitems(items):
+    """First the folders whose runs compile, last the studies, which compile too: of two workers one begins here and one
+    in the middle, so that what the first compiles the second finds, and no two compile the same at once."""
+    folders = {item: item.path.relative_to(HERE).parts[0] for item in items}
+    rank = {name: place - len(COMPILING) for place, name in enumerate(COMPILING)} | {"studies": 1}
+    items.sort(key=lambda item: rank.get(folders[item], 0))
+
+
+def pytest_terminal_summary(terminalreporter):
+    """What a cold run is told from a warm one by."""
+    terminalreporter.write_line(f"{len(KEPT)} compiled functions were kept, {len(kept() - KEPT)} more are now, in "
+                                f"{cache_folder()}")
 
 
 def pytest_collection_finish(session):
