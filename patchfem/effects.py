@@ -26,7 +26,7 @@ MOST_COORDINATES = 2000  # masses or modes of a rig, whose matrices are full; he
 class Effect(NamedTuple):
     """module: "" where the scene's own values suffice; needs, gives: what earlier effects hand on; of a law of friction
     or a waveform the keys that it must have and those that it may have besides; of a law what carries it; of both their
-    traits; means: key -> what it means, of keys that the effect alone has."""
+    traits."""
 
     module: str
     equations: str
@@ -35,7 +35,6 @@ class Effect(NamedTuple):
     keys: tuple = ("", "")
     carries: str = ""
     traits: str = ""
-    means: dict | None = None
 
 
 GAPS = "patchfem.contact.gaps"  # a shape of the gap is a function there of the places x and the keys of its table
@@ -61,19 +60,15 @@ EFFECTS = {
     "contact.lower": Effect("", "C = C_upper + C_lower, each with its own size, ends, materials and coating"),
     "contact.approach": Effect("", "delta given, N = sum f"),
     "contact.holder": Effect("", "sum f x = N offset + K theta, slide_i = q - F/K_t"),
-    "contact.step": Effect(GAPS, "g += height H(x - at)", means={
-        "height": "how much wider the gap is beyond the step", "at": "place of the step from the middle of the patch"}),
+    "contact.step": Effect(GAPS, "g += height H(x - at)"),
     "contact.asperities.law=linear": Effect("", "C += diag(1/(k_n A)), C_tt += diag(1/(k_t A))"),
     "contact.asperities.law=exponential": Effect("patchfem.contact.skin", "f = A p_0 exp(-s/u_0), s = g + theta x - "
                                                  "delta + C f"),
     "contact.asperities.law=hertz": Effect("patchfem.contact.skin", "f = A 4/3 E* sqrt(R) eta int_s (z - s)^3/2 phi(z) "
                                            "dz"),
-    "contact.tilt": Effect(GAPS, "g += angle x", means={
-        "angle": "angle between the pieces; > 0 opens the gap at +x",
-        "on": "the piece that carries the shape, and with it the pressure as it slides"}),
+    "contact.tilt": Effect(GAPS, "g += angle x"),
     "contact.load_line": Effect("", "sum f x = N offset, rotation free"),
-    "contact.crown": Effect(GAPS, "g += x^2/(2 radius)", means={
-        "radius": "radius of the rounding: the gap grows as x^2/(2 radius)"}),
+    "contact.crown": Effect(GAPS, "g += x^2/(2 radius)"),
     "contact.profile": Effect("patchfem.surface.nodes", "g += z(x), levelled, averaged over each node's cells"),
     "contact.strips": Effect("patchfem.contact.strips", "C f_j >= R_j q - g - roll y_j per strip, one holder q"),
     "contact.shear": Effect("patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()),
@@ -176,16 +171,6 @@ LAWS = {name.removeprefix("friction.law="): effect for name, effect in EFFECTS.i
 SHAPES = {name.removeprefix("contact."): effect for name, effect in EFFECTS.items() if effect.module == GAPS}
 WAVEFORMS = {name.removeprefix("drive.waveform="): effect for name, effect in EFFECTS.items()
              if name.startswith("drive.waveform=")}
-LAW_KEYS = {  # what a key of one or a few laws means
-    "stiffness": "slope of the force at first loading, of the whole contact; a patch shares it as the normal force",
-    "chi": "exponent of the sliders' density: a small cycle loses energy as its amplitude to the power chi + 3",
-    "beta": "share of the last slider: its stiffness over that of all the others",
-    "exponent": "sharpness n of the knee",
-    "shape": "share s of the unloading, which rests on the elastic line at 1/2; no energy is created from there on",
-    "stribeck_speed": "speed v_s over which friction falls from static to kinetic",
-    "micro_damping": "force per rate of the bristles' stretch, of the whole contact",
-    "viscous": "force per speed of the slide, of the whole contact",
-}
 LISTED = "two-directions"  # what carries the readings and orders of 2.17 that need the sum over all bonds
 
 

@@ -5,8 +5,7 @@ from difflib import get_close_matches
 
 from pydantic import ValidationError
 
-from .keys.meanings import CONDITIONS
-from .keys.types import Table, keys, model_of
+from .keys.types import Table, keys, model_of, record
 from .rules.draft import ASPERITIES, LAWS, SLIDES
 
 NEAR = 0.6  # of difflib, from which two names are alike
@@ -71,5 +70,5 @@ def _lacking(model: type[Table], at: str, written: dict) -> Collection:
     need = [key for key, name in keys(model).items() if model.model_fields[name].is_required()]
     selector, by = SELECTORS.get(at, ("", {}))
     need += by.get(written.get(selector), ("", ""))[0].split() if isinstance(written.get(selector), str) else []
-    need += [key for key in keys(model) if f"{at}.{key}" in CONDITIONS]
+    need += [key for key in keys(model) if (found := record(model, key)) and found.needed]
     return [key for key in need if key not in written]

@@ -7,10 +7,9 @@ import re
 
 from .keys.contact import Asperities, Material
 from .keys.materials import MATERIALS
-from .keys.meanings import meaning
 from .keys.quantities import KINDS
 from .keys.tables import Friction, Slide, Tables
-from .keys.types import Table, keys, kind_of, model_of, whole_tables
+from .keys.types import Table, keys, kind_of, meaning, model_of, whole_tables
 from .rules.draft import ASPERITIES, LAWS, SLIDES
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -6,10 +6,9 @@ from typing import Literal, get_args, get_origin
 
 from ...effects import EFFECTS, WAVEFORMS
 from ...scene.keys.contact import Coating, Material
-from ...scene.keys.meanings import CONDITIONS, meaning
 from ...scene.keys.quantities import EXAMPLES, KINDS
 from ...scene.keys.tables import Tables
-from ...scene.keys.types import keys, kind_of, model_of, parts
+from ...scene.keys.types import keys, kind_of, meaning, model_of, parts, record
 from ...scene.reader import is_value
 from ...scene.rules.draft import ASPERITIES, LAWS, SLIDES
 from ...scene.rules.limits import NOT_YET_BUILT
@@ -83,15 +82,15 @@ def _row(model: type, key: str, at: str) -> tuple:
         default = " ".join([f"{default:g}", *list(KINDS.get(kind_of(model, name), ()))[:1]])
     elif default:
         default = f"`{default}`"
-    required = "yes" if field.is_required() else _needed(path)
+    required = "yes" if field.is_required() else _needed(model, key, path.rpartition(".")[0])
     said = meaning(model, key) + ("; not yet built" if path in NOT_YET_BUILT else "")
     return f"`{key}`", _kind(model, name), default, required, said
 
 
-def _needed(path: str) -> str:
-    """Condition that makes a key necessary: "law `tanh`", the values of a selector, or words."""
-    table, _, key = path.rpartition(".")
-    said = [CONDITIONS[path]] if path in CONDITIONS else []
+def _needed(model: type, key: str, table: str) -> str:
+    """Condition that makes a key of a table necessary: "law `tanh`", the values of a selector, or words."""
+    found = record(model, key)
+    said = [found.needed] if found and found.needed else []
     for selector, used in NEEDS.items():
         values = [f"`{value}`" for value, (needs, _) in used.items() if key in needs.split()]
         if values and selector.rpartition(".")[0] == table:

@@ -20,7 +20,7 @@ from ...response import rows
 from ...runs.many.answers import Answers
 from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.result import meaning
-from ...scene.keys import meanings
+from ...scene.keys import types
 from ...scene.reader import owner_of
 from .. import netcdf
 from ..summary import versions
@@ -123,7 +123,7 @@ def _numbers(values: Sequence) -> np.ndarray:
 def _about(axis) -> dict:
     model, name = owner_of(axis.key)
     try:
-        text = meanings.meaning(model, name)
+        text = types.meaning(model, name)
     except KeyError:
         text = axis.key
     return {"long_name": text, "key": axis.key} | ({"units": cf_unit(axis.unit)} if axis.unit else {})

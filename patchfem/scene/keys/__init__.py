@@ -1,5 +1,5 @@
 """The keys that a scene may hold.
 
-Each has a kind, limits and a default (`tables`, `contact`, `types`), a unit (`quantities`) and a meaning in one
-sentence (`meanings`); `materials` are known by name. Read `tables` first.
+Each has one record: kind, limits, meaning and default (`tables`, `contact`, `accuracy`, made of `types`); the units of
+a kind stand in `quantities`; `materials` are known by name. Read `tables` first.
 """

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator
 
 from .materials import MATERIALS
-from .types import Force, Length, Place, Positive, Table, Text, choices, number, quantity, whole
+from .types import Force, Length, Place, Positive, Table, Text, choices, key, number, quantity, whole
 
 Piece = Literal["upper", "lower"]
 
@@ -18,10 +18,10 @@ Piece = Literal["upper", "lower"]
 class Material(Table):
     """Elastic constants of a piece or a coating, written inline or looked up by name."""
 
-    name: str | None = None
-    young: quantity("pressure", gt=0)
-    poisson: number(gt=-1, lt=0.5)
-    density: quantity("density", gt=0)
+    name: key(str | None, "the name under which the material table lists it") = None
+    young: key(quantity("pressure", gt=0), "Young's modulus")
+    poisson: key(number(gt=-1, lt=0.5), "Poisson's ratio")
+    density: key(quantity("density", gt=0), "mass per volume")
 
 
 def material(value: object) -> object:
@@ -42,46 +42,53 @@ Substance = Annotated[Material, BeforeValidator(material)]
 class Coating(Table):
     """A hard layer on a piece: what it is made of and how thick it is, part of the piece's height."""
 
-    material: Substance
-    thickness: Length
+    material: key(Substance, "what the layer is made of, written as a substrate is")
+    thickness: key(Length, "thickness of the layer, part of the height of its piece")
 
 
 class OnePiece(Table):
     """What one of the two pieces has otherwise than the other; `coating = "none"` leaves it bare."""
 
-    height: Length | None = None
-    length: Length | None = None
-    substrate: Substance | None = None
-    coating: Coating | Literal["none"] | None = None
-    chamfer: Length | None = None
-    end_radius: Length | None = None
+    height: key(Length | None, "height of this piece; contact.height unless given") = None
+    length: key(Length | None, "length of this piece, its middle at x = 0; contact.length unless given; the interface "
+                "is as long as the shorter one") = None
+    substrate: key(Substance | None, "what this piece is made of; contact.substrate unless given") = None
+    coating: key(Coating | Literal["none"] | None, 'layer of this piece, {material = ..., thickness = ...}, or "none"; '
+                 'contact.coating unless given') = None
+    chamfer: key(Length | None, "length along x, and depth, that is cut off both ends at 45 degrees; the interface "
+                 "stops there") = None
+    end_radius: key(Length | None, "radius that rounds both ends off; the interface stops where the slope "
+                    "exceeds 0.097") = None
 
 
 class Tilt(Table):
     """A prescribed angle between the pieces; `on` is the piece that carries the shape."""
 
-    angle: quantity("angle")
-    on: Piece = "upper"
+    angle: key(quantity("angle"), "angle between the pieces; > 0 opens the gap at +x")
+    on: key(Piece, "the piece that carries the shape, and with it the pressure as it slides") = "upper"
 
 
 class LoadLine(Table):
     """The line of the load beside the middle of a piece that is free to rotate, by offset or by moment."""
 
-    offset: Place | None = None
-    moment: quantity("moment") | None = None
+    offset: key(Place | None, "distance of the line of the load from the middle of the patch; > 0 moves the pressure "
+                "to +x", "unless moment") = None
+    moment: key(quantity("moment") | None, "moment about the middle of the patch in place of the offset") = None
 
 
 class Approach(Table):
     """A prescribed closing of the holders in place of the load."""
 
-    distance: quantity("length", ge=0)
+    distance: key(quantity("length", ge=0), "how far the holders close from first touch, in place of a load")
 
 
 class Holder(Table):
     """The springs between the far face and what holds it."""
 
-    rotational_stiffness: quantity("rotational stiffness", gt=0) | None = None
-    tangential_stiffness: quantity("stiffness", gt=0) | None = None
+    rotational_stiffness: key(quantity("rotational stiffness", gt=0) | None, "stiffness against rotation between the "
+                              "far face and what holds it", "unless tangential_stiffness") = None
+    tangential_stiffness: key(quantity("stiffness", gt=0) | None, "stiffness along x between the far face and what "
+                              "holds it; rigid unless given") = None
 
 
 def convex(value: object) -> object:
@@ -96,36 +103,41 @@ def convex(value: object) -> object:
 class Crown(Table):
     """A rounding of this radius over the patch."""
 
-    radius: Annotated[Length, BeforeValidator(convex)]
-    on: Piece = "upper"
+    radius: key(Annotated[Length, BeforeValidator(convex)], "radius of the rounding: the gap grows as x^2/(2 radius)")
+    on: key(Piece, "the piece that carries the shape") = "upper"
 
 
 class Step(Table):
     """A step of this height at this place."""
 
-    height: Place
-    at: Place
-    on: Piece = "upper"
+    height: key(Place, "how much wider the gap is beyond the step")
+    at: key(Place, "place of the step from the middle of the patch")
+    on: key(Piece, "the piece that carries the shape") = "upper"
 
 
 class ProfileFile(Table):
     """Measured heights, added to the gap."""
 
-    file: Text
-    heights: Literal["gap", "surface"] = "gap"
-    on: Piece = "upper"
+    file: key(Text, "one trace of heights along x: text with units in its header, or a file of an instrument")
+    heights: key(Literal["gap", "surface"], "gap: a larger height is an opening; surface: a stylus trace, whose peaks "
+                 "are material of the piece that carries the shape") = "gap"
+    on: key(Piece, "the piece that carries the shape") = "upper"
 
 
 class Asperities(Table):
     """A compliant rough layer; the law decides which of the other keys are used."""
 
-    law: Literal["linear", "exponential", "hertz"]
-    normal_stiffness: quantity("foundation stiffness", gt=0) | None = None
-    decay_length: Length | None = None
-    radius: Length | None = None
-    density: quantity("areal density", gt=0) | None = None
-    height_deviation: Length | None = None
-    tangential_ratio: Positive | None = None
+    law: key(Literal["linear", "exponential", "hertz"], "how the rough layer gives way: pressure linear or exponential "
+             "in its closing, or of spherical peaks with Gaussian heights")
+    normal_stiffness: key(quantity("foundation stiffness", gt=0) | None, "pressure per closing; with the exponential "
+                          "law that at first touch") = None
+    decay_length: key(Length | None, "closing over which the pressure of the exponential law grows by a factor "
+                      "e") = None
+    radius: key(Length | None, "radius of the tips of the peaks") = None
+    density: key(quantity("areal density", gt=0) | None, "number of peaks per area") = None
+    height_deviation: key(Length | None, "standard deviation of the heights of the peaks") = None
+    tangential_ratio: key(Positive | None, "tangential over normal stiffness of the layer; rigid along x "
+                          "unless given") = None
 
 
 class Shear(Table):
@@ -135,10 +147,12 @@ class Shear(Table):
 class Grooves(Table):
     """Matched grooves whose flanks the load climbs."""
 
-    wavelength: Length
-    amplitude: quantity("length", ge=0)
-    phase: quantity("angle") = 0.0
-    lifted_mass: quantity("mass", ge=0) = 0.0
+    wavelength: key(Length, "distance of the grooves along x")
+    amplitude: key(quantity("length", ge=0), "half the height of their flanks, peak to peak; 0 is the law of friction "
+                   "itself")
+    phase: key(quantity("angle"), "place of the bottom of a groove, 2 pi x/wavelength, from where the run begins") = 0.0
+    lifted_mass: key(quantity("mass", ge=0), "mass that rises with the load as it climbs; its inertia counts, its "
+                     "weight is part of the load") = 0.0
 
 
 def outermost(width: float, count: int) -> float:
@@ -149,23 +163,28 @@ def outermost(width: float, count: int) -> float:
 class Strips(Table):
     """The patch as equal strips side by side over the width."""
 
-    count: whole(1, 10_000)
-    roll: quantity("angle") = 0.0
-    offset: Place | None = None
+    count: key(whole(1, 10_000), "number of equal strips side by side over the width")
+    roll: key(quantity("angle"), "rotation of the holder about x, which shifts the pressure sideways") = 0.0
+    offset: key(Place | None, "lateral place of the load line; the upper piece is then free to roll") = None
 
 
 class Contact(Table):
     """The patch: two alike pieces pressed together; its sub-tables change the shape or add compliance."""
 
-    length: Length
-    width: Length
-    height: Length
-    load: Force | None = None
-    pairs: whole(1, 1_000_000) = 1
-    plane: Literal["strain", "stress"] = "strain"
-    element_size: Length | None = None
-    substrate: Substance
-    mesh: Text | None = None
+    length: key(Length, "length of both pieces along the sliding direction x")
+    width: key(Length, "width of the patch across the plane of the model")
+    height: key(Length, "height of each piece from the interface to its held far face, coating included")
+    load: key(Force | None, "total normal force on the interface, weight included; [contact.approach] may stand in its "
+              "place", "unless [contact.approach]") = None
+    pairs: key(whole(1, 1_000_000), "number of equal patches that share the load; forces and stiffnesses are reported "
+               "for all of them") = 1
+    plane: key(Literal["strain", "stress"], "plane strain or plane stress in the pieces") = "strain"
+    element_size: key(Length | None, "length of the elements along an even interface; without it the tolerance grades "
+                      "the mesh") = None
+    substrate: key(Substance, "what the pieces are made of: a name of the material table, or a table of young, "
+                   "poisson, density")
+    mesh: key(Text | None, "a mesh file of both pieces, tagged as GUIDE.md says; made from the dimensions "
+              "unless given") = None
     coating: Coating | None = None
     upper: OnePiece | None = None
     lower: OnePiece | None = None

@@ -1,7 +1,8 @@
 """The tables of a scene as frozen pydantic models: one model per table, one attribute per key, floats in SI.
 
-What a key means stands in `meanings`; here stand its kind, its limits and its default. Whether keys fit together
-is the business of `scene.rules.check`, reading a file that of `scene`.
+The attribute is the whole record of a key: kind, limits, meaning, what makes it necessary, default. Reader, checks, the
+schema and the reference are made from it. Whether keys fit together is the business of `scene.rules.check`, reading a
+file that of `scene`.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from .types import (
     Table,
     Text,
     Title,
+    key,
     number,
     quantity,
     whole,
@@ -42,93 +44,112 @@ LawName, WaveName = Literal[tuple(LAWS)], Literal[tuple(WAVEFORMS)]
 class Normal(Table):
     """A normal load on a single point, with an optional oscillation."""
 
-    load: Force
-    amplitude: Force | None = None
-    frequency: Frequency | None = None
-    phase: quantity("angle") | None = None
-    width: Length | None = None
+    load: key(Force, "normal force on the point, its mean where it oscillates")
+    amplitude: key(Force | None, "amplitude of an oscillating load, load + amplitude cos(2 pi frequency t + phase), "
+                   "never below 0", "beside frequency") = None
+    frequency: key(Frequency | None, "frequency of the oscillating load", "beside amplitude") = None
+    phase: key(quantity("angle") | None, "phase of the oscillating load at t = 0") = None
+    width: key(Length | None, "width of the contact across the path, for "
+               "friction.spread", "beside friction.spread") = None
     grooves: Grooves | None = None
 
 
 class Temperature(Table):
     """Surface temperature and the activation of bond growth."""
 
-    surface: Kelvin
-    reference: Kelvin
-    rest_activation: quantity("temperature", ge=0) | None = None
-    slip_activation: quantity("temperature", ge=0) | None = None
+    surface: key(Kelvin, "absolute temperature of the surfaces")
+    reference: key(Kelvin, "absolute temperature at which rest_growth and slip_growth hold")
+    rest_activation: key(quantity("temperature", ge=0) | None, "activation temperature of the growth at rest; 0 unless "
+                         "given") = None
+    slip_activation: key(quantity("temperature", ge=0) | None, "activation temperature of the growth in slip; 0 unless "
+                         "given") = None
 
 
 class Friction(Table):
     """The friction law; which keys it needs depends on `law`."""
 
-    law: LawName
-    static: NotNegative
-    kinetic: NotNegative | None = None
-    reference_speed: Speed | None = None
-    bond_length: Length | None = None
-    stiffness: quantity("stiffness", gt=0) | None = None
-    chi: number(gt=-1, le=0) | None = None
-    beta: NotNegative | None = None
-    exponent: Positive = 1.0
-    shape: number(gt=0, le=1) = 0.5
-    stribeck_speed: Speed | None = None
-    micro_damping: quantity("damping", ge=0) = 0.0
-    viscous: quantity("damping", ge=0) = 0.0
-    reading: Literal["stretch", "report"] = "stretch"
-    order: number(le=100) = 1.0
-    rest_growth: Acceleration | None = None
-    slip_growth: Length | None = None
-    rest_speed: Speed | None = None
-    initial_bonds: Share = 1.0
-    breakaway: number(ge=0, le=1) = 0.0
-    spread: Length | None = None
+    law: key(LawName, "the law of friction")
+    static: key(NotNegative, "coefficient of static friction mu_s")
+    kinetic: key(NotNegative | None, "coefficient of kinetic friction mu_k, at most static; static unless given") = None
+    reference_speed: key(Speed | None, "speed v_0 over which the friction of the law tanh saturates") = None
+    bond_length: key(Length | None, "length eps_0 over which a bond forms and breaks, at rest") = None
+    stiffness: key(quantity("stiffness", gt=0) | None, "slope of the force at first loading, of the whole contact; a "
+                   "patch shares it as the normal force") = None
+    chi: key(number(gt=-1, le=0) | None, "exponent of the sliders' density: a small cycle loses energy as its "
+             "amplitude to the power chi + 3") = None
+    beta: key(NotNegative | None, "share of the last slider: its stiffness over that of all the others") = None
+    exponent: key(Positive, "sharpness n of the knee") = 1.0
+    shape: key(number(gt=0, le=1), "share s of the unloading, which rests on the elastic line at 1/2; no energy is "
+               "created from there on") = 0.5
+    stribeck_speed: key(Speed | None, "speed v_s over which friction falls from static to kinetic") = None
+    micro_damping: key(quantity("damping", ge=0), "force per rate of the bristles' stretch, of the whole contact") = 0.0
+    viscous: key(quantity("damping", ge=0), "force per speed of the slide, of the whole contact") = 0.0
+    reading: key(Literal["stretch", "report"], "eq. 2.17 with the stretch of a bond kept apart from its damage, which "
+                 "never creates energy, or as the report prints it") = "stretch"
+    order: key(number(le=100), "power p with which a bond grows stronger along its path; > -1, and >= 0 for the "
+               "reading stretch") = 1.0
+    rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (2.10); constant bond length without "
+                     "it and slip_growth", "beside slip_growth") = None
+    slip_growth: key(Length | None, "length l_k by which the bond length grows with slip "
+                     "(2.10)", "beside rest_growth") = None
+    rest_speed: key(Speed | None, "speed v_h that floors |v| in a_s/|v|; 1e-3 of the peak speed unless given") = None
+    initial_bonds: key(Share, "share m_0 of the bonds that stand when the run begins") = 1.0
+    breakaway: key(number(ge=0, le=1), "share of the bond length over which a bond stretches without damage") = 0.0
+    spread: key(Length | None, "width rho of the bonds across the path (2.15); not counted unless given") = None
     temperature: Temperature | None = None
 
 
 class Slide(Table):
     """A prescribed motion; which keys it needs depends on `kind`."""
 
-    kind: Literal["constant", "sine", "triangle", "dwell", "file"]
-    amplitude: Length | None = None
-    frequency: Frequency | None = None
-    speed: Speed | None = None
-    distance: quantity("length", ge=0) | None = None
-    hold: quantity("time", ge=0) | None = None
-    distance_after: quantity("length", ge=0) | None = None
-    cycles: Positive | None = None
-    file: Text | None = None
+    kind: key(Literal["constant", "sine", "triangle", "dwell", "file"], "the motion: at constant speed, a sine, a "
+              "triangle, a slide with a rest, or a table of places")
+    amplitude: key(Length | None, "half peak-to-peak of the motion, which starts in its middle upwards") = None
+    frequency: key(Frequency | None, "cycles per time of a sine") = None
+    speed: key(Speed | None, "speed of the slide") = None
+    distance: key(quantity("length", ge=0) | None, "way to slide, up to the rest of a dwell; of a triangle the way "
+                  "slid before its cycles, 0 unless given") = None
+    hold: key(quantity("time", ge=0) | None, "time at rest") = None
+    distance_after: key(quantity("length", ge=0) | None, "way to slide on after the rest; 0 unless given") = None
+    cycles: key(Positive | None, "number of cycles, fractions allowed; 1 unless given") = None
+    file: key(Text | None, "table with columns time and displacement, and lateral for a slide in two directions") = None
 
 
 class Mode(Table):
     """One mode of the rig: how it vibrates, how it moves the patch, the base's share and the accelerometer's."""
 
-    name: Text
-    frequency: quantity("frequency", ge=0)
-    damping: NotNegative
-    slide: Number
-    normal: Number = 0.0
-    pitch: PerMetre = 0.0
-    lateral: Number = 0.0
-    yaw: PerMetre = 0.0
-    base: Number | None = None
-    output: Number | None = None
-    accelerometer: Number | None = None
-    gauge: Number | None = None
+    name: key(Text, "name of the mode, unique")
+    frequency: key(quantity("frequency", ge=0), "natural frequency; 0 Hz for a rigid mode")
+    damping: key(NotNegative, "damping ratio")
+    slide: key(Number, "motion of the patch along x per unit of the modal coordinate")
+    normal: key(Number, "motion of the patch away from the contact per unit of the modal coordinate") = 0.0
+    pitch: key(PerMetre, "rotation of the patch in the plane of the model per unit of the modal coordinate") = 0.0
+    lateral: key(Number, "motion of the patch across x per unit of the modal coordinate") = 0.0
+    yaw: key(PerMetre, "rotation of the patch about its normal per unit of the modal coordinate; beside "
+             "[contact.strips]") = 0.0
+    base: key(Number | None, "share of the base motion that drives the mode; slide for the first mode, 0 for the "
+              "others unless given; the squares sum to at most 1") = None
+    output: key(Number | None, "motion of the accelerometer and gauge per unit of the modal coordinate; slide for the "
+                "first mode, 0 for the others unless given") = None
+    accelerometer: key(Number | None, "motion of the accelerometer per unit of the modal coordinate; output unless "
+                       "given") = None
+    gauge: key(Number | None, "motion of the displacement gauge per unit of the modal coordinate; output "
+               "unless given") = None
 
 
 class Stiffening(Table):
     """A cubic restoring force on the block."""
 
-    cubic: quantity("cubic stiffness")
+    cubic: key(quantity("cubic stiffness"), "force k_3 x^3 on the block at its output")
 
 
 class Bonded(Table):
     """A second load path beside the contact."""
 
-    stiffness: quantity("stiffness", ge=0)
-    damping: quantity("damping", ge=0) = 0.0
-    wavelength: Length | None = None
+    stiffness: key(quantity("stiffness", ge=0), "stiffness of the spring beside the contact")
+    damping: key(quantity("damping", ge=0), "damping of that spring") = 0.0
+    wavelength: key(Length | None, "period of an interlocking spring, k wavelength/(2 pi) sin(2 pi x/wavelength); "
+                    "linear unless given") = None
 
 
 MOST_MASSES = 1_000_000
@@ -138,74 +159,90 @@ Between = tuple[whole(0, MOST_MASSES), whole(0, MOST_MASSES)]
 class Spring(Table):
     """A spring between two masses, 0 being the base."""
 
-    between: Between
-    stiffness: quantity("stiffness", ge=0)
+    between: key(Between, "the two masses that it joins, counted from 1, 0 for the base")
+    stiffness: key(quantity("stiffness", ge=0), "stiffness of the spring")
 
 
 class Damper(Table):
     """A damper between two masses, 0 being the base."""
 
-    between: Between
-    coefficient: quantity("damping", ge=0)
+    between: key(Between, "the two masses that it joins, counted from 1, 0 for the base")
+    coefficient: key(quantity("damping", ge=0), "force per relative velocity")
 
 
 class Interface(Friction):
     """A friction interface between two masses, with its own law and load."""
 
-    between: Between
-    load: Force
+    between: key(Between, "the two masses that rub, counted from 1, 0 for the base; the slide is the first less the "
+                 "second")
+    load: key(Force, "normal force on the interface")
 
 
 class Start(Table):
     """Displacements and velocities at t = 0, one per mode or mass."""
 
-    displacement: Annotated[tuple[quantity("length"), ...], Field(min_length=1)] | None = None
-    velocity: Annotated[tuple[quantity("velocity"), ...], Field(min_length=1)] | None = None
+    displacement: key(Annotated[tuple[quantity("length"), ...], Field(min_length=1)] | None,
+                      "displacements at t = 0, one per mode or mass; 0 unless given") = None
+    velocity: key(Annotated[tuple[quantity("velocity"), ...], Field(min_length=1)] | None,
+                  "velocities at t = 0, one per mode or mass; 0 unless given") = None
 
 
 class Structure(Table):
     """The rig: modes, or masses with springs, or a file; `..._at` name places in a file of measured modes."""
 
-    moving_mass: Mass | None = None
-    travel: Length | None = None
+    moving_mass: key(Mass | None, "modal mass of every mode", "beside modes") = None
+    travel: key(Length | None, "stop of the flexure: a motion beyond it ends the run; none unless given") = None
     mode: tuple[Mode, ...] = ()
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
-    masses: tuple[Mass, ...] | None = None
-    output_mass: whole(1, MOST_MASSES) | None = None
+    masses: key(tuple[Mass, ...] | None, "masses of a rig of springs, in place of modes") = None
+    output_mass: key(whole(1, MOST_MASSES) | None, "number of the mass that carries the accelerometer; 1 "
+                     "unless given") = None
     spring: tuple[Spring, ...] = ()
     damper: tuple[Damper, ...] = ()
     interface: tuple[Interface, ...] = ()
-    file: Text | None = None
-    slide_at: Text | None = None
-    output_at: Text | None = None
-    base_at: Text | None = None
-    force_at: Text | None = None
-    normal_at: Text | None = None
-    pitch_at: Text | None = None
+    file: key(Text | None, "file of matrices, modes or measured responses (.npz, .mat, .uff), in place of modes") = None
+    slide_at: key(Text | None, "place in the file that moves the patch along x, such as 12:+x") = None
+    output_at: key(Text | None, "place in the file that carries the accelerometer") = None
+    base_at: key(Text | None, "place in the file that is driven as the base") = None
+    force_at: key(Text | None, "place in the file at which the force drives") = None
+    normal_at: key(Text | None, "place in the file that moves the patch away from the contact") = None
+    pitch_at: key(Text | None, "place in the file that rotates the patch") = None
     start: Start | None = None
 
 
 class Drive(Table):
     """What sets the rig in motion; which keys it needs depends on `kind` and `waveform`."""
 
-    kind: Literal["base", "force", "free"]
-    waveform: WaveName = "sine"
-    frequency: Frequency | None = None
-    from_: Frequency | None = Field(None, alias="from")
-    to: Frequency | None = None
-    rate: quantity("sweep rate", gt=0) | None = None
-    log_rate: quantity("logarithmic sweep rate", gt=0) | None = None
-    acceleration: quantity("acceleration", ge=0) | None = None
-    displacement: quantity("length", ge=0) | None = None
-    levels: Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)] | None = None
-    onset: Literal["slip", "distortion", "gauge"] = "distortion"
-    onset_length: Length | None = None
-    force: Force | None = None
-    mass: whole(1, MOST_MASSES) | None = None
-    cycles: Positive | None = None
-    duration: Seconds | None = None
-    file: Text | None = None
+    kind: key(Literal["base", "force", "free"], "what drives: the accelerated base, a force, or nothing after a "
+              "release")
+    waveform: key(WaveName, "course of the drive in time") = "sine"
+    frequency: key(Frequency | None, "frequency of a sine or of levels") = None
+    from_: key(Frequency | None, "frequency at which a sweep begins") = Field(None, alias="from")
+    to: key(Frequency | None, "frequency at which a sweep ends") = None
+    rate: key(quantity("sweep rate", gt=0) | None,
+              "change of frequency per time of a linear sweep", "waveform `sweep` unless log_rate") = None
+    log_rate: key(quantity("logarithmic sweep rate", gt=0) | None, "octaves per time of a logarithmic sweep") = None
+    acceleration: key(quantity("acceleration", ge=0) | None,
+                      "acceleration of the base, zero to "
+                      "peak", "kind `base` unless displacement, levels or a file") = None
+    displacement: key(quantity("length", ge=0) | None, "displacement of the base, zero to peak, in place of an "
+                      "acceleration; where a release starts", "kind `free` unless [structure.start]") = None
+    levels: key(Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)] | None,
+                "accelerations of the base, or forces, one after the other, the state carried over") = None
+    onset: key(Literal["slip", "distortion", "gauge"], "what onset_level means: 'slip' the first irreversible motion "
+               "(of what gives way elastically, beyond a thousandth of the slide over which it does), 'distortion' a "
+               "third harmonic of the acceleration above 3 % of the first, 'gauge' half peak-to-peak at the output "
+               "above onset_length") = "distortion"
+    onset_length: key(Length | None, "half peak-to-peak at the output from which a gauge sees "
+                      "motion", "onset `gauge`") = None
+    force: key(Force | None, "force, zero to peak", "kind `force` unless a file") = None
+    mass: key(whole(1, MOST_MASSES) | None, "number of the mass on which the force acts; the output unless "
+              "given") = None
+    cycles: key(Positive | None, "length of the run, of each level, in cycles of the drive or of the first mode that "
+                "is not rigid", "unless duration, a sweep or a file") = None
+    duration: key(Seconds | None, "length of the run, of each level, in place of cycles") = None
+    file: key(Text | None, "record of the drive, a table with units or UFF") = None
 
     @field_validator("levels", mode="before")
     @classmethod
@@ -219,27 +256,33 @@ class Drive(Table):
 class Wear(Table):
     """Material removed over many cycles."""
 
-    coefficient: quantity("wear coefficient", ge=0)
-    upper_share: Share = 0.5
-    cycles: Positive
-    jumps: Literal["auto"] | whole(1, 1_000_000) = "auto"
-    form: Literal["archard", "energy"] = "archard"
-    scheme: Literal["implicit", "explicit"] = "implicit"
+    coefficient: key(quantity("wear coefficient", ge=0), "volume worn per load and slip path, of both pieces together; "
+                     "form 'energy': per friction work")
+    upper_share: key(Share, "share of the worn depth that the upper piece bears") = 0.5
+    cycles: key(Positive, "number of cycles over which material is removed, each like the converged last cycle")
+    jumps: key(Literal["auto"] | whole(1, 1_000_000), "number of equal steps in which the cycles are taken; by the "
+               "tolerance unless given") = "auto"
+    form: key(Literal["archard", "energy"], "'archard': depth by pressure and slip path; 'energy': by friction work "
+              "per area") = "archard"
+    scheme: key(Literal["implicit", "explicit"], "'explicit' takes the pressure from the start of a step and is "
+                "refused beyond its critical length") = "implicit"
 
 
 class Measured(Table):
     """A table of measurements to stand beside the results."""
 
-    file: Text
-    acceleration_gain: Positive = 1.0
-    reading: Literal["peak", "fundamental", "rms", "lowpass"] = "peak"
-    reading_cutoff: Frequency | None = None
+    file: key(Text, "table of measured rows: frequency, input, acceleration, displacement, flag")
+    acceleration_gain: key(Positive, "factor by which the reading exceeds the true acceleration") = 1.0
+    reading: key(Literal["peak", "fundamental", "rms", "lowpass"], "what the accelerometer shows: 'peak' the largest "
+                 "acceleration, 'fundamental' its part at the drive's frequency, 'rms' its effective value, 'lowpass' "
+                 "the largest behind a low pass of second order") = "peak"
+    reading_cutoff: key(Frequency | None, "cut-off frequency of that low pass", "reading `lowpass`") = None
 
 
 class Tables(Table):
     """The whole scene as tables, in the order in which effects are named."""
 
-    title: Title = ""
+    title: key(Title, "a line of text that stands over the results") = ""
     contact: Contact | None = None
     normal: Normal | None = None
     friction: Friction | None = None

@@ -81,6 +81,20 @@ def _printable(value: str) -> str:
     return value
 
 
+@dataclass(frozen=True, slots=True)
+class Key:
+    """The record of a key: what it means, in one sentence whose first word is a capital only in a name and which says a
+    default that follows from other keys; what makes it necessary where neither its table alone nor a selector does."""
+
+    means: str
+    needed: str = ""
+
+
+def key(kind: Any, means: str, needed: str = "") -> Any:
+    """The type of a key with its record."""
+    return Annotated[kind, Key(means, needed)]
+
+
 # kinds that many keys share
 Text = Annotated[str, Field(min_length=1), After(_printable)]
 Title = Annotated[str, After(_printable)]
@@ -154,6 +168,19 @@ def parts(annotation: Any) -> Iterator[Any]:
     for part in (*getattr(annotation, "__metadata__", ()), *get_args(annotation)):
         yield part
         yield from parts(part)
+
+
+def record(model: type[BaseModel], written: str) -> Key | None:
+    """The record of a key as written in a scene; None where it has none, as a table."""
+    return next((mark for mark in model.model_fields[keys(model)[written]].metadata if isinstance(mark, Key)), None)
+
+
+def meaning(model: type[BaseModel], written: str) -> str:
+    """What a key of a table means; KeyError where no record stands."""
+    found = record(model, written)
+    if found is None:
+        raise KeyError(f"no record of {model.__name__}.{written}: write its type as key(type, meaning)")
+    return found.means
 
 
 @cache
