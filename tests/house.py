@@ -10,6 +10,8 @@ ROOT is any checkout; nothing of it is imported. What the figures mean:
   count, and so does a module of compiled code that is loaded by its literal name.
 - own lazy import: a name of ours imported below the outermost level of a file; `from .x import a, b` has two. What
   stands under `if TYPE_CHECKING` never runs and is none.
+- taken whole: a module of ours that a file takes as a module at its outermost level; it is loaded at its first use
+  (`patchfem.later`), a module of compiled code at once.
 - parameters: all but `self`, `*args` and `**kwargs` included. Length of a function: its lines without its docstring.
 """
 
@@ -202,6 +204,7 @@ def figures(root: Path) -> dict:
         "rooms": len(rooms), "arrows between rooms": sum(map(len, rooms.values())), "upward arrows": upward(rooms),
         "files in cycles": circles(graph_of(tree)), "studies in cycles": circles(study_graph(sources(root, "studies"))),
         "own lazy imports": sum(one.lazy for one in own),
+        "modules taken whole": sum(not one.lazy and not one.taken for one in own),
         "functions": len(functions), "with a scene": sum("scene" in parameters(node) for node in functions),
         "with over 6 parameters": f"{sum(len(parameters(node)) > 6 for node in functions) / len(functions):.1%}",
         "lines of a function, median": median(lengths), "90 % below": round(quantiles(lengths, n=10)[-1], 1),

@@ -9,11 +9,26 @@ from cyclopts import Parameter
 from ..campaigns import compare as pressing
 from ..export import results, summary
 from ..export.surfaces import compare as paper
-from ..scene.keys import quantities
 from ..surface import profile
 from ..surface.compare import compare as comparison
 from ..surface.compare import verdict
-from .shared import Json, Out, Quiet, Refused, Sets, Units, flag, model_of, note, say, scene_of, word
+from .shared import (
+    Json,
+    Out,
+    Quiet,
+    Refused,
+    Sets,
+    Units,
+    flag,
+    model_of,
+    note,
+    pair,
+    placed,
+    quantity,
+    say,
+    scene_of,
+    word,
+)
 
 
 def compare(before: Path, after: Path, /, *other: Path,
@@ -32,14 +47,11 @@ def compare(before: Path, after: Path, /, *other: Path,
     """
     if direction not in ("", "x", "y"):
         raise Refused(f"compare --direction {direction}: x or y is wanted")
-
-    told = _length("shift", shift) if shift else None
-    named = tuple(word.strip() for word in units.split(",")) if units else None
-    parts = comparison.compared_files((before, after, *other), direction, named, told, keep_spikes)
+    known = quantity(shift, "length", "compare --shift")
+    parts = comparison.compared_files((before, after, *other), direction, pair(units), known, keep_spikes)
     directions = comparison.directions_of(parts)
     found = verdict.verdicts(parts, directions)
-    target = out if out is not None else Path("out") / f"{before.stem}-{after.stem}"
-
+    target = placed(out, f"{before.stem}-{after.stem}")
     with results.Folder(target) as folder:
         pressing = _pressed(scene, set_, parts[0], folder.path, quiet) if scene is not None else None
         data = paper.data_of(parts, found, directions, pressing)
@@ -52,13 +64,6 @@ def compare(before: Path, after: Path, /, *other: Path,
     else:
         print("\n".join(paper.lines_of(parts, found, pressing)))
         print(f"results: {target}")
-
-
-def _length(name: str, text: str) -> float:
-    try:
-        return quantities.parse(text, "length")
-    except ValueError as fault:
-        raise Refused(f"compare --{name}: {fault}") from None
 
 
 def _pressed(scene: Path, sets, part, target: Path, quiet: bool):

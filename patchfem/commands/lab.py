@@ -15,9 +15,8 @@ from ..identify import measured_modes
 from ..identify import measured_modes as measured
 from ..inputs import laboratory, records
 from ..inputs import universal as universal_files
-from ..scene.keys import quantities
 from ..structure import universal as universal_modes
-from .shared import Json, Refused, flag, note, texts, word
+from .shared import Json, Refused, flag, note, quantity, texts, word
 
 
 @dataclass(frozen=True)
@@ -85,8 +84,8 @@ def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
         found = measured.of_shapes(*shapes)
     else:
         values, notes = _records(file, asked)
-        found = measured.of_decay(values, _second(how.begin, "--begin")) if how.decay else \
-            measured.of_drive(values, _second(how.segment, "--segment"), _window(how.window), _band(how.band))
+        found = measured.of_decay(values, quantity(how.begin, "time", f"--begin {how.begin}")) if how.decay else \
+            measured.of_drive(values, _segment(how.segment), _window(how.window), _band(how.band))
     whole.write_text(out, mode_lines.fragment(found, file.name))
     listed = [{"frequency": f, "damping": zeta, "about": about} for f, zeta, about in
               zip(found.frequency.tolist(), found.damping.tolist(), found.about)]
@@ -98,8 +97,7 @@ def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
     if how.decay or how.begin or how.band:
         raise Refused("--decay, --begin and --band belong to modes (-o modes.toml)")
     values, notes = _records(file, asked)
-    segment, window = _second(how.segment, "--segment"), _window(how.window)
-    found, step, drive, response = measured_modes.estimated(values, segment, window)
+    found, step, drive, response = measured_modes.estimated(values, _segment(how.segment), _window(how.window))
     write.write_response(out, found, drive, response)
     return {"lines": found.frequency.size, "segments": found.segments, "window": found.window, "notes": notes,
             "told": f"{response} over {drive}, {found.frequency.size} lines from {found.segments} segments of "
@@ -116,7 +114,6 @@ def _shapes(file: Path, asked, how: Estimate) -> tuple:
     names = {text.partition("=")[0].strip() for text in asked}
     if file.suffix.lower() not in laboratory.UNIVERSAL or how != Estimate() or names & set(records.UNITS):
         return None, ()
-
     if not any(one["type"] == 55 or int(one.get("func_type", 0)) == 4 for one in universal_files.sets_of(file)):
         return None, ()
     try:
@@ -126,16 +123,8 @@ def _shapes(file: Path, asked, how: Estimate) -> tuple:
     return (shapes, {one.quantity: one.source for one in records.wanted(asked, measured_modes.PLACES)}), ()
 
 
-def _second(text: str, option: str) -> float | None:
-    """A time in words as seconds, None for no words."""
-    return None if not text else _quantity(text, "time", option)
-
-
-def _quantity(text: str, kind: str, option: str) -> float:
-    try:
-        return quantities.parse(text, kind)
-    except ValueError as error:
-        raise Refused(f"{option} {text}: {error}") from None
+def _segment(text: str) -> float | None:
+    return quantity(text, "time", f"--segment {text}")
 
 
 def _window(text: str) -> str | None:
@@ -148,7 +137,7 @@ def _band(text: str) -> tuple:
     if not text:
         return (0.0, float("inf"))
     low, dots, high = text.partition("..")
-    ends = tuple(_quantity(one.strip(), "frequency", "--band") for one in (low, high)) if dots else ()
-    if len(ends) != 2 or not 0 <= ends[0] < ends[1]:
+    ends = [quantity(one, "frequency", f"--band {one}") for one in (low.strip(), high.strip()) if dots]
+    if not ends or None in ends or not 0 <= ends[0] < ends[1]:
         raise Refused(f'--band {text}: two rising frequencies are wanted, such as "20 Hz..400 Hz"')
-    return ends
+    return tuple(ends)

@@ -6,10 +6,9 @@ from pathlib import Path
 from .. import __version__
 from ..export import results, summary
 from ..export.surfaces import roughness
-from ..scene.keys import quantities
 from ..surface.files import read
 from ..surface.roughness import report as roughness_report
-from .shared import Json, Refused, Units, flag, note, out_in, word
+from .shared import Json, Refused, Units, flag, note, out_in, pair, quantity, word
 
 
 def profile(file: Path, /, *more: Path,
@@ -23,14 +22,12 @@ def profile(file: Path, /, *more: Path,
 
     Example: patchfem profile trace.csv --cutoff "0.25 mm"
     """
-    asked = {"cutoff": _length("cutoff", cutoff) if cutoff else None, "window": _window(window) if window else None,
-             "tip": _length("tip", tip) if tip else None}
-    for name in ("cutoff", "tip"):
+    asked = {"window": _window(window) if window else None}
+    for name, text in (("cutoff", cutoff), ("tip", tip)):
+        asked[name] = quantity(text, "length", f"profile --{name}")
         if asked[name] is not None and asked[name] <= 0:
-            raise Refused(f"profile --{name} {cutoff if name == 'cutoff' else tip}: a length above zero is wanted")
-
-    named = tuple(word.strip() for word in units.split(",")) if units else None
-    reports = [roughness_report.report_of(read.read_surface(path, named), **asked) for path in (file, *more)]
+            raise Refused(f"profile --{name} {text}: a length above zero is wanted")
+    reports = [roughness_report.report_of(read.read_surface(path, pair(units)), **asked) for path in (file, *more)]
     for report in reports:
         if not json_:
             print("\n".join(roughness.lines_of(report, verbose)))
@@ -47,15 +44,8 @@ def profile(file: Path, /, *more: Path,
         print(f"results: {out}")
 
 
-def _length(name: str, text: str) -> float:
-    try:
-        return quantities.parse(text, "length")
-    except ValueError as error:
-        raise Refused(f"profile --{name}: {error}") from None
-
-
 def _window(text: str) -> tuple:
     words = text.split(",")
-    if len(words) != 2:
+    if len(words) != 2 or not all(map(str.strip, words)):
         raise Refused(f"profile --window '{text}': two places are wanted, such as '468 um,733 um'")
-    return tuple(_length("window", word) for word in words)
+    return tuple(quantity(word, "length", "profile --window") for word in words)

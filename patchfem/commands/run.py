@@ -9,7 +9,22 @@ from ..disk import whole
 from ..export import folder, summary
 from ..export.pages import released, words
 from ..runs import plan
-from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, note, progress_bar, say, scene_of
+from .shared import (
+    Ended,
+    Json,
+    NoPage,
+    NotReached,
+    Out,
+    Quiet,
+    Refused,
+    Sets,
+    flag,
+    note,
+    placed,
+    progress_bar,
+    say,
+    scene_of,
+)
 
 
 def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False,
@@ -29,7 +44,7 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
     if verbose:
         compiles = plan.compile_words(what.compile_seconds)
         talk(f"about {what.seconds:.1f} s{compiles}, {what.steps} steps, engine {what.engine}")
-    target = out if out is not None else Path("out") / what.model.source.path.stem
+    target = placed(out, what.model.source.path.stem)
     with progress_bar(quiet or json_) as progress:
         written = folder.run_into(what, target, talk, progress, fresh, resume)
     answer = written.summary

@@ -49,7 +49,6 @@ def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
     nothing is imported for them."""
     if not scenes.files_of(tables):
         return []
-
     return model_files.faults(tables, folder, whole, notes)
 
 
@@ -116,7 +115,6 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"],
     found = model_of(scene, set_)
     if found.patch is None:
         raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")
-
     low, high = result.bodies(found)
     mesh_files.write_mesh(low, out, high)
     for name, body in (("lower", low), ("upper", high or low)):

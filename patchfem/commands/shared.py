@@ -9,6 +9,7 @@ from cyclopts import Parameter
 
 from ..model import model
 from ..scene import scene
+from ..scene.keys import quantities
 from .streams import plain
 
 
@@ -38,6 +39,24 @@ Out = out_in("folder of the results, such as out/mine")
 Quiet = flag("nothing but faults", "-q", "--quiet")
 Units = word('units of x and z where the files name none, such as "mm,um"')
 NoPage = flag("leave out report.html", "--no-page")
+
+
+def placed(out: Path | None, name: str) -> Path:
+    """The folder of the results: the one that is named, else out/<name>."""
+    return out if out is not None else Path("out") / name
+
+
+def quantity(text: str, kind: str, option: str) -> float | None:
+    """The words of an option as a quantity of this kind in SI, None where there are none."""
+    try:
+        return quantities.parse(text, kind) if text else None
+    except ValueError as error:
+        raise Refused(f"{option}: {error}") from None
+
+
+def pair(units: str) -> tuple | None:
+    """The units of x and z that --units names, None where it is not given."""
+    return tuple(word.strip() for word in units.split(",")) if units else None
 
 
 class Ended(Exception):

@@ -9,7 +9,7 @@ from ..scene import schema as schemas
 from ..scene import starting
 from . import examine, sources
 from .run import run
-from .shared import Json, NoPage, Out, Refused, out_in, say
+from .shared import Json, NoPage, Out, Refused, out_in, placed, say
 
 
 def new(kind: str = "", /, *, out: out_in("mine.toml in place of the screen") = None):
@@ -39,7 +39,7 @@ def demo(*, out: Out = None, no_page: NoPage = False):
     """
     scene = starting.shipped()
     say(f"scene: {scene}; another to start from: patchfem new")
-    run(scene, out=out if out is not None else Path("out") / "demo", no_page=no_page)
+    run(scene, out=placed(out, "demo"), no_page=no_page)
 
 
 def schema(*, out: out_in("scene.json in place of the screen") = None):

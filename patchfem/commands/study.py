@@ -30,6 +30,7 @@ from .shared import (
     Sets,
     flag,
     model_of,
+    placed,
     progress_bar,
     say,
     scene_of,
@@ -51,8 +52,7 @@ def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle,
     knobs = [over] if over else cost_curves.knobs_of(found)
     if not knobs:
         raise Refused(f"{scene}: no knob changes what this scene computes")
-
-    target, curves, answer = out if out is not None else Path("out") / f"{found.source.path.stem}-cost", {}, {}
+    target, curves, answer = placed(out, f"{found.source.path.stem}-cost"), {}, {}
     for knob in knobs:
         runs = curves[knob] = cost_curves.curve(found, knob, None if quiet else say)
         names = cost_files.shown(runs)
@@ -113,19 +113,9 @@ def fit(scene: Path, /, *, to: Annotated[str, Parameter(
     if found.wear is not None:
         _fit_wear(found, to, free, out, json_, quiet)
         return
-
     fitted = loop_fits.fit_loop(found, Path(to), free, hold, None if quiet else say, fit_path.Beside(offset, warm_up))
-    target = out if out is not None else Path("out") / f"{found.path.stem}-fit"
-    answer = fit_folder.fit_into(fitted, target)
-    if json_:
-        print(json.dumps(answer, ensure_ascii=False))
-    else:
-        print("\n".join(fit_lines.lines_of(answer)))
-        for text in answer["warnings"]:
-            say(f"warning: {text}")
-        print(f"results: {target}")
-    if answer["outcome"] == "not_converged":
-        raise NotReached
+    target = placed(out, f"{found.path.stem}-fit")
+    _print_fit(fit_folder.fit_into(fitted, target), fit_lines.lines_of, target, json_)
 
 
 def _fit_rows(found, to: str, asked: tuple, out: Path | None, json_: bool, quiet: bool) -> None:
@@ -136,7 +126,7 @@ def _fit_rows(found, to: str, asked: tuple, out: Path | None, json_: bool, quiet
         raise scenes.SceneError(wrong)
     if rows.starts < 1:
         raise Refused(f"--starts {rows.starts}: one at least is wanted")
-    target, path = out if out is not None else Path("out") / f"{found.path.stem}-fit", Path(to)
+    target, path = placed(out, f"{found.path.stem}-fit"), Path(to)
     with results.Folder(target, rows.resume) as folder, progress_bar(quiet or json_) as progress:
         if folder.dropped and not quiet:
             say(folder.dropped)
@@ -147,10 +137,15 @@ def _fit_rows(found, to: str, asked: tuple, out: Path | None, json_: bool, quiet
         beside = row_fits.Beside(hold, rows.leave_out, rows.placebo, how)
         fitted = row_fits.fit_rows(asking.Question(found, wanted, path), beside, None if quiet else say, progress)
         answer = written.fit_into(fitted, folder.path, folder.target)
+    _print_fit(answer, written.lines_of, target, json_)
+
+
+def _print_fit(answer: dict, lines_of, target: Path, json_: bool) -> None:
+    """The answer of a fit on stdout, as JSON or in lines; NotReached for one that did not converge."""
     if json_:
         print(json.dumps(answer, ensure_ascii=False))
     else:
-        print("\n".join(written.lines_of(answer)))
+        print("\n".join(lines_of(answer)))
         for text in answer["warnings"]:
             say(f"warning: {text}")
         print(f"results: {target}")
@@ -161,7 +156,7 @@ def _fit_rows(found, to: str, asked: tuple, out: Path | None, json_: bool, quiet
 def _fit_wear(found, to: str, free, out: Path | None, json_: bool, quiet: bool) -> None:
     with progress_bar(quiet or json_) as progress:
         fitted = wear_coefficient.wear_coefficient(model.build(found), to, free, progress)
-    target = out if out is not None else Path("out") / f"{found.path.stem}-fit"
+    target = placed(out, f"{found.path.stem}-fit")
     text = scenes.loads(found.text, found.path, [*found.sets, fitted.bounds.assigned(fitted.value)]).resolved()
     answer = wear_fit.fit_into(fitted, found.title, text, target)
     if json_:

@@ -3,6 +3,7 @@
 import json
 import shlex
 import sys
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -16,7 +17,7 @@ from ..campaigns.sweeps import sweep as sweeping
 from ..export.pages import lead as leading
 from ..export.sweeps import page as sweep_page
 from ..export.sweeps import run
-from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, say, texts, word
+from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, placed, say, texts, word
 
 FIRST = 5  # messages of failed cases that are printed
 
@@ -88,7 +89,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     by = by or By()
     begin, part = perf_counter(), by.part()
     asked, cases = ask.asked_of(scene, set_, (what or Over()).request())
-    target = out if out is not None else Path("out") / f"{scene.stem}-sweep"
+    target = placed(out, f"{scene.stem}-sweep")
     tells = "json" if json_ else "faults" if quiet else "words"
     if by.collect:
         _answer(asked, cases, run.collect(asked, cases, target, not no_page), Told(target, not no_page, tells, begin))
@@ -147,9 +148,6 @@ class Progress:
 
 def _answer(asked, cases, found, told: Told) -> None:
     """What came out, the worst first."""
-    from collections import Counter
-
-
     counts, target = dict(Counter(map(str, found.outcome)).most_common()), told.target
     failed = sorted(found.messages)
     if told.tells != "faults":
