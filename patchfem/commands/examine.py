@@ -36,7 +36,7 @@ class Finding(NamedTuple):
 
 def examined() -> list[Finding]:
     """Everything that a run may need, looked at now; a picture is drawn in a process of its own."""
-    return [*_packages(), _cache(), _threads(), _picture(), _film(), *_extras()]
+    return [*_packages(), _cache(), _threads(), _window(), _film(), *_extras()]
 
 
 def _packages() -> Iterator[Finding]:
@@ -71,15 +71,15 @@ def _threads() -> Finding:
     return Finding("threads", True, f"{cores} of {os.cpu_count()} cores; -j {cores} lets a sweep use them", "")
 
 
-def _picture() -> Finding:
-    """Whether a picture of the pieces can be drawn here (patchfem view -o)."""
+def _window() -> Finding:
+    """Whether the window on the pieces can be drawn here (patchfem view)."""
     try:
         done = subprocess.run([sys.executable, "-P", "-c", PICTURE], capture_output=True, text=True, timeout=SECONDS)
         fine, why = done.returncode == 0, (done.stderr.strip().splitlines() or ["it crashed"])[-1][:100]
     except (OSError, subprocess.TimeoutExpired) as error:
         fine, why = False, str(error)[:100]
-    cure = "" if fine else "apt-get install libgl1 libxrender1, or look at report.html, which needs none"
-    return Finding("pictures by OpenGL", fine, "drawn" if fine else why, cure)
+    cure = "" if fine else "apt-get install libgl1 libxrender1, or name a picture (view -o FILE.png), which needs none"
+    return Finding("the window by OpenGL", fine, "drawn" if fine else why, cure)
 
 
 def _film() -> Finding:

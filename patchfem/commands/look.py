@@ -10,7 +10,7 @@ from ..export.drawing import paraview
 from ..export.drawing import view as viewer
 from ..export.fields import vtu
 from ..export.lab import write
-from .shared import Refused, flag, out_in, say
+from .shared import Refused, flag, out_in
 
 Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0, the pressed state; the last one unless "
                                              "given")]
@@ -52,7 +52,7 @@ def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif
 
     Example: patchfem view out/rig -o cycle.gif
     """
-    viewer.view(folder, out, frame, magnify, say)
+    viewer.view(folder, out, frame, magnify)
 
 
 def report(*folders: Path, out: out_in("page.html, by default report.html here") = None,

@@ -62,10 +62,10 @@ def test_always_the_doctor_tells_what_is_missing(monkeypatch):
     found = {one["name"]: one for one in json.loads(cli("doctor", "--json").out)}
     assert not found["scipy"]["fine"] and found["scipy"]["cure"] == "pip install scipy" and found["numpy"]["fine"]
     assert found["trame (fields in a browser)"]["cure"] == 'pip install "patchfem[web]"'
-    assert "no display" in found["pictures by OpenGL"]["found"] and found["pictures by OpenGL"]["cure"]
+    assert "no display" in found["the window by OpenGL"]["found"] and found["the window by OpenGL"]["cure"]
     lines = cli("doctor").out.splitlines()
     assert len(lines) == len(found)
-    assert [line.split()[1] for line in lines if line.startswith("--")] == ["scipy", "pictures", "trame"]
+    assert [line.split()[1] for line in lines if line.startswith("--")] == ["scipy", "the", "trame"]
 
 
 def test_always_the_doctor_names_every_package_of_the_project_and_what_writes_films(monkeypatch):

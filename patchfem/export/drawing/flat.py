@@ -1,4 +1,4 @@
-"""The picture of the pressed pieces without OpenGL: the panels of export.panels drawn by matplotlib.
+"""The picture of the pressed pieces: the panels of `panels` drawn by matplotlib, which needs no OpenGL.
 
 A picture is drawn once; a film shows frame after frame in the same picture.
 """
@@ -20,7 +20,7 @@ def draw(frame: Frame, head: str, magnify: float | None, path: Path) -> None:
     """Draw both pieces whole and near their contact, and the stress along the interface, as the ending of `path`
     says."""
     with matplotlib.rc_context(LOOK):
-        Picture(frame, head, panels(frame, magnify), (18, 10)).figure.savefig(path, dpi=100)
+        Picture(frame, head, panels(frame, magnify), (12, 20 / 3)).figure.savefig(path, dpi=150)
 
 
 class Picture:

@@ -41,13 +41,6 @@ class Panel:
             return text + f"\nthe slide of {self.slide * 1e3:.3g} um {self.aside:g} times as large"
         return text + (f"\nthe slide of {self.slide * 1e3:.3g} um as it is" if self.slide and self.factor > 1 else "")
 
-    def ticks(self) -> tuple:
-        """Round numbers (along x, along y) [mm] for the axes of the window, about five on the longer side."""
-        left, right, bottom, top = self.window
-        step = rounded(max(right - left, top - bottom) / 4, 0.0)
-        return tuple(step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
-                     for low, high in ((left, right), (bottom, top)))
-
 
 def panels(frame: Frame, magnify: float | tuple | None = None, close: tuple | None = None, aside: float = 1.0) -> tuple:
     """Panels of both pieces whole and of the place where they touch, with one scale of colours, each with a factor of

@@ -1,7 +1,7 @@
 """The pressed pieces in a window or a picture: von Mises stress, motion magnified, stress along the interface.
 
-The one module that touches pyvista. Whether pictures can be drawn with OpenGL is found out in a child process, because
-a broken driver ends the process that asks; without it a picture is drawn by matplotlib.
+Pictures are drawn by matplotlib (`flat`), the window by pyvista, which nothing else touches. Whether OpenGL can draw
+the window is found out in a child process, because a broken driver ends the process that asks.
 """
 
 import os
@@ -29,10 +29,9 @@ assert plotter.screenshot(None, return_img=True).std() > 0, "the picture is empt
 SIZE = (1800, 1000)
 COLOURS = "viridis"
 FONT = 20
-ROOM = (110, 170, 95, 105)  # pixels left, right, under and over the pieces
 
 
-def view(folder: Path, out: Path | None, frame: int | None = None, magnify: float | None = None, say=print) -> None:
+def view(folder: Path, out: Path | None, frame: int | None = None, magnify: float | None = None) -> None:
     """Open a window on the fields of a results folder (the last frame or `frame`), or draw them into `out`, of which
     .gif, .mp4 and .html show the last cycle.
 
@@ -55,26 +54,14 @@ def view(folder: Path, out: Path | None, frame: int | None = None, magnify: floa
     if out is None:
         _window(one, head, magnify)
         return
-    _picture(one, head, magnify, Path(out), say)
+    with whole(Path(out)) as partial:
+        flat.draw(one, head, magnify, partial)
     print(f"{out}: {head}")
-
-
-def _picture(one: Frame, head: str, magnify, out: Path, say) -> None:
-    why = no_opengl() if out.suffix == ".png" else None
-    with whole(out) as partial:
-        if why is None and out.suffix == ".png":
-            _plotter(one, head, magnify, True).screenshot(partial)
-        else:
-            if why is not None:
-                say(f"no working OpenGL ({why}); {out} is drawn by matplotlib")
-
-            flat.draw(one, head, magnify, partial)
 
 
 def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> None:
     if frame is not None:
         raise PatchfemError(f"--frame: {out.suffix} shows the whole last cycle; name a .png for one frame")
-
     reels.ready(out)
     with Series(folder) as series:
         with whole(out) as partial:
@@ -88,7 +75,7 @@ def _window(one: Frame, head: str, magnify) -> None:
     why = no_opengl()
     if why is not None:
         raise Missing(f"view: no working OpenGL for a window ({why}); name a picture with -o FILE.png")
-    _plotter(one, head, magnify, False).show(title=f"patchfem: {head}")
+    plotter(one, head, magnify).show(title=f"patchfem: {head}")
 
 
 def no_opengl() -> str | None:
@@ -105,21 +92,22 @@ def no_opengl() -> str | None:
     return last[0].strip() if last else f"drawing a tiny picture ended with code {done.returncode}"
 
 
-def _plotter(one: Frame, head: str, magnify, off_screen: bool):
+def plotter(one: Frame, head: str, magnify: float | None, off_screen: bool = False):
+    """The pyvista Plotter of the window: both pieces whole, the place where they touch, the stresses between them."""
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
 
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # it reports every display it does not find
-    plotter = pv.Plotter(off_screen=off_screen, window_size=SIZE, shape=(2, 2), groups=[(slice(None), 0)], border=False)
-    plotter.set_background("white")
+    made = pv.Plotter(off_screen=off_screen, window_size=SIZE, shape=(2, 2), groups=[(slice(None), 0)], border=False)
+    made.set_background("white")
     whole, close = panels(one, magnify)
-    plotter.subplot(0, 0)
-    _bodies(plotter, one, whole, f"{head}\n{whole.title()}", True)
-    plotter.subplot(0, 1)
-    _bodies(plotter, one, close, f"where they touch, {close.title(False)}", False)
-    plotter.subplot(1, 1)
-    _chart(plotter, one)
-    return plotter
+    made.subplot(0, 0)
+    _bodies(made, one, whole, f"{head}\n{whole.title()}", True)
+    made.subplot(0, 1)
+    _bodies(made, one, close, f"where they touch, {close.title(False)}", False)
+    made.subplot(1, 1)
+    _chart(made, one)
+    return made
 
 
 def _bodies(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
@@ -143,44 +131,12 @@ def _bodies(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
             plotter.add_mesh(lines, color=colour, line_width=2, lighting=False)
     said = plotter.add_text(text, font_size=FONT * 0.6, color="black", position=(0.03, 0.98), viewport=True)
     said.GetTextProperty().SetVerticalJustificationToTop()
-    _axes(plotter, panel, _look(plotter, panel.window))
-
-
-def _look(plotter, window: tuple) -> float:
-    """The camera square on the window, with room for the axes and the scale beside it; mm per pixel."""
-    left, right, bottom, top = window
-    view = plotter.renderer.GetViewport()
-    wide, high = ((view[k + 2] - view[k]) * SIZE[k] for k in (0, 1))
-    before, after, under, over = ROOM
-    per_pixel = max((right - left) / (wide - before - after), (top - bottom) / (high - under - over))
-    middle = ((left + right + per_pixel * (after - before)) / 2, (bottom + top + per_pixel * (over - under)) / 2)
     plotter.view_xy()
-    camera = plotter.camera
-    camera.parallel_projection = True
-    camera.focal_point, camera.position = (*middle, 0), (*middle, 1)
-    camera.parallel_scale = per_pixel * high / 2
-    return per_pixel
-
-
-def _axes(plotter, panel: Panel, pixel: float) -> None:
-    import pyvista as pv
-
-    left, right, bottom, top = panel.window
-    x, y = left - 12 * pixel, bottom - 12 * pixel
-    lines = [((left, y), (right, y)), ((x, bottom), (x, top))]
-    along, up = panel.ticks()
-    lines += [((at, y), (at, y - 8 * pixel)) for at in along] + [((x, at), (x - 8 * pixel, at)) for at in up]
-    ends = np.insert(np.array(lines).reshape(-1, 2), 2, 0.0, axis=1)
-    plotter.add_mesh(pv.line_segments_from_points(ends), color="black", line_width=1, lighting=False)
-    for places, texts, across, upright in (
-            ([(at, y - 12 * pixel) for at in along], [f"{at:.6g}" for at in along], "center", "top"),
-            ([(x - 12 * pixel, at) for at in up], [f"{at:.6g}" for at in up], "right", "center"),
-            ([((left + right) / 2, y - 40 * pixel)], ["x [mm]"], "center", "top"),
-            ([(x, top + 12 * pixel)], ["y [mm]"], "right", "bottom")):
-        if texts:
-            plotter.add_point_labels(np.insert(np.array(places), 2, 0.0, axis=1), texts, font_size=FONT, shape=None,
-                                     text_color="black", bold=False, show_points=False, always_visible=True,
-                                     justification_horizontal=across, justification_vertical=upright)
+    plotter.enable_parallel_projection()
+    plotter.show_bounds(bounds=(*panel.window, 0, 0), xtitle="x [mm]", ytitle="y [mm]", font_size=FONT - 6, bold=False,
+                        location="outer", show_zaxis=False, show_zlabels=False)
+    plotter.reset_camera(bounds=(*panel.window, 0, 0))
+    plotter.camera.zoom(0.95)  # the scale of colours stands beside the pieces
 
 
 def _chart(plotter, one: Frame) -> None:
