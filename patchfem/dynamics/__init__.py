@@ -17,11 +17,12 @@ and the entries before it:
 12. `periodic`        Newton's method on the map of an engine over a period
 13. `contacts`        what one interface is to the loop of a march: solve, given, commit, state
 14. `events`          exact from event to event: rigid and elastic-plastic elements, or no friction
-15. `march`           any law in time, under the path-mean forces of each step
-16. `smooth`          smooth laws by a method of high order from reversal to reversal
-17. `comparison`      the report's own methods: Duhamel, Newmark, Euler
-18. `harmonic`        steady motions by harmonic balance, branches and stability
-19. `grooves`         a load that climbs the flanks of matched grooves
+15. `lanes`             many cases of one mode under a sine side by side, with the answers of `events` to its bars
+16. `march`           any law in time, under the path-mean forces of each step
+17. `smooth`          smooth laws by a method of high order from reversal to reversal
+18. `comparison`      the report's own methods: Duhamel, Newmark, Euler
+19. `harmonic`        steady motions by harmonic balance, branches and stability
+20. `grooves`         a load that climbs the flanks of matched grooves
 
 The friction force of a patch over a step comes from `contacts/`, called by the loop of `march/`: for rigid pieces
 `element_kernels.solve` (one point stands for all in the law, `friction.laws.stretch_kernels.mean`), for elastic ones

@@ -30,7 +30,7 @@ def estimate(asked: Asked, cases: Cases) -> dict:
     if not plans:
         raise wrong
     alone = [max(one.seconds - ONCE, TOGETHER) for one in plans]
-    batches = [batch_of(one.model) for one in plans]
+    batches = [batch_of(one.model, len(cases)) for one in plans]
     each = sum(one if batch is None else max(TOGETHER, batch.share * one) for one, batch in zip(alone, batches))
     each /= len(plans)
     once = ONCE + max(one * (batch is not None) for one, batch in zip(alone, batches))  # the first as a single run

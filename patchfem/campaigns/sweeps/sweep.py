@@ -53,7 +53,7 @@ def warmed(work: Work) -> None:
     """Bring up what the first case of a work needs, though its meshes are not chosen yet; what is wrong with it is told
     by its own run."""
     try:
-        many.batch_of(model := work.asked.model(work.cases.sets(0))) or plan.plan(model)
+        many.batch_of(model := work.asked.model(work.cases.sets(0)), len(work.cases)) or plan.plan(model)
     except Exception:
         return
 
@@ -63,7 +63,7 @@ def answer(work: Work, numbers: Sequence[int], say: Callable | None = None) -> t
     them. This is what a worker does with a chunk."""
     models = [_model(work, number) for number in numbers]
     keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
-    found = many.answers(models, keep, say, work.estimate)
+    found = many.answers(models, keep, say, work.estimate, len(work.cases))
     told = [] if work.tell is None else [work.tell(number, model, found, case)
                                          for case, (number, model) in enumerate(zip(numbers, models))]
     return handed(work, numbers, found, told)

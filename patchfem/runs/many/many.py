@@ -19,7 +19,9 @@ class Batch(NamedTuple):
 
     refuses(model) -> "" or the sentence why not; group(model): equal for models that can share work; solve(models,
     say) -> Answers of a group, equal to single runs to 1e-12, bars too, whatever else is in the group; share: seconds
-    of a case over those of its own run, 0 where they are next to nothing; compile: CPU seconds of the first group.
+    of a case over those of its own run, 0 where they are next to nothing; compile: CPU seconds of the first group;
+    least: fewest cases of a study that it serves: such a batch gives answers with bars of their own, each the same
+    whatever else is in the group.
     """
 
     name: str
@@ -28,20 +30,22 @@ class Batch(NamedTuple):
     solve: Callable[..., Answers]
     share: float = 0.0
     compile: float = 0.0
+    least: int = 0
 
 
-def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0) -> Batch:
+def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least: int = 0) -> Batch:
     """The batch of the module of this name, which takes models of this kind and is imported for the first of them."""
     def of(function: str) -> Callable:
         return lambda *given: getattr(import_module(f"patchfem.runs.many.{name}"), function)(*given)
 
     asked = of("refuses")
     return Batch(name, lambda model: asked(model) if model.kind == kind else f"it is a {model.kind}", of("group"),
-                 of("solve"), share, compile)
+                 of("solve"), share, compile, least)
 
 
 # the first that does not refuse a model takes it
-BATCHES: tuple[Batch, ...] = (_batch("patches", "patch"), _batch("lumped.lumped", "rig", compile=12.0),
+BATCHES: tuple[Batch, ...] = (_batch("patches", "patch"), _batch("lumped.lanes", "rig", compile=6.0, least=64),
+                              _batch("lumped.lumped", "rig", compile=12.0),
                               _batch("lumped.sheared", "rig", 0.4, 12.0))
 
 
@@ -58,35 +62,36 @@ def _kind(batch: Batch, model: Model) -> str:
     return " ".join([batch.name, rig.waveform, *(one.numbers.law for one in rig.interfaces), str(bool(model.soft))])
 
 
-def batch_of(model: Model) -> Batch | None:
-    """The batch that takes a model; None where it is run by itself."""
-    return next((one for one in BATCHES if not one.refuses(model)), None)
+def batch_of(model: Model, study: int = 1) -> Batch | None:
+    """The batch that takes a model of a study of so many cases; None where it is run by itself."""
+    return next((one for one in BATCHES if study >= one.least and not one.refuses(model)), None)
 
 
 def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = None,
-            say: Callable | None = None, estimate: bool = True) -> Answers:
+            say: Callable | None = None, estimate: bool = True, study: int = 0) -> Answers:
     """Answers of the models in their order; an error in place of a model is the message of its failed case.
 
     keep(case, Result): called after each run; a batch has no Result, so all cases then run one by one. say: called with
     one line when compiled code has to be made; estimate: False leaves out the coarser runs of all models, and their
-    errors, where they run one by one (a batch has its errors from the same work).
+    errors, where they run one by one (a batch has its errors from the same work); study: cases of the whole that these
+    are a part of, 0 where they are all of it.
     """
     found, groups = Answers.blank(len(models)), {}
     for case, model in enumerate(models):
         if isinstance(model, PatchfemError):
             found.fail(case, str(model))
             continue
-        groups.setdefault(_place(model) if keep is None else (None, None), []).append(case)
+        groups.setdefault(_place(model, study or len(models)) if keep is None else (None, None), []).append(case)
     for (batch, _), cases in groups.items():
         found.place(cases, _solved(batch, [models[case] for case in cases],
                                    partial(one_by_one.solve, keep=_of(keep, cases), estimate=estimate), say))
     return found
 
 
-def _place(model: Model) -> tuple:
+def _place(model: Model, study: int) -> tuple:
     """(batch, group) of a model; (None, None) where it is run by itself."""
     try:
-        batch = batch_of(model)
+        batch = batch_of(model, study)
         return (batch, batch.group(model)) if batch is not None else (None, None)
     except Exception:  # what is odd about the model is told by its own run
         return None, None

@@ -1,0 +1,325 @@
+"""The march of many cases side by side: one step of all lanes, then the next; measures are folded as they come.
+
+Cost: some 2 ns a step and case on a core with vectors of eight numbers.
+"""
+
+from math import nan
+
+from ...compiled.inner import njit
+from ...friction.flags_kernels import FAST, LEAN
+from . import rigid_kernels as law
+from .names_kernels import (
+    ACCELERATION,
+    BASE,
+    BEGUN,
+    C1,
+    C3,
+    CASE,
+    CLOSE,
+    COS,
+    CYCLE,
+    EVENT,
+    F_FIRST,
+    F_LAST,
+    FIRST,
+    FORCE,
+    HIGH,
+    IN,
+    LANES,
+    LAST,
+    LONGEST,
+    LOST,
+    LOW,
+    MEAN,
+    NUMBER,
+    NUMBERS,
+    OUT,
+    PASSED,
+    PATH,
+    PLACE,
+    POWER,
+    PULL,
+    PULL_HIGH,
+    PULL_LOW,
+    RANGE,
+    S1,
+    S3,
+    SECANT,
+    SEEN,
+    SHOW,
+    SHOWN,
+    SIN,
+    SLIP_HIGH,
+    SLIP_LOW,
+    START_COS,
+    START_SIN,
+    STARTS,
+    STATE,
+    STICK,
+    STUCK,
+    TURNED,
+    WAS_PLACE,
+    WAS_V,
+    WAS_X,
+    WAY,
+    D,
+    P,
+    V,
+    W,
+    X,
+)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def step(room, i, s0, c0, s1, c1, h):
+    """Move a lane over a step and add to its sums; what `advance` of its law gives."""
+    x, v, way, place = room[X * LANES + i], room[V * LANES + i], room[WAY * LANES + i], room[PLACE * LANES + i]
+    done = law.advance(room, i, s0, c0, s1, c1, h)
+    x1, v1, way1, place1, u, _, ve, pe, turn, kink = done
+    room[X * LANES + i], room[V * LANES + i] = x1, v1
+    room[WAY * LANES + i], room[PLACE * LANES + i] = way1, place1
+    room[PATH * LANES + i] += abs(pe - place) + abs(place1 - pe)
+    # what a jump of the acceleration inside the step leaves of the trapezoidal rule
+    edge = kink * h * (u * (1 - u) / 2 - 1 / 12)
+    room[IN * LANES + i] += s1 * v1 - (s0 + u * (s1 - s0)) * edge
+    room[LOST * LANES + i] += v1 * v1 - 2 * ve * edge
+    room[POWER * LANES + i] += abs(s1 * v1)
+    room[HIGH * LANES + i] = max(room[HIGH * LANES + i], max(x1, turn))
+    room[LOW * LANES + i] = min(room[LOW * LANES + i], min(x1, turn))
+    room[COS * LANES + i] += x1 * c1
+    room[SIN * LANES + i] += x1 * s1
+    return x, v, way, place, done
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def glide(room, i, s0, c0, s1, c1):
+    """Move a lane over a step in which nothing happens; in another one it is left where it is and marked."""
+    x, v, place = room[X * LANES + i], room[V * LANES + i], room[PLACE * LANES + i]
+    x1, v1, place1, event = law.ahead(room, i, s0, c0, s1, c1)
+    on = 0.0 if event else 1.0
+    room[EVENT * LANES + i] = 1.0 - on
+    room[X * LANES + i], room[V * LANES + i] = x if event else x1, v if event else v1
+    room[PLACE * LANES + i] = place if event else place1
+    power = on * (s1 * v1)
+    room[PATH * LANES + i] += on * abs(place1 - place)
+    room[IN * LANES + i] += power
+    room[LOST * LANES + i] += on * (v1 * v1)
+    room[POWER * LANES + i] += abs(power)
+    high, low = room[HIGH * LANES + i], room[LOW * LANES + i]
+    room[HIGH * LANES + i] = high if event else max(high, x1)
+    room[LOW * LANES + i] = low if event else min(low, x1)
+    room[COS * LANES + i] += on * (x1 * c1)
+    room[SIN * LANES + i] += on * (x1 * s1)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def cycle(room, marked, table, h):
+    """Move all lanes over a cycle of the drive; table (2, n + 1): sine and cosine at the steps."""
+    for k in range(table.shape[1] - 1):
+        s0, c0, s1, c1 = table[0, k], table[1, k], table[0, k + 1], table[1, k + 1]
+        for i in range(LANES):
+            glide(room, i, s0, c0, s1, c1)
+        count = 0
+        for i in range(LANES):
+            marked[count] = i
+            count += 1 if room[EVENT * LANES + i] > 0.0 else 0
+        for j in range(count):
+            step(room, marked[j], s0, c0, s1, c1, h)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def highest(g0, g1, m0, m1):
+    """Largest size of a cubic over [0, 1] with these values and slopes at its ends, its vertex by the secant of the
+    slopes."""
+    ends = max(abs(g0), abs(g1))
+    w = m0 / (m0 - m1)
+    rise = g1 - g0
+    vertex = g0 + w * (m0 + w * (3 * rise - 2 * m0 - m1 + w * (m0 + m1 - 2 * rise)))
+    return max(ends, abs(vertex)) if m0 * m1 < 0.0 else ends
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def look(room, i, s0, c0, s1, c1, h):
+    """Move a lane over a step of the last cycles and fold what they show."""
+    high, low = room[HIGH * LANES + i], room[LOW * LANES + i]
+    x, v, way, place, done = step(room, i, s0, c0, s1, c1, h)
+    x1, v1, way1, place1, u, xe, ve, pe, turn, _ = done
+    out, base = room[OUT * LANES + i], room[BASE * LANES + i]
+    damp, push, square = room[D * LANES + i], room[P * LANES + i], room[W * LANES + i]
+    f0, f1 = law.felt(x, way, place, s0, room, i), law.felt(x1, way1, place1, s1, room, i)
+    a0, a1 = push * s0 - damp * v - square * x - f0, push * s1 - damp * v1 - square * x1 - f1
+    # the acceleration on both sides of an event, and at its vertices between it and the ends
+    t = u * h
+    se = s0 * (1 - t * t / 2 + t**4 / 24) + c0 * t * (1 - t * t / 6 + t**4 / 120)
+    ce = c0 * (1 - t * t / 2 + t**4 / 24) - s0 * t * (1 - t * t / 6 + t**4 / 120)
+    before, after = law.felt(xe, way, place, se, room, i), law.felt(xe, way1, pe, se, room, i)
+    rest = push * se - damp * ve - square * xe
+    ae, af = rest - before, rest - after
+    stiff, stiff1 = square + law.stiffness(way, room, i), square + law.stiffness(way1, room, i)
+    moves, moves1 = 0.0 if law.RESTS and way == 0.0 else out, 0.0 if law.RESTS and way1 == 0.0 else out
+    best = max(highest(out * a0 + base * s0, out * ae + base * se,
+                       t * (moves * (push * c0 - damp * a0 - stiff * v) + base * c0),
+                       t * (moves * (push * ce - damp * ae - stiff * ve) + base * ce)),
+               highest(out * af + base * se, out * a1 + base * s1,
+                       (h - t) * (moves1 * (push * ce - damp * af - stiff1 * ve) + base * ce),
+                       (h - t) * (moves1 * (push * c1 - damp * a1 - stiff1 * v1) + base * c1)))
+    room[ACCELERATION * LANES + i] = max(room[ACCELERATION * LANES + i], best)
+    # sticks and releases
+    stuck = (u if way == 0.0 else 0.0) + (1 - u if way1 == 0.0 else 0.0)
+    room[STUCK * LANES + i] += h * stuck
+    run = room[STICK * LANES + i] + h * (u if way == 0.0 else 0.0)
+    longest = max(room[LONGEST * LANES + i], run)
+    room[LONGEST * LANES + i] = longest
+    run = run if way == 0.0 and u >= 1.0 else 0.0
+    room[STICK * LANES + i] = run + h * (1 - u if way1 == 0.0 else 0.0)
+    begins = 1.0 if way == 0.0 and way1 != 0.0 else 0.0
+    room[STARTS * LANES + i] += begins
+    room[START_COS * LANES + i] += begins * (1 - 2 * se * se)
+    room[START_SIN * LANES + i] += begins * 2 * se * ce
+    # the loop
+    fold_t = law.felt(turn, way, place, se, room, i)
+    peak = max(max(abs(f0), abs(f1)), max(abs(before), abs(after)))
+    room[FORCE * LANES + i] = max(room[FORCE * LANES + i], peak if turn == x1 else max(peak, abs(fold_t)))
+    room[SLIP_HIGH * LANES + i] = max(room[SLIP_HIGH * LANES + i], max(pe, place1))
+    room[SLIP_LOW * LANES + i] = min(room[SLIP_LOW * LANES + i], min(pe, place1))
+    one, two = 0.5 * (f0 + before) * (xe - x), 0.5 * (after + f1) * (x1 - xe)
+    room[TURNED * LANES + i] += one + two
+    room[PASSED * LANES + i] += abs(one) + abs(two)
+    room[C1 * LANES + i] += x1 * c1
+    room[S1 * LANES + i] += x1 * s1
+    room[C3 * LANES + i] += x1 * c1 * (4 * c1 * c1 - 3)
+    room[S3 * LANES + i] += x1 * s1 * (3 - 4 * s1 * s1)
+    room[MEAN * LANES + i] += x1
+    room[PULL * LANES + i] += f1
+    pull = law.at_turn(turn, way, place, room, i)
+    turned = v != 0.0 and v * v1 <= 0.0
+    higher, lower = max(x1, turn) > high, min(x1, turn) < low
+    room[PULL_HIGH * LANES + i] = (pull if turned else nan) if higher else room[PULL_HIGH * LANES + i]
+    room[PULL_LOW * LANES + i] = (pull if turned else nan) if lower else room[PULL_LOW * LANES + i]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def fetch(case, i, cases, motion, room):
+    """Put a case in the lane i."""
+    for n in range(NUMBERS):
+        room[(NUMBER + n) * LANES + i] = cases[case, n]
+    for n in range(STATE):
+        room[n * LANES + i] = motion[case, n]
+    room[CASE * LANES + i], room[CYCLE * LANES + i] = case, 0.0
+    room[WAS_X * LANES + i], room[WAS_V * LANES + i] = room[X * LANES + i], room[V * LANES + i]
+    room[WAS_PLACE * LANES + i] = room[PLACE * LANES + i]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def turn_over(i, room, history, case, k, share):
+    """Write the extremes and the phasor of the cycle k of a lane and begin the next one; share: 2 over the steps."""
+    x, begun = room[X * LANES + i], room[WAS_X * LANES + i]
+    history[case, k, 0], history[case, k, 1] = room[LOW * LANES + i], room[HIGH * LANES + i]
+    history[case, k, 2] = share * (room[COS * LANES + i] + 0.5 * (begun - x))
+    history[case, k, 3] = share * room[SIN * LANES + i]
+    room[HIGH * LANES + i] = room[LOW * LANES + i] = x
+    room[COS * LANES + i] = room[SIN * LANES + i] = 0.0
+    room[WAS_X * LANES + i], room[WAS_V * LANES + i] = x, room[V * LANES + i]
+    room[WAS_PLACE * LANES + i] = room[PLACE * LANES + i]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def repeats(i, room):
+    """Whether the cycle of a lane ends where it began."""
+    size = CLOSE * (room[HIGH * LANES + i] - room[LOW * LANES + i])
+    return abs(room[X * LANES + i] - room[WAS_X * LANES + i]) <= size \
+        and abs(room[V * LANES + i] - room[WAS_V * LANES + i]) <= size \
+        and abs(room[PLACE * LANES + i] - room[WAS_PLACE * LANES + i]) <= size
+
+
+@njit(error_model="numpy", cache=True, nogil=True, fastmath=FAST, **LEAN)
+def march(cases, order, motion, table, until, history, ended, room, marked):
+    """March cases up to the end of the cycle `until`, or of one that repeats. A lane that is done takes the next case.
+
+    cases (n, NUMBERS); order (m,): numbers of those that march; motion (n, STATE): at their begin, and at their end;
+    table (3, s + 1): sine and cosine at the steps of a cycle, and the step; history (n, c, 4): least and largest slide
+    of a cycle [m], and its phasor [m]; ended (n,): cycles done; room (ROOM * LANES,), marked (LANES + 1,): of the
+    lanes. Cost: 2 to 5 ns a step of a case.
+    """
+    share, given = 2 / (table.shape[1] - 1), min(LANES, len(order))
+    for i in range(LANES):
+        fetch(order[min(i, given - 1)], i, cases, motion, room)
+        room[CASE * LANES + i] = order[i] if i < given else -1
+    busy = given
+    while busy > 0:
+        cycle(room, marked, table, table[2, 0])
+        for i in range(LANES):
+            case, k = int(room[CASE * LANES + i]), int(room[CYCLE * LANES + i])
+            if case < 0:
+                continue
+            same = repeats(i, room)
+            turn_over(i, room, history, case, k, share)
+            room[CYCLE * LANES + i] = k + 1
+            if k + 1 < until and not same:
+                continue
+            ended[case] = k + 1
+            for n in range(STATE):
+                motion[case, n] = room[n * LANES + i]
+            if given < len(order):
+                fetch(order[given], i, cases, motion, room)
+                given += 1
+            else:
+                room[CASE * LANES + i] = -1.0
+                busy -= 1
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def open_cycle(i, room):
+    """Begin a cycle of what a lane shows."""
+    room[BEGUN * LANES + i] = room[X * LANES + i]
+    room[MEAN * LANES + i] = room[PULL * LANES + i] = 0.0
+    rests = law.RESTS and room[WAY * LANES + i] == 0.0
+    room[PULL_HIGH * LANES + i] = room[PULL_LOW * LANES + i] = 0.0 if rests else nan
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def close_cycle(i, room, first, cycles, h):
+    """Take the range, the secant and the means of a cycle of a lane, the first or not, into what it shows."""
+    size, begun = room[HIGH * LANES + i] - room[LOW * LANES + i], room[BEGUN * LANES + i]
+    secant = (room[PULL_HIGH * LANES + i] - room[PULL_LOW * LANES + i]) / size
+    room[RANGE * LANES + i] += size / cycles
+    if secant == secant and size > 0.0:
+        room[SEEN * LANES + i] += 1.0
+        room[SECANT * LANES + i] += secant
+    mean = h * (room[MEAN * LANES + i] + 0.5 * (begun - room[X * LANES + i]))
+    pull = h * room[PULL * LANES + i]
+    if first:
+        room[FIRST * LANES + i], room[F_FIRST * LANES + i] = mean, pull
+    room[LAST * LANES + i], room[F_LAST * LANES + i] = mean, pull
+
+
+@njit(error_model="numpy", cache=True, nogil=True, fastmath=FAST, **LEAN)
+def read(cases, order, motion, table, cycles, history, ended, shown, room):
+    """March cases over their last `cycles` and read what they show; arguments as of `march`.
+
+    ended: the cycle at which a case goes on; shown (n, SHOWN): numbers by their places.
+    """
+    steps = table.shape[1] - 1
+    h = table[2, 0]
+    for begin in range(0, len(order), LANES):
+        for i in range(LANES):
+            fetch(order[min(begin + i, len(order) - 1)], i, cases, motion, room)
+            for n in range(SHOW, SHOW + SHOWN):
+                room[n * LANES + i] = 0.0
+            room[SLIP_HIGH * LANES + i] = room[SLIP_LOW * LANES + i] = room[PLACE * LANES + i]
+        for k in range(cycles):
+            for i in range(LANES):
+                open_cycle(i, room)
+            for j in range(steps):
+                s0, c0, s1, c1 = table[0, j], table[1, j], table[0, j + 1], table[1, j + 1]
+                for i in range(LANES):
+                    look(room, i, s0, c0, s1, c1, h)
+            for i in range(LANES):
+                close_cycle(i, room, k == 0, cycles, h)
+                case = int(room[CASE * LANES + i])
+                turn_over(i, room, history, case, ended[case] + k, 2 / steps)
+        for i in range(min(LANES, len(order) - begin)):
+            for n in range(SHOWN):
+                shown[order[begin + i], n] = room[(SHOW + n) * LANES + i]
+            for n in range(STATE):
+                motion[order[begin + i], n] = room[n * LANES + i]

@@ -1,0 +1,31 @@
+"""Places of the numbers of a case in lanes, and how many cases march side by side; no compiled code.
+
+A room is a flat array that holds a number of all lanes side by side: number n of lane i stands at n * LANES + i, so
+that a compiler knows the distance of any two and takes several lanes at once. Lengths are in m, times are angles of the
+drive, so forces over the mass are in m and energies over it in m^2.
+"""
+
+LANES = 32
+CLOSE = 1e-9  # of the range of a cycle, by which the next one may differ that is the same
+
+# the motion: state, then sums of the run, then extremes and phasor of a cycle; whether the next step holds an event
+X, V, WAY, PLACE, PATH, IN, LOST, POWER, HIGH, LOW, COS, SIN, EVENT = range(13)
+STATE = 13
+
+# the case: x and x' after a step from x, x', a constant force, the sine and the cosine of the drive, in a slip and with
+# the spring of a stick; then the equation itself, acceleration of the output over x'' and of the base over the sine
+NUMBER = STATE
+(A11, A12, A21, A22, RX, RV, SX, SV, CX, CV, B11, B12, B21, B22, QX, QV, TX, TV, UX, UV, D, W, P, GK, GS, K, LENGTH,
+ OUT, BASE) = range(NUMBER, NUMBER + 29)
+NUMBERS = 29
+
+# what the last cycles show
+SHOW = NUMBER + NUMBERS
+(ACCELERATION, STUCK, FORCE, SLIP_HIGH, SLIP_LOW, C1, S1, C3, S3, MEAN, TURNED, PASSED, STARTS, START_COS, START_SIN,
+ PULL, PULL_HIGH, PULL_LOW, RANGE, SECANT, SEEN, LONGEST, STICK, FIRST, LAST, F_FIRST, F_LAST,
+ BEGUN) = range(SHOW, SHOW + 28)
+SHOWN = 28
+
+# which case a lane has, -1 none, its cycle and where that began
+CASE, CYCLE, WAS_X, WAS_V, WAS_PLACE = range(SHOW + SHOWN, SHOW + SHOWN + 5)
+ROOM = SHOW + SHOWN + 5

@@ -1,0 +1,85 @@
+"""What lanes show of their last cycles, as the numbers that runs from event to event give of theirs."""
+
+import numpy as np
+
+from ..events import names_kernels as of
+from ..events.reading import Reading
+from . import names_kernels as at
+from .run import Cases, Marched
+
+
+def books(law: str, cases: Cases, found: Marched, energy) -> dict:
+    """Energies (n,) [J] of whole runs by name; energy (n,) [kg s-2]: what a square of lengths stands for."""
+    h, b, e, first = found.step, found.begun, found.motion, found.start
+    left = found.history.shape[1] - found.ended - found.cycles
+    sums = {k: e[:, k] + left * (e[:, k] - b[:, k]) / found.cycles for k in (at.PATH, at.IN, at.LOST, at.POWER)}
+    (x0, v0), (x1, v1) = ((m[:, at.X], m[:, at.V]) for m in (first, e))
+    gains = [v * (-cases.damp * v - cases.square * x - _held(law, cases, m))
+             for x, v, m in ((x0, v0, first), (x1, v1, e))]
+    # the sums are those of the trapezoidal rule; its ends by Euler and Maclaurin
+    viscous = h * sums[at.LOST] + h / 2 * (v0**2 - v1**2) + h * h / 6 * (gains[0] - gains[1])
+    reach = np.abs(found.history[:, :, :2]).max(axis=(1, 2))
+    lost, elastic = cases.slip * sums[at.PATH], _elastic(cases, e) - _elastic(cases, first)
+    out = {"work_in": cases.push * (h * sums[at.IN] + h * h / 12 * (v0 - v1)), "viscous": cases.damp * viscous,
+           "power": np.abs(cases.push) * h * sums[at.POWER], "friction": lost + elastic, "lost": lost,
+           "stored": 0.5 * (v1**2 - v0**2 + cases.square * (x1**2 - x0**2)),
+           "peak_stored": 0.5 * np.maximum(cases.square * reach**2, v0**2 + cases.square * x0**2)}
+    return {name: energy * value for name, value in out.items()}
+
+
+def _held(law: str, cases: Cases, motion) -> np.ndarray:
+    """Friction where the drive passes 0."""
+    x, place, way = (motion[:, k] for k in (at.X, at.PLACE, at.WAY))
+    return np.where(way != 0, way * cases.slip, -cases.square * x if law == "rigid" else cases.spring * (x - place))
+
+
+def _elastic(cases: Cases, motion) -> np.ndarray:
+    """Energy in the contact."""
+    return 0.5 * cases.spring * (motion[:, at.X] - motion[:, at.PLACE])**2
+
+
+def reading_of(cases: Cases, found: Marched, energy, omega, outward) -> Reading:
+    """Reading of the last cycles, (n,) runs alike; omega (n,) [rad/s]; outward (n, c, 2) [m]: extremes of the output in
+    the cycles at the end."""
+    n, b, e = len(omega), found.begun, found.motion
+    shown = {name: found.shown[:, getattr(at, name) - at.SHOW] for name in (
+        "ACCELERATION", "STARTS", "START_COS", "START_SIN", "SLIP_HIGH", "SLIP_LOW", "FORCE", "STUCK", "TURNED",
+        "PASSED", "FIRST", "LAST", "F_FIRST", "F_LAST", "RANGE", "SECANT", "SEEN")}
+    run, face, angle = np.zeros((n, of.OF_RUN)), np.zeros((n, of.OF_FACE)), 2 * np.pi * found.cycles
+    slide, push, pull, third = harmonics(cases, found, angle)
+    run[:, of.OUT_LOW], run[:, of.OUT_HIGH] = outward[:, :, 0].min(axis=1), outward[:, :, 1].max(axis=1)
+    run[:, of.REACH] = np.abs(outward).max(axis=(1, 2))
+    run[:, [of.A_COS, of.A_SIN, of.A3_COS, of.A3_SIN]] = np.array([*push, *third]).T / omega[:, None]
+    for name in ("ACCELERATION", "STARTS", "START_COS", "START_SIN"):
+        run[:, getattr(of, name)] = shown[name]
+    last = found.history[:, -outward.shape[1]:]
+    face[:, of.LOW], face[:, of.HIGH] = last[..., 0].min(axis=1), last[..., 1].max(axis=1)
+    for name, unit in (("SLIP_HIGH", 1.0), ("SLIP_LOW", 1.0), ("RANGE", 1.0), ("FORCE", energy), ("TURNED", energy),
+                       ("PASSED", energy), ("STUCK", 1 / omega), ("FIRST", 1 / omega), ("LAST", 1 / omega),
+                       ("F_FIRST", energy / omega), ("F_LAST", energy / omega)):
+        face[:, getattr(of, name)] = unit * shown[name]
+    face[:, of.WORK] = energy * (cases.slip * (e[:, at.PATH] - b[:, at.PATH]) + _elastic(cases, e) - _elastic(cases, b))
+    face[:, [of.Q_COS, of.Q_SIN]] = np.array(slide).T / omega[:, None]
+    face[:, [of.F_COS, of.F_SIN]] = np.array(pull).T * (energy / omega)[:, None]
+    face[:, of.BEGIN], face[:, of.END] = b[:, at.X], e[:, at.X]
+    seen = shown["SEEN"] > 0
+    face[:, of.SECANT] = np.where(seen, energy * shown["SECANT"] / np.where(seen, shown["SEEN"], 1.0), np.nan)
+    return Reading(run, face[:, None], angle / omega, 2 * np.pi / omega)
+
+
+def harmonics(cases: Cases, found: Marched, angle) -> tuple:
+    """Integrals with cosine and sine over the last cycles: of the slide, of the acceleration of the output, of the
+    friction, which the equation leaves, and of the acceleration with those of three times the angle.
+
+    Those of x'' follow from those of x by parts; the sums of x have their ends by Euler and Maclaurin.
+    """
+    h, b, e = found.step, found.begun, found.motion
+    x, v = b[:, at.X] - e[:, at.X], b[:, at.V] - e[:, at.V]
+    c, s, c3, s3 = (h * found.shown[:, k - at.SHOW] for k in (at.C1, at.S1, at.C3, at.S3))
+    c, c3 = c + h / 2 * x + h * h / 12 * v, c3 + h / 2 * x + h * h / 12 * v
+    s, s3 = s + h * h / 12 * x, s3 + h * h / 4 * x
+    gain, side = -v - c, x - s
+    push = cases.out * gain, cases.out * side + cases.base * angle / 2
+    pull = -gain - cases.damp * (s - x) - cases.square * c, \
+        cases.push * angle / 2 - side + cases.damp * c - cases.square * s
+    return (c, s), push, pull, (cases.out * (-v - 9 * c3), cases.out * (3 * x - 9 * s3))

@@ -1,0 +1,124 @@
+"""A step of one mode under Coulomb friction, of one case: exact between stops and releases, each found inside its step.
+
+Equation, in the angle of the drive: x'' + D x' + W x = P sin - f, f = +-GK in a slip and at most GS in a stick. Twin: a
+run from event to event (`dynamics.events`).
+"""
+
+from ...compiled.inner import njit
+from ...friction.flags_kernels import FAST, LEAN
+from .names_kernels import A11, A12, A21, A22, CV, CX, GK, GS, LANES, RV, RX, SV, SX, WAY, D, P, V, W, X
+
+RESTS = True  # nothing moves in a stick
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def root(y0, y1, m0, m1, least):
+    """(u, value, slope and integral up to u) of the cubic over [0, 1] with values y0, y1 and slopes m0, m1 where it
+    crosses 0, u from `least` to 1: three Newton steps from the secant."""
+    c2, c3 = 3 * (y1 - y0) - 2 * m0 - m1, m0 + m1 - 2 * (y1 - y0)
+    u = y0 / (y0 - y1)
+    for _ in range(3):
+        u = u - (y0 + u * (m0 + u * (c2 + u * c3))) / (m0 + u * (2 * c2 + 3 * c3 * u))
+        u = u if u > least else least
+        u = u if u < 1.0 else 1.0
+    return u, y0 + u * (m0 + u * (c2 + u * c3)), m0 + u * (2 * c2 + 3 * c3 * u), \
+        u * (y0 + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4)))
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def felt(x, way, place, sine, room, i):
+    """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
+    held, most = room[P * LANES + i] * sine - room[W * LANES + i] * x, room[GS * LANES + i]
+    return min(max(held, -most), most) if way == 0.0 else way * room[GK * LANES + i]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def stiffness(way, room, i):
+    """Slope of the friction over the slide; 0 for a rigid contact, whose stick has no motion."""
+    return 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def at_turn(x, way, place, room, i):
+    """Friction at a turn of the slide, the mean of what it is before and after it."""
+    return 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def stored(x, place, room, i):
+    """Energy in the contact, in the units of x^2."""
+    return 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def linear(room, i, s0, c0):
+    """(x, x') after a step in a slip."""
+    x, v = room[X * LANES + i], room[V * LANES + i]
+    pull = room[WAY * LANES + i] * room[GK * LANES + i]
+    x1 = room[A11 * LANES + i] * x + room[A12 * LANES + i] * v + room[SX * LANES + i] * s0 + room[CX * LANES + i] * c0 \
+        - pull * room[RX * LANES + i]
+    v1 = room[A21 * LANES + i] * x + room[A22 * LANES + i] * v + room[SV * LANES + i] * s0 + room[CV * LANES + i] * c0 \
+        - pull * room[RV * LANES + i]
+    return x1, v1
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def ahead(room, i, s0, c0, s1, c1):
+    """(x, x', place after a step without a stop, a release or a turn in it; whether there is one)."""
+    x, way = room[X * LANES + i], room[WAY * LANES + i]
+    xs, vs = linear(room, i, s0, c0)
+    held = way == 0.0
+    n1 = room[P * LANES + i] * s1 - room[W * LANES + i] * x
+    event = abs(n1) > room[GS * LANES + i] if held else way * vs < 0.0
+    x1, v1 = x if held else xs, 0.0 if held else vs
+    return x1, v1, x1, event
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def advance(room, i, s0, c0, s1, c1, h):
+    """(x, v, way, place at the end of a step h; share u of the step up to an event; x, v and place there; x where the
+    slide turns, that of the end without a turn; kink: jump of the acceleration at the event).
+
+    way: sign of the slip, 0 stuck; s0, c0, s1, c1: sine and cosine of the drive at both ends.
+    """
+    x, v, way = room[X * LANES + i], room[V * LANES + i], room[WAY * LANES + i]
+    damp, square, push = room[D * LANES + i], room[W * LANES + i], room[P * LANES + i]
+    gk, gs = room[GK * LANES + i], room[GS * LANES + i]
+    pull = way * gk
+    xs, vs = linear(room, i, s0, c0)
+    n0, n1 = push * s0 - square * x, push * s1 - square * x
+    held = way == 0.0
+    side = way if not held else 1.0 if n1 > 0.0 else -1.0
+    y0 = gs - side * n0 if held else way * v
+    y1 = gs - side * n1 if held else way * vs
+    m0 = -side * push * c0 if held else way * (n0 - damp * v - pull)
+    m1 = -side * push * c1 if held else way * (push * s1 - square * xs - damp * vs - pull)
+    # a stop that does not hold to the end of its step is a release before the next one
+    u, miss, slope, area = root(y0, y1, h * m0, h * m1, -1.0 if held and y0 < 0.0 else 0.0)
+    event = y1 < 0.0
+    r = h - u * h
+    xe = x if held else x + way * h * area
+    n = side * (gs - miss) if held else slope * way / h + pull
+    sticks = (n if n > 0.0 else -n) <= gs
+    # what a constant force, and one that rises with the angle, moves in the rest r of the step
+    r2 = r * r
+    e2 = damp * damp - square
+    one = r2 * (0.5 + r * (-damp / 6 + r * (e2 / 24 - r * damp * (e2 - square) / 120)))
+    one_v = r * (1.0 + r * (-damp / 2 + r * (e2 / 6 - r * damp * (e2 - square) / 24)))
+    two = r2 * r * (1.0 / 6 + r * (-damp / 24 + r * e2 / 120))
+    two_v = r2 * (0.5 + r * (-damp / 6 + r * e2 / 24))
+    three = r2 * r2 * (1.0 / 24 - r * damp / 120)
+    three_v = r2 * r * (1.0 / 6 - r * damp / 24)
+    rise, bend = -side * slope / h, -(n + square * x)
+    free = n - side * gk
+    xr = x + free * one + rise * two + bend * three
+    vr = free * one_v + rise * two_v + bend * three_v
+    xf, vf = xs + 2 * pull * one, vs + 2 * pull * one_v
+    x1 = (xr if held else xe if sticks else xf) if event else x if held else xs
+    v1 = (vr if held else 0.0 if sticks else vf) if event else 0.0 if held else vs
+    way1 = (side if held else 0.0 if sticks else -way) if event else way
+    kink = (free if held else -slope * way / h if sticks else 2 * pull) if event else 0.0
+    u = u if event else 1.0
+    xe = xe if event else x1
+    turn = x1 if held or not event else xe
+    return x1, v1, way1, x1, u, xe, 0.0 if event else v1, xe, turn, kink

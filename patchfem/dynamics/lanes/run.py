@@ -1,0 +1,111 @@
+"""Cases of one mode, one interface and a sine as numbers, and their march in lanes."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...compiled import instance, load
+from . import names_kernels as at
+
+HERE = "dynamics.lanes"
+TERMS = 24  # of a Taylor series over a step; what is left falls below round-off for rates up to 2 a step
+ONCE = 3  # cycles that are read of a motion that repeats
+
+
+class Cases(NamedTuple):
+    """n cases of x'' + D x' + W x = P sin - f in the angle of their drive, x the slide [m].
+
+    damp, square, push (n,): D, W, P; slip, stick (n,): f in a slip and the most of a stick; spring (n,): slope of f in
+    a stick, 0 of a rigid contact, length (n,) [m] over which it yields; out, base (n,) [m s-2]: acceleration of the
+    output over x'' and of the base over the sine; x, v (n,): start.
+    """
+
+    damp: np.ndarray
+    square: np.ndarray
+    push: np.ndarray
+    slip: np.ndarray
+    stick: np.ndarray
+    spring: np.ndarray
+    length: np.ndarray
+    out: np.ndarray
+    base: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+
+
+class Marched(NamedTuple):
+    """Cases after their march: motion (n, STATE) at the start, where the cycles begin that were read, and at the end;
+    history (n, c, 4) of all cycles; shown (n, SHOWN); ended, cycles (n,): cycles before those that were read, and how
+    many these are; numbers (n, NUMBERS); step: angle."""
+
+    start: np.ndarray
+    begun: np.ndarray
+    motion: np.ndarray
+    history: np.ndarray
+    shown: np.ndarray
+    ended: np.ndarray
+    cycles: np.ndarray
+    numbers: np.ndarray
+    step: float
+
+
+def kernels(law: str):
+    """The loop of a law, "rigid" or "yielding"."""
+    loop = f"{HERE}.loop_kernels"
+    return load(loop) if law == "rigid" else instance(loop, {"law": f"{HERE}.{law}_kernels"})
+
+
+def after(damp, square, h: float, begin: tuple, forces: tuple) -> tuple:
+    """(x, x') (n,) after an angle h of x'' + D x' + W x = g from (x, x') `begin`, by its Taylor series.
+
+    forces: derivatives of g at the start, from order 0 on; those left out are 0.
+    """
+    y = [np.full(damp.shape, float(one)) for one in begin]
+    x, v, power = y[0] + h * y[1], y[1], 1.0
+    for k in range(TERMS):
+        y.append((forces[k] if k < len(forces) else 0.0) - damp * y[k + 1] - square * y[k])
+        power *= h / (k + 1)
+        x, v = x + y[k + 2] * power * h / (k + 2), v + y[k + 2] * power
+    return x, v
+
+
+def numbers_of(cases: Cases, steps: int) -> np.ndarray:
+    """(n, NUMBERS) of cases that march by so many steps a cycle."""
+    found, h = np.zeros((len(cases.damp), at.NUMBERS)), 2 * np.pi / steps
+    sine, cosine = ([float(np.round(wave(k * np.pi / 2))) for k in range(TERMS)] for wave in (np.sin, np.cos))
+    for stiff, first in ((0.0, at.A11), (cases.spring, at.B11)):
+        parts = [after(cases.damp, cases.square + stiff, h, begin, forces) for begin, forces in (
+            ((1, 0), ()), ((0, 1), ()), ((0, 0), (1.0,)), ((0, 0), cosine), ((0, 0), sine))]
+        (xx, vx), (xv, vv), force, *drive = parts
+        drive = [cases.push * one for pair in drive for one in pair]
+        found[:, first - at.NUMBER:first - at.NUMBER + 10] = np.array([xx, xv, vx, vv, *force, *drive]).T
+    found[:, at.D - at.NUMBER:] = np.array(cases[:9]).T
+    return found
+
+
+def table_of(steps: int) -> np.ndarray:
+    """(3, s + 1) sine and cosine at the steps of a cycle, and the step."""
+    angle = 2 * np.pi * np.arange(steps + 1) / steps
+    waves = np.array([np.sin(angle), np.cos(angle)])
+    waves[np.abs(waves) < 1e-15] = 0.0  # so that cycles are alike to the last bit
+    return np.concatenate([waves, np.full((1, steps + 1), 2 * np.pi / steps)])
+
+
+def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> Marched:
+    """March cases over `cycles` by so many steps each; the last `window` of them are read, fewer of what repeats."""
+    loop, n = kernels(law), len(cases.damp)
+    numbers, table, order = numbers_of(cases, steps), table_of(steps), np.arange(n)
+    motion, history = np.zeros((n, at.STATE)), np.zeros((n, cycles, 4))
+    motion[:, at.X], motion[:, at.V], motion[:, at.PLACE] = cases.x, cases.v, cases.x
+    motion[:, at.WAY] = np.sign(cases.v) * (cases.spring == 0)
+    motion[:, at.HIGH] = motion[:, at.LOW] = cases.x
+    start, ended, shown = motion.copy(), np.zeros(n, np.int64), np.zeros((n, at.SHOWN))
+    room, marked = np.zeros(at.ROOM * at.LANES), np.zeros(at.LANES + 1, np.int64)
+    loop.march(numbers, order, motion, table, cycles - window, history, ended, room, marked)
+    begun, read = motion.copy(), np.where(ended < cycles - window, min(ONCE, window), window)
+    for count in np.unique(read).tolist():
+        loop.read(numbers, order[read == count], motion, table, count, history, ended, shown, room)
+    done = ended + read
+    for case in np.flatnonzero(done < cycles):  # a motion that repeats goes on as it is
+        history[case, done[case]:] = history[case, done[case] - 1]
+    return Marched(start, begun, motion, history, shown, ended, read, numbers, 2 * np.pi / steps)

@@ -1,0 +1,202 @@
+"""The batch of lanes: lumped Coulomb and elastic-plastic cases marched side by side, with bars from half the steps.
+
+A case goes to the exact batch `lumped` where a bar misses its tolerance, where nothing slips, rings are to be told or a
+motion still has to settle. So does every case of a batch of which the exact engine contradicts one of a few.
+"""
+
+from collections.abc import Sequence
+from time import perf_counter
+from zlib import crc32
+
+import numpy as np
+
+from ....dynamics.lanes import names_kernels as at
+from ....dynamics.lanes import reading
+from ....dynamics.lanes import run as march
+from ....model.model import Model
+from ....response.errors import APART, GAPS, MAIN, ROUND
+from ....response.measures import energy_balance
+from ....response.rows import TABLE, first_harmonic
+from ....scene.rules.draft import pinned
+from ....structure.drive_sizes import largest
+from ...rig.pieces import read_off
+from ..answers import Answers
+from . import lumped
+from .columns import ENDS, Runs, batch_answers
+
+LEAST = 64  # cases of a study that lanes serve
+TIGHTEST = 1e-4  # tolerance that lanes serve
+TOGETHER = 4096  # cases of one compiled call
+RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
+# of the change at half the steps, of that of the main measures, and of the measure itself, as both marches can miss an
+# event alike: 99.9 % of the errors of 4000 cases lay within
+OF_CHANGE, OF_TYPICAL, OF_SIZE = 2.0, 1.0, 2e-5
+CHECKED, FEWEST = 200, 2  # one of so many cases is held against the exact engine, so many of a batch at least
+RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a ring is looked for
+
+
+def refuses(model: Model) -> str:
+    """Why lanes do not take a model; "" where they do."""
+    if why := lumped.refuses(model):
+        return why
+    if model.friction.law not in ("coulomb", "elastic-plastic"):
+        return "its law does not march in lanes"
+    if model.accuracy.method != "auto" or pinned(model.accuracy) or model.accuracy.tolerance < TIGHTEST:
+        return "it asks for another method, or for more than lanes state"
+    return "" if _steps(model) else "it rings too fast beside its drive"
+
+
+def _steps(model: Model) -> int:
+    """Steps per cycle of a model, 0 where they would be too many."""
+    modes, omega, stiff = model.rig.modes, model.rig.drive.omega, 0.0
+    if model.friction.law != "coulomb":
+        stiff = model.limits(model.point.load)[0] / model.friction.bond_length * modes.slide[0]**2 / modes.mass
+    fastest = np.sqrt(modes.omega[0]**2 + stiff) + modes.dampers[0, 0]
+    return next((steps for rate, steps in RATES if fastest <= rate * omega), 0)
+
+
+def group(model: Model) -> tuple:
+    """Equal for models of one compiled call."""
+    return int(model.rig.cycles), model.friction.law, _steps(model)
+
+
+def solve(models: Sequence[Model], say=None) -> Answers:
+    """Answers of models of one group."""
+    found = Answers.blank(len(models))
+    for first in range(0, len(models), TOGETHER):
+        part = models[first:first + TOGETHER]
+        found.place(range(first, first + len(part)), _solved(part, say))
+    return found
+
+
+def _solved(models: Sequence[Model], say) -> Answers:
+    begin, (cycles, law, steps) = perf_counter(), group(models[0])
+    window = min(10, cycles // 10)
+    runs, exact, marks = runs_of(models, cycles, window, steps)
+    found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window})
+    # elastic-plastic motions that have not settled have a steady estimate by the map of their yields
+    unsettled = found.outcome == "grows" if law == "coulomb" else found.outcome != "steady"
+    exact |= alone | too_wide(models, found) | unsettled
+    for case in range(len(models)):
+        found.numerics[case] = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
+    found.seconds[:] = (perf_counter() - begin) / len(models)
+    looked = checked(marks, ~exact)
+    ones = lumped.solve([models[case] for case in looked], say) if looked else None
+    if wrong := contradicted(found, ones, looked):
+        exact[:] = True
+        note = f"lanes said {wrong} otherwise than the exact engine in a check of {len(looked)} cases, so all are exact"
+    if cases := np.flatnonzero(exact).tolist():
+        lumped.take_out(found, cases)
+        found.place(cases, lumped.solve([models[case] for case in cases], say))
+        for case in cases if wrong else ():
+            found.notes[case] = [*found.notes.get(case, ()), note]
+    return found
+
+
+def too_wide(models, found: Answers) -> np.ndarray:
+    """(n,) whether a bar misses the tolerance of a case."""
+    tolerance, out = np.array([model.accuracy.tolerance for model in models]), np.zeros(len(models), bool)
+    for name, values in found.values.items():
+        out |= found.errors[name] > tolerance * np.abs(values) + found.floors[name]
+    return out
+
+
+def checked(marks, free) -> list:
+    """Numbers of the cases that the exact engine checks: by a hash of what each is, whatever stands beside it; free:
+    (n,) which may be."""
+    hashes = np.array([crc32(row.tobytes()) for row in marks])
+    order = [case for case in np.argsort(hashes, kind="stable").tolist() if free[case]]
+    few = sum(hashes[case] < 2**32 // CHECKED for case in order)
+    return order[:max(few, FEWEST)]
+
+
+def contradicted(found: Answers, ones: Answers | None, looked: list) -> str:
+    """The first measure that exact answers of some cases contradict, beyond the sum of both bars and the floor, or "".
+    """
+    for place, case in enumerate(looked):
+        for name, column in found.values.items():
+            if not (name in ones.values and ones.has(name, place)):
+                continue
+            apart = abs(column[case] - ones.values[name][place])
+            if name == "slip_start_phase":
+                apart = min(apart, np.pi - apart)
+            bars = np.nan_to_num(found.errors[name][case]) + np.nan_to_num(ones.errors[name][place])
+            if apart > bars + found.floors[name][case]:
+                return name
+    return ""
+
+
+def runs_of(models, cycles: int, window: int, steps: int) -> tuple:
+    """(Runs of models of a group, (n,) which must be run otherwise, (n, k) numbers that tell each from any other)."""
+    law = "rigid" if models[0].friction.law == "coulomb" else "yielding"
+    cases, c = cases_of(models)
+    fine, coarse = (_measured(law, cases, c, march.march(law, cases, cycles, window, count))
+                    for count in (steps, steps // 2))
+    values, book, found, extremes = fine
+    changes = {name: np.abs(value - coarse[0][name]) for name, value in values.items()}
+    changes["slip_start_phase"] = np.minimum(changes["slip_start_phase"], np.pi - changes["slip_start_phase"])
+    slips = found.shown[:, at.SLIP_HIGH - at.SHOW] - found.shown[:, at.SLIP_LOW - at.SHOW]
+    stuck = slips / 2 <= np.maximum(c["held"], ROUND * np.abs(found.history[:, :, :2]).max(axis=(1, 2)))
+    exact = stuck | np.any([np.isnan(values[name]) != np.isnan(coarse[0][name]) for name in values], axis=0)
+    if law == "yielding":
+        own = np.sqrt(np.maximum(cases.square + cases.spring - cases.damp**2 / 4, 0.0))
+        exact |= found.shown[:, at.LONGEST - at.SHOW] * own >= RINGS
+    phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
+    ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
+    none = {name: np.full(len(models), np.nan) for name in ("ring_frequency", "ring_damping")}
+    runs = Runs(cycles, window, values | none, book, extremes, phasors[:, ends], stuck & False, stuck & False,
+                    bars(values, changes), 1e-9, np.inf, again=False)
+    return runs, exact, np.array(cases).T.copy()
+
+
+def cases_of(models) -> tuple:
+    """(Cases of models, what else is told of them by name, (n,) each: SI)."""
+    rows = []
+    for model in models:
+        modes, drive, start, (static, kinetic) = model.rig.modes, model.rig.drive, model.rig.start, \
+            model.limits(model.point.load)
+        coulomb = model.friction.law == "coulomb"
+        rows.append((modes.omega[0], modes.dampers[0, 0], modes.slide[0], modes.base[0], modes.output[0], modes.mass,
+                     drive.acceleration, drive.omega, drive.moving, static,
+                     kinetic if coulomb and model.friction.kinetic is not None else static,
+                     0.0 if coulomb else model.friction.bond_length, *((0.0, 0.0) if start is None else
+                     (start.z[0], start.v[0])), model.rig.stiffness, model.point.load, largest(drive)))
+    own, damping, slide, share, output, mass, drive, w, moving, static, kinetic, length, z, v, stiffness, load, size = \
+        np.array(rows, float).T
+    scale = slide**2 / (mass * w**2)
+    spring = np.where(length > 0, scale * static / np.where(length > 0, length, 1.0), 0.0)
+    cases = march.Cases(damping / w, (own / w)**2, -slide * share * drive / w**2, scale * kinetic, scale * static,
+                        spring, length, output / slide * w**2, drive * moving, slide * z, slide * v / w)
+    return cases, {"omega": w, "energy": mass * (w / slide)**2, "ratio": output / slide, "held": 1e-3 * length,
+                   "stiffness": stiffness, "load": load, "size": size}
+
+
+def _measured(law: str, cases, c: dict, found) -> tuple:
+    """(values, books, Marched, extremes of the output (n, c, 2) [m]) of a march."""
+    extremes = np.sort(found.history[:, :, :2] * c["ratio"][:, None, None], axis=2)
+    window = min(10, extremes.shape[1] // 10)
+    book = reading.books(law, cases, found, c["energy"])
+    seen = reading.reading_of(cases, found, c["energy"], c["omega"], extremes[:, -window:])
+    with np.errstate(all="ignore"):
+        values = read_off(seen, book, True, True, c["stiffness"], c["size"])
+    values |= {"normal_load": c["load"], "friction_work": book["friction"], "energy_dissipated": book.pop("lost"),
+               "energy_created": np.zeros(len(c["load"])), "energy_balance": energy_balance(book)}
+    return values, book, found, extremes
+
+
+def bars(values: dict, changes: dict) -> dict:
+    """Errors by name, (n,) each, of values whose changes at half the steps are known: the change, and a share of the
+    median relative change of the main measures, as one change can be small by chance."""
+    with np.errstate(all="ignore"):
+        shares = [np.where(changes[name] > 0, changes[name] / np.abs(values[name]), np.nan) for name in MAIN
+                  if name in values]
+        typical = np.nan_to_num(np.nanmedian(shares, axis=0))
+    out = {}
+    for name, change in changes.items():
+        size = first_harmonic(values) if name == "equivalent_stiffness" else 1.0 if TABLE[name].term is not None \
+            and name not in GAPS and name != "drift_per_cycle" else np.abs(values[name])
+        if name == "drift_per_cycle":
+            size = np.abs(values[MAIN[0]])
+        chance = 0.0 if name in (*APART[:1], "normal_load", *GAPS) else (OF_TYPICAL * typical + OF_SIZE) * size
+        out[name] = np.maximum(OF_CHANGE * np.nan_to_num(change), chance)
+    return out
