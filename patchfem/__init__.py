@@ -5,33 +5,34 @@ Read the package in this order. A module imports its own entry of the list and t
 1. `later`        modules that are loaded at their first use
 2. `faults`       named failures: a sentence for a person, the exit code
 3. `scales`       numbers as people read them: the unit by the size, the digits by the error
-4. `core`         the nouns that travel: interface, compliance, pressure, modal basis, response, measure, outcome
-5. `effects`      which key of a scene needs which module and equation
-6. `disk`         files written whole, folders with one writer
-7. `compiled`     where compiled code is kept
-8. `closed_forms` exact answers that tests, studies and users share
-9. `scene`        a TOML file becomes SI values, every mistake named at once
-10. `inputs`      files of measurements: columns, slide paths, signals, loops
-11. `mesh`        two coated pieces as tagged meshes
-12. `surface`     measured height profiles as a share of the gap
-13. `elasticity`  the pieces condensed to their interface, fields recovered inside
-14. `contact`     gap shapes, unilateral contact, skins, strips
-15. `friction`    laws of friction and the sum over bonds along the path
-16. `slip`        partial slip of the pieces: elements, shear modes, their tangent
-17. `structure`   the modes of the rig and what drives it
-18. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
-19. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
-20. `response`    measures of a run, outcome, events, levels, ringing
-21. `wear`        worn depth over many cycles
-22. `runs`        patch, bench and rig: where the pillars meet
-23. `identify`    values from measurements with intervals
-24. `campaigns`   many runs: fits, error against cost, sweeps
-25. `export`      summary, netCDF, VTK, report
-26. `api`         load, build, plan and run from Python
-27. `commands`    the verbs of the command line
+4. `rates`        what work takes: one table of CPU seconds, and how fast this machine is
+5. `core`         the nouns that travel: interface, compliance, pressure, modal basis, response, measure, outcome
+6. `effects`      which key of a scene needs which module and equation
+7. `disk`         files written whole, folders with one writer
+8. `compiled`     where compiled code is kept
+9. `closed_forms` exact answers that tests, studies and users share
+10. `scene`       a TOML file becomes SI values, every mistake named at once
+11. `inputs`      files of measurements: columns, slide paths, signals, loops
+12. `mesh`        two coated pieces as tagged meshes
+13. `surface`     measured height profiles as a share of the gap
+14. `elasticity`  the pieces condensed to their interface, fields recovered inside
+15. `contact`     gap shapes, unilateral contact, skins, strips
+16. `friction`    laws of friction and the sum over bonds along the path
+17. `slip`        partial slip of the pieces: elements, shear modes, their tangent
+18. `structure`   the modes of the rig and what drives it
+19. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
+20. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
+21. `response`    measures of a run, outcome, events, levels, ringing
+22. `wear`        worn depth over many cycles
+23. `runs`        patch, bench and rig: where the pillars meet
+24. `identify`    values from measurements with intervals
+25. `campaigns`   many runs: fits, error against cost, sweeps
+26. `export`      summary, netCDF, VTK, report
+27. `api`         load, build, plan and run from Python
+28. `commands`    the verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used,
-and a module that is taken as a whole, as in `from .contact import halfspace`, is loaded at its first use (`later`).
+and a module that is taken as a whole, as in `from .contact import unilateral`, is loaded at its first use (`later`).
 """
 
 from typing import TYPE_CHECKING

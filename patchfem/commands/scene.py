@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from .. import rates
 from ..campaigns.sweeps import ask, estimate
 from ..effects import shown_absent
 from ..mesh import files as mesh_files
@@ -53,7 +54,7 @@ def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
 
 
 def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Json = False,
-         probe: flag("solve the static patch for its stiffness") = False):
+         probe: flag("time this machine, and solve the static patch for its stiffness") = False):
     """Say what SCENE would run and not, its size, cost, stiffness chain and groups; with --over, or a table [sweep],
     of the whole sweep.
 
@@ -68,6 +69,8 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
         return
     found = plans.plan(read)
     answer, asked = found.as_json(), found.model.patch
+    if probe:
+        answer["seconds"] = round(answer["seconds"] * rates.speed(), 2)
     if probe and asked is not None:
         solved = result.probed(found.model)
         answer["stiffness_chain"]["pieces_shear"] = solved["tangential_stiffness"] if asked.shear else "rigid"

@@ -15,14 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import rates
 from ..core import NotConverged
 from .lapack import dpotrf, dtrsm
 
 LEAF = 24  # cells of a part that is not halved any further
 CHUNK = 256  # leaves assembled at once
-# CPU seconds of one core of an AMD EPYC at 2.6 GHz, fitted to 15 grids of 21 x 20 to 301 x 201 nodes, each both ways;
-# 0.85 to 1.07 of what they took
-PER_CALL, PER_SHAPE, PER_FRONT, PER_ENTRY, PER_OPERATION = 1.4e-3, 9.8e-5, 4.5e-6, 1.38e-8, 1.22e-11
 WORD = 8  # bytes of a number
 
 
@@ -279,7 +277,8 @@ def predicted_seconds(nx: int, ny: int, mirrored: bool, order: int = 1) -> float
     is; memory that a process touches for the first time takes up to as long again.
     """
     shapes, fronts, entries, operations, _ = counts(nx, ny, mirrored, order)
-    return (PER_CALL + PER_SHAPE * shapes + PER_FRONT * fronts + PER_ENTRY * entries + PER_OPERATION * operations)
+    return rates.PER_CALL + rates.PER_SHAPE * shapes + rates.PER_FRONT * fronts + rates.PER_ENTRY * entries + \
+        rates.PER_OPERATION * operations
 
 
 def predicted_bytes(nx: int, ny: int, mirrored: bool) -> float:

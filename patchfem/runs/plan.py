@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from .. import rates
 from ..core import Missing, PatchfemError, say
 from ..effects import EFFECTS, has
 from ..friction import record
@@ -18,7 +19,6 @@ from .rig import numerics as rig_numerics
 from .rig import plan as of_rig
 from .wear import plan as of_wear
 
-START = 0.7  # seconds of CPU until a run begins, and of its files and its page
 LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -110,7 +110,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
     if model.wear is not None and model.patch is not None:
         seconds += of_wear.cost(model, unknowns["interface_points"], more)
         said[2] = [*said[2], of_wear.verdict(model)]
-    seconds += START + memory.code(model, engine).seconds
+    seconds += rates.START + memory.code(model, engine).seconds
     parts = memory.needs(model, engine, steps, unknowns, numerics, pressed)
     if model.friction is not None:
         chain |= _link(model)

@@ -5,10 +5,8 @@ from math import pi, sqrt
 import numpy as np
 
 from ...core import ModalBasis
+from ...rates import PYTHON_PIECE, PYTHON_SAMPLE
 from ...structure.drive_sizes import fastest
-
-PIECE = 7e-5  # CPU seconds of a piece of the motion, per mode + 1 and interface + 1
-SAMPLE, READ = 0.1, 0.5  # of that: of a sample that is shown, of a piece that is read
 
 
 def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) -> float:
@@ -19,9 +17,9 @@ def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) ->
     most = stiffness * float((modes.interfaces**2).sum(axis=1).max(initial=0.0)) / modes.mass
     rate = damper + sqrt(damper**2 + float(modes.omega.max())**2 + most)
     pieces = max(rate * drive.period, 2 * pi * fastest(drive)) / 2 + 4 * faces + 2 * elements
-    return PIECE * (1 + modes.omega.size) * (1 + faces) * pieces
+    return PYTHON_PIECE * (1 + modes.omega.size) * (1 + faces) * pieces
 
 
 def sample_seconds(modes: ModalBasis) -> float:
     """CPU seconds of a sample of the motion as Python."""
-    return SAMPLE * PIECE * (1 + modes.omega.size) * (1 + len(modes.interfaces))
+    return PYTHON_SAMPLE * PYTHON_PIECE * (1 + modes.omega.size) * (1 + len(modes.interfaces))

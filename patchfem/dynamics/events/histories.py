@@ -7,7 +7,8 @@ import numpy as np
 
 from ...compiled import load, when_compiling
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
-from .cost import READ, python_seconds, sample_seconds
+from ...rates import PYTHON_READ
+from .cost import python_seconds, sample_seconds
 from .elements import stretches, table_of, virgin
 from .event_list import BORDER, RELEASE, REVERSAL, ROOM, STOP, EventLog
 from .names_kernels import OF_FACE, OF_RUN
@@ -86,7 +87,7 @@ def expect(modes: ModalBasis, drive, groups, cycles: float, window: int, runs: i
     march.march.expect(runs * cycles * each)
     march.stored.expect(runs * each)
     dense.evaluate.expect(runs * shown * SAMPLES * sample_seconds(modes))
-    read.read.expect(READ * runs * shown * each)
+    read.read.expect(PYTHON_READ * runs * shown * each)
 
 
 def started(modes: ModalBasis, drive, groups, cycles: float, window: int = 1, travel: float = np.inf,

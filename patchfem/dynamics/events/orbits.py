@@ -7,8 +7,8 @@ import numpy as np
 
 from ...compiled import load
 from ...core import ModalBasis, NotConverged, Response, Start
+from ...rates import PYTHON_READ
 from . import histories
-from .cost import READ
 from .elements import Memory
 from .period import PeriodMap, Point
 from .plant import books_of, past_of, plant_of
@@ -59,7 +59,7 @@ class Orbits:
         one = self.one
         point = turning(one, drive, near if self._fits(near) else None)[0].point
         used, swing = self._half(drive, point, one.plant)
-        self.peak.expect(READ * one.seconds / 2)
+        self.peak.expect(PYTHON_READ * one.seconds / 2)
         high = self.peak.held_call(self._held("peak", one.plant, float(drive.moving)), self.rows[:used])
         first = -2 * drive.omega**2 * complex(*self.books.phasors[0]) - 1j * drive.acceleration * drive.moving
         if self.gauge is not None:

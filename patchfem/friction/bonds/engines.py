@@ -8,6 +8,7 @@ The list has two settings, the tail that its cut-off may lose and the width up t
 from dataclasses import dataclass
 from math import ceil, inf, sqrt
 
+from ... import rates
 from .list_numbers import AGED, MOMENTS, POWER, SHARES, cutoff, form_of
 from .parameters import Bonds
 
@@ -17,11 +18,7 @@ ENGINES = (*LISTS, "recursion")
 # with growth, the print with growth, the print of order < 1
 MERGING = (0.25, 1.0, 6.0, 1.0)
 YOUNG = 3e-4  # error of merging growing bonds of order < 0 besides, at any width: of bonds that form at a reversal
-STRIP = {MOMENTS: 3e-10, POWER: 3e-9, SHARES: 2e-9, AGED: 3e-9}  # seconds per strip and pass, measured on one core
-ANY_ORDER = 2.5e-8  # the same of an order that takes a power, other than 0, 1, 2
-PASS, STEP = 1.5e-7, 5e-7  # seconds per pass over the list and per step besides
 PASSES = 9  # over the list in a step of the rig: three for each of the two or three trial increments
-RECURSION = 3e-8  # seconds per step
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +65,7 @@ def choose(law: Bonds, tolerance: float, stroke: float, steps: float, engine: st
     if reason:
         raise ValueError(f"{engine} {reason}")
     if engine == "recursion" or (engine == "auto" and form_of(law) == MOMENTS):
-        return Choice("recursion", 0.0, 0.0, 0.0, 0.0, RECURSION)
+        return Choice("recursion", 0.0, 0.0, 0.0, 0.0, rates.RECURSION)
     cut = tail if tail is not None else min(1e-3 * tolerance, 1e-6)
     width = merge if merge is not None else min(0.02, sqrt(0.09 * tolerance / _merging(law)))
     found = {name: _priced(law, name, cut * drops, width * joins, stroke, steps)
@@ -99,11 +96,11 @@ def _priced(law: Bonds, name: str, tail: float, merge: float, stroke: float, ste
         strips *= 2
     if merge > 0:
         strips = min(strips, 5 / merge + 20 + 2 * min(reach / stroke, 50) + (180 if form == AGED else 0))
-    cost = STRIP[form]
+    cost = rates.STRIP[int(form)]
     if form in (POWER, SHARES) and law.order not in (0, 1, 2):
-        cost = ANY_ORDER
+        cost = rates.ANY_ORDER
     panels = 1 if each <= 1 else 2 + ceil(each).bit_length()
-    seconds = STEP + PASSES * (PASS + cost * strips) * (1 if each <= 0.1 else 5 / 2 * panels)
+    seconds = rates.LIST_STEP + PASSES * (rates.PASS + cost * strips) * (1 if each <= 0.1 else 5 / 2 * panels)
     error = tail
     if merge > 0 and form != MOMENTS:
         error += _merging(law) * merge**2 + (YOUNG if form == AGED and law.order < 0 else 0.0)

@@ -9,6 +9,7 @@ from math import ceil
 
 import numpy as np
 
+from ... import rates
 from ...core import Missing
 from ...effects import has, listed
 from ...friction.bonds.engines import Choice
@@ -52,15 +53,15 @@ def bench_engine(model, slide, points: int = 1, choice: Choice | None = None) ->
         return BenchEngine(PLANE, _stepped_seconds(model, slide, 1))
     if soft and (has(f.law, "bonds") or model.grooves is not None):
         modes = model.accuracy.shear_modes or shear_modes.SHEAR_MODES
-        return BenchEngine(POINTS, 4e-8 * points * (1 + modes / 4))
+        return BenchEngine(POINTS, rates.behind_modes(points, modes))
     if soft:
-        return BenchEngine(ELEMENTS, 3e-9 * points + 1e-7)
+        return BenchEngine(ELEMENTS, rates.SLIP_NODE * points + rates.SAMPLE)
     if pressure_changes(model) and model.grooves is None:
         return _stepped(model, slide, points)
     if has(f.law, "memoryless"):
-        return BenchEngine(CLOSED, 1e-7)
+        return BenchEngine(CLOSED, rates.SAMPLE)
     if not has(f.law, "bonds"):
-        return BenchEngine(ELEMENTS, 1e-7)
+        return BenchEngine(ELEMENTS, rates.SAMPLE)
     return _summed(model, slide, points, choice or sum_of(model, slide))
 
 
@@ -110,7 +111,7 @@ def strokes(slide) -> tuple:
 def _summed(model, slide, points: int, found: Choice) -> BenchEngine:
     law = model.bonds
     if found.engine == "recursion":
-        return BenchEngine(RECURSION, 3e-8, found)
+        return BenchEngine(RECURSION, rates.RECURSION, found)
     if law.breakaway:  # a list has no elastic range
         return _stepped(model, slide, points)
     size = slide.size
@@ -131,10 +132,11 @@ def _stepped_seconds(model, slide, points: int) -> float:
     """Seconds of a step in NumPy: laws of the last increment, or a sum over the strips of the path."""
     f = model.friction
     if not listed(f):
-        return 6e-5
+        return rates.LAW_STEP
     moved = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
     strips = min(slide.size / 2, 40 * f.bond_length / moved + 64)
-    return (3 if model.load_varies else 1) * (1.2e-3 + 2e-6 * strips + 8e-9 * strips * points)
+    return (3 if model.load_varies else 1) * (rates.PATH_STEP + rates.PATH_STRIP * strips
+                                               + rates.PATH_POINT * strips * points)
 
 
 def slips_by_elements(model) -> bool:

@@ -2,19 +2,16 @@
 
 from math import log10, sqrt
 
+from ... import rates
 from ...model.model import Model
 from ...model.patch import bars, block_shear
 from . import skin
 from .grids import Sizes
 from .high_order import takes_cells
 
-PRESSED, WORK = 0.15, 3.0  # seconds of a patch with its fields, and per predicted second of condensing it
-OUTLINED = 2.2  # the last of pieces beyond the interface, whose predicted seconds are those of any cells already
-MOVING, MOVING_NODE = 0.35, 3e-5  # seconds of the frames of a patch that moves, and per node of the finest grids
 # bytes of packages; per predicted byte of condensing; per node: of pieces beyond the interface, of frames
 PACKAGES, CONDENSED, OUTLINED_NODE, FRAMES_NODE = 2e7, 0.8, 4.6e3, 3.5e3
-SHARPER, SHARPER_BYTES = 0.09, 1.2e7  # seconds and bytes of cells of order 4 at a tolerance of 1e-4
-EDGED = 3.0  # times that where a contact ends inside or under a coating
+SHARPER_BYTES = 1.2e7  # of cells of order 4 at a tolerance of 1e-4
 SHARP_FROM = 5e-4  # tolerance from which cells of order 4 are wanted
 FULL = 0.7  # of the tilt at which bars open: elastic pieces, seen at height/length 0.08 to 4, open from 0.77 on
 
@@ -30,13 +27,13 @@ def effort(asked, found: Sizes, tolerance: float) -> tuple:
     Both follow from the work of condensing the grids, which is known from their sizes; what a unit of it takes, with
     the fields and files of the finest grid, was measured over random patches.
     """
-    seconds = PRESSED + (OUTLINED if found.outlined else WORK) * found.seconds
+    seconds = rates.PRESSED + (rates.OUTLINED if found.outlined else rates.CONDENSED) * found.seconds
     size = PACKAGES + (OUTLINED_NODE * found.nodes if found.outlined else CONDENSED * found.bytes)
     if tolerance < SHARP_FROM and takes_cells(asked):
-        decades = log10(1e-3 / tolerance) * (1 if found.ends == 0 and not asked.lower.thickness else sqrt(EDGED))
-        seconds, size = seconds + SHARPER * decades**2, size + SHARPER_BYTES * decades**2
+        decades = log10(1e-3 / tolerance) * (1 if found.ends == 0 and not asked.lower.thickness else sqrt(rates.EDGED))
+        seconds, size = seconds + rates.SHARPER * decades**2, size + SHARPER_BYTES * decades**2
     if not asked.still:
-        seconds, size = seconds + MOVING + MOVING_NODE * found.nodes, size + FRAMES_NODE * found.nodes
+        seconds, size = seconds + rates.MOVING + rates.MOVING_NODE * found.nodes, size + FRAMES_NODE * found.nodes
     return seconds, size
 
 

@@ -1,8 +1,8 @@
-"""What the engines of a rig cost, before anything runs: one table for the choice of an engine, a plan and a refusal.
+"""What the engines of a rig cost, before anything runs, for the choice of an engine, a plan and a refusal.
 
-A run from event to event counts its pieces, one of high order and a march their steps; the seconds of each were
-measured on one core. A spring that an element holds by rings on, which costs pieces only while it holds: all the time
-where the friction limit exceeds the push of the drive, hardly any where it is half of it.
+A run from event to event counts its pieces, one of high order and a march their steps; `rates` has the seconds of
+each. A spring that an element holds by rings on, which costs pieces only while it holds: all the time where the
+friction limit exceeds the push of the drive, hardly any where it is half of it.
 """
 
 from functools import lru_cache
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ... import rates
 from ...core import Missing
 from ...dynamics.events import plant
 from ...effects import has
@@ -24,12 +25,6 @@ from ...structure.drive_sizes import fastest, largest, omega_of, sinusoidal, slo
 if TYPE_CHECKING:
     from ...friction.protocol import Element
 
-# seconds of a piece of the motion, of each further mode and interface in it, of each element
-PIECE, PIECE_MODE, PIECE_FACE, PIECE_ELEMENT = 2.5e-7, 1.5e-7, 3e-7, 3e-9
-MOST_PIECE, READ = 1e-6, 4e-6  # of one at most, and of one of the last cycles, which are kept whole
-CYCLE, STEP, STEP_ELEMENT = 3e-4, 4.3e-7, 9e-10  # of a cycle of a march, of a step of it, of each element in that
-SMOOTH_STEP, SMOOTH = 2e-6, 0.02  # of a step of high order, and of such a run besides
-CURVE, POINT, BALANCE = 0.1, 0.05, 8e-10  # of steady motions: of all, of a point, per cubed number of its unknowns
 WORTH = 5.0  # that an exact motion may take where steps would take less, and be off by their bars
 PATIENCE = 60.0  # that it may take where the finest march does not resolve the modes
 LONGEST = 600.0  # seconds that an exact motion may take before it is refused
@@ -122,14 +117,14 @@ def _jumps(model: Model) -> float:
 
 def seconds_of_pieces(model: Model) -> float:
     """Seconds of a run from event to event at most, by which its engine is chosen: all holds all the time."""
-    cycles = model.rig.cycles
-    return ((MOST_PIECE + _of_size(model)) * cycles + READ * min(cycles, 10.0)) * pieces_per_cycle(model)
+    cycles, each = model.rig.cycles, rates.MOST_PIECE + _of_size(model)
+    return (each * cycles + rates.READ_PIECE * min(cycles, 10.0)) * pieces_per_cycle(model)
 
 
 def _of_size(model: Model) -> float:
     """Seconds of a piece of several modes and interfaces besides that of one."""
     modes = model.rig.modes
-    return PIECE_MODE * (modes.omega.size - 1) + PIECE_FACE * max(0, len(modes.interfaces) - 1)
+    return rates.PIECE_MODE * (modes.omega.size - 1) + rates.PIECE_FACE * max(0, len(modes.interfaces) - 1)
 
 
 def expected_seconds(model: Model) -> float:
@@ -140,13 +135,14 @@ def expected_seconds(model: Model) -> float:
     push = rig.force or rig.mass * largest(rig.drive)
     ringing, events = _ringing_and_events(model)
     share = min(1.0, limit / push)**HELD if stiff and push else 1.0
-    return (PIECE + _of_size(model) + PIECE_ELEMENT * count) * (ringing * share + events) * rig.cycles
+    return (rates.PIECE + _of_size(model) + rates.PIECE_ELEMENT * count) * (ringing * share + events) * rig.cycles
 
 
 def seconds_of_steps(model: Model) -> float:
     """Estimated seconds of a march with the coarser runs of its error, which has none of the exactness."""
     count, many = expected_elements(model)[0], len(model.rig.interfaces)
-    return 1.75 * model.rig.cycles * (CYCLE + steps_per_cycle(model) * many * (STEP + STEP_ELEMENT * count))
+    step = rates.STEP + rates.STEP_ELEMENT * count
+    return 1.75 * model.rig.cycles * (rates.CYCLE + steps_per_cycle(model) * many * step)
 
 
 def dear_events(model: Model) -> str:
@@ -251,13 +247,11 @@ def smooth_cost(model: Model, numerics, unknowns: dict) -> tuple:
     if sinusoidal(rig.drive) and (decay := slowest(rig.modes) * rig.drive.period) > 0:  # then it repeats
         cycles = min(cycles, 20 + REPEATS / decay)
     steps = 2 * cycles * smooth_steps(model, smooth_element(model))
-    return int(steps), SMOOTH + SMOOTH_STEP * steps
-
-
+    return int(steps), rates.SMOOTH + rates.SMOOTH_STEP * steps
 
 
 def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:
     """Points of a curve of steady motions and the seconds that they take."""
     points = 1 if model.rig.waveform == "sine" else 120
     size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(model.rig.interfaces))
-    return points, CURVE + POINT * points + BALANCE * size**3
+    return points, rates.CURVE + rates.POINT * points + rates.BALANCE * size**3

@@ -4,6 +4,7 @@ from math import inf, pi
 
 import numpy as np
 
+from ... import rates
 from ...effects import has
 from ...friction.bonds import parameters
 from ...model.model import Model
@@ -14,10 +15,7 @@ from .costs import exact_words
 from .engines import ENGINES, PIECES, steady_by
 from .numerics import choose
 
-STEP, STEP_MODE = 7e-7, 1e-7  # seconds of a step of one mode, and of each further one
 STIFF = 10.0  # times the stiffness of the mode, from which a link holds the block
-GROWS, JOINT = 3.0, 2.5  # times that where bonds grow, and for each of several interfaces
-CLIMB = 3e-6  # seconds of a sample over grooves
 
 
 def chain(rig) -> dict:
@@ -37,7 +35,8 @@ def march_cost(model: Model, numerics, unknowns: dict) -> tuple:
     steps = int(numerics.cycles * numerics.steps)
     each, points = _step(rig, f), unknowns.get("interface_points", 1)
     if model.grooves is not None:
-        each = CLIMB + (4 * _of_modes(numerics, points, unknowns) if soft else 0.0)  # the normal force is searched
+        searched = 4 * _of_modes(numerics, points, unknowns) if soft else 0.0  # for the normal force
+        each = rates.CLIMB + searched
     elif f is not None and has(f.law, "bonds"):
         if lists.quadrature_of(model, numerics).engine != "recursion":
             entries, seconds = lists.bonds_cost(model, numerics)
@@ -45,11 +44,11 @@ def march_cost(model: Model, numerics, unknowns: dict) -> tuple:
         elif soft:
             each = _of_modes(numerics, points, unknowns)
         elif numerics.per_point:
-            each = 6e-8 * points
+            each = rates.FIELD_NODE * points
     elif soft and rig.load_varies:
         each = _of_modes(numerics, points, unknowns)
     elif soft:
-        each = 3e-9 * points + 5e-7
+        each = rates.SLIP_NODE * points + rates.LIST_STEP
     passes = 0.75 + 2**(lists.halvings(model) + 1) - 1  # a half and a quarter of the steps, and each halving of them
     return int(steps * passes), steps * passes * each
 
@@ -58,14 +57,14 @@ def _step(rig, f) -> float:
     """Seconds of a step of a march: of one mode and interface, more where bonds grow or interfaces move each other."""
     faces = len(rig.interfaces)
     grows = f is not None and f.slip_growth is not None and has(f.law, "bonds")
-    return (STEP + STEP_MODE * (len(rig.frequencies) - 1)) * (GROWS if grows else 1.0) * (JOINT * faces if faces > 1
-                                                                                          else 1.0)
+    return (rates.BOND_STEP + rates.STEP_MODE * (len(rig.frequencies) - 1)) * (rates.GROWS if grows else 1.0) * (
+        rates.JOINT * faces if faces > 1 else 1.0)
 
 
 def _of_modes(numerics, points: int, unknowns: dict) -> float:
     """Seconds of a step behind shear modes, whose number goes into `unknowns`."""
     unknowns["shear_modes"] = numerics.shear_modes or shear_modes.SHEAR_MODES
-    return 4e-8 * points * (1 + unknowns["shear_modes"] / 4)
+    return rates.behind_modes(points, unknowns["shear_modes"])
 
 
 def groups(model: Model) -> dict:

@@ -1,0 +1,23 @@
+"""The table of what work takes: a plan counts by it, and a machine is held against it."""
+
+from __future__ import annotations
+
+import pytest
+from scene_texts import BENCH
+
+from patchfem import rates
+from patchfem.runs.plan import plan
+from patchfem.scene.scene import loads
+
+
+def test_exact_a_machine_of_half_the_pace_takes_twice_as_long(monkeypatch):
+    ticks = iter(range(0, 1000))
+    monkeypatch.setattr(rates, "process_time", lambda: rates.OURS * 2 * next(ticks))
+    assert rates.speed() == pytest.approx(2.0, rel=1e-12)
+
+
+def test_always_a_plan_counts_by_the_table(monkeypatch):
+    scene = loads(BENCH, "a.toml")
+    before = plan(scene)
+    monkeypatch.setattr(rates, "START", rates.START + 3.0)
+    assert plan(scene).seconds == pytest.approx(before.seconds + 3.0, abs=0.02)
