@@ -254,6 +254,37 @@ def passed(top, plant, motion, room, travel, u):
     return crossing(poly, top, (travel if step > 0 else -travel) - here, u, room.polys[faces])
 
 
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def begin_piece(left, motion, plant, table, memory, clock, room):
+    """The next piece of the motion as series, and the forces of what holds: (its length [s], `left` [s] at most; the
+    rate [1/s] that it was chosen by; the order of the series)."""
+    segment = clock.segments[int(clock.now[2])]
+    for f in range(len(plant.reach)):
+        room.springs[f] = tangent(f, table, memory)[0]
+    own = fastest(plant, room.springs) if room.held[1] == 0.0 else 0.0
+    slow = followed(motion, memory.force, plant, clock, room) if own > 0.0 else 0.0
+    rate = slow if slow > 0.0 else max(own, rate_of(segment, clock.period[0]))
+    h = min(REACH / rate * min(1.0, max(rate * wait(motion, plant, table, memory), 0.02)), left)
+    top = piece_series(h, rate, slow, motion, memory.force, plant, clock, room)
+    for f in range(len(plant.reach)):
+        if holds(f, table, memory):
+            memory.force[f] = room.reactions[f, 0]
+    return h, rate, top
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def cross_border(what, left, stop, motion, plant, table, memory, past, clock):
+    """Pass the end of a cycle or of a part of the drive: (whether the drive changes, whether the motion repeats)."""
+    changes, came = arrive(clock, stop, left), False
+    if clock.now[1] == 0.0 and what == NOTHING:
+        came = come_back(motion, plant, memory, clock, past)
+    elif clock.now[1] == 0.0:
+        forget(past)
+    for f in range(len(plant.reach)):  # at every border, so that a run in parts is the run
+        memory.force[f] = pulled(f, table, memory)
+    return changes, came
+
+
 @njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
 def march(stop, motion, plant, table, memory, past, clock, books, room, rows):
     """Run from the clock's time to `stop` (cycle, offset [s]).
@@ -263,9 +294,8 @@ def march(stop, motion, plant, table, memory, past, clock, books, room, rows):
     OPEN, or REPEATS at the first border from where on every cycle is the last one bit by bit, rows used). Where it goes
     on does not change a bit. Cost: 0.2 to 0.5 us a piece of one mode.
     """
-    used, now, came = 0, clock.now, False
+    used, now, came, faces = 0, clock.now, False, len(plant.reach)
     first, now[3] = max(now[3], float(YIELDED)), 0.0
-    faces = len(plant.reach)
     if room.orders[0, 0] < 0.0 and not begin(motion, plant, table, memory, clock, room):
         return OPEN, used
     if now[5] == 0.0:
@@ -276,19 +306,10 @@ def march(stop, motion, plant, table, memory, past, clock, books, room, rows):
         if used == rows.shape[0] and used > 0:
             now[3], now[5] = first, 1.0  # the forces go on as they are
             return FULL, used
-        left, segment = left_of(clock, stop), clock.segments[int(now[2])]
-        theta = phase_of(segment, now[0], now[1], clock.period[0])
-        for f in range(faces):
-            room.springs[f] = tangent(f, table, memory)[0]
-        own = fastest(plant, room.springs) if room.held[1] == 0.0 else 0.0
-        slow = followed(motion, memory.force, plant, clock, room) if own > 0.0 else 0.0
-        rate = slow if slow > 0.0 else max(own, rate_of(segment, clock.period[0]))
-        h = min(REACH / rate * min(1.0, max(rate * wait(motion, plant, table, memory), 0.02)), left)
+        left = left_of(clock, stop)
+        theta = phase_of(clock.segments[int(now[2])], now[0], now[1], clock.period[0])
+        h, rate, top = begin_piece(left, motion, plant, table, memory, clock, room)
         whole = h == left
-        top = piece_series(h, rate, slow, motion, memory.force, plant, clock, room)
-        for f in range(faces):
-            if holds(f, table, memory):
-                memory.force[f] = room.reactions[f, 0]
         u, what, face, sign = next_event(top, plant, table, memory, clock, room)
         if books.limits[0] < 1e300 and u > 0:
             root = passed(top, plant, motion, room, books.limits[0], u)
@@ -311,13 +332,7 @@ def march(stop, motion, plant, table, memory, past, clock, books, room, rows):
                 room.orders[f, 0], room.orders[f, 1] = 0.0, 0.0
             advance(u, h, top, motion, plant, table, memory, clock, books, room)
             if whole and (u == 1.0 or now[1] + u * h >= now[1] + left):  # an event on the border, to the last digit
-                changes = arrive(clock, stop, left)
-                if now[1] == 0.0 and what == NOTHING:
-                    came = come_back(motion, plant, memory, clock, past)
-                elif now[1] == 0.0:
-                    forget(past)
-                for f in range(faces):  # at every border, so that a run in parts is the run
-                    memory.force[f] = pulled(f, table, memory)
+                changes, came = cross_border(what, left, stop, motion, plant, table, memory, past, clock)
             else:
                 now[1] += u * h
             books.ledger[5] = max(books.ledger[5], stored(motion, plant, table, memory))
@@ -333,11 +348,9 @@ def march(stop, motion, plant, table, memory, past, clock, books, room, rows):
             room.signs[face] = sign if what == RELEASES else 0.0
         if (switches or changes) and not enter(motion, plant, table, memory, clock, room):
             return OPEN, used
-        if what == STOPS:
-            return TRAVEL, used
-        if came:
-            now[3] = first
-            return REPEATS, used
+        if what == STOPS or came:
+            now[3] = first if came and what != STOPS else 0.0
+            return TRAVEL if what == STOPS else REPEATS, used
     now[3] = first
     return DONE, used
 

@@ -325,13 +325,9 @@ def first_root(poly, low, top, hulls):
                 at = k
         if least >= -noise:  # free of roots: on with the part to the right, which an outer halving left
             left += width
-            while depth > 0 and hulls[depth, WIDE - 1] == 1.0:
-                depth -= 1
-                width *= 2
+            depth, width = _to_the_right(hulls, depth, width, degree)
             if depth == 0:
                 return NONE
-            _halve(hulls[depth - 1], hulls[depth], degree, False)
-            hulls[depth, WIDE - 1] = 1.0
             continue
         if hull[0] > 0 and changes == 1:
             share = (at - 1 + hull[at - 1] / (hull[at - 1] - hull[at])) / degree
@@ -356,6 +352,18 @@ def _halve(hull, half, degree, first):
         for j in range(1, degree + 1):
             for k in range(degree - j + 1):
                 half[k] = 0.5 * (half[k] + half[k + 1])
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def _to_the_right(hulls, depth, width, degree):
+    """Go on with the part to the right that an outer halving left: its depth and width; depth 0 where none is left."""
+    while depth > 0 and hulls[depth, WIDE - 1] == 1.0:
+        depth -= 1
+        width *= 2
+    if depth > 0:
+        _halve(hulls[depth - 1], hulls[depth], degree, False)
+        hulls[depth, WIDE - 1] = 1.0
+    return depth, width
 
 
 @njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
@@ -385,13 +393,9 @@ def largest(poly, top, best, hulls):
             known = True
         if known:
             left += width
-            while depth > 0 and hulls[depth, WIDE - 1] == 1.0:
-                depth -= 1
-                width *= 2
+            depth, width = _to_the_right(hulls, depth, width, top)
             if depth == 0:
                 return best
-            _halve(hulls[depth - 1], hulls[depth], top, False)
-            hulls[depth, WIDE - 1] = 1.0
             continue
         _halve(hull, hulls[depth + 1], top, True)
         depth, width = depth + 1, width / 2

@@ -350,17 +350,16 @@ def least_forces(within, fixed, plant, table, room):
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def by_squares(kinetic, noise, motion, plant, table, memory, h, room):
-    """Whether a choice holds that the smallest accelerations tell, for many slides at rest; kinetic: their forces are
-    within the kinetic limits, where the law always has a solution, else within the static ones.
+def smallest_accelerations(kinetic, motion, plant, table, memory, room):
+    """The least squares whose forces `least_forces` finds: limits in room.row[6], accelerations (i,) of the slides
+    without friction of those at rest in room.row[4], of the modes in room.scales[0], and their (i, i) room.gram.
 
-    Slides that move under these forces slip; those at their limit that do not are tried in every combination.
+    kinetic: as `by_squares` has it.
     """
     n, count = len(plant.square), len(plant.reach)
-    within, fixed, pull = room.row[6], room.row[7], room.scales[0]
+    within, pull = room.row[6], room.scales[0]
     for f in range(count):
         within[f] = max(table.kinetic[f], 1e-9 * table.static[f]) if kinetic else table.static[f]
-        fixed[f] = 0.0
         rests = room.resting[f] == 1.0
         if table.static[f] > 0.0:
             memory.head[f] = 0.0 if rests else room.signs[f]
@@ -383,6 +382,20 @@ def by_squares(kinetic, noise, motion, plant, table, memory, h, room):
         most = max(most, room.gram[f, f])
     for f in range(count):
         room.gram[f, f] += 1e-12 * most  # picks the smallest forces among equal ones
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def by_squares(kinetic, noise, motion, plant, table, memory, h, room):
+    """Whether a choice holds that the smallest accelerations tell, for many slides at rest; kinetic: their forces are
+    within the kinetic limits, where the law always has a solution, else within the static ones.
+
+    Slides that move under these forces slip; those at their limit that do not are tried in every combination.
+    """
+    n, count = len(plant.square), len(plant.reach)
+    within, fixed, pull = room.row[6], room.row[7], room.scales[0]
+    smallest_accelerations(kinetic, motion, plant, table, memory, room)
+    for f in range(count):
+        fixed[f] = 0.0
     for _ in range(4 * count):
         least_forces(within, fixed, plant, table, room)
         changed = False

@@ -20,6 +20,27 @@ MANY, STOPS, PRESSED = parts.MANY, parts.STOPS, parts.PRESSED  # names by which 
 UNFIT = 4  # status where no contact set fits
 
 
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def seen(i, last, drive, motion, plant, row, c, j, n):
+    """Sample i as (slide, its rate, output; force, energy and slip of the interface; energy of what stands beside it),
+    written into its row; drive: acceleration of the step before."""
+    q, v, out = sample(row, motion, plant.slide, plant.output)
+    force, energy, slip, beside = 0.0, 0.0, 0.0, 0.0
+    if PRESSED:
+        beside = pressing.pressed(i, last, motion, plant.mass, c, j, n, row)
+        if n.slot[0] < 0:
+            return q, v, out, force, energy, slip, beside
+    if MANY:
+        force, energy, slip, springs = faces.sampled(q, v, motion, row, c, j)
+        beside += springs
+        if STOPS:
+            if i > 0:
+                force = faces.held(motion, plant, drive, force, row, j)
+    else:
+        force, energy, slip = contact.state(c, q, v)
+    return q, v, out, force, energy, slip, beside
+
+
 @njit(error_model="numpy", cache=True, **LEAN)
 def march(first, steps, motion, plant, table, c, j, n, travel, ledger, rows):
     """March `steps` steps, the first by row `first` of the table (in turns); 0.1-0.3 us per step, a few ns per point.
@@ -41,21 +62,11 @@ def march(first, steps, motion, plant, table, c, j, n, travel, ledger, rows):
         n.few[:] = 0.0
         n.few[0] = n.sets.base[0]
     for i in range(steps + 1):
-        q, v, out = sample(rows[i], motion, slide, plant.output)
-        beside = 0.0
+        drive = table[(first + i - 1) % around, 4 * size + 2] if STOPS else 0.0
+        q, v, out, force, energy, slip, beside = seen(i, i == steps, drive, motion, plant, rows[i], c, j, n)
         if PRESSED:
-            beside = pressing.pressed(i, i == steps, motion, plant.mass, c, j, n, rows[i])
             if n.slot[0] < 0:
                 return i, UNFIT
-        if MANY:
-            force, energy, slip, springs = faces.sampled(q, v, motion, rows[i], c, j)
-            beside += springs
-            if STOPS:
-                if i > 0:
-                    drive = table[(first + i - 1) % around, 4 * size + 2]
-                    force = faces.held(motion, plant, drive, force, rows[i], j)
-        else:
-            force, energy, slip = contact.state(c, q, v)
         status = note(rows[i, :size + 6], force, energy, slip, out, travel,
                       energy + (beside + stored(motion, plant.omega, plant.mass)), ledger)
         if status:

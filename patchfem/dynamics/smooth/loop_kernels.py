@@ -389,6 +389,18 @@ def went_on(m):
     return fresh
 
 
+@njit(error_model="numpy", **INNER)
+def first_of_ends(m, taken, what, share, travel):
+    """(length [s] of the step that was tried up to the first end in it, what ends it); NOTHING as it is."""
+    while what != NOTHING:
+        taken = located(m, taken, what, share, travel) if what < RELEASE else let_go(m, taken, what, travel)
+        other, share = first_end(m, taken, travel, what)
+        if other == NOTHING:
+            break
+        what = other
+    return taken, what
+
+
 @njit(error_model="numpy", cache=True, nogil=True, **LEAN)
 def advance(m, k, until, edge, tolerance, travel):
     """Move on to the time `until` [s], or to the edge [s] of the piece of the drive: how it ended.
@@ -425,12 +437,7 @@ def advance(m, k, until, edge, tolerance, travel):
             enter(m, -m.turn[0])
             fresh = FLIPPED
             continue
-        while what != NOTHING:
-            taken = located(m, taken, what, share, travel) if what < RELEASE else let_go(m, taken, what, travel)
-            other, share = first_end(m, taken, travel, what)
-            if other == NOTHING:
-                break
-            what = other
+        taken, what = first_of_ends(m, taken, what, share, travel)
         if what != NOTHING:  # the stages of the step that was tried may have passed by what bends beside its end
             error = steps.missed(m, taken, tolerance)
             if error > 1:
