@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -40,6 +41,7 @@ WORN = PIECE + 'load = "2000 N"\n' + TITANIUM.replace("120", "121") + '[contact.
     '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 100000\njumps = 1\n'
 
 
+@cache
 def measures(text: str, tolerance: float) -> dict:
     return pf.run(text, **{"accuracy.tolerance": tolerance}).measures
 

@@ -109,7 +109,9 @@ def test_always_unworn_traces_of_one_place_show_no_wear(count):
         assert "none shown" in verdicts([found])[1][0] and "at most" not in verdicts([found])[1][0]
 
 
-def test_always_surfaces_that_wear_each_other_have_their_depth_or_none():
+@pytest.mark.share(0)
+@pytest.mark.parametrize("rows", [4, 8])
+def test_always_surfaces_that_wear_each_other_have_their_depth_or_none(rows):
     """Wear by 3 um leaves valleys that both traces share; by 6 um hardly any, and no depth may be claimed. The wear
     runs out slowly between worn and unworn heights here, and only about half of the intervals hold the truth."""
     step, count = 2 * UM, 512
@@ -118,13 +120,13 @@ def test_always_surfaces_that_wear_each_other_have_their_depth_or_none():
     for worn, registered in ((3 * UM, True), (6 * UM, False)):
         lower = rub(*pieces, step, 3 * step, 2 * worn, bite=0.05 * UM).lower
         errors = []
-        for k in range(0, count, 64):
+        for k in range(0, count, count // rows):
             noise = 0.02 * UM * random.standard_normal((2, count))
             found = compared(Profile(x, frozen_array(pieces[0][k] + noise[0] - 0.003 * x), "before"),
                              Profile(x, frozen_array(lower[k] + noise[1] + 0.004 * x), "after"))
             if found.reference == "place":
                 errors.append(found.worn.mean.value - float((pieces[0][k] - lower[k]).mean()))
-        assert (len(errors) >= 6 and max(map(abs, errors)) < 0.02 * UM) if registered else not errors
+        assert (len(errors) >= 0.75 * rows and max(map(abs, errors)) < 0.02 * UM) if registered else not errors
 
 
 def test_always_a_turned_surface_has_no_place():
