@@ -36,7 +36,11 @@ def adapted(find: Callable, places, share: float = 0.01, most: int = 2000) -> tu
 
 
 def coarse(places, values, share: float) -> np.ndarray:
-    """Numbers k of the intervals from places (n,) k to k + 1 that want a point between, by the values (n,)."""
+    """Numbers k of the intervals from places (n,) k to k + 1 that want a point between, by the values (n,).
+
+    An interval wants one where the parabola through three neighbours leaves the straight line by more than 3/4 of
+    `share` of the largest of their values. Values of any unit; nan where none was found.
+    """
     if places.size < 3:
         return np.zeros(0, int)
     h = np.abs(np.diff(places))

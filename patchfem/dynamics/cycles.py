@@ -28,14 +28,21 @@ def thinned(rows, run) -> np.ndarray:
 
 
 def extremes_of(rows, modes, dt) -> tuple:
-    """(smallest, largest) output of a cycle, found between the samples by the cubic through values and rates."""
+    """(smallest, largest) output [m] of a cycle, found between the samples by the cubic through values and rates.
+
+    rows: (k, >= 2n) of a march, modal displacements and velocities first; dt [s] between them.
+    """
     n = modes.omega.size
     y, v = rows[:, :n] @ modes.output, rows[:, n:2 * n] @ modes.output
     return hermite_extremes(y, v, dt)
 
 
 def phasor(rows, modes, first: int, around: int) -> complex:
-    """Drive-frequency part of the output over a cycle of samples that begins at step number `first`."""
+    """Complex amplitude c [m] of the output Re(c exp(i omega t)) over a cycle of samples, omega that of the drive.
+
+    rows: (k, >= n), modal displacements first, the last row that of the next cycle; first: number of the first step,
+    whose phase is 2 pi first/around; around: steps in a cycle. 0 of no samples.
+    """
     y = rows[:-1, :modes.omega.size] @ modes.output
     return complex(2 * (y @ _carrier(first % around, y.size, around)) / y.size) if y.size else 0j
 

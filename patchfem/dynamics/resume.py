@@ -188,7 +188,7 @@ def _into(run, name: str, found: dict) -> None:
 
 
 def save(path: Path, key: str, run, samples: Samples) -> None:
-    """Write the state of a march; Missing where it cannot be written."""
+    """Write the state of a march whole to path, under the key of its scene and numerics; Missing where it cannot be."""
     arrays = _of_run("run", run) | samples.arrays()
     need = sum(one.nbytes for one in arrays.values())
     with whole(path, need) as partial, open(partial, "wb") as file:

@@ -80,7 +80,10 @@ def warm_up(say=None) -> tuple:
 
 
 def expect(modes: ModalBasis, drive, groups, cycles: float, window: int, runs: int = 1) -> None:
-    """Tell the functions of the loop that as many runs like this one are to come: what is over soon is not compiled."""
+    """Tell the functions of the loop that as many runs like this one are to come: what is over soon is not compiled.
+
+    groups: Elements of every interface; cycles: of the drive in a run; window: of them kept whole.
+    """
     march, dense, read = warm_up()
     stiff, shown = max((float(one.stiffness.sum()) for one in groups), default=0.0), min(cycles, window)
     each = python_seconds(modes, drive, stiff, sum(one.stiffness.size for one in groups))
@@ -92,7 +95,10 @@ def expect(modes: ModalBasis, drive, groups, cycles: float, window: int, runs: i
 
 def started(modes: ModalBasis, drive, groups, cycles: float, window: int = 1, travel: float = np.inf,
             start: Start | None = None, memory=None) -> "_Run":
-    """A run of its own before its first piece; arguments as of `simulate`."""
+    """A run of its own before its first piece; arguments as of `simulate`.
+
+    Its `go` runs it to the end, its `until` for some periods at a time, as a map over a period wants.
+    """
     expect(modes, drive, groups, cycles, window)
     return _Run(modes, drive, groups, cycles, window, travel, start, memory)
 

@@ -154,7 +154,11 @@ def _what_happened(one: Stretch, later: Stretch, changed, reactions) -> tuple:
 
 
 def period_map(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Map:
-    """The map of a state (2n,) over whole drive periods; groups: Elements of every interface, rigid ones alone."""
+    """The map of a state (2n,) over whole drive periods, with its slope (2n, 2n).
+
+    state: modal displacements and velocities where the drive begins; groups: Elements of every interface, rigid ones
+    alone. The slope is that of the stretches between events times the jump at each (saltation matrices).
+    """
     n = modes.omega.size
     run = histories.started(modes, drive, groups, periods, periods, start=Start(state[:n], state[n:]))
     kept = []

@@ -53,7 +53,11 @@ class GroovesModel(FlankModel):
 
 
 def model_of(grooves: Grooves, load: float, static: float, kinetic: float, speed: float | None, modes) -> GroovesModel:
-    """The model of grooves below these modes; PatchfemError as of `refuse_heavy`."""
+    """The model of grooves below these modes.
+
+    load [N]: mean of the load; static, kinetic [1]: coefficients of friction on the flanks; speed [m/s]: v_0 of the
+    tanh law, None for Coulomb friction. PatchfemError as of `refuse_heavy`.
+    """
     refuse_heavy(grooves, static, modes)
     return GroovesModel(grooves, load, static, kinetic, speed)
 

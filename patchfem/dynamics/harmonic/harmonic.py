@@ -286,7 +286,11 @@ def damped(system, x, met, goal: float = 1e-10, most: int = 40) -> tuple | None:
 
 
 def newton(balance: Balance, x, omega: float, level: float, harmonics: int, most: int = 40):
-    """(unknowns, System one last step before, iterations) of a balance by `damped`, NotConverged where it ends."""
+    """(unknowns, System one last step before, iterations) of a balance by `damped`.
+
+    x (N,): unknowns to begin from; omega [rad/s] and level [m s-2] of the drive; most: steps. NotConverged where the
+    residual is not rounding by then.
+    """
     def met(here, left, size) -> bool:
         return balance.met(here, left, omega, level, harmonics, size)
 

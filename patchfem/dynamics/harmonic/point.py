@@ -146,7 +146,10 @@ def _next(h: int) -> int:
 
 
 def cut(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
-    """Unknowns for another number of harmonics from slides (i, K + 1)."""
+    """Unknowns for `harmonics` harmonics from those for h: the slides' harmonics (i, K + 1) [m], cut or with zeros.
+
+    What stands behind the slides' harmonics in the unknowns, other numbers of the balance, is kept.
+    """
     y = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
     keep = min(harmonics, slides.shape[1] - 1) + 1
     y[:, :keep] = balance.lift.T @ slides[:, :keep]
@@ -230,13 +233,13 @@ def _along_levels(balance, omega, level, h: int) -> np.ndarray:
 
 
 def by_level(balance, x, omega, level, h) -> tuple:
-    """(residual, Jacobian, slope over the level) for dynamics.continuation."""
+    """(residual, Jacobian, slope over the level) for `continuation`; level: acceleration of the drive [m s-2]."""
     s = balance.system(x, omega, level, h)
     return s.residual, s.jacobian, s.by_level
 
 
 def by_omega(balance, x, omega, level, h) -> tuple:
-    """(residual, Jacobian, slope over omega) for dynamics.continuation."""
+    """(residual, Jacobian, slope over omega) for `continuation`; omega [rad/s] of the drive."""
     s = balance.system(x, omega, level, h)
     return s.residual, s.jacobian, s.by_omega
 

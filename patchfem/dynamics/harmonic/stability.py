@@ -1,4 +1,4 @@
-"""Multipliers of a steady motion of the balance: the laws' slopes and memories, cell by cell, for dynamics.floquet."""
+"""Multipliers of a steady motion of the balance: the laws' slopes and memories, cell by cell, for `floquet`."""
 
 from dataclasses import replace
 
@@ -19,7 +19,10 @@ def with_stability(periodic, modes, cells: int = 0):
 
 
 def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
-    """dynamics.floquet.monodromy of a Periodic."""
+    """The map (2n, 2n), or larger by the laws' memories, of a small change of a Periodic over one period of the drive.
+
+    cells: of the cycle, in each of which the slopes of the laws are constant; 0 as in `with_stability`.
+    """
     group, n = periodic.group, cells or max(1024, 2 ** (periodic.samples - 1).bit_length())
     slope, by_rate, by_bend = np.zeros((3, len(group.rows), n))
     marks, fading = [], []

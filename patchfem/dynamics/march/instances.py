@@ -57,6 +57,9 @@ def march(model, *arguments) -> tuple:
 
 
 def follow_path(path, dt, kind, contact, work, goal, energies, forces) -> int:
-    """`loop_kernels.follow` with the contact of this kind; work: nothing. The steps that failed."""
+    """Drive a contact of this kind along a prescribed path: `loop_kernels.follow`. Number of steps that failed.
+
+    path (k,) [m] at steps of dt [s]; goal: relative residual of a step; energies and forces are filled; work: unused.
+    """
     return loop_of(kind).follow(path, float(dt), contact, float(goal), energies, forces)
 

@@ -182,7 +182,10 @@ def _left_out(samples: Samples, run, count: int) -> int:
 
 
 def mark_of(run, cycles, extremes, after=None) -> Mark:
-    """The Mark of the cycles (first step, rows, work) that end here; after: the march to go on with."""
+    """The Mark of the cycles (first step, rows, work [J]) that end here.
+
+    extremes: (smallest, largest) output [m] of each cycle so far; after: the march to go on with.
+    """
     rows, first = _joined(cycles)
     return Mark(run.response(rows, first + np.arange(len(rows))), rows[:-1, 2 * run.modes.omega.size + 4].copy(),
                 sum(work for _, _, work in cycles), np.array(extremes), run.book(), after)

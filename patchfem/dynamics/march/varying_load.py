@@ -291,6 +291,10 @@ def _one_point(load: float) -> dict:
 def march(modes: ModalBasis, drive, sets: ContactSets | None, law: Rubbing, cycles: float, steps_per_cycle: int,
           window: int = 10, travel: float = np.inf, frames: int = 0, start=None, load=None, say=None, progress=None,
           shear=None):
-    """`march.march` of a basis on contact sets, or under a prescribed load, from rest or from `start`."""
+    """`march.march` of a basis on contact sets, or under a prescribed load, from rest or from `start`.
+
+    sets: what touches at each load and tilt, None where the load of a point is prescribed by `load`; law: what rubs;
+    shear: the ShearModes behind it. The other arguments, and what it returns and refuses, are those of `march.march`.
+    """
     model = model_of(modes, law, sets, load, shear)
     return run(modes, drive, model, cycles, steps_per_cycle, window, travel, frames, say, progress, start)

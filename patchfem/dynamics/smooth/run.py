@@ -81,7 +81,11 @@ class SmoothResult(MarchResult):
 
 
 def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tuple:
-    """(Moving, Kept) of a motion before it begins."""
+    """(Moving, Kept) of a motion before it begins: the arrays of the kernels, named in `arrays`.
+
+    element: the law with its numbers and the sizes of its memory; start: core.Start, at rest without.
+    The first step is FIRST over the fastest rate of modes and drive.
+    """
     n, l = modes.omega.size, len(element.sizes)
     size, damping = 2 * n + l + 3, np.zeros((0, 0)) if modes.damping is None else modes.damping
     state = np.zeros(size)
