@@ -35,7 +35,7 @@ class Cost:
     label: of the setting, or of all settings that gave this run, bit for bit; value: of the knob in SI, None where the
     scene's tolerance chose; words: the setting in a sentence; CPU seconds of the whole run with its error estimates,
     the least of so many timings, and those by the clock in the same timing. By measure: values; errors, as the run
-    states them, in the unit of the value; floors of these; distances to the run `best`, which has none itself; units.
+    states them, in the unit of the value; floors of these; distances to the run `best`, which has none itself.
     """
 
     label: str
@@ -47,7 +47,6 @@ class Cost:
     values: dict
     errors: dict
     floors: dict
-    units: dict
     distances: dict
 
     def off(self, name: str) -> float | None:
@@ -76,23 +75,19 @@ def curve(model: Model, knob: str, say=None) -> list:
     not have.
     """
     with placed(model.source):
-        return _curve(model, knob, say)
-
-
-def _curve(model: Model, knob: str, say) -> list:
-    mine = knobs_of(model)
-    if knob not in mine:
-        raise PatchfemError(f"cost --over {knob}: this scene has the knobs {', '.join(mine) or 'none'}", "")
-    wanted = settings(model, knob)
-    _tried(wanted[0], "first run, not counted", None)  # imports and compiling stay out of the times
-    runs, done = [], 0
-    for one in wanted:
-        found = _timed(one, one is not wanted[-1], say, runs[-1:])
-        if found is not None:
-            done += 1
-            runs[-1:] = [_one_run(runs[-1], found)] if runs and found.same_as(runs[-1]) else [*runs[-1:], found]
-    if done < 3:
-        raise PatchfemError(f"cost --over {knob}: fewer than three values could be run", "")
+        mine = knobs_of(model)
+        if knob not in mine:
+            raise PatchfemError(f"cost --over {knob}: this scene has the knobs {', '.join(mine) or 'none'}", "")
+        wanted = settings(model, knob)
+        _tried(wanted[0], "first run, not counted", None)  # imports and compiling stay out of the times
+        runs, done = [], 0
+        for one in wanted:
+            found = _timed(one, one is not wanted[-1], say, runs[-1:])
+            if found is not None:
+                done += 1
+                runs[-1:] = [_one_run(runs[-1], found)] if runs and found.same_as(runs[-1]) else [*runs[-1:], found]
+        if done < 3:
+            raise PatchfemError(f"cost --over {knob}: fewer than three values could be run", "")
     best = _best(runs)
     return [one if one is best else replace(one, distances=_distances(one, best)) for one in runs]
 
@@ -137,7 +132,7 @@ def _timed(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
         one = Cost(setting.label, setting.value, setting.words, *min(timings), len(timings),
                    {name: m.value for name, m in known.items()},
                    {name: m.error for name, m in known.items() if m.error is not None},
-                   {name: m.floor for name, m in known.items()}, {name: m.unit for name, m in known.items()}, {})
+                   {name: m.floor for name, m in known.items()}, {})
         if one.seconds >= LONG and _compiled() == kept:
             break
     again = "".join(f", the run of {other.label}" for other in before if one.same_as(other))

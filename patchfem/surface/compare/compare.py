@@ -75,9 +75,7 @@ class Comparison:
         if self.worn.extent is not None:
             names = (f"worn_{end}_{when}" for when in ("before", "after") for end in ("from", "to"))
             out.update(zip(names, (*self.worn.extent.before, *self.worn.extent.after)))
-        sizes = self.tracks.sizes
-        names = {"from": "track_from", "to": "track_to", "depth_mean": "track_depth"}
-        out.update((names.get(name, f"track_{name}"), one) for name, one in sizes.items())
+        out.update((f"track_{name.removesuffix('_mean')}", one) for name, one in self.tracks.sizes.items())
         if isinstance(self.before, Profile):
             out["hidden_wear"] = self.hidden
         return out if self.abbott is None else {**out, "worn_depth_mean_from_abbott": self.abbott}

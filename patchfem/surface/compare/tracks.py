@@ -1,6 +1,8 @@
 """Tracks and new valleys in the registration of two traces: where they are, and the traces without a track's edges."""
 
+from collections.abc import Mapping
 from itertools import pairwise
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -35,25 +37,12 @@ class Valley(NamedTuple):
 
 
 class Tracks(NamedTuple):
-    """spans: first and last sample of each track; start, end, depth, floor, gross, pile, net: `Quantity` of the longest
-    one, all of one span, None without one; valley: the deepest new one, None without one."""
+    """spans: first and last sample of each track; sizes: `Quantity` of the longest one by name (`_sizes`), all of one
+    span, nothing without one; valley: the deepest new one, None without one."""
 
     spans: tuple
-    start: Quantity | None = None
-    end: Quantity | None = None
-    depth: Quantity | None = None
-    floor: Quantity | None = None
-    gross: Quantity | None = None
-    pile: Quantity | None = None
-    net: Quantity | None = None
+    sizes: Mapping = MappingProxyType({})
     valley: Valley | None = None
-
-    @property
-    def sizes(self) -> dict:
-        """Every `Quantity` of the longest track by its name; nothing without one."""
-        names = ("from", "to", "depth_mean", "depth_floor", "area_net", "area_gross", "pile_up")
-        parts = (self.start, self.end, self.depth, self.floor, self.net, self.gross, self.pile)
-        return dict(zip(names, parts)) if self.start is not None else {}
 
 
 def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
@@ -75,7 +64,7 @@ def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
     low = spans[at - 1][1] + 1 if at else 0
     high = spans[at + 1][0] if at + 1 < len(spans) else rest.size
     ends = _ends(found, widest, (low, high), together)
-    return Tracks(spans, *ends, *_sizes(found, *ends), valley)
+    return Tracks(spans, _sizes(found, *ends), valley)
 
 
 def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -> tuple:
@@ -93,8 +82,8 @@ def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -
     return tuple(out)
 
 
-def _sizes(found: Registration, start: Quantity, end: Quantity) -> tuple:
-    """Depth, floor, lost area, pile-up and net area of the track from start to end [m], each a `Quantity`.
+def _sizes(found: Registration, start: Quantity, end: Quantity) -> dict:
+    """Ends, depth, floor, net and lost area, and pile-up of the track from start to end [m], each a `Quantity`.
 
     The interval of the mean depth has that of the width.
     """
@@ -106,9 +95,11 @@ def _sizes(found: Registration, start: Quantity, end: Quantity) -> tuple:
     near = (abs(x - (start.value + end.value) / 2) < 1.5 * width) & ((x < start.value) | (x > end.value)) & (raised > 0)
     piled = float(widths(x)[near] @ raised[near])
     loose = float(widths(x)[near].sum()) * max(found.errors[0], found.noise / max(np.sqrt(near.sum()), 1.0))
-    return (around(depth, float(np.hypot(error / width, depth * wide / width)), "m", DEPTH, 0.0),
-            _floor(found, start.value, width), around(area, error, "m2", GROSS, 0.0),
-            around(piled, loose, "m2", PILED, 0.0), around(area - piled, float(np.hypot(error, loose)), "m2", NET))
+    return {"from": start, "to": end,
+            "depth_mean": around(depth, float(np.hypot(error / width, depth * wide / width)), "m", DEPTH, 0.0),
+            "depth_floor": _floor(found, start.value, width),
+            "area_net": around(area - piled, float(np.hypot(error, loose)), "m2", NET),
+            "area_gross": around(area, error, "m2", GROSS, 0.0), "pile_up": around(piled, loose, "m2", PILED, 0.0)}
 
 
 def _floor(found: Registration, start: float, width: float) -> Quantity:
@@ -162,14 +153,16 @@ def of_flanks(found: Flanks) -> Tracks:
     """The track below the unworn flanks of a trace: its ends are known to a part (`flanks.PARTS`), its pile-up not."""
     part = float(found.x[-1] - found.x[0]) / PARTS
     ends = [Quantity(one, one - part, one + part, "m", text) for one, text in ((found.start, FROM), (found.end, TO))]
-    depth = Quantity(*(one / found.width for one in found.area), "m", DEPTH)
     inside = np.asarray(found.depth)[(found.x >= found.start) & (found.x <= found.end)]
     many = max(inside.size // FLOOR, 1)
     floor = float(np.convolve(inside, np.full(many, 1 / many), "valid").max())
     off = found.largest[2] - found.largest[0]
-    unknown = [refused("m2", text, "what stands beside the track before is not known") for text in (PILED, NET)]
-    return Tracks((), *ends, depth, Quantity(floor, max(floor - off, 0.0), floor + off, "m", BOTTOM),
-                  Quantity(*found.area, "m2", GROSS), *unknown)
+    why = "what stands beside the track before is not known"
+    return Tracks((), {"from": ends[0], "to": ends[1],
+                       "depth_mean": Quantity(*(one / found.width for one in found.area), "m", DEPTH),
+                       "depth_floor": Quantity(floor, max(floor - off, 0.0), floor + off, "m", BOTTOM),
+                       "area_net": refused("m2", NET, why), "area_gross": Quantity(*found.area, "m2", GROSS),
+                       "pile_up": refused("m2", PILED, why)})
 
 
 def beside_flanks(after: Profile, found: Flanks, longest: float) -> list:

@@ -157,7 +157,7 @@ def _worn(one: Comparison, name: str) -> str:
     what = "over the track below its unworn flanks" if one.reference == "flanks" else "over the common length"
     text = (f"Worn{name}: {_track(one)}{_length(mean)} in the mean {what}, {_length(one.worn.largest)} at the deepest "
             f"place.{above}")
-    if one.worn.extent is not None and one.tracks.start is None:
+    if one.worn.extent is not None and not one.tracks.sizes:
         before, after = (_span(*(end.value for end in ends)) for ends in one.worn.extent)
         text += f" Worn from x = {before} of the trace before, that is from {after} of the trace after."
     return text
@@ -176,13 +176,13 @@ def _reference(one: Comparison) -> list:
 
 def _track(one: Comparison) -> str:
     """The longest track as the begin of a sentence."""
-    found = one.tracks
+    found = one.tracks.sizes
     if one.flanks is not None:
         return f"a track from about x = {_span(one.flanks.start, one.flanks.end)} of the trace after; "
-    if found.start is None:
+    if not found:
         return ""
-    return (f"a track from x = {_span(found.start.value, found.end.value)} of the trace after, {_length(found.depth)} "
-            f"deep in the mean, its floor {_length(found.floor)}; ")
+    return (f"a track from x = {_span(found['from'].value, found['to'].value)} of the trace after, "
+            f"{_length(found['depth_mean'])} deep in the mean, its floor {_length(found['depth_floor'])}; ")
 
 
 def _apart(one: Comparison) -> list:

@@ -2,5 +2,6 @@
 
 In: a path, and the units of files that name none. Out: a `Profile` or an `Areal` in metres, or a refusal that names
 file and line. A format is known by its content first, by the suffix of the file second. Sizes are read from a header
-and limited before anything is allocated. Read `read` first.
+and limited before anything is allocated. X3P (ISO 25178-72) and SDF (71) are read by every installation;
+SurfaceTopography is an extra and works in a process of its own. Read `read` first.
 """

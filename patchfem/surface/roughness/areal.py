@@ -2,7 +2,8 @@
 
 import numpy as np
 
-LOW, HIGH = 0.05, 0.95
+from .intervals import HIGH, LOW
+
 SPENT = 0.85  # share of the degrees of freedom that is left when the spectrum is estimated too (240 made scans)
 
 

@@ -8,7 +8,7 @@ from scene_texts import BENCH, COULOMB, POINT, SHORT, SMALL_PATCH
 from patchfem.campaigns.sweeps.ask import Request, cases_of
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.campaigns.sweeps.estimate import ONCE, estimate
-from patchfem.campaigns.sweeps.executors.here import Here
+from patchfem.campaigns.sweeps.executors import Here
 from patchfem.export.sweeps.run import Place, sweep_into
 from patchfem.runs.plan import plan
 

@@ -18,9 +18,8 @@ from scene_texts import BENCH, COULOMB, POINT, SHORT
 from patchfem.campaigns.sweeps import executors
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.campaigns.sweeps.cases import Cases
-from patchfem.campaigns.sweeps.executors import pool
+from patchfem.campaigns.sweeps.executors import Here, pool
 from patchfem.campaigns.sweeps.executors.cluster import Cluster
-from patchfem.campaigns.sweeps.executors.here import Here
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import TRIES, Chunks, Clock, Work, solved
 from patchfem.core import Missing, PatchfemError

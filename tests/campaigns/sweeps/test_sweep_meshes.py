@@ -9,8 +9,8 @@ from scene_texts import PATCH
 from patchfem.campaigns.sweeps import sweep
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.campaigns.sweeps.cases import Cases
+from patchfem.campaigns.sweeps.executors import Here
 from patchfem.campaigns.sweeps.executors import pool as pool_module
-from patchfem.campaigns.sweeps.executors.here import Here
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import Work, solved, with_meshes
 from patchfem.runs.many.answers import joined_answers

@@ -1,11 +1,28 @@
 """Ways to work on the chunks of a sweep: in this process, in others beside it, on a Dask cluster.
 
 Each has `workers` and `run(work, take, say)`, which gives (chunk, seconds, answer or Died) of every chunk that `take`
-hands out. `of` finds one by its name; read `here` first.
+hands out. `of` finds one by its name; read `Here` first.
 """
 
+from collections.abc import Callable, Iterator
+from time import perf_counter
+
 from ....core import PatchfemError
-from . import cluster, here, pool
+from ..sweep import Work, answer
+from . import cluster, pool
+
+
+class Here:
+    """The executor of this process: chunks one after the other."""
+
+    workers = 1
+
+    def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
+        """(chunk, seconds, what `answer` gives) of each chunk that `take` hands out."""
+        while (chunk := take()) is not None:
+            begin = perf_counter()
+            found = answer(work, chunk, say)
+            yield chunk, perf_counter() - begin, found
 
 
 def of(name: str = "", jobs: int = 1):
@@ -22,6 +39,5 @@ def of(name: str = "", jobs: int = 1):
     if name:
         raise PatchfemError(f"--executor {name}: unknown; dask or dask:ADDRESS is wanted, or -j N without it")
     if jobs == 1:
-        return here.Here()
-
+        return Here()
     return pool.Pool(jobs)
