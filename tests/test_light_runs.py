@@ -11,6 +11,33 @@ from scene_texts import COULOMB, POINT, STRUCTURE
 
 from patchfem.export.summary import PACKAGES, versions
 
+RINGING = """
+[normal]
+load = "109.3 N"
+[friction]
+law = "elastic-plastic"
+static = 0.755
+bond_length = "0.97 um"
+[structure]
+moving_mass = "0.214 kg"
+[[structure.mode]]
+name = "first"
+frequency = "136.3 Hz"
+damping = 0.003
+slide = 1.0
+base = 0.8
+[[structure.mode]]
+name = "second"
+frequency = "334.5 Hz"
+damping = 0.05
+slide = 0.3
+base = 0.1
+[drive]
+kind = "base"
+acceleration = "3.655 m/s^2"
+frequency = "123.9 Hz"
+cycles = 12
+"""
 RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
 
 
@@ -24,6 +51,16 @@ def test_exact_a_rig_with_its_page_loads_no_dice_and_no_benches(tmp_path):
     unwanted = {"numpy.random", "cyclopts.completion", "numba", "patchfem.runs.bench.bench",
                 "patchfem.runs.wear", "email", "socket"}
     assert not {name for name in modules if any(f"{name}.".startswith(f"{one}.") for one in unwanted)}
+
+
+def test_exact_a_short_rig_that_rings_compiles_nothing(tmp_path, monkeypatch):
+    """Nothing is kept: the loop, and the fit of what rings while the interface sticks, run as Python."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "empty"))
+    scene = tmp_path / "scene.toml"
+    scene.write_text(RINGING, "utf-8")
+    assert "numba" not in loaded(FROM_SHELL, "run", scene, "-o", tmp_path / "out", "-q")
+    values = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert "ring_frequency" in values["measures"]
 
 
 def test_exact_a_check_reads_no_metadata_and_who_wants_it_has_it(tmp_path):

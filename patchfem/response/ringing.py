@@ -21,6 +21,7 @@ MISSED = 0.1  # share of the ring that a fit may leave over
 WIDEST = 0.5  # largest damping ratio of what is called a ring
 WHOLE = 1e-9  # of what the forced sine leaves: a fit that leaves less has found the ring, no other start is tried
 ROUNDING = float(np.finfo(float).eps)
+LOOK, LOOKS = 8e-7, 2.0  # CPU seconds of a look at a fit as Python, per sample and square of columns; looks of a fit
 KERNELS = "response.ringing_kernels"
 STEPS = 60  # of a fit
 SHORT = 0.9  # of LEAST_PERIODS; a WHOLE fit below it is refused, and its last digits are not sought
@@ -149,8 +150,10 @@ def _fitted(time, value, forced, poles, *ends) -> tuple:
     `ends`."""
     room = _room(forced.shape[1] + poles.size, poles.size, time.size)
     room[0][0, :forced.shape[1]] = forced.T
+    fit = compiled.kernels(KERNELS).fitted
+    fit.expect(LOOKS * LOOK * time.size * (forced.shape[1] + poles.size)**2)
     ends = np.array([*ends, STEPS] if ends else [0.0] * 4)
-    return *compiled.kernels(KERNELS).fitted(time, value, poles, np.abs(poles) + 1 / time[-1], ends, room), room
+    return *fit(time, value, poles, np.abs(poles) + 1 / time[-1], ends, room), room
 
 
 @lru_cache(maxsize=16)

@@ -35,10 +35,12 @@ class EngineCode(NamedTuple):
 
 
 NONE = EngineCode(0.0, 0.0)
-STEPS, FOLLOWED = EngineCode(58e6, 0.4, 8.0), EngineCode(58e6, 0.4, 3.0)  # a march; a slide or a method of few kernels
-SMOOTH, PIECES, BALANCE = EngineCode(74e6, 0.4, 13.0), EngineCode(82e6, 0.4, 20.0), EngineCode(1e8, 0.55, 3.0)
+STEPS, SHEARED = EngineCode(58e6, 0.4, 3.5), EngineCode(58e6, 0.4, 7.0)  # a march; one with the shear modes of a patch
+LINEAR = EngineCode(58e6, 0.0)  # nothing of it is compiled
+FOLLOWED = EngineCode(58e6, 0.4, 2.0)  # a slide, or a method of few kernels
+SMOOTH, PIECES, BALANCE = EngineCode(74e6, 0.4, 9.0), EngineCode(82e6, 0.4, 20.0), EngineCode(1e8, 0.55, 3.0)
 CODES = {"static": NONE, "bench, closed form": NONE, "bench, law step by step": NONE, "bench, two directions": NONE,
-         "bench, parallel elements": FOLLOWED, "duhamel": FOLLOWED, "newmark": FOLLOWED, "euler": FOLLOWED,
+         **dict.fromkeys(("bench, parallel elements", "bench, recursion", "duhamel", "newmark", "euler"), FOLLOWED),
          "smooth": SMOOTH, "exact": PIECES, "piecewise": PIECES, "harmonic": BALANCE}
 OF_EVENTS = "exact", "piecewise"  # engines whose loop runs as Python where it is over soon
 
@@ -48,8 +50,10 @@ def code(model: Model, engine: str) -> EngineCode:
     rig = model.rig
     if rig is None:
         return CODES.get(engine, STEPS)
-
-    return CODES.get(engines.steady_by(model).like if engines.ENGINES[engine].steady else engine, STEPS)
+    if engine in OF_EVENTS and not rig.interfaces:  # a linear motion in closed form
+        return LINEAR
+    engine = engines.steady_by(model).like if engines.ENGINES[engine].steady else engine
+    return CODES.get(engine, SHEARED if model.soft else STEPS)
 
 
 def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:

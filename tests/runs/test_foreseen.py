@@ -124,6 +124,8 @@ def test_exact_a_plan_counts_no_compile_where_a_short_history_runs_as_python(tmp
     for law in COULOMB, PLASTIC:
         short, long = (planned(POINT + law + STRUCTURE, f"drive.cycles={cycles}") for cycles in (30, 30000))
         assert short.compile_seconds == 0 < long.compile_seconds
+    linear = planned(STRUCTURE, "drive.cycles=30000")
+    assert (linear.kind, linear.engine, linear.compile_seconds) == ("linear", "exact", 0)
 
 
 @pytest.mark.slow
