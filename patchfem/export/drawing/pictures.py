@@ -69,9 +69,12 @@ def styled(draw):
 
 
 @styled
-def draw(made: list, onto=None):
-    """Draw charts as `charts` describes them, side by side; onto Axes the first alone. Cells: pages alone."""
-    figure, axes = drawing(len(made), TALL, onto)
+def draw(made: list, onto=None, height: float = TALL):
+    """Draw charts as `charts` describes them, side by side, `height` inches tall; onto Axes the first alone.
+
+    Cells are drawn by pages alone.
+    """
+    figure, axes = drawing(len(made), height, onto)
     for axis, one in zip(axes, made):
         for mark in one["marks"]:
             MARKS[mark["kind"]](axis, mark)
@@ -99,20 +102,21 @@ def _line(axis, mark: dict) -> None:
 
 
 def _dots(axis, mark: dict) -> None:
-    axis.errorbar(mark["x"], mark["y"], mark.get("errors"), fmt=SHAPES[mark.get("shape", "circle")], ms=5, capsize=2,
-                  color=_colour(mark), label=mark["name"] or None)
+    axis.errorbar(mark["x"], mark["y"], mark.get("errors"), fmt=SHAPES[mark.get("shape", "circle")],
+                  ms=mark.get("size", 5), capsize=2, color=_colour(mark), label=mark["name"] or None)
 
 
 def _band(axis, mark: dict) -> None:
-    axis.fill_between(mark["x"], mark["low"], mark["high"], color=_colour(mark), alpha=0.22, lw=0)
+    axis.fill_between(mark["x"], mark["low"], mark["high"], color=_colour(mark), alpha=0.22, lw=0,
+                      label=mark["name"] or None)
 
 
 def _span(axis, mark: dict) -> None:
-    axis.axvspan(mark["left"], mark["right"], color=_colour(mark), alpha=0.12, lw=0)
+    axis.axvspan(mark["left"], mark["right"], color=_colour(mark), alpha=0.12, lw=0, label=mark["name"] or None)
 
 
 def _rule(axis, mark: dict) -> None:
-    axis.axvline(mark["x"], color=_colour(mark), lw=0.9, ls="-.", label=mark["name"] or None)
+    axis.axvline(mark["x"], color=_colour(mark), lw=0.9, ls=mark.get("dash", "dashdot"), label=mark["name"] or None)
 
 
 def _arrow(axis, mark: dict) -> None:

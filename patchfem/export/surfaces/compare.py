@@ -19,7 +19,7 @@ from ...surface.roughness.parameters import Heights, abbott
 from ...surface.roughness.spectrum import BAND
 from ..drawing.inline import CSS, placed
 from ..pages.words import pair
-from . import compare_pictures as pictures
+from . import pictures
 
 WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_max": "worn depth, largest",
          "worn_depth_mean": "worn depth, mean", "worn_area": "worn area", "amplitude_ratio": "amplitude ratio",
@@ -198,7 +198,7 @@ def figures(one: Comparison) -> list:
         [_bearing(z - tilt) for z in (found.first, second)]
     spectra = [each.spectrum for each in one.sizes]
     if all(each.density.any() for each in spectra):
-        out.append((pictures.statistics(curves, spectra, BAND), f"Left: Abbott curves about {about}. Right: "
+        out.append((pictures.both_statistics(curves, spectra, BAND), f"Left: Abbott curves about {about}. Right: "
                     "spectra with the band in which the true density lies with 95 % probability.",
                     f"Abbott curves and spectra: amplitude ratio {shown(one.amplitude_ratio)[0]}"))
     return out

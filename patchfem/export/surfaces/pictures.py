@@ -1,98 +1,84 @@
-"""Pictures of a trace, its Abbott curve, its spectrum and of an areal scan, as SVG text."""
+"""Figures of surfaces: a trace, its Abbott curve and spectrum, a scan; traces before and after, and their pressure."""
 
 import numpy as np
 
 from ...scales import axis_unit
-from ..drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
+from ...surface.profile import level
+from ...surface.roughness.filter import even
+from ..drawing.charts import axis, chart, line, mark
+from ..drawing.pictures import BLUE, draw, drawing, styled
 
-POINTS = 1200  # pairs of lowest and highest height that a line shows
-CURVE = 400  # points of a spectrum
-
-
-def thinned(x, z, most: int = POINTS) -> tuple:
-    """A line that looks the same: lowest and highest height of every few samples, in their order along x."""
-    if z.size <= 2 * most:
-        return x, z
-    each = -(-z.size // most)
-    count = z.size // each
-    parts = z[:count * each].reshape(count, each)
-    pair = np.sort(np.stack([parts.argmin(axis=1), parts.argmax(axis=1)], axis=1), axis=1)
-    keep = np.append((pair + each * np.arange(count)[:, None]).ravel(), z.size - 1)
-    return x[keep], z[keep]
+POINTS, CURVE = 2400, 400  # of a line and of a spectrum
+FINE = 400  # samples that the closer view shows, at least
+SIDES = (("soft", "before"), ("accent", "after"))
+VOLUME = 1e18  # um^3
 
 
-@styled
-def trace(primary, waviness):
-    """Draw the levelled trace, and the waviness on it where there is one."""
-    figure, (axis,) = drawing(1, 2.7)
-    along, mm = axis_unit(primary.x, "m")
-    up, um = axis_unit(primary.z, "m")
-    x, z = thinned(primary.x, primary.z)
-    axis.plot(x * mm, z * um, color=GREY if waviness is not None else BLUE, lw=0.7, label="levelled trace")
+def trace(primary, waviness) -> str:
+    """The levelled trace, and the waviness on it where there is one."""
+    (along, mm), (up, um) = axis_unit(primary.x, "m"), axis_unit(primary.z, "m")
+    marks = [line(primary.x * mm, primary.z * um, "accent", most=POINTS, width=0.7)]
     if waviness is not None:
-        x, z = thinned(waviness.x, waviness.z)
-        axis.plot(x * mm, z * um, color=ORANGE, lw=1.6, label="waviness")
-        axis.legend(loc="upper left", bbox_to_anchor=(0.0, 1.16), ncols=2)
-    axis.set(xlabel=f"x [{along}]", ylabel=f"height [{up}]", xlim=(primary.x[0] * mm, primary.x[-1] * mm))
-    return figure
+        marks = [marks[0] | {"colour": "soft", "name": "levelled trace"},
+                 line(waviness.x * mm, waviness.z * um, "warm", "waviness", most=POINTS, width=1.6)]
+    return draw([chart("", _place("x", along, primary.x * mm), axis("height", up), marks)], height=2.7)
 
 
-@styled
-def rough(roughness, ends: tuple, cutoff: float):
-    """Draw the roughness profile with its sections of one cut-off [m]; ends [m] of the trace."""
-    figure, (axis,) = drawing(1, 2.4)
-    along, mm = axis_unit(ends, "m")
-    up, um = axis_unit(roughness.z, "m")
-    x, z = thinned(roughness.x, roughness.z)
-    axis.plot(x * mm, z * um, color=BLUE, lw=0.7)
-    if (roughness.x[-1] - roughness.x[0]) / cutoff < 60:
-        for edge in np.arange(roughness.x[0], roughness.x[-1] + cutoff / 1e6, cutoff):
-            axis.axvline(edge * mm, color=GREY, lw=0.7, ls=":")
-    axis.set(xlabel=f"x [{along}]", ylabel=f"roughness [{up}]", xlim=(ends[0] * mm, ends[1] * mm))
-    return figure
+def rough(roughness, ends: tuple, cutoff: float) -> str:
+    """The roughness profile with its sections of one cut-off [m]; ends [m] of the trace."""
+    (along, mm), (up, um) = axis_unit(ends, "m"), axis_unit(roughness.z, "m")
+    marks, count = [line(roughness.x * mm, roughness.z * um, "accent", most=POINTS, width=0.7)], \
+        (roughness.x[-1] - roughness.x[0]) / cutoff
+    if count < 60:
+        marks += [mark("rule", "soft", x=(roughness.x[0] + k * cutoff) * mm, dash="dotted")
+                  for k in range(int(count + 1e-6) + 1)]
+    return draw([chart("", _place("x", along, np.array(ends) * mm), axis("roughness", up), marks)], height=2.4)
 
 
-@styled
-def statistics(abbott: tuple, core, spectrum, band: tuple, cutoff: float | None):
-    """Draw the Abbott curve with the straight line of its core, and the spectrum with its 95 % band."""
-    figure, (left, right) = drawing(2, 3.6)
-    ratio, height = abbott
-    up, um = axis_unit(height, "m")
-    left.plot(100 * ratio, height * um, color=BLUE)
+def statistics(abbott: tuple, core, spectrum, band: tuple, cutoff: float | None) -> str:
+    """The Abbott curve with the straight line of its core, and the spectrum with its 95 % band."""
+    (ratio, height), (up, um) = abbott, axis_unit(abbott[1], "m")
+    marks = [line(100 * ratio, height * um, "accent")]
     if core is not None:
-        left.plot([0, 100], [core.top * um, (core.top - core.core) * um], color=ORANGE, lw=1.2, ls="--")
-        for name, at, level in (("Mr1", core.first, core.top), ("Mr2", core.second, core.top - core.core)):
-            left.plot([100 * at], [level * um], "o", color=ORANGE, ms=5)
-            left.annotate(f"{name} {100 * at:.1f} %", (100 * at, level * um), xytext=(6, 6 if name == "Mr1" else -14),
-                          textcoords="offset points", fontsize=9, ha="left" if at < 0.8 else "right")
-    left.set(xlabel="material ratio [%]", ylabel=f"height [{up}]", title="Abbott curve", xlim=(0, 100))
-    _spectrum(right, spectrum, band, cutoff)
-    return figure
-
-
-def _spectrum(axis, spectrum, band: tuple, cutoff: float | None) -> None:
-    axis.set(ylabel="density [um$^3$]", title="Power spectral density")
+        low = core.top - core.core
+        marks.append(line([0, 100], [core.top * um, low * um], "warm", width=1.2, dash="dashed"))
+        marks += [mark("dots", "warm", f"{name} {100 * at:.1f} %", x=[100 * at], y=[height * um], shape=shape)
+                  for name, at, height, shape in (("Mr1", core.first, core.top, "circle"),
+                                                  ("Mr2", core.second, low, "square"))]
+    share = _place("material ratio", "%", [0, 100])
+    left, title = chart("Abbott curve", share, axis("height", up), marks), "Power spectral density"
     if not spectrum.density.any():
-        axis.text(0.5, 0.5, "the trace is flat", ha="center", transform=axis.transAxes)
-        return
-    name, scale = axis_unit([1 / spectrum.frequency[0] / 4], "m")
+        return draw([left, chart(f"{title}: the trace is flat", axis("wavelength"), axis("density"), [])])
+    name, scale = _wave(spectrum)
+    marks = _density(spectrum, scale, "accent", "95 % band", "")
+    ends = marks[-1]["x"]
+    if band[1] > 1 / spectrum.frequency[-1] and band[0] < 1 / spectrum.frequency[0]:
+        marks.append(mark("span", "soft", "band of band_amplitude", left=band[0] * scale, right=band[1] * scale))
+    if spectrum.dominant is not None:
+        marks.append(mark("rule", "warm", "dominant wavelength", x=spectrum.dominant * scale, dash="dashed"))
+    if cutoff is not None:
+        marks.append(mark("rule", "#4d4d4d", "cut-off", x=cutoff * scale, dash="dotted"))
+    waves = axis("wavelength", name, True) | {"range": [ends.min(), ends.max()]}
+    return draw([left, chart(title, waves, axis("density", "um$^3$", True), marks)])
+
+
+def _place(label: str, unit: str, x) -> dict:
+    """The axis of places x, all of which are shown."""
+    return axis(label, unit) | {"range": [x[0], x[-1]]}
+
+
+def _wave(spectrum) -> tuple:
+    return axis_unit([1 / spectrum.frequency[0] / 4], "m")
+
+
+def _density(spectrum, scale: float, colour: str, band: str, name: str) -> list:
+    """A spectrum over the wavelength with its 95 % band."""
     low, high = spectrum.band()
     pick = np.unique(np.round(np.geomspace(1, spectrum.frequency.size, CURVE)).astype(int)) - 1
+    pick = pick[spectrum.density[pick] > 0]
     waves = scale / spectrum.frequency[pick]
-    shown = spectrum.density[pick] > 0
-    cubic = 1e18  # um^3
-    axis.fill_between(waves[shown], low[pick][shown] * cubic, high[pick][shown] * cubic, color=BLUE, alpha=0.2, lw=0,
-                      label="95 % band")
-    axis.loglog(waves[shown], spectrum.density[pick][shown] * cubic, color=BLUE, lw=1.0)
-    ends = axis.get_xlim()
-    if band[1] > 1 / spectrum.frequency[-1] and band[0] < 1 / spectrum.frequency[0]:
-        axis.axvspan(band[0] * scale, band[1] * scale, color=GREY, alpha=0.18, lw=0, label="band of band_amplitude")
-    if spectrum.dominant is not None:
-        axis.axvline(spectrum.dominant * scale, color=ORANGE, lw=1.2, ls="--", label="dominant wavelength")
-    if cutoff is not None:
-        axis.axvline(cutoff * scale, color="0.3", lw=1.0, ls=":", label="cut-off")
-    axis.set(xlabel=f"wavelength [{name}]", xlim=ends)
-    axis.legend(loc="upper left", fontsize=8)
+    return [mark("band", colour, band, x=waves, low=low[pick] * VOLUME, high=high[pick] * VOLUME),
+            line(waves, spectrum.density[pick] * VOLUME, colour, name, width=1.0)]
 
 
 @styled
@@ -112,3 +98,75 @@ def scan(x, y, z):
     right.hist(known, bins=120, color=BLUE, weights=np.full(known.size, 100 / known.size))
     right.set(xlabel=f"height [{up}]", ylabel="share of the points [%]", title="Distribution of the heights")
     return figure
+
+
+def overlay(x, first, second, rest, where: tuple) -> str:
+    """Both traces (n,) [m] over x (n,) [m], the second laid on the first, and between them what wore off.
+
+    rest (n,) [m]: depth; where: (from, to) [m] of the closer view on the right.
+    """
+    (along, mm), (up, um) = axis_unit(x, "m"), axis_unit(np.concatenate([first, second]), "m")
+    marks = [line(x * mm, z * um, colour, name, most=POINTS, width=1.0)
+             for z, (colour, name) in zip((first, second), SIDES)]
+    marks.append(mark("band", "warm", "worn off", x=x * mm, low=np.where(rest > 0, second, np.nan) * um,
+                      high=first * um))
+    inside = (x >= where[0]) & (x <= where[1])
+    both = np.concatenate([first[inside], second[inside]]) * um
+    label, up = "x of the trace after", axis("height", up)
+    ends = [both.min() - 0.1 * np.ptp(both), both.max() + 0.15 * np.ptp(both)]
+    return draw([chart("Both traces", _place(label, along, x * mm), up, marks),
+                 chart("A part of them", _place(label, along, np.array(where) * mm), up | {"range": ends}, marks)],
+                height=3.4)
+
+
+def apart(before, after) -> str:
+    """Both traces for themselves, one above the other: their places have nothing in common."""
+    flat = [level(even(one)) for one in (before, after)]
+    along, mm = axis_unit(np.concatenate([one.x - one.x[0] for one in flat]), "m")
+    up, um = axis_unit(np.concatenate([one.z for one in flat]), "m")
+    lift = 1.1 * (np.ptp(flat[1].z) / 2 + np.ptp(flat[0].z) / 2)
+    marks = [line((one.x - one.x[0]) * mm, (one.z + by) * um, colour, name, most=POINTS, width=0.8)
+             for one, by, (colour, name) in zip(flat, (lift, 0.0), SIDES)]
+    return draw([chart("", axis("along the trace", along), axis("height, shifted", up), marks)], height=3.4)
+
+
+def difference(x, rest, used, noise: float | None, ends: tuple | None) -> str:
+    """The depth (n,) [m] of the trace after below its reference, and the unworn heights that carry it."""
+    (along, mm), (up, um) = axis_unit(x, "m"), axis_unit(rest, "m")
+    marks = [line(x * mm, rest * um, "warm", "depth of the trace after", most=POINTS, width=1.0),
+             line(x[[0, -1]] * mm, [0.0, 0.0], "#4d4d4d", width=0.8)]
+    if used is not None:
+        marks.append(mark("dots", "accent", "unworn: carries the registration", x=x[used] * mm, y=rest[used] * um,
+                          size=1.5))
+    if ends is not None:
+        marks.append(mark("span", "soft", "track", left=ends[0] * mm, right=ends[1] * mm))
+    room = 0.05 * np.ptp(rest)
+    down = axis("worn depth", up) | {"range": [(rest.max() + room) * um, (rest.min() - room) * um]}
+    return draw([chart("", _place("x of the trace after", along, x * mm), down, marks)], height=2.5)
+
+
+def both_statistics(curves: tuple, spectra: tuple, band: tuple) -> str:
+    """The Abbott curves ((ratio, height) each) and the spectra with their 95 % bands, before and after."""
+    up, um = axis_unit(np.concatenate([height for _, height in curves]), "m")
+    lines = [line(100 * ratio, height * um, *side) for (ratio, height), side in zip(curves, SIDES)]
+    unit, scale = _wave(spectra[0])
+    marks = [one for found, (colour, name) in zip(spectra, SIDES)
+             for one in _density(found, scale, colour, "", name)]
+    marks.append(mark("span", "warm", "band of the amplitude ratio", left=band[0] * scale, right=band[1] * scale))
+    return draw([chart("Abbott curves", _place("material ratio", "%", [0, 100]), axis("height", up), lines),
+                 chart("Power spectral density, 95 % bands", axis("wavelength", unit, True),
+                       axis("density", "um$^3$", True), marks)])
+
+
+def pressures(sides: list) -> str:
+    """The normal stress of the patch with each surface; sides: (x (n,) [m], stress (n,) [Pa], name)."""
+    along, mm = axis_unit(sides[0][0], "m")
+    unit, scale = axis_unit(np.concatenate([stress for _, stress, _ in sides]), "Pa")
+    top, made = 1.05 * max(float(stress.max()) for _, stress, _ in sides) * scale, []
+    for x, stress, name in sides:
+        colour = dict(map(reversed, SIDES))[name]
+        made.append(chart(f"Pressure with the surface {name}", _place("x", along, x * mm), axis(
+            "normal stress", unit) | {"range": [0.0, top]}, [
+                mark("band", colour, x=x * mm, low=0 * x, high=stress * scale),
+                line(x * mm, stress * scale, colour, width=0.9)]))
+    return draw(made, height=2.9)
