@@ -20,9 +20,11 @@ from ....response.rows import TABLE, first_harmonic
 from ....scene.rules.draft import pinned
 from ....structure.drive_sizes import largest
 from ...rig.pieces import read_off
+from .. import one_by_one
 from ..answers import Answers
 from . import lumped
 from .columns import ENDS, Runs, batch_answers
+from .pieces import LONGEST, SHORTEST
 
 LEAST = 64  # cases of a study that lanes serve
 TIGHTEST = 1e-4  # tolerance that lanes serve
@@ -37,8 +39,10 @@ RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a 
 
 def refuses(model: Model) -> str:
     """Why lanes do not take a model; "" where they do."""
-    if why := lumped.refuses(model):
+    if why := lumped.not_one_point(model):
         return why
+    if not SHORTEST <= model.rig.cycles <= LONGEST or not model.friction.static > 0:
+        return "its cycles are too few or too many, or nothing rubs"
     if model.friction.law not in ("coulomb", "elastic-plastic"):
         return "its law does not march in lanes"
     if model.accuracy.method != "auto" or pinned(model.accuracy) or model.accuracy.tolerance < TIGHTEST:
@@ -81,15 +85,24 @@ def _solved(models: Sequence[Model], say) -> Answers:
         found.numerics[case] = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
     found.seconds[:] = (perf_counter() - begin) / len(models)
     looked = checked(marks, ~exact)
-    ones = lumped.solve([models[case] for case in looked], say) if looked else None
+    ones = exactly([models[case] for case in looked], say) if looked else None
     if wrong := contradicted(found, ones, looked):
         exact[:] = True
         note = f"lanes said {wrong} otherwise than the exact engine in a check of {len(looked)} cases, so all are exact"
     if cases := np.flatnonzero(exact).tolist():
         lumped.take_out(found, cases)
-        found.place(cases, lumped.solve([models[case] for case in cases], say))
+        found.place(cases, exactly([models[case] for case in cases], say))
         for case in cases if wrong else ():
             found.notes[case] = [*found.notes.get(case, ()), note]
+    return found
+
+
+def exactly(models: Sequence[Model], say) -> Answers:
+    """Answers of models of a group by the exact batch; by runs of their own where that refuses them."""
+    found, fit = Answers.blank(len(models)), np.array([not lumped.refuses(model) for model in models])
+    for cases, batch in ((np.flatnonzero(fit), lumped), (np.flatnonzero(~fit), one_by_one)):
+        if cases.size:
+            found.place(cases, batch.solve([models[case] for case in cases], say))
     return found
 
 

@@ -18,15 +18,18 @@ TOGETHER = 1024  # cases of one compiled call, so that their histories of cycles
 
 def refuses(model: Model) -> str:
     """Why the batch does not take a model; "" where it does."""
+    return not_one_point(model) or pieces.refuses(model)
+
+
+def not_one_point(model: Model) -> str:
+    """Why a model is not one mode under one sine behind a point under a constant load; "" where it is."""
     rig = model.rig
     if model.kind != "rig" or model.patch is not None or model.wear is not None or model.measured is not None:
         return "it is not one lumped contact"
     if model.heat is not None or rig.load_varies or rig.names or rig.bends or len(rig.interfaces) != 1 \
             or not model.point.load > 0:
         return "its interface is not one point under a constant load"
-    if why := not_one_sine(rig):
-        return why
-    return pieces.refuses(model)
+    return not_one_sine(rig)
 
 
 def not_one_sine(rig) -> str:
