@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import numba
@@ -48,6 +49,41 @@ def slid(home: Path, cache: Path) -> dict:
     answer = json.loads(done.stdout)
     assert Path(answer["home"]).is_relative_to(home)
     return answer
+
+
+def begun(cache: Path, before: str = "") -> subprocess.Popen:
+    """A process that slides as `slid` does, under way; before: what it runs first."""
+    return subprocess.Popen([sys.executable, "-c", before + BENCH, SCENE], stdout=subprocess.PIPE, text=True,
+                            env=os.environ | {"PATCHFEM_CACHE": str(cache)})
+
+
+def test_exact_of_two_processes_on_an_empty_cache_one_compiles(tmp_path):
+    both = [begun(tmp_path) for _ in range(2)]
+    answers = [json.loads(one.communicate(timeout=300)[0]) for one in both]
+    assert sorted(one["numba"] for one in answers) == [False, True]
+    assert len({(one["work"], one["peak"]) for one in answers}) == 1
+
+
+def test_always_another_takes_over_from_a_process_that_is_killed_while_it_compiles(tmp_path):
+    mark = tmp_path / "compiles"
+    stuck = begun(tmp_path, f"""
+import pathlib, time
+from patchfem.compiled import machine
+def make(*arguments):
+    pathlib.Path({str(mark)!r}).touch()
+    time.sleep(600)
+machine.make = make
+""")
+    end = time.monotonic() + 120
+    while not mark.exists() and time.monotonic() < end:
+        time.sleep(0.05)
+    other = begun(tmp_path)
+    with pytest.raises(subprocess.TimeoutExpired):  # it waits
+        other.wait(8.0)
+    assert not list(tmp_path.rglob("*.code"))
+    stuck.kill()
+    assert json.loads(other.communicate(timeout=300)[0])["numba"] and list(tmp_path.rglob("*.code"))
+    stuck.communicate()
 
 
 def test_exact_an_edited_law_changes_the_answer_of_a_cached_bench(tmp_path):

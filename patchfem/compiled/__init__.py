@@ -27,6 +27,7 @@ from importlib.util import module_from_spec, spec_from_file_location, spec_from_
 from math import inf
 from operator import add, mul, neg, pos, sub, truediv
 from pathlib import Path
+from time import monotonic, sleep
 
 import numpy as np
 
@@ -42,6 +43,7 @@ TUPLES = "contacts/arrays.py", "smooth/arrays.py", "events/plant.py", "events/el
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # numba's own switch: all runs as the Python it is
 LEAST = 1 << 21  # bytes of the machine code of a run
 PATIENCE = 2.0  # CPU seconds of a function as Python in a process, from which on it is compiled: a tenth of that
+WAIT, LOOK = 300.0, 0.05  # s that a process waits at most for what another compiles: ten times the largest; how often
 UNKEPT = set()  # functions called here whose machine code cannot be kept: every process brings up numba for them
 _LISTENERS = []  # who is told when something is compiled
 ARITHMETIC = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv, ast.Pow: pow, ast.USub: neg, ast.UAdd: pos}
@@ -138,6 +140,36 @@ def tidied_later():
             gc.enable()
 
 
+@contextmanager
+def alone(path: Path):
+    """One process at a time within, by a lock on a file, which the system takes from a process that is killed.
+
+    Others wait, `WAIT` at most: on a network's file system the lock of a machine that is gone may stay. Where a file
+    system has no locks nobody waits.
+    """
+    try:
+        import fcntl
+
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        file = os.open(path, os.O_CREAT | os.O_RDWR, 0o600)
+    except (ImportError, OSError):  # Windows; a folder that cannot be written
+        yield
+        return
+    try:
+        end = monotonic() + WAIT
+        while monotonic() < end:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                sleep(LOOK)
+            except OSError:
+                break
+        yield
+    finally:
+        os.close(file)
+
+
 class Entry:
     """A function of a module of compiled code: its kept machine code where there is some, else by numba, or as Python
     while that costs little."""
@@ -187,10 +219,7 @@ class Entry:
                 with np.errstate(all="ignore"):
                     return getattr(plain(self.home.__name__), self.name)(*arguments)
             if code is None:
-                _tell()
-                with tidied_later():
-                    optimised = import_module(f"{__name__}.inner").optimised  # brings numba
-                    code = machine.make(path, self.function(), arguments, optimised)
+                code = self._made(path, arguments)
             if code is None:
                 with tidied_later():
                     answer = self.function()(*arguments)
@@ -200,6 +229,17 @@ class Entry:
                 return answer
             self.codes[kinds] = code
         return code(b"".join(words)) if code else self.function()(*arguments)
+
+    def _made(self, path: Path, arguments: tuple):
+        """Machine code made for arguments of these types, or by another process meanwhile; None where there is none."""
+        with alone(path.with_suffix(".lock")):
+            code = machine.found(path)
+            if code is None:
+                _tell()
+                with tidied_later():
+                    optimised = import_module(f"{__name__}.inner").optimised  # brings numba
+                    code = machine.make(path, self.function(), arguments, optimised)
+        return code
 
     def function(self):
         """The function of the module, which numba compiles or finds in its cache."""
