@@ -7,6 +7,11 @@ per law: `instance` writes it beside the compiled code, with the import of the l
 Numba's own switches are obeyed: NUMBA_DISABLE_JIT=1 runs every kernel as the Python that it is written in (a debugger
 or a measure of coverage sees each line), NUMBA_BOUNDSCHECK=1 compiles all anew and checks every index.
 
+Numba's level of optimisation stays its own, 3. Compile CPU s of the rig, Iwan, Bouc-Wen, tanh, LuGre and bonds at the
+levels 3, 2 and 1: 6.4 5.0 5.1, 23.0 24.3 21.8, 8.9 9.7 9.2, 7.8 8.5 7.8, 8.4 8.0 7.8, 8.8 8.9 9.0, in all 63, 64 and 61
+on a busy machine, for most of it is numba's own Python. Iwan's loop then takes 7.9, 10.1 and 10.0 ms, others up to a
+sixth more.
+
 `inner` has the `njit` of all kernels. `load` and `instance` give `Kernels`, which import the module of compiled code,
 and with it numba, only where a function of it is called whose machine code is not kept yet (`machine`). A function
 whose caller says what its work would cost as Python (`Entry.expect`) runs as Python (`plain`) while that is little: a
