@@ -17,7 +17,7 @@ from ...surface.profile import Profile, even, level
 from ...surface.quantity import LEVEL, Quantity
 from ...surface.roughness.parameters import Heights, abbott
 from ...surface.roughness.spectrum import BAND
-from ..drawing.inline import CSS, placed
+from ..drawing import inline
 from ..pages.words import pair
 from . import pictures
 
@@ -153,23 +153,18 @@ def page(parts: list, found: tuple, pressing: Pressed | None = None) -> str:
     headline, sentences = found
     names = [Path(each.source).name for each in (parts[0].before, parts[0].after)]
     title = f"{names[0]} and {names[1]}: before and after"
-    body = [f"<h1>{escape(title)}</h1><p class=soft>patchfem {escape(__version__)}</p>",
-            f"<div class=verdict><b>{escape(headline[0].upper() + headline[1:])}.</b>"
+    body = [f"<div class=verdict><b>{escape(headline[0].upper() + headline[1:])}.</b>"
             + "".join(f"<p>{escape(text)}</p>" for text in sentences) + "</div>"]
-    told = [text for one in parts for text in one.notes]
-    if told:
-        body.append("<div class='verdict warn'>" + "".join(f"<p>{escape(text)}.</p>" for text in told) + "</div>")
+    body.append(inline.warned([f"{text}." for one in parts for text in one.notes]))
     for number, one in enumerate(parts):
         if len(parts) > 1:
             body.append(f"<h2>Along {escape(one.direction)}</h2>")
-        body += [_figure(f"{number}{place}", *each) for place, each in enumerate(figures(one))]
+        body += [inline.placed(f"{number}{place}", *each) for place, each in enumerate(figures(one))]
         body.append(_table(one))
     body.append(f"<p class=soft>{escape(NOTE)}</p>")
     if pressing is not None:
         body.append(_pressing(pressing))
-    text = "\n".join(body)
-    return (f"<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content='width=device-width'>"
-            f"<title>{escape(title)}</title><style>{CSS}</style></head><body>{text}</body></html>\n")
+    return inline.page(title, "\n".join(body))
 
 
 def figures(one: Comparison) -> list:
@@ -224,11 +219,6 @@ def _closer(x, worn) -> tuple:
     return at - half, at + half
 
 
-def _figure(number: str, svg: str, caption: str, alternative: str) -> str:
-    svg = svg.replace("<svg", f'<svg role="img" aria-label="{escape(alternative, quote=True)}"', 1)
-    return placed(number, svg, caption)
-
-
 def _table(one: Comparison) -> str:
     rows = []
     for key, quantity in one.values.items():
@@ -245,15 +235,14 @@ def _pressing(found: Pressed) -> str:
     parts = [f"<h2>{escape(found.title)}, pressed with each surface</h2>"]
     told = [*found.failed, *(f"{name}: {text}" for name, one in (("before", found.before), ("after", found.after))
                              if one is not None for text in one.warnings)]
-    if told:
-        parts.append("<div class='verdict warn'>" + "".join(f"<p>{escape(text)}</p>" for text in told) + "</div>")
+    parts.append(inline.warned(told))
     sides = [(one.x, one.stress, name) for name, one in (("before", found.before), ("after", found.after))
              if one is not None]
     if sides:
         peaks = ", ".join(f"{name} {_said('pressure_peak', one.measures.get('pressure_peak'))}" for name, one in
                           (("before", found.before), ("after", found.after)) if one is not None)
-        parts.append(_figure("p", pictures.pressures(sides), "Normal stress of the pressed patch; all else in the "
-                             "scene is the same.", f"Pressure along the patch, largest: {peaks}"))
+        parts.append(inline.placed("p", pictures.pressures(sides), "Normal stress of the pressed patch; all else in "
+                                   "the scene is the same.", f"Pressure along the patch, largest: {peaks}"))
         rows = ""
         for name, words, *measures in found.rows():
             cells = "".join(f"<td class=n>{escape(_said(name, one))}</td>" for one in measures)

@@ -3,14 +3,12 @@
 from html import escape
 from pathlib import Path
 
-from ... import __version__
 from ...core import say
 from ...disk.whole import write_text
 from ...scales import LADDERS, plain, step_of
 from ...surface.quantity import Quantity
 from ...surface.roughness.report import RoughnessReport
 from ..drawing import inline
-from ..drawing.inline import CSS
 from . import pictures
 
 AREAL = ("Interval: 5 to 95 %, of the mean over all scans of this size on a surface with Gaussian heights and the "
@@ -93,9 +91,7 @@ def page(reports: list) -> str:
     """The page of one or several surfaces, nothing fetched."""
     title = "Roughness of " + ", ".join(Path(one.source).name for one in reports)
     body = "\n".join(_section(number, one, len(reports) > 1) for number, one in enumerate(reports))
-    return (f"<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content='width=device-width'>"
-            f"<title>{escape(title)}</title><style>{CSS}</style></head><body><h1>{escape(title)}</h1>"
-            f"<p class=soft>patchfem {escape(__version__)}</p>{body}</body></html>\n")
+    return inline.page(title, body)
 
 
 def write_page(path: Path, reports: list) -> None:
@@ -107,11 +103,10 @@ def _section(number: int, report: RoughnessReport, several: bool) -> str:
     parts = [f"<h2>{escape(report.source)}</h2>"] if several else []
     parts += [f"<p class=verdict>{verdict(report)}</p>", f"<p class=soft>{escape(heading(report))}.</p>"]
     told = [*report.notes, *([report.tip.sentence] if report.tip is not None and not report.tip.reaches else [])]
-    if told:
-        parts.append("<div class='verdict warn'>" + "".join(f"<p>{escape(text)}.</p>" for text in told) + "</div>")
+    parts.append(inline.warned([f"{text}." for text in told]))
     if report.tip is not None and report.tip.reaches:
         parts.append(f"<p class=soft>Stylus: {escape(report.tip.sentence)}.</p>")
-    parts += [_figure(f"{number}{place}", *one) for place, one in enumerate(figures(report))]
+    parts += [inline.placed(f"{number}{place}", *one) for place, one in enumerate(figures(report))]
     return "\n".join([*parts, _table(report), _printed(report), _definitions(report)])
 
 
@@ -155,11 +150,6 @@ def figures(report: RoughnessReport) -> list:
                 "degrees of freedom.",
                 f"Abbott curve and power spectral density; the dominant wavelength is {_said(wave)}"))
     return out
-
-
-def _figure(number: str, svg: str, caption: str, alternative: str) -> str:
-    svg = svg.replace("<svg", f'<svg role="img" aria-label="{escape(alternative, quote=True)}"', 1)
-    return inline.placed(number, svg, caption)
 
 
 def _table(report: RoughnessReport) -> str:
