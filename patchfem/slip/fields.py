@@ -44,8 +44,7 @@ def shear_of(patch, law: Bonds, count: int | None, tolerance: float):
     """ShearModes of the pressed patch for a bond law: `count` of them, or as many as the tolerance asks for.
 
     The limit of a node is mu_s sigma_n times its share of the interface [N]; the bonds' length [m] is a spring in
-    series. Their
-    number is doubled until the error of the backbone is a tenth of the tolerance.
+    series. Unless named, the number is doubled until the error of the backbone is a tenth of the tolerance.
     """
     limit = law.static * patch.pressure.sigma_n * patch.pieces.interface.weight
     weakening = 1 / law.ratio if law.ratio > 0 else np.inf
