@@ -26,9 +26,10 @@ def scene(tmp_path):
 def test_exact_a_patch_needs_no_motion(scene):
     modules = loaded(FROM_PYTHON, scene(PATCH))
     absent(modules, "friction", "structure", "dynamics", "response", "inputs", "wear", "identify", "runs.bench",
-           "runs.rig", "runs.wear", "model.slide", "model.structure", "compiled", "surface", "contact.skin",
-           "contact.skin_laws", "contact.strips", "contact.gradients", "elasticity.mortar", "elasticity.substructure",
-           "elasticity.fronts", "skfem", "slip.tangent", "elasticity.recovery", "mesh.anymesh", "export", "scipy")
+           "runs.rig", "runs.wear", "model.slide", "model.structure", "closed_forms.contact", "compiled", "surface",
+           "contact.skin", "contact.skin_laws", "contact.strips", "contact.gradients", "elasticity.mortar",
+           "elasticity.substructure", "elasticity.fronts", "elasticity.recovery", "mesh.anymesh", "slip.tangent",
+           "export", "skfem", "scipy")
     assert {"patchfem.contact.unilateral", "patchfem.mesh.tensor"} <= modules
 
 

@@ -3,11 +3,13 @@
 In: sizes in SI units, shapes as each docstring says. Out: closed forms, or one scalar equation solved to round-off.
 `contact` has Hertz, punches, waves, wedges and layers; `friction` the bond law of eqs. 2.10 to 2.17 along given
 slides; `dynamics` one mode with Coulomb friction; `wear` depths under a steady slip.
-Nothing here uses the rest of the package, so tests may trust it. Read `contact` first.
+Nothing here uses the rest of the package but `later`, so tests may trust it. Read `contact` first.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING
+
+from ..later import modules_of
 
 if TYPE_CHECKING:
     from .contact import (
@@ -118,4 +120,4 @@ def __getattr__(name: str):
         found = getattr(import_module(f"{__name__}.{home}"), name, None)
         if found is not None:
             return found
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return modules_of(__name__, __path__)(name)

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from ...closed_forms.contact import rounded_corner
+from ...closed_forms import contact
 from ...contact import edges
 from ...core import Outcome
 from ...elasticity.lapack import one_thread
@@ -166,7 +166,7 @@ def unresolved_rounding(patch: Patch) -> float:
         cell = np.diff(x)[max(at - 1, 0):at + 1].max()
         if abs(abs(x[at]) - flat) > 2 * cell:  # the contact ends elsewhere
             continue
-        reach, peak = rounded_corner(sigma[max(at - 2, 0):at + 3].max() * np.sqrt(cell), radius, modulus)
+        reach, peak = contact.rounded_corner(sigma[max(at - 2, 0):at + 3].max() * np.sqrt(cell), radius, modulus)
         found = max(found, peak if FINE * cell > reach else 0.0)
     return found
 

@@ -16,8 +16,7 @@ from ...model.law import Rubbing, bonds_of
 from ...model.model import Model
 from ...slip.fields import shear_of
 from ...structure.drive_sizes import omega_of
-from ..bench import rigid
-from ..bench.averaged import limit_share
+from ..bench import averaged, rigid
 from ..patch.kept import elements, strip_elements
 from . import strips, varying_load
 from .lists import quadrature_of
@@ -99,7 +98,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
     if has(f.law, "bonds"):
         return _bonds(model, numerics, patch, load)
     if has(f.law, "averaged"):
-        return models.coulomb_model(*(f.static * load * limit_share(model, patch),) * 2)
+        return models.coulomb_model(*(f.static * load * averaged.limit_share(model, patch),) * 2)
     one = law_from(f, load).element(load)
     if not soft:
         return models.element_model(one)

@@ -12,11 +12,11 @@ from ...response.measures import peaks_between, step_harmonic
 from ...response.spectrum import friction_harmonic, motion_harmonic
 from ...structure.drive_sizes import omega_of, peak_speed, sinusoidal, whole
 from . import levels as rig_levels
+from . import strips
 from .interface import contact_of
 from .lists import quadrature_of
 from .reading import Reader
 from .solution import Solution, sampled_loop
-from .strips import mark_as_one, run_of_strips
 
 LATE = 1.5  # times what an end beside the asked one changes to first order
 
@@ -40,7 +40,7 @@ def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) ->
     done = hub.march(rig.modes, rig.drive, contact, numerics.cycles, numerics.steps, numerics.window, rig.travel,
                      frames, say, progress, rig.start, rig_levels.level_ends(rig), numerics.whole)
     seconds = perf_counter() - begin
-    done = run_of_strips(done, patch) if rig.strips_slide_apart else done
+    done = strips.run_of_strips(done, patch) if rig.strips_slide_apart else done
     return contact, done, seconds, {"reduce": reduced, "compiled_code": loaded}
 
 
@@ -125,6 +125,6 @@ class MarchReader(Reader):
             run = done.marks[number].after.fork(other) if number >= 0 else hub.fresh(
                 rig.modes, other, self.contact, numerics.steps, rig.travel, rig.start)
             mark = run.mark(round(rig.level_cycles), numerics.window)
-            return self.level(level, mark_as_one(mark, self.patch) if rig.strips_slide_apart else mark, other)
+            return self.level(level, strips.mark_as_one(mark, self.patch) if rig.strips_slide_apart else mark, other)
 
         return tuple(self.level(size, mark) for size, mark in zip(rig.levels, done.marks)), probe
