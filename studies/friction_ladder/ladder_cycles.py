@@ -49,11 +49,11 @@ def harmonic(amplitude: float, steps: int = STEPS, path: float = 20.0) -> np.nda
 
 
 def followed(model, amplitude: float, steps: int = STEPS) -> Cycle:
-    """Last of the cycles of a model of the hub whose lengths are in metres and whose limit is in mu_s N."""
+    """Last of the cycles of a model of the loops whose lengths are in metres and whose limit is in mu_s N."""
     path = LENGTH * harmonic(amplitude, steps)
-    contact, work = model.build(loop_kernels)
+    contact = model.build()
     forces, energies = np.zeros((path.size, 3)), np.zeros((path.size, 2))
-    if loop_kernels.follow_path(path, 1 / (HERTZ * steps), model.kind, contact, work, 1e-11, energies, forces):
+    if loop_kernels.follow_path(path, 1 / (HERTZ * steps), model.kind, contact, 1e-11, energies, forces):
         raise ArithmeticError("a step did not converge")
     return Cycle(np.diff(path)[-steps:] / LENGTH, forces[-steps - 1:-1, 1])
 

@@ -27,12 +27,12 @@ def along(law, path, dt, tail, merge, repeats=1) -> tuple:
     """(forces at the samples, microseconds per step, longest list) of one engine."""
     model = list_model(law, 1.0, cutoff(law.order, tail) if tail else np.inf, merge)
     model.fields["bondlist"] = np.zeros((10, ROOM)) if not merge else model.fields["bondlist"]
-    hub, best = load_kernels(), np.inf
+    loops, best = load_kernels(), np.inf
     for _ in range(repeats):
-        contact, work = model.build(hub)
+        contact = model.build()
         energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
         begin = process_time()
-        bad = hub.follow_path(path, dt, model.kind, contact, work, 1e-11, energies, forces)
+        bad = loops.follow_path(path, dt, model.kind, contact, 1e-11, energies, forces)
         best = min(best, process_time() - begin)
         assert bad == 0
     return forces[:, 0], 1e6 * best / (path.size - 1), int(contact.tally[10])

@@ -41,14 +41,14 @@ def path_of(amplitude: float, cycles: int = CYCLES, steps: int = STEPS) -> np.nd
 
 def compiled(model, path, dt: float, repeats: int = 3) -> tuple:
     """(seconds per step, strips of the list at the end, 1 without one) of the compiled loop."""
-    hub, best = load_kernels(), np.inf
+    loops, best = load_kernels(), np.inf
     for _ in range(repeats):
         spent, runs = 0.0, 0
         while spent < LEAST:
-            contact, work = model.build(hub)
+            contact = model.build()
             energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
             begin = process_time()
-            hub.follow_path(path, dt, model.kind, contact, work, 1e-11, energies, forces)
+            loops.follow_path(path, dt, model.kind, contact, 1e-11, energies, forces)
             spent, runs = spent + process_time() - begin, runs + 1
         best = min(best, spent / runs)
     tally = getattr(contact, "tally", np.zeros(11))  # points keep no list

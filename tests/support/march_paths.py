@@ -25,10 +25,10 @@ def one_mode(omega, zeta, mass):
 
 
 def follow(model, path, dt=0.3):
-    """(force at the samples, step means, slip), (dissipated, stored), unconverged, contact of hub.follow_path."""
-    hub = load_kernels()
-    contact, work = model.build(hub)
+    """(force at the samples, step means, slip), (dissipated, stored), unconverged, contact of loops.follow_path."""
+    loops = load_kernels()
+    contact = model.build()
     energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
-    bad = hub.follow_path(np.ascontiguousarray(path, float), dt, model.kind, contact, work, GOAL * model.limit,
+    bad = loops.follow_path(np.ascontiguousarray(path, float), dt, model.kind, contact, GOAL * model.limit,
                           energies, forces)
     return forces, energies, bad, contact

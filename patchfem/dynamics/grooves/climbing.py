@@ -124,7 +124,7 @@ class ClimbingModel(FlankModel):
 
     @property
     def kind(self) -> tuple:
-        """(contact, law): what the hub takes an instance of its loop for."""
+        """(contact, law): what `march.instances` takes an instance of its loop for."""
         return HERE, ""
 
     @property
@@ -142,10 +142,10 @@ class ClimbingModel(FlankModel):
         """The class that marches it."""
         return ClimbingRun
 
-    def build(self, hub=None) -> tuple:
-        """(Climbing, None) with arrays of their own, at rest at the slide 0."""
+    def build(self) -> Climbing:
+        """The Climbing with arrays of its own, at rest at the slide 0."""
         law, share, (flank, at, normal) = self.law, np.array(self.share, float), self.flank(self.law.kind)
-        return Climbing(flank, at, share, *rub_of(law, normal * share, self.shear, self.limit)), None
+        return Climbing(flank, at, share, *rub_of(law, normal * share, self.shear, self.limit))
 
     def shown(self, contact) -> dict:
         """Of pieces that give way the points' friction along the flank [N], what is elastic there [m] and their share
@@ -174,7 +174,7 @@ class ElementsModel(FlankModel):
 
     @property
     def kind(self) -> tuple:
-        """(contact, law): what the hub takes an instance of its loop for."""
+        """(contact, law): what `march.instances` takes an instance of its loop for."""
         return HERE, self.element.kernels
 
     @property
@@ -187,12 +187,12 @@ class ElementsModel(FlankModel):
         """The class that marches it."""
         return FlankRun
 
-    def build(self, hub=None) -> tuple:
-        """(Flanked, None) with arrays of their own, at rest at the slide 0."""
+    def build(self) -> Flanked:
+        """The Flanked with arrays of its own, at rest at the slide 0."""
         law, (flank, at, _) = self.element, self.flank(-1.0)
         bound = law.limit if law.bounded else np.inf
         return Flanked(flank, at, np.array(law.numbers[None]), np.array(law.memory[None]),
-                       np.array(law.memory[None]), np.array([bound])), None
+                       np.array(law.memory[None]), np.array([bound]))
 
 
 class GroovesRun(Run):
@@ -219,8 +219,8 @@ class GroovesRun(Run):
 class FlankRun(GroovesRun):
     """The arrays of a march of a contact along flanks, and its clock."""
 
-    def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
-        super().__init__(modes, drive, model, steps_per_cycle, travel, hub, start)
+    def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
+        super().__init__(modes, drive, model, steps_per_cycle, travel, loops, start)
         q, v = self.modes.slide @ self.state[0], self.modes.slide @ self.state[1]
         steep, at = float(model.grooves.slope(q)), self.contact.now_at
         begin = float(model.swing.about(model.load, 0.0))

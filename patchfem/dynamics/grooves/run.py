@@ -47,8 +47,8 @@ class GroovesModel(FlankModel):
         """The class that marches it."""
         return SampledRun
 
-    def build(self, hub):
-        """(contact, None) that nothing uses."""
+    def build(self):
+        """A contact that nothing uses."""
         return coulomb_model(0.0, 0.0).build()
 
 
@@ -65,8 +65,8 @@ def model_of(grooves: Grooves, load: float, static: float, kinetic: float, speed
 class SampledRun(GroovesRun):
     """The arrays of a march over grooves, its clock, and the motion that is sampled."""
 
-    def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
-        super().__init__(modes, drive, model, steps_per_cycle, travel, hub, start)
+    def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
+        super().__init__(modes, drive, model, steps_per_cycle, travel, loops, start)
         self.width += 1
         self._begin()
         self.ledger[0] += self.strained()

@@ -56,10 +56,10 @@ def march(model, *arguments) -> tuple:
     return loop_of(model.kind, model.laws, model.loading, there, several).march(*arguments)
 
 
-def follow_path(path, dt, kind, contact, work, goal, energies, forces) -> int:
+def follow_path(path, dt, kind, contact, goal, energies, forces) -> int:
     """Drive a contact of this kind along a prescribed path: `loop_kernels.follow`. Number of steps that failed.
 
-    path (k,) [m] at steps of dt [s]; goal: relative residual of a step; energies and forces are filled; work: unused.
+    path (k,) [m] at steps of dt [s]; goal: relative residual of a step; energies and forces are filled.
     """
     return loop_of(kind).follow(path, float(dt), contact, float(goal), energies, forces)
 

@@ -84,6 +84,6 @@ class JointsModel:
         """What a picture needs of the patch's memory (ContactModel.shown), {} without a patch."""
         return self.patch.shown(contact) if self.patch is not None else {}
 
-    def build(self, hub=None):
-        """(contact, None) of the patch with arrays of their own; an idle point where there is none."""
+    def build(self):
+        """The contact of the patch with arrays of its own; an idle point where there is none."""
         return (self.patch or free_model()).build()

@@ -199,10 +199,10 @@ def _joined(parts) -> tuple:
 class Run:
     """The arrays of one march and its clock."""
 
-    def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
-        self.modes, self.drive, self.model, self.travel, self.hub = modes, drive, model, travel, hub
+    def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
+        self.modes, self.drive, self.model, self.travel, self.loops = modes, drive, model, travel, loops
         self.prop = propagator(modes, drive, steps_per_cycle, getattr(model, "rows", None))
-        self.contact = model.build(hub)[0]
+        self.contact = model.build()
         self.state = np.zeros((2, modes.omega.size))
         if start is not None:
             self.state[:] = start.z, start.v
@@ -283,8 +283,8 @@ class Run:
 
     def _slid(self, path) -> None:
         """Move the memory of the contact along a slide, path (2,) [m], in a second."""
-        self.hub.follow_path(path, 1.0, self.model.kind, self.contact, None, GOAL * self.model.limit, np.zeros((2, 2)),
-                             np.zeros((2, 3)))
+        self.loops.follow_path(path, 1.0, self.model.kind, self.contact, GOAL * self.model.limit, np.zeros((2, 2)),
+                               np.zeros((2, 3)))
 
     def books_anew(self) -> None:
         """Begin the books here, with the energies that are there, at the start of a cycle of a drive that repeats."""
@@ -381,8 +381,8 @@ class Run:
     def _steps(self, count: int, rows) -> tuple:
         """March `count` steps into rows (count + 1, width): (steps done, status)."""
         table, row = self.table(count)
-        return self.hub.march(self.model, row, count, self.state, self.plant, table, self.contact, self.faces,
-                              self._load(count), float(self.travel), self.ledger, rows)
+        return self.loops.march(self.model, row, count, self.state, self.plant, table, self.contact, self.faces,
+                                self._load(count), float(self.travel), self.ledger, rows)
 
     def _pressing(self):
         """The load at the start: one that stays."""
@@ -478,8 +478,8 @@ class Run:
     def strained(self) -> float:
         """Energy stored in what rubs, in springs and in the contact that presses [J]."""
         n, rows = 2 * self.modes.omega.size, np.zeros((1, self.width))
-        self.hub.march(self.model, 0, 0, self.state, self.plant, np.zeros((1, 1)), self.contact, self.faces,
-                       self._load(0), np.inf, np.zeros(9), rows)
+        self.loops.march(self.model, 0, 0, self.state, self.plant, np.zeros((1, 1)), self.contact, self.faces,
+                         self._load(0), np.inf, np.zeros(9), rows)
         springs = [one.potential(part[0]) for one, part in zip(self.model.joints, self._elements(rows)[0])
                    if one.potential is not None]
         normal = rows[0, -3] if self.model.loading else 0.0  # of the preloaded contact

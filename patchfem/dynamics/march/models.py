@@ -91,10 +91,10 @@ class ContactModel:
             return {}
         return {"bonds": contact.points[:5, :self.reduction.points.size].copy(), "b": contact.b.copy()}
 
-    def build(self, hub=None):
-        """(contact, None) with arrays of their own."""
+    def build(self):
+        """The contact with arrays of its own."""
         made = {k: np.array(v, dtype=np.float64, order="C") for k, v in self.fields.items()}
-        return self.tuple_of(**made), None
+        return self.tuple_of(**made)
 
 
 def element_model(element: Element, reduction=None) -> ContactModel:

@@ -175,12 +175,12 @@ class VaryingLoadModel:
             return "dynamics.contacts.pressed_points_kernels", ""
         return IDLE if self.set_valued else (IDLE[0], "friction.laws.tanh_kernels")
 
-    def build(self, hub=None) -> tuple:
-        """(contact, None) with arrays of their own, under the preload."""
+    def build(self):
+        """The contact with arrays of its own, under the preload."""
         law = self.law
         if self.pointed:
             now = np.full(1 if self.load is not None else self.sets.x.size, self.preload)
-            return arrays.Rub(*rub_of(law, now, self.shear, self.limit)), None
+            return arrays.Rub(*rub_of(law, now, self.shear, self.limit))
         return element_model(Rate(law.static, law.force[1] if law.kind == RATE else 1.0).element(self.preload)).build()
 
     def shown(self, contact) -> dict:

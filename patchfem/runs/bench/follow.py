@@ -41,8 +41,8 @@ def follow_path(model, time, slide, frames: int, watch: Watch, paced: bool = Fal
 
     paced: whether the law feels how fast it slides. Missing where a list of bonds outgrows its room.
     """
-    hub = load_kernels(watch.say)
-    contact, work = model.build(hub)
+    loops = load_kernels(watch.say)
+    contact = model.build()
     at = frame_numbers(slide.size, frames)
     turns = _new_pace(time) if paced else np.zeros(0, int)
     last = slide.size - 1
@@ -53,8 +53,9 @@ def follow_path(model, time, slide, frames: int, watch: Watch, paced: bool = Fal
         kept = keep(contact)
 
         def slid(contact, a=a, b=b):
-            return hub.follow_path(slide[a:b + 1].copy(), float(time[b] - time[a]) / float(b - a), model.kind, contact,
-                                   work, GOAL * model.limit, energies[a:b + 1], forces[a:b + 1])
+            dt = float(time[b] - time[a]) / float(b - a)
+            return loops.follow_path(slide[a:b + 1].copy(), dt, model.kind, contact, GOAL * model.limit,
+                                     energies[a:b + 1], forces[a:b + 1])
 
         failed = slid(contact)
         while failed and kept is not None:  # a list of bonds misses nothing but room

@@ -5,7 +5,7 @@ from time import perf_counter
 import numpy as np
 
 from ...dynamics.integrated import Integrated
-from ...dynamics.march import march as hub
+from ...dynamics.march import march as engine
 from ...effects import has
 from ...response.ends import end_error
 from ...response.measures import peaks_between, step_harmonic
@@ -33,11 +33,11 @@ def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) ->
     rig, begin = model.rig, perf_counter()
     contact = contact_of(model, numerics, patch)
     reduced = perf_counter() - begin
-    hub.warm_up(rig.modes, rig.drive, contact, say)
+    engine.warm_up(rig.modes, rig.drive, contact, say)
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
     frames = 0 if rig.strips_slide_apart else frames  # strips have no common field of shear
-    done = hub.march(rig.modes, rig.drive, contact, numerics.cycles, numerics.steps, numerics.window, rig.travel,
+    done = engine.march(rig.modes, rig.drive, contact, numerics.cycles, numerics.steps, numerics.window, rig.travel,
                      frames, say, progress, rig.start, rig_levels.level_ends(rig), numerics.whole)
     seconds = perf_counter() - begin
     done = strips.run_of_strips(done, patch) if rig.strips_slide_apart else done
@@ -122,7 +122,7 @@ class MarchReader(Reader):
 
         def probe(number, level):
             other = rig_levels.drive_with(rig.drive, number + 1, level)
-            run = done.marks[number].after.fork(other) if number >= 0 else hub.fresh(
+            run = done.marks[number].after.fork(other) if number >= 0 else engine.fresh(
                 rig.modes, other, self.contact, numerics.steps, rig.travel, rig.start)
             mark = run.mark(round(rig.level_cycles), numerics.window)
             return self.level(level, strips.mark_as_one(mark, self.patch) if rig.strips_slide_apart else mark, other)

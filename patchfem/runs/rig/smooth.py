@@ -4,7 +4,7 @@ from dataclasses import replace
 from time import perf_counter
 
 from ...dynamics.integrated import Integrated
-from ...dynamics.smooth import run as hub
+from ...dynamics.smooth import run as engine
 from ...response.measures import slip_noise
 from ...response.rows import row_of
 from .interface import contact_of
@@ -25,10 +25,10 @@ def smooth_run(model, numerics, patch, frames: int = 0, say=None, progress=None)
     """(Solution without what it leaves open itself, SmoothResult, Smooth that tells it); arguments as `run_smooth`."""
     rig, begin = model.rig, perf_counter()
     contact = contact_of(model, numerics, patch)
-    hub.loops_of(contact.element.kernels, say)
+    engine.loops_of(contact.element.kernels, say)
     loaded = perf_counter() - begin
     begin = perf_counter()
-    done = hub.simulate(rig.modes, rig.drive, contact.element, numerics.cycles, numerics.local, numerics.window,
+    done = engine.simulate(rig.modes, rig.drive, contact.element, numerics.cycles, numerics.local, numerics.window,
                         rig.travel, frames, rig.start, progress)
     reader = SmoothReader(model, numerics, patch, contact)
     return reader.solution(done, perf_counter() - begin, prepare={"compiled_code": loaded}, extra={
@@ -39,7 +39,7 @@ class SmoothReader(Reader):
     """What a finished run of high order shows: what the integrator knows comes before what samples show."""
 
     def __init__(self, model, numerics, patch, contact):
-        super().__init__(model, numerics, patch, contact, 1e-3 * contact.length, hub.SAMPLES)
+        super().__init__(model, numerics, patch, contact, 1e-3 * contact.length, engine.SAMPLES)
 
     def integrated(self, run, drive) -> Integrated:
         """What the polynomials of the steps give."""

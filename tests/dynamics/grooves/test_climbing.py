@@ -68,8 +68,8 @@ def test_exact_a_slow_slide_by_the_numpy_law(law, swing):
     """Under a load that swings the energy in the height is what was done against it, int N dz."""
     grooves, slide = Grooves(80e-6, 7.5e-6, 0.4), 30e-6 * np.sin(np.linspace(0, 7.3, 101))
     model = ClimbingModel(grooves, LOAD, LAWS[law][0](2e-6), swing=swing)
-    forces, energies, contact = np.zeros((101, 3)), np.zeros((101, 2)), model.build()[0]
-    assert follow_path(slide, 1e-3, model.kind, contact, None, 1e-9, energies, forces) == 0
+    forces, energies, contact = np.zeros((101, 3)), np.zeros((101, 2)), model.build()
+    assert follow_path(slide, 1e-3, model.kind, contact, 1e-9, energies, forces) == 0
     mean, lost = twin(LAWS[law][1](2e-6), grooves, slide, swing.about(LOAD, 1e-3 * np.arange(101)))
     np.testing.assert_allclose(forces[:-1, 1], mean, rtol=1e-9, atol=1e-9 * LOAD)
     np.testing.assert_allclose(energies[:-1, 0], lost, rtol=1e-7, atol=1e-12 * lost.sum())
@@ -94,8 +94,8 @@ def test_exact_a_slide_one_way_is_coulombs_beyond_the_bonds(law):
     bond length, over which the normal force changes."""
     grooves, slide = Grooves(80e-6, 7.5e-6, 0.4), np.linspace(0, 160e-6, 16001)
     model = ClimbingModel(grooves, LOAD, LAWS[law][0](2e-8))
-    forces, energies, contact = np.zeros((slide.size, 3)), np.zeros((slide.size, 2)), model.build()[0]
-    assert follow_path(slide, 1e-3, model.kind, contact, None, 1e-9, energies, forces) == 0
+    forces, energies, contact = np.zeros((slide.size, 3)), np.zeros((slide.size, 2)), model.build()
+    assert follow_path(slide, 1e-3, model.kind, contact, 1e-9, energies, forces) == 0
     true = LOAD * grooves.ratio(slide, 1.0, MU)
     np.testing.assert_allclose(forces[50:-1, 0], true[50:-1], rtol=0, atol=2e-3 * true.max())
 
@@ -133,7 +133,7 @@ def test_exact_a_motion_may_start_on_a_flank(law):
     normal = LOAD * np.hypot(1, grooves.slope(place))
     model = ClimbingModel(grooves, LOAD, LAWS[law][0](2e-6))
     on = fresh(BASIS, DRIVE, model, 100, start=Start(np.array([place]), np.zeros(1))).contact
-    flat = ClimbingModel(Grooves(80e-6, 0.0), normal, LAWS[law][0](2e-6)).build()[0]
+    flat = ClimbingModel(Grooves(80e-6, 0.0), normal, LAWS[law][0](2e-6)).build()
     for there, here in zip((on.before, on.now, on.memory), (flat.before, flat.now, flat.memory)):
         np.testing.assert_allclose(there, here, rtol=1e-14)
 

@@ -46,10 +46,10 @@ def model(name, grooves=GROOVES, length=2e-6, swing=STEADY):
 
 
 def slid(name, grooves, slide, dt=1e-3, swing=STEADY):
-    contact = model(name, grooves, swing=swing).build()[0]
+    contact = model(name, grooves, swing=swing).build()
     forces, energies = np.zeros((slide.size, 3)), np.zeros((slide.size, 2))
     kind = model(name, grooves).kind
-    assert follow_path(slide, dt, kind, contact, None, 1e-9, energies, forces) == 0
+    assert follow_path(slide, dt, kind, contact, 1e-9, energies, forces) == 0
     return forces, energies
 
 
@@ -185,7 +185,7 @@ def test_exact_equal_sliders_are_one():
     made = []
     for one in (parallel([MU * LOAD / 2e-6], [2e-6]), parallel(np.full(4, MU * LOAD / 8e-6), np.full(4, 2e-6))):
         contact, forces, energies = ElementsModel(GROOVES, LOAD, MU, one), np.zeros((301, 3)), np.zeros((301, 2))
-        assert follow_path(slide, 1e-3, contact.kind, contact.build()[0], None, 1e-9, energies, forces) == 0
+        assert follow_path(slide, 1e-3, contact.kind, contact.build(), 1e-9, energies, forces) == 0
         made.append(forces)
     np.testing.assert_allclose(made[0], made[1], rtol=0, atol=1e-9 * LOAD)
 
@@ -195,7 +195,7 @@ def test_always_iwans_law_slips_at_its_limit():
     law = Iwan(*sliders(MU, MU / 1e-8, -0.5, 0.5))
     slide, contact = np.linspace(0, 160e-6, 8001), ElementsModel(GROOVES, LOAD, MU, law.element(LOAD))
     forces, energies = np.zeros((slide.size, 3)), np.zeros((slide.size, 2))
-    assert follow_path(slide, 1e-3, contact.kind, contact.build()[0], None, 1e-9, energies, forces) == 0
+    assert follow_path(slide, 1e-3, contact.kind, contact.build(), 1e-9, energies, forces) == 0
     true = LOAD * GROOVES.ratio(slide, 1.0, MU)
     np.testing.assert_allclose(forces[200:-1, 0], true[200:-1], rtol=0, atol=3e-3 * true.max())
 

@@ -28,8 +28,8 @@ GROOVES = Grooves(80e-6, 7.5e-6, 0.3)
 
 
 def slid(model, slide):
-    forces, energies, contact = np.zeros((slide.size, 3)), np.zeros((slide.size, 2)), model.build()[0]
-    assert follow_path(slide, 1e-3, model.kind, contact, None, 1e-9, energies, forces) == 0
+    forces, energies, contact = np.zeros((slide.size, 3)), np.zeros((slide.size, 2)), model.build()
+    assert follow_path(slide, 1e-3, model.kind, contact, 1e-9, energies, forces) == 0
     return forces, energies
 
 

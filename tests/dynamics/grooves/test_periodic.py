@@ -76,8 +76,8 @@ def test_order_springs_along_the_flank_are_those_of_the_march():
         track = Track(X[0], OMEGA, count)
         found = law.sample(track).force
         path = np.concatenate([np.linspace(0, track.q[0], 200), np.tile(track.q, 3)[1:], track.q[:1]])
-        forces, energies, contact = np.zeros((path.size, 3)), np.zeros((path.size, 2)), law.model.build()[0]
-        assert follow_path(path, 1e-3, law.model.kind, contact, None, 1e-9, energies, forces) == 0
+        forces, energies, contact = np.zeros((path.size, 3)), np.zeros((path.size, 2)), law.model.build()
+        assert follow_path(path, 1e-3, law.model.kind, contact, 1e-9, energies, forces) == 0
         mean = forces[-count - 1:-1, 1]
         gaps.append(np.sort(np.abs(mean - (found + np.roll(found, -1)) / 2))[count // 20:-count // 20].max())
     assert gaps[1] < 0.3 * gaps[0] and gaps[1] < 4e-6 * LOAD

@@ -279,10 +279,10 @@ def test_exact_a_run_without_histories_has_the_same_last_cycles(cycles, travel):
 
 def release(basis, model, start, steps_per_cycle, count):
     """Modal + stored energy at every step of a free march from the modal displacements `start`, and the last slide."""
-    hub = load_kernels()
+    loops = load_kernels()
     drive = BaseSine(0.0, basis.omega[0])
     prop = propagator(basis, drive, steps_per_cycle)
-    contact, _ = model.build(hub)
+    contact = model.build()
     state = np.zeros((2, basis.omega.size))
     state[0] = start
     plant, table, alone = modal_arrays(basis, prop), prop.tables(drive, 0, 1), Single(np.array([GOAL * model.limit]))
@@ -300,8 +300,8 @@ def release(basis, model, start, steps_per_cycle, count):
 
     history = [energy()]
     for _ in range(count):
-        done, status = hub.march(model, 0, 1, state, plant, table, contact, alone, Steady(np.zeros(0)), np.inf, ledger,
-                                 rows)
+        done, status = loops.march(model, 0, 1, state, plant, table, contact, alone, Steady(np.zeros(0)), np.inf,
+                                   ledger, rows)
         assert (done, status) == (1, 0)
         history.append(energy())
     assert ledger[7] == 0

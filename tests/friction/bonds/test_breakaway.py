@@ -61,9 +61,9 @@ def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
     law = bonds(0.35, initial=0.6, **growth)
     path = random_walk(7, 80, 0.4)
     model = points_model(law, [1.0], [1.0])
-    contact, work = model.build()
+    contact = model.build()
     energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
-    assert load_kernels().follow_path(path, 1.0, model.kind, contact, work, 1e-12, energies, forces) == 0
+    assert load_kernels().follow_path(path, 1.0, model.kind, contact, 1e-12, energies, forces) == 0
     run = walk(Recursion(law), path, ONE)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-12)
     assert forces[:-1, 1] == pytest.approx(run.mean[:, 0], abs=1e-12)

@@ -197,17 +197,17 @@ def test_exact_c10_pressure_wave_is_smoothed_and_delayed(order, eps, size, lag):
 
 def free_rows(basis, model, start, per_cycle, count):
     """Rows (count + 1, 2 n + 7) of a free march from a modal displacement, and its ledger."""
-    hub = load_kernels()
+    loops = load_kernels()
     drive = BaseSine(0.0, basis.omega[0])
     prop = propagator(basis, drive, per_cycle)
-    contact, _ = model.build(hub)
+    contact = model.build()
     n = basis.omega.size
     state = np.zeros((2, n))
     state[0] = start
     plant, table = modal_arrays(basis, prop), prop.tables(drive, 0, 1)
     ledger, rows = np.zeros(9), np.zeros((count + 1, 2 * n + 7))
     alone, steady = Single(np.array([1e-3 * GOAL * model.limit])), Steady(np.zeros(0))
-    done = hub.march(model, 0, count, state, plant, table, contact, alone, steady, np.inf, ledger, rows)
+    done = loops.march(model, 0, count, state, plant, table, contact, alone, steady, np.inf, ledger, rows)
     assert done == (count, 0)
     return rows, ledger, prop
 

@@ -9,7 +9,7 @@ from ....core import NotConverged, Outcome, Start
 from ....dynamics.grooves.run import GroovesModel
 from ....dynamics.harmonic import orbits
 from ....dynamics.harmonic.laws import synthesis
-from ....dynamics.march import march as hub
+from ....dynamics.march import march as engine
 from ....dynamics.periodic import is_stable
 from ....response.measures import peaks_between
 from ..interface import contact_of
@@ -38,7 +38,7 @@ def left_grooves(model, numerics, patch, drive, contact, start=None) -> Solution
     begin, found = perf_counter(), []
     rig = replace(model.rig, drive=drive, levels=(), waveform="sine")
     for steps in (STEPS, STEPS // 2):
-        done = hub.march(rig.modes, drive, contact, LEAD, steps, 1, rig.travel, start=start, whole=False)
+        done = engine.march(rig.modes, drive, contact, LEAD, steps, 1, rig.travel, start=start, whole=False)
         if done.outcome is not Outcome.LEAVES_GROOVES:
             return None
         few = replace(numerics, cycles=LEAD, steps=steps, window=1)
@@ -60,11 +60,11 @@ class MarchFinder:
         exact = self.contact.set_valued
         self.steps = model.accuracy.steps_per_cycle or (EXACT if exact else STEPS)
         self.numerics = replace(numerics, cycles=1.0, window=1)
-        hub.warm_up(model.rig.modes, model.rig.drive, self.contact, say)
+        engine.warm_up(model.rig.modes, model.rig.drive, self.contact, say)
 
     def _run(self, drive, near, steps: int):
         """A Run that repeats, from the Run `near` as it stands or from rest."""
-        run = hub.fresh(self.model.rig.modes, drive, self.contact, steps, self.model.rig.travel)
+        run = engine.fresh(self.model.rig.modes, drive, self.contact, steps, self.model.rig.travel)
         if near is not None:
             run.contact = type(near.contact)(*(array.copy() for array in near.contact))
             run.state[:] = near.state
@@ -148,12 +148,12 @@ def disturbed(modes, drive, contact, motion) -> np.ndarray:
     a cycle over what it missed before.
     """
     turn = 1j * np.arange(len(motion)) * drive.omega
-    run = hub.fresh(modes, drive, contact, FINE, start=Start(motion.sum(axis=0).real, (turn @ motion).real))
+    run = engine.fresh(modes, drive, contact, FINE, start=Start(motion.sum(axis=0).real, (turn @ motion).real))
     slide = synthesis(motion.T, FINE).T @ modes.slide
     before = np.concatenate([np.linspace(0.0, slide[0], FINE // 8, endpoint=False), slide, slide, slide[:1]])
     if not isinstance(contact, GroovesModel):
-        run.contact = contact.build(run.hub)[0]
-        run.hub.follow_path(before, drive.period / FINE, contact.kind, run.contact, None, hub.GOAL * contact.limit,
+        run.contact = contact.build()
+        run.loops.follow_path(before, drive.period / FINE, contact.kind, run.contact, engine.GOAL * contact.limit,
                             np.zeros((before.size, 2)), np.zeros((before.size, 3)))
     run.placed(*run.state)
     gone = orbits.departures(run)
