@@ -14,7 +14,8 @@ import numpy as np
 
 from ..disk.whole import sturdy, whole, write_bytes
 
-LARGE = 100_000_000  # bytes of numbers
+LARGE = 10_000_000  # numbers
+CACHE = 1 << 18  # bytes of each variable that stay in memory until its file is closed
 
 LONG = {
     "relative_displacement": ("m", "displacement of the output relative to the base"),
@@ -206,13 +207,14 @@ def described(data: Contents, summary: dict, scene_text: str, versions: dict) ->
 def write(data: Contents, path: Path) -> None:
     """Write contents as netCDF4 to `path`.
 
-    A file is made in memory, so that a full disk is an OSError of one write and nothing is left open; one beyond LARGE
-    is made on the disk, whose faults are held back until it is closed.
+    A file is made in memory, so that a full disk is an OSError of one write and nothing is left open; one of more than
+    LARGE numbers is made on the disk, whose faults are held back until it is closed.
     """
     path = Path(path)
-    size = sum(np.asarray(one[1]).nbytes for one in (data.variables | data.coordinates).values())
+    size = sum(np.size(one[1]) for one in (data.variables | data.coordinates).values())
     if size > LARGE:
-        with whole(path) as partial, sturdy(partial) as kept, _Opened(kept, "w", track_order=True) as file:
+        with whole(path) as partial, sturdy(partial) as kept, _Opened(
+                kept, "w", track_order=True, rdcc_nbytes=CACHE) as file:
             _write(file, data)
         return
     with _Opened(path.name, "w", driver="core", backing_store=False, track_order=True) as memory:

@@ -134,7 +134,8 @@ def _cases(table: dict) -> str:
     shown = [name for name in FIRST if name in table["measures"]]
     shown += [name for name, one in table["measures"].items() if name not in shown and _changes(one["values"])]
     shown = shown[:6]
-    columns = [_measure(name, table["measures"][name], slice(None), table.get("tolerance", np.nan)) for name in shown]
+    few = slice(LISTED)
+    columns = [_measure(name, table["measures"][name], few, table.get("tolerance", np.nan)) for name in shown]
     head = "".join(f"<th>{escape(one['name'])}</th>" for one in table["keys"]) + "<th>outcome</th>" + "".join(
         f"<th class=n>{linked(one['label'], one['name'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}</th>"
         for one in columns)

@@ -146,17 +146,13 @@ def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder, pag
     cases."""
     keys = folder.keys()
     write_csv(cases, found, keys, folder.target / "sweep.csv")
-    found.rest()
     table = table_of(asked, cases, found, keys, folder.target)
     answer = write_answer(table, folder.target / "sweep.json")
-    found.rest()
     netcdf.write(contents(asked, cases, found, keys, answer), folder.target / "sweep.nc")
-    found.rest()
     if page:
         write_page(table, folder.target)
     else:
         (folder.target / WHOLE).unlink(missing_ok=True)
-    found.rest()
 
 
 def _part(count: int, shard: tuple | None) -> np.ndarray:

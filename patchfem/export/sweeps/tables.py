@@ -25,7 +25,7 @@ from ...scene.reader import owner_of
 from .. import netcdf
 from ..summary import versions
 
-BLOCK = 1000  # cases whose texts are made at once
+BLOCK = 4000  # cases whose texts are made at once
 TRIED = 3  # cases that are asked for what all have in common
 ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
 

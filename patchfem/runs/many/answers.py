@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import mmap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from math import prod
 from pathlib import Path
 from tempfile import TemporaryFile
 
@@ -12,6 +12,37 @@ import numpy as np
 
 MANY = 50_000  # cases from which on columns may lie on disk: those of a rig are 25 kB a thousand cases and measure
 FAILED = "failed"  # outcome of a case that was refused or that did not come to an end
+
+
+class OnDisk:
+    """An array of floats in a file, which fills memory only while it is looked at: what is taken of it is mapped, and
+    let go of with it."""
+
+    def __init__(self, file, shape: tuple):
+        self.file, self.shape = file, shape
+        self.file.truncate(8 * self.size)
+
+    @property
+    def size(self) -> int:
+        """Number of floats."""
+        return prod(self.shape)
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __array__(self, dtype=None, copy=None) -> np.ndarray:
+        held = np.memmap(self.file, float, "r+", shape=self.shape).view(np.ndarray)
+        return held if dtype in (None, held.dtype) and not copy else held.astype(dtype or float)
+
+    def __getitem__(self, at) -> np.ndarray:
+        return np.array(np.asarray(self)[at])
+
+    def __setitem__(self, at, values) -> None:
+        np.asarray(self)[at] = values
+
+    def reshape(self, shape: tuple) -> OnDisk:
+        """The same numbers in another shape."""
+        return OnDisk(self.file, tuple(shape))
 
 
 @dataclass(eq=False, slots=True)
@@ -58,21 +89,10 @@ class Answers:
             self.units[name] = unit
             for columns in (self.values, self.errors, self.floors):
                 columns[name] = self._column()
-                columns[name].fill(np.nan)
+                columns[name][:] = np.nan
 
-    def _column(self) -> np.ndarray:
-        if self.room is None:
-            return np.empty(len(self))
-        with TemporaryFile(dir=self.room) as file:  # the column keeps it until it is dropped
-            return np.memmap(file, float, "w+", shape=(len(self),))
-
-    def rest(self) -> None:
-        """Give back the memory of what lies on disk as well."""
-        if self.room is None or not hasattr(mmap, "MADV_DONTNEED"):
-            return
-        for columns in (self.values, self.errors, self.floors):
-            for one in columns.values():
-                one._mmap.madvise(mmap.MADV_DONTNEED)
+    def _column(self) -> np.ndarray | OnDisk:
+        return np.empty(len(self)) if self.room is None else OnDisk(TemporaryFile(dir=self.room), (len(self),))
 
     def fail(self, case: int, message: str) -> None:
         """Mark a case as failed."""
@@ -106,7 +126,6 @@ class Answers:
         for mine, given in ((self.messages, part.messages), (self.warnings, part.warnings), (self.notes, part.notes),
                             (self.numerics, part.numerics)):
             mine.update({int(at[case]): found for case, found in given.items()})
-        self.rest()
 
     def some(self, cases: np.ndarray) -> Answers:
         """The answers of some cases, in their order, as `place` takes them."""

@@ -145,7 +145,11 @@ def test_exact_columns_on_disk_make_the_same_tables(swept, scene, tmp_path, monk
     assert 7 <= len(list((out / "chunks").iterdir())) <= 14
     total = Answers.blank(11, tmp_path)
     total.measure("loop_area", "J")
-    assert isinstance(total.values["loop_area"], np.memmap)
+    assert isinstance(total.values["loop_area"], kept.OnDisk)
+    total.values["loop_area"][[3, 5]] = 1.5, 2.5
+    assert total.values["loop_area"][3:6].tolist()[::2] == [1.5, 2.5] and np.isnan(total.values["loop_area"]).sum() == 9
+    assert np.asarray(total.values["loop_area"].reshape((11, 1))).shape == (11, 1) == np.shape(
+        total.values["loop_area"].reshape((11, 1)))
     assert not [one for one in Path(tmp_path).iterdir() if one.name != "out"]
 
 
