@@ -9,7 +9,7 @@ from time import process_time
 
 import numpy as np
 
-START = 0.7  # of a run until it begins, and of its files and its page
+START = 0.5  # of a run until it begins, and of its files and its page
 
 # of a piece of a motion from event to event, of each further mode and interface in it, of each element; of one at most,
 # and of one of the last cycles, which are kept whole; as Python per mode + 1 and interface + 1, and of that a sample
