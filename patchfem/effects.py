@@ -1,16 +1,17 @@
 """Every effect a scene can name: what computes it, its equations, what it needs and what it gives.
 
 An effect is a table of a scene or the value of its selector key. `plan` imports only the modules of the effects that a
-scene names. A law of friction is such an effect with the keys that it has besides `static` and with what carries it:
-nothing else in the package knows which laws there are.
+scene names. A law of friction is such an effect with the keys that it has besides `static` and with what can run it.
+Two places serve some laws alone and name them: loads that change in the contact (`runs.rig.varying_load`) and the lanes
+of a study (`runs.many.lumped.lanes`).
 
-A law is carried by the bench, by a rig of one interface under a constant load, and by what its record names: "shear"
-of pieces that give way, "joints" (several interfaces, springs that bend, strips that yaw), "varying-load" in a rig,
-"harmonic" balance, "two-directions" of a bench, "comparison" methods, "exact" events, "pieces" of it (elements that
-stick or slip, exact from yield to yield), "grooves" whose flanks the load climbs. Traits: "set-valued" (it holds
-without a stretch), "bonds" (the sum 2.17 with its readings and orders), "averaged" (over the pressure behind a point),
-"timeless" (no rate of the slide changes its force), "memoryless" (of the last motion alone), "creeps" (it never holds),
-"cells" (a density cut into elements).
+A law is carried by the bench, by a rig of one interface under a constant load (it can run there), and by what its
+record names: "shear" of pieces that give way, "joints" (several interfaces, springs that bend, strips that yaw),
+"varying-load" in a rig, "harmonic" balance, "two-directions" of a bench, "comparison" methods, "exact" events,
+"pieces" of it (elements that stick or slip, exact from yield to yield), "grooves" whose flanks the load
+climbs. Traits: "set-valued" (it holds without a stretch), "bonds" (the sum 2.17 with its readings and orders),
+"averaged" (over the pressure behind a point), "timeless" (no rate of the slide changes its force), "memoryless" (of
+the last motion alone), "creeps" (it never holds), "cells" (a density cut into elements).
 
 A shape of the gap is an effect, its table in `scene.keys.contact` and a function of `contact.gaps`. A waveform of the
 drive is an effect with its keys, and a row of `structure.drives.MADE`. Traits: "steady" (harmonic balance finds its

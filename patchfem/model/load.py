@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..core import Missing
 from ..friction import grooves
 from .slide import SlidePath
-
-if TYPE_CHECKING:
-    pass
 
 MOST_SAMPLES = 5_000_000
 

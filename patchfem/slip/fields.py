@@ -26,8 +26,8 @@ def element_fields(patch, found, states, length: float) -> tuple:
 def point_fields(patch, law: Bonds, shear, states) -> tuple:
     """Traction (f, m) [Pa] and irreversible local slip (f, m) [m] of bond points, read back from their states.
 
-    patch: the solved Patch; shear: its ShearModes or None; states: f of (slide [m], bonds (4, a): m, z, s2, local
-    slide).
+    patch: the solved Patch; shear: its ShearModes or None; states: f of (slide [m], bonds (5, a), of which four
+    are read: m, z, s2, local slide).
     """
     m = patch.x.size
     index = np.arange(m) if shear is None else shear.points

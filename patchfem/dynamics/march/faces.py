@@ -9,8 +9,8 @@ GOAL = 1e-11  # residual of the step solve over the friction limit
 
 
 def faces_of(model, prop, plant, mass: float):
-    """Fresh `arrays.Faces` of a march, from the Propagator and the Plant of its modes [kg]; `arrays.Single` of a model
-    without joints."""
+    """Fresh `arrays.Faces` of a march, from the Propagator and the ModalArrays of its modes, mass in kg;
+    `arrays.Single` of a model without joints."""
     if not model.joints:
         return arrays.Single(np.array([GOAL * model.limit]))
     elements, (p, n), numbers = [one.element for one in model.joints], prop.rows.shape, number_of(model.laws)

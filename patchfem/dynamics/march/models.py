@@ -81,7 +81,7 @@ class ContactModel:
         return (Joint(0, self.element),) if self.set_valued else ()
 
     def shown(self, contact) -> dict:
-        """What a picture of the interface needs of the memory: "stretch" (t,) of elements, or "bonds" (4 or 5, m)."""
+        """What a picture of the interface needs of the memory: "stretch" (t,) of elements, or "bonds" (5, m)."""
         form = self.element.form if self.element is not None else ""
         if form == "parallel":
             return {"stretch": contact.mem[0, 3:].copy()}

@@ -58,7 +58,7 @@ def plastic(static: float, length: float) -> Rubbing:
 
 
 def bonds(law) -> Rubbing:
-    """The stretch reading with p = 1 of a friction.law.Bonds at every point. PatchfemError for any other."""
+    """The stretch reading with p = 1 of friction.bonds.parameters.Bonds at every point. PatchfemError for others."""
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
         raise PatchfemError(unbuilt("friction: such bonds beside a load that changes", "recursion"))
 

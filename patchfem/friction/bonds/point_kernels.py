@@ -132,7 +132,7 @@ def step_of(m, z, s2, dq, sigma, eps, f1, e, a2, a3, a4):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def free_part(play, dq, half):
-    """Elastic part of an increment and the play after it (twin: `law.elastic_part`)."""
+    """Elastic part of an increment and the play after it (twin: `parameters.elastic_part`)."""
     start = play * half
     end = start + dq
     if end >= half:
@@ -174,7 +174,7 @@ def loose_step(m, z, s2, play, half, dq, sigma, eps):
 
 @njit(error_model="numpy", **LEAN)
 def grow(eps, v0, v1, path, dt, growth):
-    """(bond length after the step, I_A + I_B) of eq. 2.10 (twin: `law.grow`).
+    """(bond length after the step, I_A + I_B) of eq. 2.10 (twin: `parameters.grow`).
 
     growth: (a_s, l_k, v_h, eps_0, eps_k), a_s < 0 for a constant length.
     """

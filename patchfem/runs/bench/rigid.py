@@ -23,7 +23,7 @@ from .ledger import Slid, Watch, elastic_slip, local_slip
 def rigid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Watch) -> Slid:
     """Slide the interface rigidly along path = (time (k,) [s], slide (k,) [m]) by a compiled engine.
 
-    patch: the solved Patch or None; frames: how many frames of tractions are kept; engine: of `engine_of`.
+    patch: the solved Patch or None; frames: how many frames of tractions are kept; engine: of `bench_engine`.
     """
     (time, slide), f = path, model.friction
     sigma, weight = pressure_of(model, patch)

@@ -140,7 +140,7 @@ def _extra(run: Coupled, notes: list) -> dict:
 def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -> tuple:
     """Solution of the chosen engine, its numerics, and its measures with errors on the engine's ladder of coarser runs.
 
-    Steps that the scene does not pin are halved until the error of the displacement is met.
+    Steps a cycle that the scene does not pin are doubled until the error of the displacement is met.
     """
     engine, frames, made = ENGINES[numerics.engine], FRAMES if patch is not None else 0, {}
     go, size = engine.run, model.rig.displacement
@@ -208,7 +208,7 @@ def _whole_period(model, numerics, found) -> int:
 
 
 def _enough(model, numerics, found, measures) -> bool:
-    """Whether the error of the displacement is met, or the steps cannot be halved again."""
+    """Whether the error of the displacement is met, or the steps a cycle cannot be doubled again."""
     main, again = measures["relative_displacement_amplitude"], numerics.steps * 2
     met = main.error <= model.accuracy.tolerance * abs(main.value) + main.floor
     if numerics.local:
