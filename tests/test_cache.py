@@ -9,6 +9,8 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from types import SimpleNamespace
+from zipfile import ZipFile
 
 import numba
 import pytest
@@ -17,7 +19,7 @@ from scene_texts import PLASTIC, POINT, TRIANGLE
 
 import patchfem
 from patchfem import compiled
-from patchfem.compiled import kept
+from patchfem.compiled import generic, hook, kept
 from patchfem.disk import own
 
 SCENE = POINT + PLASTIC + TRIANGLE  # a slide that is given: the smallest loop with a law in it to compile
@@ -108,6 +110,98 @@ def test_exact_an_edited_law_changes_the_answer_of_a_cached_bench(tmp_path):
     assert edited["numba"]
     assert edited["peak"] == pytest.approx(0.8 * first["peak"], rel=1e-12)
     assert len(list((cache / "patchfem").iterdir())) == 2
+
+
+def smallest(place: Path):
+    (place / "slide.toml").write_text(SCENE, "utf-8")
+    yield "run", place / "slide.toml", "--no-page"
+
+
+def test_exact_code_that_came_with_the_package_serves_the_first_run(tmp_path):
+    """Nothing is compiled, nothing is said; kernels with another text leave it alone."""
+    home = copied(tmp_path / "home")
+    hook.made(home / "patchfem" / "compiled" / "generic", smallest)
+    first, native = slid(home, tmp_path / "cache"), slid(copied(tmp_path / "other"), tmp_path / "native")
+    assert not first["numba"] and first["said"] == [] and not list((tmp_path / "cache").rglob("*.code"))
+    assert native["numba"] and native["said"]
+    assert (first["work"], first["peak"]) == pytest.approx((native["work"], native["peak"]), rel=1e-9)
+    for law in (home / "patchfem" / "friction" / "laws").glob("*kernels.py"):
+        law.write_text(law.read_text("utf-8") + "# edited\n", "utf-8")
+    assert slid(home, tmp_path / "edited")["numba"]
+
+
+def test_exact_code_that_came_with_the_package_is_of_this_machine(tmp_path, monkeypatch):
+    monkeypatch.setattr(generic, "HERE", tmp_path)
+    (tmp_path / "machine.py").touch()
+
+    def found():
+        return generic.folder.__wrapped__(compiled.sources)
+
+    assert found() is None
+    own = tmp_path / "generic" / generic.key(compiled.sources)
+    own.mkdir(parents=True)
+    can = dict.fromkeys(generic.V3, True)
+    monkeypatch.setattr("llvmlite.binding.get_host_cpu_features", lambda: can)
+    assert found() == own and compiled.is_kept("some.function") is False
+    with monkeypatch.context() as more:
+        more.setenv("NUMBA_BOUNDSCHECK", "1")
+        assert found() is None
+    for lacking, name in (({"avx2": False}, "x86_64"), ({}, "riscv64")):
+        with monkeypatch.context() as more:
+            more.setattr("llvmlite.binding.get_host_cpu_features", lambda lacking=lacking: can | lacking)
+            more.setattr("platform.machine", lambda name=name: name)
+            (tmp_path / "generic" / generic.key(compiled.sources)).mkdir(exist_ok=True)
+            assert found() is None
+    with monkeypatch.context() as more:
+        more.setattr(generic, "version", lambda name: "0.0")
+        assert found() is None
+    (tmp_path / "machine.py").write_text("# edited")
+    assert found() is None
+
+
+def test_exact_a_wheel_has_no_machine_code_unless_it_is_asked_for(monkeypatch):
+    monkeypatch.setitem(sys.modules, "hatchling.builders.hooks.plugin.interface",
+                        SimpleNamespace(BuildHookInterface=object))
+    monkeypatch.setattr(hook, "made", lambda place: (place / "KEY").mkdir())
+    for asked, version, has in (("", "standard", False), ("0", "standard", False), ("1", "editable", False),
+                                ("1", "standard", True)):
+        monkeypatch.setenv("PATCHFEM_MACHINE_CODE", asked)
+        data, builder = {"force_include": {}}, hook.get_build_hook()()
+        builder.initialize(version, data)
+        assert [*data["force_include"].values()] == ["patchfem/compiled/generic"] * has
+        assert data.get("tag", "").startswith("py3-none-") is has
+
+
+def wheel(folder: Path, **more) -> Path:
+    """A wheel of this checkout, unpacked in a folder."""
+    done = subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder], text=True,
+                          cwd=Path(patchfem.__file__).parents[1], env=os.environ | more, capture_output=True)
+    assert done.returncode == 0, done.stderr
+    [path] = folder.glob("*.whl")
+    with ZipFile(path) as file:
+        file.extractall(folder)
+    return path
+
+
+@pytest.mark.slow
+def test_exact_the_first_run_of_the_rig_from_a_wheel_compiles_nothing(tmp_path):
+    bare, full = wheel(tmp_path / "bare"), wheel(tmp_path / "full", PATCHFEM_MACHINE_CODE="1")
+    assert bare.name.endswith("-py3-none-any.whl") and not (bare.parent / "patchfem/compiled/generic").exists()
+    assert not full.name.endswith("-any.whl")
+    assert len(list((full.parent / "patchfem/compiled/generic").rglob("*.code"))) > 7
+    measures = {}
+    for one in (bare, full):
+        words = [sys.executable, "-X", "importtime", "-m", "patchfem", "run", hook.ROOT / "studies/rig/rig.toml", "-o",
+                 one.parent / "out"]
+        done = subprocess.run(words, cwd=one.parent, capture_output=True, text=True, env=os.environ | {
+            "PYTHONPATH": str(one.parent), "PATCHFEM_CACHE": str(one.parent / "cache")})
+        assert done.returncode == 0, done.stderr
+        assert ("compiling" in done.stderr) is (" numba\n" in done.stderr) is (one is bare)
+        found = json.loads((one.parent / "out" / "summary.json").read_text("utf-8"))["measures"]
+        measures[one] = {name: each["value"] for name, each in found.items()}
+        assert measures[one].pop("energy_balance") < 1e-11  # of what cancels
+    assert not list((full.parent / "cache").rglob("*.code"))
+    assert measures[full] == pytest.approx(measures[bare], rel=1e-9, abs=1e-30)
 
 
 def test_exact_key_follows_the_kernels_only(tmp_path, monkeypatch):

@@ -195,11 +195,13 @@ def test_exact_constants_are_read_without_the_module(tmp_path):
     path = tmp_path / "some_kernels.py"
     path.write_text('"""Text."""\nimport nothing_there\nSTILL, MOVES = 0, 1\nNAME = "a"\nFAR = 1e-3\n'
                     'WIDE = -FAR * (2 + MOVES)\nHALF = 2.0 ** -(MOVES - 2 * STILL) / +1\nPLACES = (MOVES, (NAME, -2))\n'
+                    'LEFT, RIGHT = range(MOVES + 1)\nUP, = range(STILL + 5, 6)\n'
                     'OTHER = len(NAME)\nWORSE = [missing.remove() for missing in NAME]\n')
     brought = []
     module = Kernels("patchfem.some_kernels", path, lambda: brought.append(1))
     assert (module.STILL, module.MOVES, module.NAME, module.FAR, module.WIDE) == (0, 1, "a", 1e-3, -3e-3)
     assert (module.HALF, module.PLACES) == (0.5, (1, ("a", -2)))
+    assert (module.LEFT, module.RIGHT, module.UP) == (0, 1, 5)
     assert not brought
     with pytest.raises(AttributeError):
         module.OTHER  # noqa: B018

@@ -39,7 +39,7 @@ import numpy as np
 from ..disk import own
 from ..disk.installed import version
 from ..disk.whole import short
-from . import bounded, machine
+from . import bounded, generic, machine
 from .plain import plain
 
 HERE = Path(__file__).parents[1]  # the package
@@ -54,13 +54,19 @@ _LISTENERS = []  # who is told when something is compiled
 ARITHMETIC = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv, ast.Pow: pow, ast.USub: neg, ast.UAdd: pos}
 
 
-def kernel_key() -> str:
-    """Hash of every *kernels.py of the package and of the tuples that they take, how they are compiled, the kind of CPU
-    and what it can do."""
+def sources():
+    """Hash, as an object, of every *kernels.py of the package, of the tuples that they take and how they are
+    compiled."""
     digest = hashlib.sha256()
     for source in (HERE / "compiled" / "inner.py", *sorted(HERE.rglob("*kernels.py")),
                    *(HERE / "dynamics" / name for name in TUPLES)):
         digest.update(str(source.relative_to(HERE)).encode() + b"\0" + source.read_bytes())
+    return digest
+
+
+def kernel_key() -> str:
+    """Hash of the kernels and their compilers, the kind of CPU and what it can do."""
+    digest = sources()
     checked = os.environ.get("NUMBA_BOUNDSCHECK", "")
     made_by = f"{version('numba')} {version('llvmlite')} {sys.version_info[:2]} {checked}"
     digest.update(f"{made_by} {platform.machine()} {_cpu()}".encode())
@@ -219,7 +225,7 @@ class Entry:
         code = self.codes.get(kinds)
         if code is None:
             path = _prepared() / "code" / f"{self.kept}{digest(','.join(kinds))}.code"
-            code = machine.found(path)
+            code = machine.found(path) or _generic(path)
             if code is None and self.as_python <= PATIENCE:
                 with np.errstate(all="ignore"):
                     return getattr(plain(self.home.__name__), self.name)(*arguments)
@@ -277,7 +283,8 @@ def _names(text: Path | str) -> tuple:
 
 
 def _value(node: ast.expr, names: dict):
-    """What an expression stands for: constants and these names with arithmetic between them; KeyError for others."""
+    """What an expression stands for: constants and these names with arithmetic between them, ranges of them; KeyError
+    for others."""
     match node:
         case ast.Constant():
             return node.value
@@ -285,6 +292,8 @@ def _value(node: ast.expr, names: dict):
             return names[node.id]
         case ast.Tuple():
             return tuple(_value(one, names) for one in node.elts)
+        case ast.Call(ast.Name("range"), given, []):
+            return tuple(range(*(_value(one, names) for one in given)))
         case ast.UnaryOp():
             return ARITHMETIC[type(node.op)](_value(node.operand, names))
         case ast.BinOp():
@@ -361,12 +370,23 @@ def ran(kind: str) -> None:
 
 def has_run(kind: str) -> bool:
     """Whether a run of this kind has come to its end with the kernels as they are, so that nothing of it compiles."""
-    return PLAIN or (_placed()[0] / "kinds" / digest(kind)).is_file()
+    return PLAIN or any((one / "kinds" / digest(kind)).is_file() for one in _kept())
 
 
 def is_kept(function: str) -> bool:
     """Whether machine code of a function is kept, such as "dynamics.events.march_kernels.march"."""
-    return any((_placed()[0] / "code").glob(f"{function}-*.code"))
+    return any(any((one / "code").glob(f"{function}-*.code")) for one in _kept())
+
+
+def _kept(own_code: Path | None = None) -> list:
+    """Folders in which compiled code may be: that of this machine, and what came with the package."""
+    return [own_code or _placed()[0], *filter(None, [generic.folder(sources)])]
+
+
+def _generic(path: Path) -> machine.Code | None:
+    """The code that came with the package for a file of this name."""
+    found = generic.folder(sources)
+    return found and machine.found(found / "code" / path.name)
 
 
 def _bytes_of(path: Path) -> bytes | None:
@@ -410,7 +430,7 @@ def _tell() -> None:
 
 @cache
 def _told(say) -> None:
-    if not PLAIN and not any(any(_folder().rglob(f"*.{ending}")) for ending in ("code", "nbi")):
+    if not PLAIN and not any(any(one.rglob(f"*.{ending}")) for one in _kept(_folder()) for ending in ("code", "nbi")):
         why = _placed()[1] or short(_folder() / "code", LEAST)
         say("compiling the time loop for this machine, " +
             (f"at every command (10 to 30 s): {why}; name another folder in PATCHFEM_CACHE" if why else

@@ -1,0 +1,105 @@
+"""Hatchling's hook of the wheel: with PATCHFEM_MACHINE_CODE=1 in the environment it holds machine code (`generic`).
+
+    PATCHFEM_MACHINE_CODE=1 pip wheel --no-deps --no-build-isolation .
+
+Python must have hatchling and the packages of a run, numba among them, and the CPU must be able to run the code, for it
+is made by runs. Without the variable the wheel is made of the sources alone, for any machine.
+"""
+
+import os
+import subprocess
+import sys
+import sysconfig
+from itertools import product
+from pathlib import Path
+from shutil import copytree, ignore_patterns
+from tempfile import TemporaryDirectory
+
+ROOT = Path(__file__).parents[2]
+ABOUT = """import platform, numba
+from patchfem.compiled import generic, sources
+if not generic.runs_here():
+    raise SystemExit('this CPU lacks what the machine code asks for')
+print(generic.CPUS[platform.machine()][0], generic.key(sources))"""
+# a command that compiles what it calls, however little there is to do
+RUN = """import sys
+from patchfem import compiled
+from patchfem.__main__ import main
+compiled.PATIENCE = -1.0
+main(sys.argv[1:])"""
+RIG = """
+[normal]
+load = "26 lbf"
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+"""
+SECOND = '[[structure.mode]]\nname = "second"\nfrequency = "990 Hz"\ndamping = 0.01\nslide = 0.1\n'
+DRIVEN = """[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 20
+[friction]
+static = 0.3
+law = """
+LAWS = ('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"', '"nonlocal"\nbond_length = "1 um"',
+        '"iwan"\nstiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5', '"tanh"\nreference_speed = "1 mm/s"',
+        '"bouc-wen"\nstiffness = "1e7 N/m"', '"lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"')
+
+
+def usual(place: Path):
+    """Words of the commands whose kernels are the usual ones: the shipped rig, rigs of each law, sweeps.
+
+    place: a folder for the scenes that they take.
+    """
+    yield "run", ROOT / "studies" / "rig" / "rig.toml"
+    for at, (modes, law) in enumerate(product(("", SECOND), LAWS)):
+        scene = place / f"{at}.toml"
+        scene.write_text(f"{RIG}{modes}{DRIVEN}{law}\n", "utf-8")
+        yield "run", scene
+    for at in range(2):  # laws whose many cases march side by side
+        yield "sweep", place / f"{at}.toml", "--over", "drive.acceleration=3 g..6 g:64"
+
+
+def made(place: Path, commands=usual) -> None:
+    """Make the code that commands call for the common CPU of this kind of machine, in the folder `place`/KEY.
+
+    commands: a function of a folder for their scenes. CalledProcessError where one fails.
+    """
+    with TemporaryDirectory() as work:
+        cache = Path(work) / "cache"
+        environment = os.environ | {"NUMBA_CPU_FEATURES": "", "PATCHFEM_CACHE": str(cache), "PYTHONPATH": str(ROOT)}
+        cpu, key = subprocess.run([sys.executable, "-c", ABOUT], env=environment, cwd=work, check=True,
+                                  stdout=subprocess.PIPE, text=True).stdout.split()
+        for at, words in enumerate(commands(Path(work))):
+            subprocess.run([sys.executable, "-c", RUN, *map(str, words), "-q", "-o", f"{work}/{at}"],
+                           env=environment | {"NUMBA_CPU_NAME": cpu}, cwd=work, check=True)
+        [found] = (cache / "patchfem").iterdir()
+        for part in ("code", "kinds"):
+            copytree(found / part, place / key / part, ignore=ignore_patterns("*.lock"))
+
+
+def get_build_hook():
+    """The hook, as hatchling asks for it."""
+    from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+    class MachineCode(BuildHookInterface):
+        """Puts machine code into a wheel that is asked to have some, which then is one for this kind of machine."""
+
+        def initialize(self, version: str, build_data: dict) -> None:
+            """Make the code and name it to hatchling; version: "editable" of one that only points to the sources."""
+            if version == "editable" or os.environ.get("PATCHFEM_MACHINE_CODE", "0") in ("", "0"):
+                return
+            self.work = TemporaryDirectory()
+            made(Path(self.work.name))
+            build_data["force_include"][self.work.name] = "patchfem/compiled/generic"
+            build_data["pure_python"] = False
+            machine = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+            build_data["tag"] = f"py3-none-{machine}"
+
+    return MachineCode
