@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from math import inf
 from typing import Any
 
 from .lines import key_lines, pieces_of
 from .reader import Draft, apply_set
-from .scene import Scene, scene_of, with_files
+from .rules.structure import HEAVY
+from .scene import Scene, files_of, scene_of, with_files
 
 MOST = 4096  # tables with other values that are remembered
+# keys of a lumped rig under a sine -> end of the values > 0 of which no rule or remark tells one from another
+PLAIN = {"normal.load": inf, "friction.static": inf, "friction.bond_length": inf, "drive.acceleration": inf,
+         "drive.frequency": inf, "structure.moving_mass": inf, "structure.mode.frequency": inf,
+         "structure.mode.damping": HEAVY}
 
 
 class Base:
@@ -62,6 +69,75 @@ class Base:
         draft.raw[name], draft.read_before[id(raw)] = raw, made
         draft.sets |= keys
         return True
+
+    def numbered(self, like: Scene, keys: Sequence[str]) -> Numbered | None:
+        """How scenes with other numbers at these keys are made from one that `changed` gave for the same keys; None
+        where a key is not plain, or where a rule of such a scene looks at what the key holds."""
+        if not _lumped(like) or ("friction.static" in keys and "kinetic" in self.raw.get("friction", {})):
+            return None
+        places = [_place_of(like, key) for key in keys]
+        return None if None in places else Numbered(like, tuple(places))
+
+
+@dataclass(frozen=True, slots=True)
+class Numbered:
+    """Scenes that are one scene with other numbers, which no rule tells from it; places: (table, number of a mode or
+    None, attribute, end of its values) of each key."""
+
+    like: Scene
+    places: tuple
+
+    @property
+    def tables(self) -> frozenset[str]:
+        """Names of the tables that change."""
+        return frozenset(place[0] for place in self.places)
+
+    def scene(self, values: Sequence[float], sets: Sequence[str]) -> Scene | None:
+        """The scene with these numbers [SI], written as `sets`, equal to that of `Base.changed`; None where the rules
+        of a scene must see them."""
+        new: dict[str, dict] = {}
+        modes: dict[int, dict] = {}
+        for (table, mode, name, end), value in zip(self.places, values):
+            if not 0 < value < end:
+                return None
+            (new.setdefault(table, {}) if mode is None else modes.setdefault(mode, {}))[name] = value
+        like = self.like
+        if modes:
+            new.setdefault("structure", {})["mode"] = tuple(
+                _with(one, modes[k]) if k in modes else one for k, one in enumerate(like.structure.mode))
+        if "static" in new.get("friction", ()) and like.friction.kinetic is not None:
+            new["friction"]["kinetic"] = new["friction"]["static"]  # its default
+        count = len(like.sets) - len(self.places)
+        return replace(like, sets=(*like.sets[:count], *sets),
+                       **{table: _with(getattr(like, table), held) for table, held in new.items()})
+
+
+def _with(table: Any, values: dict[str, Any]) -> Any:
+    return table.model_copy(update=values)
+
+
+def _lumped(scene: Scene) -> bool:
+    """Whether a scene is one point on modes under a sine of the base, in which plain numbers are what PLAIN says."""
+    structure, drive, law = scene.structure, scene.drive, scene.friction
+    if scene.kind != "rig" or scene.contact or scene.wear or not scene.normal or scene.normal.grooves or not law:
+        return False
+    return bool(structure.mode) and not structure.interface and law.temperature is None and law.spread is None and \
+        (drive.kind, drive.waveform, drive.duration) == ("base", "sine", None) and not files_of(scene)
+
+
+def _place_of(scene: Scene, key: str) -> tuple | None:
+    """(table, number of a mode or None, attribute, end of its values) of a key of PLAIN; None where it is none, or what
+    it holds in the scene does not lie inside."""
+    pieces, mode = pieces_of(key), None
+    if len(pieces) == 4:
+        names = [one.name for one in scene.structure.mode]
+        number = pieces.pop(2)
+        mode = names.index(number) if number in names else int(number) if number.isdecimal() else len(names)
+    end = PLAIN.get(".".join(pieces))
+    if end is None or (mode is None) != (len(pieces) == 2) or (mode is not None and mode >= len(scene.structure.mode)):
+        return None
+    held = getattr(getattr(scene, pieces[0]) if mode is None else scene.structure.mode[mode], pieces[-1])
+    return (pieces[0], mode, pieces[-1], end) if held is not None and 0 < held < end else None
 
 
 def _by_table(sets: tuple[str, ...]) -> dict[str, tuple[str, ...]]:

@@ -13,7 +13,7 @@ from typing import Any
 
 from ... import __version__
 from ...core import PatchfemError
-from ...model.model import Model, build
+from ...model.model import Model, build, renumbered
 from ...scene.changed import Base
 from ...scene.scene import Scene, SceneError, axes_of, is_there, loads, with_files
 
@@ -34,16 +34,37 @@ class Asked:
     def _read(self, sets: Sequence[str]) -> Scene:
         return replace(with_files(loads(self.text, self.path, (*self.sets, *sets))), sweep=())
 
-    def model(self, sets: Sequence[str]) -> Model:
-        """The model of a case; PatchfemError, with every mistake of its scene, where there is none."""
+    def model(self, sets: Sequence[str], values: Sequence[float | str] = ()) -> Model:
+        """The model of a case; PatchfemError, with every mistake of its scene, where there is none.
+
+        values: of the keys that `sets` sets, in SI, where they are known: a case that differs from one before in plain
+        numbers alone is made from that.
+        """
         try:
-            return build(self.scene(sets))
+            return self._like(sets, values) or build(self.scene(sets))
         except SceneError as error:
             raise PatchfemError("; ".join(_of_case(error))) from None
         except PatchfemError:
             raise
         except Exception as error:  # a defect of one case must not cost the answers of a thousand others
             raise PatchfemError(f"internal fault, please report it: {type(error).__name__}: {error}") from error
+
+    def _like(self, sets: Sequence[str], values: Sequence) -> Model | None:
+        """The model of a case made from the first valid one with the same keys; None where the rules of a scene must
+        see it."""
+        if not values or not all(isinstance(value, float) for value in values):
+            return None
+        keys, known = tuple(one.partition("=")[0] for one in sets), _first(self)
+        if keys not in known:
+            base = _base(self)
+            scene = base and self.scene(sets)
+            numbered = base and base.numbered(scene, keys)
+            known[keys] = numbered and (numbered, numbered.tables, build(scene))
+        if not known[keys]:
+            return None
+        numbered, tables, first = known[keys]
+        scene = numbered.scene(values, sets)
+        return scene and renumbered(first, scene, tables)
 
     def mistakes(self, sets: Sequence[str]) -> list[str]:
         """Every mistake of the scene of a case; none where it is valid."""
@@ -96,6 +117,12 @@ def _base(asked: Asked) -> Base | None:
         return Base(asked._read(()))
     except SceneError:
         return None
+
+
+@lru_cache(maxsize=2)
+def _first(asked: Asked) -> dict[tuple, tuple | None]:
+    """What models of cases with the same keys are made from, by these keys; None where none can be."""
+    return {}
 
 
 def _of_case(error: SceneError) -> list[str]:

@@ -56,6 +56,10 @@ class Cases:
         """The case as `table.key=value` strings."""
         return tuple(f"{axis.key}={text}" for axis, text in zip(self.axes, self.texts(number)))
 
+    def values(self, number: int) -> tuple:
+        """Values of a case, axis by axis: floats in SI, texts where a key has no number."""
+        return tuple(axis.values[place] for axis, place in zip(self.axes, self.places(number)))
+
     def spread(self, most: int) -> list[int]:
         """Numbers of `most` cases or somewhat fewer, spread over all axes with the ends of each; all where there are no
         more."""

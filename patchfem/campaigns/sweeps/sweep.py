@@ -76,7 +76,7 @@ def handed(work: Work, numbers: Sequence[int], found: Answers, told: list) -> tu
 
 def _model(work: Work, number: int):
     try:
-        model = work.asked.model(work.cases.sets(number))
+        model = work.asked.model(work.cases.sets(number), work.cases.values(number))
     except PatchfemError as error:
         return error
     return model if work.meshes is None else work.meshes.given(model)
