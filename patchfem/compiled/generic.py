@@ -5,7 +5,9 @@ in `generic/KEY/`, with the files of a folder of compiled code. KEY is a hash of
 numba, llvmlite and the kind of machine: with other ones nothing is found, and what runs is compiled here. So it is on a
 CPU that lacks what the code asks for, and where numba checks every index.
 
-Code that was made for this very machine is taken first; where there is none, the code of the wheel stays in use.
+Code that was made for this very machine is taken first; where there is none, the code of the wheel stays in use, and
+nothing replaces it: rigs behind bonds, tanh and LuGre and the shipped one took no longer with it than with native code
+(0.6 to 1.0 of its CPU seconds, on a busy machine).
 """
 
 import os
