@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 from typing import NamedTuple
 
@@ -35,8 +35,12 @@ class Batch(NamedTuple):
 
 def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least: int = 0) -> Batch:
     """The batch of the module of this name, which takes models of this kind and is imported for the first of them."""
+    @cache
+    def module():
+        return import_module(f"patchfem.runs.many.{name}")
+
     def of(function: str) -> Callable:
-        return lambda *given: getattr(import_module(f"patchfem.runs.many.{name}"), function)(*given)
+        return lambda *given: getattr(module(), function)(*given)
 
     asked = of("refuses")
     return Batch(name, lambda model: asked(model) if model.kind == kind else f"it is a {model.kind}", of("group"),

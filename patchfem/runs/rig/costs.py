@@ -93,15 +93,13 @@ def pieces_per_cycle(model: Model) -> float:
 def _ringing_and_events(model: Model) -> tuple:
     """Pieces per cycle of a motion whose elements hold all the time, and those of every event and row."""
     modes, drive = model.rig.modes, model.rig.drive
-    count, stiff = expected_elements(model)
-    faces = np.asarray(modes.interfaces)
-    reach = float((faces**2).sum(axis=1).max(initial=0.0)) / modes.mass
-    damping = float(np.linalg.norm(modes.dampers, 2))
-    rate = damping / 2 + sqrt(damping**2 / 4 + float(modes.omega.max())**2 + stiff * reach)
+    (count, stiff), made = expected_elements(model), plant.plant_of(modes)
+    faces, damping = len(made.faces), made.damping_most
+    rate = damping / 2 + sqrt(damping**2 / 4 + made.square_most + stiff * max(made.reach, default=0.0))
     rows = 0 if drive.segments else len(drive.breaks) / model.rig.cycles
     ringing, quick = max(rate * drive.period, 2 * pi * fastest(drive)) / REACH, fastest(drive)
-    events = 2 * max(count, len(faces)) * quick + 2 + rows
-    if 2 * pi * quick <= plant.plant_of(modes).slow * drive.period:
+    events = 2 * max(count, faces) * quick + 2 + rows
+    if 2 * pi * quick <= made.slow * drive.period:
         dying = DYING / min(slowest(modes), float(modes.omega.min())**2 / damping)
         times = events + _jumps(model) if model.rig.interfaces else 1 / model.rig.cycles  # that it rings
         ringing = min(ringing, times * dying * rate / REACH + 4 * quick)

@@ -13,7 +13,7 @@ from ....response.outcome import SMALL, moves_on, settled, steady_error
 from ....response.reasons import CYCLIC, without_value
 from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
-from ....structure.drive_sizes import largest, omega_of, slowest
+from ....structure.drive_sizes import largest, omega_of, sinusoidal, slowest
 from ...remedies import Seen, beyond_tolerance
 from ...results.notes import BOOKS
 from ...results.result import without_folders
@@ -137,13 +137,18 @@ def _reasons(models, runs: Runs, found: Answers) -> None:
     for name in names:
         found.measure(name, TABLE[name].unit)
     lacking = np.array([np.isnan(found.values[name]) for name in names])
-    for case in np.flatnonzero(lacking.any(axis=0)).tolist():
-        drive = models[case].rig.drive
-        here = {name: values[case] for name, values in found.values.items() if not np.isnan(values[case])}
+    holds = found.values["stick_fraction"] == 1 if "stick_fraction" in found.values else lacking[0] & False
+    ends = np.array([sinusoidal(model.rig.drive) for model in models])
+    signs = np.array([*lacking, holds, ends])  # all that a reason hangs on
+    patterns, which = np.unique(signs, axis=1, return_inverse=True)
+    for place in np.flatnonzero(patterns[:len(names)].any(axis=0)).tolist():
+        cases = np.flatnonzero(which.ravel() == place).tolist()
+        drive = models[cases[0]].rig.drive
+        here = {name: values[cases[0]] for name, values in found.values.items() if not np.isnan(values[cases[0]])}
         window = SimpleNamespace(time=np.array([0.0, runs.window * drive.period]))
         for name, measure in without_value(here, window, drive, True).items():
-            found.reasons.setdefault(name, {})[case] = measure.reason
-            found.floors[name][case] = measure.floor
+            found.reasons.setdefault(name, {}).update(dict.fromkeys(cases, measure.reason))
+            found.floors[name][cases] = measure.floor
 
 
 def warned(model, outcome, found: Answers, case: int, wide: bool) -> list:
