@@ -259,7 +259,7 @@ def test_exact_a_scene_without_wear_imports_nothing_of_it(tmp_path):
     scene = tmp_path / "new.toml"
     scene.write_text(TILTED + COULOMB + SINE)
     code = "import json, sys, patchfem as pf; pf.run(sys.argv[1]); print(json.dumps(sorted(sys.modules)))"
-    assert not {name for name in loaded(code, scene) if name.startswith(("patchfem.wear", "patchfem.runs.wear"))}
+    assert not {name for name in loaded(code, scene) if name.startswith(("patchfem.wear", "patchfem.runs.wear."))}
 
 
 def _refusing(monkeypatch, cycle):
