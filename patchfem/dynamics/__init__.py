@@ -17,7 +17,7 @@ and the entries before it:
 12. `periodic`        Newton's method on the map of an engine over a period
 13. `contacts`        what one interface is to the loop of a march: solve, given, commit, state
 14. `events`          exact from event to event: rigid and elastic-plastic elements, or no friction
-15. `lanes`             many cases of one mode under a sine side by side, with the answers of `events` to its bars
+15. `lanes`             many cases of one mode under a sine side by side; answers of `events` and `smooth` to its bars
 16. `march`           any law in time, under the path-mean forces of each step
 17. `smooth`          smooth laws by a method of high order from reversal to reversal
 18. `comparison`      the report's own methods: Duhamel, Newmark, Euler

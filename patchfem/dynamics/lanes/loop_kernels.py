@@ -78,7 +78,7 @@ def step(room, i, s0, c0, s1, c1, h):
     x1, v1, way1, place1, u, _, ve, pe, turn, kink = done
     room[X * LANES + i], room[V * LANES + i] = x1, v1
     room[WAY * LANES + i], room[PLACE * LANES + i] = way1, place1
-    room[PATH * LANES + i] += abs(pe - place) + abs(place1 - pe)
+    room[PATH * LANES + i] += law.path(place, pe, place1, v1, room, i)
     # what a jump of the acceleration inside the step leaves of the trapezoidal rule
     edge = kink * h * (u * (1 - u) / 2 - 1 / 12)
     room[IN * LANES + i] += s1 * v1 - (s0 + u * (s1 - s0)) * edge
@@ -101,7 +101,7 @@ def glide(room, i, s0, c0, s1, c1):
     room[X * LANES + i], room[V * LANES + i] = x if event else x1, v if event else v1
     room[PLACE * LANES + i] = place if event else place1
     power = on * (s1 * v1)
-    room[PATH * LANES + i] += on * abs(place1 - place)
+    room[PATH * LANES + i] += on * law.path(place, place1, place1, v1, room, i)
     room[IN * LANES + i] += power
     room[LOST * LANES + i] += on * (v1 * v1)
     room[POWER * LANES + i] += abs(power)
@@ -152,17 +152,19 @@ def look(room, i, s0, c0, s1, c1, h):
     t = u * h
     se = s0 * (1 - t * t / 2 + t**4 / 24) + c0 * t * (1 - t * t / 6 + t**4 / 120)
     ce = c0 * (1 - t * t / 2 + t**4 / 24) - s0 * t * (1 - t * t / 6 + t**4 / 120)
-    before, after = law.felt(xe, way, place, se, room, i), law.felt(xe, way1, pe, se, room, i)
+    before, after = law.felt(xe, way, pe, se, room, i), law.felt(xe, way1, pe, se, room, i)
     rest = push * se - damp * ve - square * xe
     ae, af = rest - before, rest - after
-    stiff, stiff1 = square + law.stiffness(way, room, i), square + law.stiffness(way1, room, i)
     moves, moves1 = 0.0 if law.RESTS and way == 0.0 else out, 0.0 if law.RESTS and way1 == 0.0 else out
+    # slopes of the friction
+    r0, re = t * law.rise(v, a0, way, place, room, i), t * law.rise(ve, ae, way, pe, room, i)
+    rf, r1 = (h - t) * law.rise(ve, af, way1, pe, room, i), (h - t) * law.rise(v1, a1, way1, place1, room, i)
     best = max(highest(out * a0 + base * s0, out * ae + base * se,
-                       t * (moves * (push * c0 - damp * a0 - stiff * v) + base * c0),
-                       t * (moves * (push * ce - damp * ae - stiff * ve) + base * ce)),
+                       t * (moves * (push * c0 - damp * a0 - square * v) + base * c0) - moves * r0,
+                       t * (moves * (push * ce - damp * ae - square * ve) + base * ce) - moves * re),
                highest(out * af + base * se, out * a1 + base * s1,
-                       (h - t) * (moves1 * (push * ce - damp * af - stiff1 * ve) + base * ce),
-                       (h - t) * (moves1 * (push * c1 - damp * a1 - stiff1 * v1) + base * c1)))
+                       (h - t) * (moves1 * (push * ce - damp * af - square * ve) + base * ce) - moves1 * rf,
+                       (h - t) * (moves1 * (push * c1 - damp * a1 - square * v1) + base * c1) - moves1 * r1))
     room[ACCELERATION * LANES + i] = max(room[ACCELERATION * LANES + i], best)
     # sticks and releases
     stuck = (u if way == 0.0 else 0.0) + (1 - u if way1 == 0.0 else 0.0)
@@ -178,10 +180,10 @@ def look(room, i, s0, c0, s1, c1, h):
     room[START_SIN * LANES + i] += begins * 2 * se * ce
     # the loop
     fold_t = law.felt(turn, way, place, se, room, i)
-    peak = max(max(abs(f0), abs(f1)), max(abs(before), abs(after)))
+    peak = max(highest(f0, before, r0, re), highest(after, f1, rf, r1))
     room[FORCE * LANES + i] = max(room[FORCE * LANES + i], peak if turn == x1 else max(peak, abs(fold_t)))
-    room[SLIP_HIGH * LANES + i] = max(room[SLIP_HIGH * LANES + i], max(pe, place1))
-    room[SLIP_LOW * LANES + i] = min(room[SLIP_LOW * LANES + i], min(pe, place1))
+    room[SLIP_HIGH * LANES + i] = max(room[SLIP_HIGH * LANES + i], max(law.slid(xe, pe), law.slid(x1, place1)))
+    room[SLIP_LOW * LANES + i] = min(room[SLIP_LOW * LANES + i], min(law.slid(xe, pe), law.slid(x1, place1)))
     one, two = 0.5 * (f0 + before) * (xe - x), 0.5 * (after + f1) * (x1 - xe)
     room[TURNED * LANES + i] += one + two
     room[PASSED * LANES + i] += abs(one) + abs(two)
@@ -306,7 +308,8 @@ def read(cases, order, motion, table, cycles, history, ended, shown, room):
             fetch(order[min(begin + i, len(order) - 1)], i, cases, motion, room)
             for n in range(SHOW, SHOW + SHOWN):
                 room[n * LANES + i] = 0.0
-            room[SLIP_HIGH * LANES + i] = room[SLIP_LOW * LANES + i] = room[PLACE * LANES + i]
+            room[SLIP_HIGH * LANES + i] = law.slid(room[X * LANES + i], room[PLACE * LANES + i])
+            room[SLIP_LOW * LANES + i] = room[SLIP_HIGH * LANES + i]
         for k in range(cycles):
             for i in range(LANES):
                 open_cycle(i, room)

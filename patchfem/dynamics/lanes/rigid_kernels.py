@@ -33,20 +33,26 @@ def felt(x, way, place, sine, room, i):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def stiffness(way, room, i):
-    """Slope of the friction over the slide; 0 for a rigid contact, whose stick has no motion."""
+def rise(v, a, way, place, room, i):
+    """Rate of the friction at a speed v and an acceleration a; 0 for a rigid contact, whose stick has no motion."""
     return 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def slid(x, place):
+    """Irreversible part of the slide."""
+    return place
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def path(place, pe, place1, v1, room, i):
+    """What a step adds to the path of slip [m]."""
+    return abs(pe - place) + abs(place1 - pe)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def at_turn(x, way, place, room, i):
     """Friction at a turn of the slide, the mean of what it is before and after it."""
-    return 0.0
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def stored(x, place, room, i):
-    """Energy in the contact, in the units of x^2."""
     return 0.0
 
 

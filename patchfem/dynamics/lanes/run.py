@@ -16,8 +16,8 @@ class Cases(NamedTuple):
     """n cases of x'' + D x' + W x = P sin - f in the angle of their drive, x the slide [m].
 
     damp, square, push (n,): D, W, P; slip, stick (n,): f in a slip and the most of a stick; spring (n,): slope of f in
-    a stick, 0 of a rigid contact, length (n,) [m] over which it yields; out, base (n,) [m s-2]: acceleration of the
-    output over x'' and of the base over the sine; x, v (n,): start.
+    a stick, 0 of a rigid contact, length (n,) [m] over which it yields, or v_0 of the rate law; out, base (n,) [m s-2]:
+    acceleration of the output over x'' and of the base over the sine; x, v (n,): start.
     """
 
     damp: np.ndarray
@@ -50,7 +50,7 @@ class Marched(NamedTuple):
 
 
 def kernels(law: str):
-    """The loop of a law, "rigid" or "yielding"."""
+    """The loop of a law, "rigid", "yielding" or "creeping"."""
     loop = f"{HERE}.loop_kernels"
     return load(loop) if law == "rigid" else instance(loop, {"law": f"{HERE}.{law}_kernels"})
 
@@ -69,7 +69,7 @@ def after(damp, square, h: float, begin: tuple, forces: tuple) -> tuple:
     return x, v
 
 
-def numbers_of(cases: Cases, steps: int) -> np.ndarray:
+def numbers_of(law: str, cases: Cases, steps: int) -> np.ndarray:
     """(n, NUMBERS) of cases that march by so many steps a cycle."""
     found, h = np.zeros((len(cases.damp), at.NUMBERS)), 2 * np.pi / steps
     sine, cosine = ([float(np.round(wave(k * np.pi / 2))) for k in range(TERMS)] for wave in (np.sin, np.cos))
@@ -80,6 +80,8 @@ def numbers_of(cases: Cases, steps: int) -> np.ndarray:
         drive = [cases.push * one for pair in drive for one in pair]
         found[:, first - at.NUMBER:first - at.NUMBER + 10] = np.array([xx, xv, vx, vv, *force, *drive]).T
     found[:, at.D - at.NUMBER:] = np.array(cases[:9]).T
+    if law == "creeping":
+        found[:, at.A11 - at.NUMBER], found[:, at.A12 - at.NUMBER] = h, 0.5 / np.cos(h / 2)
     return found
 
 
@@ -94,10 +96,12 @@ def table_of(steps: int) -> np.ndarray:
 def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> Marched:
     """March cases over `cycles` by so many steps each; the last `window` of them are read, fewer of what repeats."""
     loop, n = kernels(law), len(cases.damp)
-    numbers, table, order = numbers_of(cases, steps), table_of(steps), np.arange(n)
+    numbers, table, order = numbers_of(law, cases, steps), table_of(steps), np.arange(n)
     motion, history = np.zeros((n, at.STATE)), np.zeros((n, cycles, 4))
     motion[:, at.X], motion[:, at.V], motion[:, at.PLACE] = cases.x, cases.v, cases.x
     motion[:, at.WAY] = np.sign(cases.v) * (cases.spring == 0)
+    if law == "creeping":
+        motion[:, at.WAY], motion[:, at.PLACE] = 1.0, cases.slip * np.tanh(cases.v / cases.length)
     motion[:, at.HIGH] = motion[:, at.LOW] = cases.x
     start, ended, shown = motion.copy(), np.zeros(n, np.int64), np.zeros((n, at.SHOWN))
     room, marked = np.zeros(at.ROOM * at.LANES), np.zeros(at.LANES + 1, np.int64)

@@ -51,9 +51,21 @@ def felt(x, way, place, sine, room, i):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def stiffness(way, room, i):
-    """Slope of the friction over the slide."""
-    return room[K * LANES + i] if way == 0.0 else 0.0
+def rise(v, a, way, place, room, i):
+    """Rate of the friction at a speed v and an acceleration a."""
+    return room[K * LANES + i] * v if way == 0.0 else 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def slid(x, place):
+    """Irreversible part of the slide."""
+    return place
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def path(place, pe, place1, v1, room, i):
+    """What a step adds to the path of slip [m]."""
+    return abs(pe - place) + abs(place1 - pe)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)

@@ -48,10 +48,15 @@ def notes_of(run) -> list:
     if raw.levels and rig.onset[0] == "slip" and raw.held > 0:
         out.append(f"onset_level: a slip amplitude counts from {length(raw.held)} on, a thousandth of the slide over "
                    "which the interface gives way; below it a part of the interface may slip already")
-    if f is not None and has(f.law, "creeps"):
-        out.append(f"law '{f.law}' never holds: under a constant force of half its limit it creeps at "
-                   f"{1e3 * 0.5493 * f.reference_speed:.3g} mm/s")
-    return [*out, *run.rings.notes, *ended]
+    return [*out, *creeping_note(f), *run.rings.notes, *ended]
+
+
+def creeping_note(friction) -> list:
+    """The sentence on a law that never holds."""
+    if friction is None or not has(friction.law, "creeps"):
+        return []
+    return [f"law '{friction.law}' never holds: under a constant force of half its limit it creeps at "
+            f"{1e3 * 0.5493 * friction.reference_speed:.3g} mm/s"]
 
 
 def _as_one_point(model, patch, numerics) -> list:

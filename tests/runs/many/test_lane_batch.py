@@ -5,14 +5,15 @@ import pytest
 from scene_texts import MODE
 
 from patchfem.api import base_of, build, load
-from patchfem.runs.many import many
+from patchfem.runs.many import many, one_by_one
 from patchfem.runs.many.lumped import lanes, lumped
 from patchfem.scene.sets import assignments
 
 SCENE = '[normal]\nload = "30 N"\n[friction]\n{law}\n' + MODE + \
     '[drive]\nkind = "base"\nacceleration = "5 g"\nfrequency = "140 Hz"\ncycles = 60\n'
 LAWS = {"coulomb": 'law = "coulomb"\nstatic = 0.3', "weakening": 'law = "coulomb"\nstatic = 0.3\nkinetic = 0.2',
-        "elastic-plastic": 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"'}
+        "elastic-plastic": 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"',
+        "tanh": 'law = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"'}
 
 
 def models(law: str, seed: int, count: int) -> list:
@@ -26,6 +27,8 @@ def models(law: str, seed: int, count: int) -> list:
                 "structure.mode.axial.output": float(r.choice([1, -1.3]))}
         if law == "elastic-plastic":
             sets["friction.bond_length"] = 10 ** r.uniform(-5.5, -4.3)
+        if law == "tanh":
+            sets["friction.reference_speed"] = push / (2 * np.pi * sets["drive.frequency"]) * 10 ** r.uniform(-2.3, 0)
         model = build(base.changed(assignments(sets)))
         out += [model] if not lanes.refuses(model) else []
     return out
@@ -54,8 +57,8 @@ def held(law: str, seed: int, count: int) -> None:
     cases = models(law, seed, count)
     found = many.answers(cases)
     mine = [case for case in range(count) if found.numerics[case]["engine"] == "lanes"]
-    assert len(mine) > count / 3 and not found.notes
-    ones = lumped_answers([cases[case] for case in mine])
+    assert len(mine) > count / 3 and not any("lanes said" in one for notes in found.notes.values() for one in notes)
+    ones = (lumped_answers if law != "tanh" else one_by_one.solve)([cases[case] for case in mine])
     part = many.Answers.blank(len(mine))
     part.outcome[:] = found.outcome[mine]
     part.values, part.errors = ({name: column[mine] for name, column in columns.items()}

@@ -1,7 +1,8 @@
-"""The batch of lanes: lumped Coulomb and elastic-plastic cases marched side by side, with bars from half the steps.
+"""The batch of lanes: lumped Coulomb, elastic-plastic and tanh cases side by side, with bars from half the steps.
 
-A case goes to the exact batch `lumped` where a bar misses its tolerance, where nothing slips, rings are to be told or a
-motion still has to settle. So does every case of a batch of which the exact engine contradicts one of a few.
+A tanh case whose bars miss its tolerance marches by finer steps. A case goes to the exact batch `lumped`, a tanh case
+to a run of its own, where a bar still misses its tolerance, where nothing slips, rings are to be told or a motion still
+has to settle. So does every case of a batch of which these contradict one of a few.
 """
 
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ from ....response.rows import TABLE, first_harmonic
 from ....scene.rules.draft import pinned
 from ....structure.drive_sizes import largest
 from ...rig.pieces import read_off
+from ...rig.remarks import creeping_note
 from .. import one_by_one
 from ..answers import Answers
 from . import lumped
@@ -29,10 +31,14 @@ from .pieces import LONGEST, SHORTEST
 LEAST = 64  # cases of a study that lanes serve
 TIGHTEST = 1e-4  # tolerance that lanes serve
 TOGETHER = 4096  # cases of one compiled call
+KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "tanh": "creeping"}  # law -> that of `dynamics.lanes`
+SMOOTH = 128, 256, 512, 1024, 2048  # steps of a cycle under the rate law, whose own rate is 1 a step then
+FINER = 4  # times as many steps has a case under the rate law whose bars miss its tolerance
 RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
 # of the change at half the steps, of that of the main measures, and of the measure itself, as both marches can miss an
 # event alike: 2 of 4077 random cases had an error beyond
 OF_CHANGE, OF_TYPICAL, OF_SIZE = 2.0, 1.0, 2e-5
+WIDER = 2.0  # times these are the bars of tanh cases: 493 of 500 had no error beyond half of them
 CHECKED, FEWEST = 200, 2  # one of so many cases is held against the exact engine, so many of a batch at least
 RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a ring is looked for
 
@@ -43,7 +49,7 @@ def refuses(model: Model) -> str:
         return why
     if not SHORTEST <= model.rig.cycles <= LONGEST or not model.friction.static > 0:
         return "its cycles are too few or too many, or nothing rubs"
-    if model.friction.law not in ("coulomb", "elastic-plastic"):
+    if model.friction.law not in KINDS:
         return "its law does not march in lanes"
     if model.accuracy.method != "auto" or pinned(model.accuracy) or model.accuracy.tolerance < TIGHTEST:
         return "it asks for another method, or for more than lanes state"
@@ -53,7 +59,11 @@ def refuses(model: Model) -> str:
 def _steps(model: Model) -> int:
     """Steps per cycle of a model, 0 where they would be too many."""
     modes, omega, stiff = model.rig.modes, model.rig.drive.omega, 0.0
-    if model.friction.law != "coulomb":
+    if model.friction.law == "tanh":
+        rate = model.limits(model.point.load)[0] / model.friction.reference_speed * modes.slide[0]**2 / modes.mass
+        rate = max(rate + modes.dampers[0, 0], modes.omega[0]) / omega
+        return next((steps for steps in SMOOTH if 2 * np.pi * rate <= steps), 0)
+    if model.friction.law == "elastic-plastic":
         stiff = model.limits(model.point.load)[0] / model.friction.bond_length * modes.slide[0]**2 / modes.mass
     fastest = np.sqrt(modes.omega[0]**2 + stiff) + modes.dampers[0, 0]
     return next((steps for rate, steps in RATES if fastest <= rate * omega), 0)
@@ -73,22 +83,31 @@ def solve(models: Sequence[Model], say=None) -> Answers:
     return found
 
 
-def _solved(models: Sequence[Model], say) -> Answers:
-    begin, (cycles, law, steps) = perf_counter(), group(models[0])
+def _solved(models: Sequence[Model], say, steps: int = 0) -> Answers:
+    begin, (cycles, law, least) = perf_counter(), group(models[0])
+    steps = max(steps, least)
     window = min(10, cycles // 10)
     runs, exact, marks = runs_of(models, cycles, window, steps)
     found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window})
     # elastic-plastic motions that have not settled have a steady estimate by the map of their yields
-    unsettled = found.outcome == "grows" if law == "coulomb" else found.outcome != "steady"
-    exact |= alone | too_wide(models, found) | unsettled
+    unsettled = found.outcome == "grows" if law != "elastic-plastic" else found.outcome != "steady"
+    wide = too_wide(models, found)
+    exact |= alone | wide | unsettled
     for case in range(len(models)):
         found.numerics[case] = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
+        if notes := creeping_note(models[case].friction):
+            found.notes[case] = notes
     found.seconds[:] = (perf_counter() - begin) / len(models)
-    looked = checked(marks, ~exact)
+    looked = checked(marks, ~exact, FEWEST if steps == least else 0)
     ones = exactly([models[case] for case in looked], say) if looked else None
     if wrong := contradicted(found, ones, looked):
         exact[:] = True
         note = f"lanes said {wrong} otherwise than the exact engine in a check of {len(looked)} cases, so all are exact"
+    finer = (wide | alone) & (law == "tanh" and not wrong and FINER * steps <= SMOOTH[-1])
+    exact &= ~finer
+    if cases := np.flatnonzero(finer).tolist():
+        lumped.take_out(found, cases)
+        found.place(cases, _solved([models[case] for case in cases], say, FINER * steps))
     if cases := np.flatnonzero(exact).tolist():
         lumped.take_out(found, cases)
         found.place(cases, exactly([models[case] for case in cases], say))
@@ -114,13 +133,13 @@ def too_wide(models, found: Answers) -> np.ndarray:
     return out
 
 
-def checked(marks, free) -> list:
+def checked(marks, free, fewest: int) -> list:
     """Numbers of the cases that the exact engine checks: by a hash of what each is, whatever stands beside it; free:
-    (n,) which may be."""
+    (n,) which may be; fewest: of them."""
     hashes = np.array([crc32(row.tobytes()) for row in marks])
     order = [case for case in np.argsort(hashes, kind="stable").tolist() if free[case]]
     few = sum(hashes[case] < 2**32 // CHECKED for case in order)
-    return order[:max(few, FEWEST)]
+    return order[:max(few, fewest)]
 
 
 def contradicted(found: Answers, ones: Answers | None, looked: list) -> str:
@@ -141,7 +160,7 @@ def contradicted(found: Answers, ones: Answers | None, looked: list) -> str:
 
 def runs_of(models, cycles: int, window: int, steps: int) -> tuple:
     """(Runs of models of a group, (n,) which must be run otherwise, (n, k) numbers that tell each from any other)."""
-    law = "rigid" if models[0].friction.law == "coulomb" else "yielding"
+    law = KINDS[models[0].friction.law]
     cases, c = cases_of(models)
     fine, coarse = (_measured(law, cases, c, march.march(law, cases, cycles, window, count))
                     for count in (steps, steps // 2))
@@ -156,9 +175,10 @@ def runs_of(models, cycles: int, window: int, steps: int) -> tuple:
         exact |= found.shown[:, at.LONGEST - at.SHOW] * own >= RINGS
     phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
+    errors = {name: (WIDER if law == "creeping" else 1.0) * one for name, one in bars(values, changes).items()}
     none = {name: np.full(len(models), np.nan) for name in ("ring_frequency", "ring_damping")}
     runs = Runs(cycles, window, values | none, book, extremes, phasors[:, ends], stuck & False, stuck & False,
-                    bars(values, changes), 1e-9, np.inf, again=False)
+                    errors, 1e-9, np.inf, again=False)
     return runs, exact, np.array(cases).T.copy()
 
 
@@ -168,20 +188,23 @@ def cases_of(models) -> tuple:
     for model in models:
         modes, drive, start, (static, kinetic) = model.rig.modes, model.rig.drive, model.rig.start, \
             model.limits(model.point.load)
-        coulomb = model.friction.law == "coulomb"
+        law = KINDS[model.friction.law]
+        kinetic = kinetic if law == "rigid" and model.friction.kinetic is not None else static
+        length = model.friction.bond_length if law == "yielding" else \
+            model.friction.reference_speed / drive.omega if law == "creeping" else 0.0
         rows.append((modes.omega[0], modes.dampers[0, 0], modes.slide[0], modes.base[0], modes.output[0], modes.mass,
                      drive.acceleration, drive.omega, drive.moving, static,
-                     kinetic if coulomb and model.friction.kinetic is not None else static,
-                     0.0 if coulomb else model.friction.bond_length, *((0.0, 0.0) if start is None else
+                     kinetic, length, *((0.0, 0.0) if start is None else
                      (start.z[0], start.v[0])), model.rig.stiffness, model.point.load, largest(drive)))
     own, damping, slide, share, output, mass, drive, w, moving, static, kinetic, length, z, v, stiffness, load, size = \
         np.array(rows, float).T
     scale = slide**2 / (mass * w**2)
-    spring = np.where(length > 0, scale * static / np.where(length > 0, length, 1.0), 0.0)
+    springs = KINDS[models[0].friction.law] == "yielding"
+    spring = scale * static / length if springs else 0.0 * scale
     cases = march.Cases(damping / w, (own / w)**2, -slide * share * drive / w**2, scale * kinetic, scale * static,
                         spring, length, output / slide * w**2, drive * moving, slide * z, slide * v / w)
-    return cases, {"omega": w, "energy": mass * (w / slide)**2, "ratio": output / slide, "held": 1e-3 * length,
-                   "stiffness": stiffness, "load": load, "size": size}
+    return cases, {"omega": w, "energy": mass * (w / slide)**2, "ratio": output / slide,
+                   "held": 1e-3 * length * springs, "stiffness": stiffness, "load": load, "size": size}
 
 
 def _measured(law: str, cases, c: dict, found) -> tuple:
@@ -189,7 +212,7 @@ def _measured(law: str, cases, c: dict, found) -> tuple:
     extremes = np.sort(found.history[:, :, :2] * c["ratio"][:, None, None], axis=2)
     window = min(10, extremes.shape[1] // 10)
     book = reading.books(law, cases, found, c["energy"])
-    seen = reading.reading_of(cases, found, c["energy"], c["omega"], extremes[:, -window:])
+    seen = reading.reading_of(law, cases, found, c["energy"], c["omega"], extremes[:, -window:])
     with np.errstate(all="ignore"):
         values = read_off(seen, book, True, True, c["stiffness"], c["size"])
     values |= {"normal_load": c["load"], "friction_work": book["friction"], "energy_dissipated": book.pop("lost"),
