@@ -61,6 +61,12 @@ class By:
                    "--executor") = ""
     shard: word("such as 3/40: the third of 40 parts only, into a folder that all parts share", "--shard") = ""
     collect: flag("only write the tables of a sweep whose shards are done", "--collect") = False
+    device: word("cpu; lanes on another processor are not built yet", "--device") = "cpu"
+
+    def __post_init__(self):
+        if self.device != "cpu":
+            raise Refused(f"--device {self.device}: the lanes of a sweep run on the cores of a processor alone as yet; "
+                          "leave --device out, or share the cases among processes or machines: -j N, --executor dask")
 
     def part(self) -> tuple | None:
         """(i, n) of a shard, None without one."""

@@ -220,6 +220,7 @@ def test_exact_one_object_on_stdout(scene, tmp_path):
     (["--over", "normal.load=-1 N,-2 N"], ["-1 N", "-2 N"]),
     (["--set", "drive.cycles=0", "--over", "normal.load=1 N,2 N"], ["drive.cycles: must be > 0"]),
     ([], ["nothing to sweep over"]),
+    (["--over", "normal.load=1 N,2 N", "--device", "cuda"], ["--device cuda: the lanes of a sweep run on the cores"]),
     (["--over", "friction.static=0.1..0.2:4000", "--over", "normal.load=1 N..2 N:4000"], ["16000000 cases are more"]),
 ])
 def test_refuses_before_anything_runs(scene, tmp_path, words, says):
