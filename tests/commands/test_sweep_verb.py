@@ -163,7 +163,9 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
     assert answer.code == 130 and "--resume" in answer.err
     held = len(list((out / "cases").iterdir()))
     assert 2 <= held < 6 and sum(row["outcome"] != "" for row in rows(out)) == held  # its tables have what there is
-    assert json.loads((out / "sweep.json").read_text())["cases"]["unfinished"] == 6 - held
+    told = json.loads((out / "sweep.json").read_text())
+    assert told["cases"]["unfinished"] == 6 - held
+    assert told["answer"].startswith(f"{6 - held} of 6 cases have no answer yet; what follows is of the others.")
     assert (out / "report.html").is_file()
     monkeypatch.setattr(many, "answers", real)
     text = "cases have an answer from an interrupted sweep"

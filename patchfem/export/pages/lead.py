@@ -22,7 +22,8 @@ class Lead(NamedTuple):
     """missed: as `missed.counted`; misses: that in a sentence; limits: what the key allows; limit: that in a sentence;
     span: from where to where the main measure runs; turns: what changes as the key grows. "" where there is nothing to
     say. ranks, spread, peaks: as `ranked.ranks_of`, `ranked.quantiles` and `peaks.found` give them; rank, scatter,
-    peak: what matters most, where nine in ten drawn cases lie, where a swept frequency has its peak, in sentences."""
+    peak: what matters most, where nine in ten drawn cases lie, where a swept frequency has its peak, in sentences;
+    left: how many cases have no answer yet."""
 
     missed: dict
     misses: str
@@ -36,17 +37,21 @@ class Lead(NamedTuple):
     scatter: str = ""
     peaks: Sequence = ()
     peak: str = ""
+    left: str = ""
 
     def sentences(self) -> list:
         """What people read, the worst first."""
         rank = self.rank if self.scatter or not (self.limit or self.peak) else ""  # of a grid they say more
-        return [one for one in (self.misses, self.limit, self.peak, rank, self.scatter, self.span, self.turns) if one]
+        return [one for one in (self.left, self.misses, self.limit, self.peak, rank, self.scatter, self.span,
+                                self.turns) if one]
 
     def answer(self) -> str:
         """One sentence, two of drawn cases: how far the key may go, where the peak is, what matters most and how far
         the answers scatter, or where the main measure runs; before it how many cases miss the tolerance."""
         drawn = " ".join(one for one in (self.rank, self.scatter) if one)
         text = self.limit or self.peak or drawn or self.span or self.turns
+        if self.left:
+            return f"{self.left} {self._replace(left='').answer()}".strip()
         return f"{self.misses.rstrip('.')}; {text[0].lower() if text[1:2].islower() else text[0]}{text[1:]}" \
             if self.missed and text else text or self.misses
 
@@ -71,7 +76,13 @@ def lead_of(table: dict) -> Lead:
     return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
                 allowed.sentence(limits), span(columns(table), trusted, settled),
                 changes(keys, columns(table), outcome, table["grid"]), *ranked.told(table, trusted),
-                tops, peaks.sentence(tops))
+                tops, peaks.sentence(tops), _left(outcome))
+
+
+def _left(outcome: np.ndarray) -> str:
+    """How many cases of an interrupted sweep have no answer, "" where all have one."""
+    count = int(np.sum(outcome == ""))
+    return f"{count} of {outcome.size} cases have no answer yet; what follows is of the others." if count else ""
 
 
 def span(measures: dict, trusted: dict, settled: np.ndarray) -> str:
