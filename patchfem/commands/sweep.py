@@ -61,7 +61,7 @@ class By:
                    "--executor") = ""
     shard: word("such as 3/40: the third of 40 parts only, into a folder that all parts share", "--shard") = ""
     collect: flag("only write the tables of a sweep whose shards are done", "--collect") = False
-    device: word("cpu; lanes on another processor are not built yet", "--device") = "cpu"
+    device: word("what the lanes of a sweep run on, as yet only the processor, such as cpu", "--device") = "cpu"
 
     def __post_init__(self):
         if self.device != "cpu":

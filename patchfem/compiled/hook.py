@@ -74,10 +74,10 @@ def made(place: Path, commands=usual) -> None:
     with TemporaryDirectory() as work:
         cache = Path(work) / "cache"
         environment = os.environ | {"NUMBA_CPU_FEATURES": "", "PATCHFEM_CACHE": str(cache), "PYTHONPATH": str(ROOT)}
-        cpu, key = subprocess.run([sys.executable, "-c", ABOUT], env=environment, cwd=work, check=True,
+        cpu, key = subprocess.run([sys.executable, "-P", "-c", ABOUT], env=environment, cwd=work, check=True,
                                   stdout=subprocess.PIPE, text=True).stdout.split()
         for at, words in enumerate(commands(Path(work))):
-            subprocess.run([sys.executable, "-c", RUN, *map(str, words), "-q", "-o", f"{work}/{at}"],
+            subprocess.run([sys.executable, "-P", "-c", RUN, *map(str, words), "-q", "-o", f"{work}/{at}"],
                            env=environment | {"NUMBA_CPU_NAME": cpu}, cwd=work, check=True)
         [found] = (cache / "patchfem").iterdir()
         for part in ("code", "kinds"):
