@@ -40,6 +40,9 @@ from .names_kernels import (
     W,
     X,
 )
+from .rigid_kernels import path, slid
+
+__all__ = ["RESTS", "advance", "ahead", "at_turn", "felt", "path", "rise", "slid"]
 
 RESTS = False  # a stick moves its spring
 
@@ -54,18 +57,6 @@ def felt(x, way, place, sine, room, i):
 def rise(v, a, way, place, room, i):
     """Rate of the friction at a speed v and an acceleration a."""
     return room[K * LANES + i] * v if way == 0.0 else 0.0
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def slid(x, place):
-    """Irreversible part of the slide."""
-    return place
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def path(place, pe, place1, v1, room, i):
-    """What a step adds to the path of slip [m]."""
-    return abs(pe - place) + abs(place1 - pe)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)

@@ -21,8 +21,9 @@ NAMED = 3  # keys in the sentence
 
 def told(table: dict, trusted: dict) -> tuple:
     """(ranks, rank, quantiles, scatter) of the Lead of a sweep; trusted: as `lead` makes it."""
-    ranks, found = ranks_of(table), quantiles(table, trusted)
-    return ranks, sentence(ranks), found, scatter(found, len(table["outcome"]))
+    ranks, found, of = ranks_of(table), quantiles(table, trusted), len(table["outcome"])
+    left = of - int(np.sum(trusted[next(iter(ranks))])) if ranks else 0
+    return ranks, sentence(ranks, left), found, scatter(found, of)
 
 
 def ranks_of(table: dict) -> dict:
@@ -37,8 +38,9 @@ def ranks_of(table: dict) -> dict:
     return table["ranks"]
 
 
-def sentence(ranks: dict) -> str:
-    """Which keys matter how much for the first measure that is ranked; "" where none is."""
+def sentence(ranks: dict, left: int = 0) -> str:
+    """Which keys matter how much for the first measure that is ranked, "" where none is; left: cases that have not
+    settled within the tolerance, which count as they ended."""
     name = next(iter(ranks), None)
     if name is None:
         return ""
@@ -47,7 +49,8 @@ def sentence(ranks: dict) -> str:
     said += [f"then on {one.key} ({percent(one)})" for one in others[:NAMED - 1]]
     if len(others) >= NAMED:
         said.append(f"least on {others[-1].key} ({percent(others[-1])})")
-    return f"{label(name).capitalize()} {', '.join(said)}."
+    ended = f"; {left} cases that have not settled count as they ended" if left else ""
+    return f"{label(name).capitalize()} {', '.join(said)}{ended}."
 
 
 def percent(one) -> str:

@@ -25,10 +25,10 @@ from ...disk.exchange import put
 from ...disk.whole import Unwritten, unmade, write_bytes, write_inside
 from ...effects import EFFECTS
 from ...model.model import Model
-from ...runs.many.answers import Answers
+from ...runs.many.answers import FAILED, Answers
 from ..folder import save
 from ..results import LOCK, PAGE, refuse_others
-from ..summary import summary
+from ..summary import read_summary, summary
 from . import chunks
 from .chunks import CHUNKS
 
@@ -167,7 +167,32 @@ class Folder:
                 raise
         write_bytes(self.target / CHUNKS / self.token, b"")
         self.chunks.look()
+        self._adopt()
         return self
+
+    def _adopt(self) -> None:
+        """Take the answers of an older folder, which has them in the summaries of its cases alone, into columns."""
+        if not (self.target / CASES).is_dir():
+            return
+        named = {one.name for one in os.scandir(self.target / CASES)}
+        numbers, found = [], []
+        for number in np.flatnonzero(self.chunks.held < 0).tolist():
+            if (key := key_of(self.chunks.names[number])) in named:
+                with suppress(OSError, ValueError):
+                    found.append(read_summary(self.target / CASES / key / SUMMARY))
+                    numbers.append(number)
+        for first in range(0, len(numbers), chunks.MOST):
+            part = slice(first, first + chunks.MOST)
+            answers = Answers.blank(len(numbers[part]))
+            for case, one in enumerate(found[part]):
+                measures = {name: Measure(m["value"], m["unit"], m["error"], m["floor"], reason=m.get("reason", ""))
+                            for name, m in one["measures"].items()}
+                answers.put(case, one["outcome"], measures, one["seconds"]["total"])
+                if one["outcome"] == FAILED:
+                    answers.fail(case, one.get("message", ""))
+            chunks.write(self.chunks.folder, numbers[part], self.chunks.names[numbers[part]], answers)
+        if numbers:
+            self.chunks.look()
 
     def __exit__(self, *_) -> None:
         (self.target / CHUNKS / self.token).unlink(missing_ok=True)

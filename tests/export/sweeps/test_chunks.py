@@ -134,6 +134,19 @@ def test_always_a_damaged_file_is_run_again(swept, scene, tmp_path, monkeypatch,
         assert (out / name).read_bytes() == (swept / name).read_bytes()
 
 
+def test_exact_a_folder_of_summaries_alone_is_gone_on_with(scene, tmp_path, monkeypatch):
+    """As sweeps were kept before they had columns; a summary that is damaged is run again."""
+    out, words = tmp_path / "out", ("sweep", scene, *OVER, "-o", tmp_path / "out")
+    assert cli(*words).code == 3
+    before = {name: (out / name).read_bytes() for name in TABLES}
+    shutil.rmtree(out / "chunks")
+    (next((out / "cases").iterdir()) / "summary.json").write_text("{")
+    ran, real = [], many.answers
+    monkeypatch.setattr(many, "answers", lambda models, *more: ran.extend(models) or real(models, *more))
+    assert cli(*words, "--resume").code == 3 and len(ran) == 1
+    assert {name: (out / name).read_bytes() for name in TABLES} == before
+
+
 def test_exact_columns_on_disk_make_the_same_tables(swept, scene, tmp_path, monkeypatch):
     monkeypatch.setattr(kept, "MANY", 10)
     monkeypatch.setattr(chunks, "MOST", 16)

@@ -177,8 +177,9 @@ def runs_of(models, cycles: int, window: int, steps: int) -> tuple:
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
     errors = {name: (WIDER if law == "creeping" else 1.0) * one for name, one in bars(values, changes).items()}
     none = {name: np.full(len(models), np.nan) for name in ("ring_frequency", "ring_damping")}
-    runs = Runs(cycles, window, values | none, book, extremes, phasors[:, ends], stuck & False, stuck & False,
-                    errors, 1e-9, np.inf, again=False)
+    nowhere = np.zeros(len(models), bool)  # what sticks or is lost goes elsewhere
+    runs = Runs(cycles, window, values | none, book, extremes, phasors[:, ends], nowhere, nowhere, errors, 1e-9, np.inf,
+                again=False)
     return runs, exact, np.array(cases).T.copy()
 
 
