@@ -79,17 +79,16 @@ def quantiles(table: dict, trusted: dict) -> dict:
 
 def scatter(found: dict, of: int) -> str:
     """Where nine in ten of `of` drawn cases lie; found: as `quantiles` gives them; "" where there are none."""
-    said, counts = [], set()
+    said, most = [], max((found[name][2] for name in SPREAD if name in found), default=0)
+    if most and most < SETTLED * of:
+        return (f"{of - most} of {of} drawn cases have not settled within the tolerance, perhaps those that move "
+                "most: how far the answers scatter is not known.")
     for name in [name for name in SPREAD if name in found]:
         unit, (low, _, high), count = found[name]
-        counts.add(count)
         low, high = (short(one, unit, 3, zero_below(name)) for one in (low, high))
-        said.append(f"{'an' if name[0] in 'aeio' else 'a'} {label(name)} from {low} to {high}")
-    least = min(counts, default=0)
-    if said and least < SETTLED * of:
-        return (f"{of - least} of {of} drawn cases have not settled within the tolerance, perhaps those that move "
-                "most: how far the answers scatter is not known.")
-    whose = f"{of} drawn cases" if least == of else f"{least} of {of} drawn cases that settled"
+        some = f" (in the {count} that have one)" if count < most else ""
+        said.append(f"{'an' if name[0] in 'aeio' else 'a'} {label(name)} from {low} to {high}{some}")
+    whose = f"{of} drawn cases" if most == of else f"{most} of {of} drawn cases that settled"
     return f"Nine in ten of the {whose} have {', '.join(said)}." if said else ""
 
 

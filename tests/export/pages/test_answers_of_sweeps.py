@@ -91,3 +91,6 @@ def test_always_a_scatter_that_unsettled_cases_hide_is_not_told():
     assert "is not known" in ranked.scatter(found, 100) and "40 of 100" in ranked.scatter(found, 100)
     assert ranked.scatter(found, 60).startswith("Nine in ten of the 60 drawn cases have a loop area from 1 J to 3 J")
     assert ranked.scatter({}, 100) == ""
+    some = found | {"equivalent_damping": ("1", np.array([0.1, 0.2, 0.3]), 40)}  # those that stick have none
+    assert ranked.scatter(some, 100).startswith("40 of 100 drawn cases have not settled")
+    assert ranked.scatter(some, 60).endswith("an equivalent damping from 0.1 to 0.3 (in the 40 that have one).")
