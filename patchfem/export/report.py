@@ -10,7 +10,7 @@ from .. import scales
 from ..effects import shown_absent
 from .drawing import charts
 from .pages import player
-from .pages.document import Section, document
+from .pages.document import Section, document, table, warned
 from .pages.words import SHARP, G, headline, linked, others, pair, texts, units
 
 SETTLED = ("steady", "stuck", "done")
@@ -51,9 +51,7 @@ def page(data: dict) -> str:
             f"computed in {summary['seconds'].get('total', 0):.2f} s</p>",
             f"<p class=verdict>{verdict(data)}</p>"]
     warnings = [w for w in summary["warnings"] if w != data["sentence"]]
-    if warnings:
-        said = "".join(f"<p>{escape(text)}</p>" for text in warnings)
-        lead.append(f"<div class='verdict warn'><b>Warnings</b>{said}</div>")
+    lead.append(warned(warnings, "Warnings"))
     lead += [f"<p class=soft>Note: {escape(text)}</p>" for text in summary["notes"]]
     drawn, shown = figures(data)
     drawn = charts.within(drawn, ROOM)
@@ -248,13 +246,11 @@ def _table_one(data: dict) -> list:
             mine = mine * (_factor(m) if name == "acceleration" else 1.0)
             kind = f"{name}{' (repeat run)' if 'R' in r.flag else ''}"
             ratio = f"{mine / value:.2f}" if value else "&ndash;"
-            rows.append(f"<tr><td>{linked(kind, key)}</td><td class=n>{value / scale:.3g} {unit}</td>"
-                        f"<td class=n>{mine / scale:.3g} {unit}</td><td class=n>{ratio}</td></tr>")
-    if not rows:
-        text = "<p class=soft>No measured row has this frequency and input.</p>"
-        return [Section("measured", "Against the measurement", text)]
-    text = ("<div class=across><table><tr><th>reading<th class=n>measured<th class=n>computed"
-            f"<th class=n>ratio</tr>{''.join(rows)}</table></div><p class=soft>{escape(_unsettled(data).strip())}</p>")
+            rows.append([linked(kind, key), f"{value / scale:.3g} {unit}", f"{mine / scale:.3g} {unit}", ratio])
+    text = "<p class=soft>No measured row has this frequency and input.</p>"
+    if rows:
+        text = (table(("reading", ">measured", ">computed", ">ratio"), rows)
+                + f"<p class=soft>{escape(_unsettled(data).strip())}</p>")
     return [Section("measured", "Against the measurement", text)]
 
 
@@ -273,16 +269,13 @@ def _table_of_levels(levels: list) -> Section:
             there = value is not None and np.isfinite(value)
             cells.append(pair(name, measure(value, unit, error)) if there else DASH)
         drive = f"{one['drive']:.4g} N" if one.get("unit") == "N" else f"{one['drive'] / G:.4g} g"
-        rows.append(f"<tr><td class=n>{number}</td><td class=n>{drive}</td>"
-                    + "".join(f"<td class=n>{cell}</td>" for cell in cells)
-                    + (f"<td>{escape(one['outcome'])}</td>" if judged else "")
-                    + f"<td>{'stuck' if one['stuck'] else 'slips'}</td></tr>")
+        rows.append([str(number), drive, *cells, *([escape(one["outcome"])] if judged else []),
+                     "stuck" if one["stuck"] else "slips"])
     sized = "force" if any(one.get("unit") == "N" for one in levels) else "base acceleration"
     texts = ("half peak-to-peak", "peak acceleration", "its first harmonic", "third over first")
-    heads = (f"<th class=n>level<th class=n>{sized}"
-             + "".join(f"<th class=n>{linked(text, name)}" for text, (name, _) in zip(texts, OF_LEVELS))
-             + f"{'<th>outcome' if judged else ''}<th>interface")
-    return Section("levels", "Levels", f"<div class=across><table><tr>{heads}</tr>{''.join(rows)}</table></div>")
+    heads = [">level", f">{sized}", *(f">{linked(text, name)}" for text, (name, _) in zip(texts, OF_LEVELS)),
+             *(["outcome"] if judged else []), "interface"]
+    return Section("levels", "Levels", table(heads, rows))
 
 
 def measure(value: float, unit: str, error: float | None) -> dict:
@@ -295,33 +288,31 @@ def _measures(data: dict) -> Section:
     rows, means = [], data.get("means", {})
     for name, m in data["summary"]["measures"].items():
         value, error = texts(name, m)
-        cells = f"<td id='measure-{escape(name)}'>{escape(name)}</td><td class=n>{value}</td>"
+        cells = [f"<td id='measure-{escape(name)}'>{escape(name)}</td>", value]
         if m["value"] is None:
-            cells += f"<td class=soft colspan=3>{escape(m.get('reason', ''))}</td>"
+            cells.append(f"<td class=soft colspan=3>{escape(m.get('reason', ''))}</td>")
         else:
             unit = units(name, m["value"], m["unit"], m["error"])[0][0]
             error = error or ("unknown" if m["error"] is None else DASH)
-            cells += f"<td class=n>{error}</td><td class=v>{escape(unit)}</td><td>{escape(others(name, m))}</td>"
-        rows.append(f"<tr>{cells}<td class=soft>{escape(means.get(name, ''))}</td></tr>")
+            cells += [error, f"<td class=v>{escape(unit)}</td>", escape(others(name, m))]
+        rows.append([*cells, f"<td class=soft>{escape(means.get(name, ''))}</td>"])
     note = (f"<p class=soft>The run holds {data['cycles']:.2g} of a cycle: measures per cycle are not those of a "
             "whole one.</p>") if part_of_cycle(data) else ""
-    return Section("measures", "Measures", "<div class='across many'><table><tr><th>measure<th class=n>value"
-                   "<th class=n>error (±)"
-                   f"<th>unit<th>in a workshop's units<th>what it is</tr>{''.join(rows)}</table></div>"
-                   f"<p class=soft>Value and error in the same unit; {SHARP.replace('±', 'error')}. "
+    heads = ("measure", ">value", ">error (±)", "unit", "in a workshop's units", "what it is")
+    return Section("measures", "Measures", table(heads, rows, "across many")
+                   + f"<p class=soft>Value and error in the same unit; {SHARP.replace('±', 'error')}. "
                    f"summary.json has all digits in SI.</p>{note}")
 
 
 def _cost(data: dict) -> Section:
     """What ran, by which equations, and how long it took."""
     summary = data["summary"]
-    rows = "".join(f"<tr><td>{escape(e['effect'])}</td><td>{escape(e['equations'])}</td>"
-                   f"<td class=n>{e['seconds']:.3f}</td></tr>" for e in summary["effects"])
+    rows = [[escape(e["effect"]), escape(e["equations"]), f"{e['seconds']:.3f}"] for e in summary["effects"]]
     parts = ", ".join(f"{k} {v:.3f} s" for k, v in summary["seconds"].items())
     shared = " The law and the modes share one loop; its time stands with the law." if summary["kind"] == "rig" else ""
     absent = shown_absent(summary["not_in_scene"], summary.get("numerics", {}).get("engine"))
-    text = (f"<div class=across><table><tr><th>effect<th>equations<th class=n>seconds</tr>{rows}"
-            f"</table></div><p class=soft>Seconds by the clock on the wall: {escape(parts)}.{shared}</p>"
+    text = (table(("effect", "equations", ">seconds"), rows)
+            + f"<p class=soft>Seconds by the clock on the wall: {escape(parts)}.{shared}</p>"
             f"<details><summary>Not in the scene, so neither imported nor computed</summary><p class=soft>"
             f"{escape(', '.join(absent))}.</p></details>")
     return Section("cost", "What ran and what it cost", text)

@@ -109,12 +109,17 @@ def upper_points(frame: Frame) -> np.ndarray:
 def slide_of(frame: Frame) -> float:
     """Slide [m] of the upper piece as a whole: of its far face, which is held rigid, carried down to y = 0."""
     upper = upper_points(frame)
-    height = frame.points[upper, 1].max()
-    far = upper[frame.points[upper, 1] >= height * (1 - 1e-9)]
-    x, (across, up) = frame.points[far, 0], frame.point_data["displacement"][far, :2].astype(float).T
-    rotation = np.polyfit(x - x.mean(), up, 1)[0] if np.ptp(x) > 0 else 0.0
-    slide = float(across.mean() + rotation * height)
-    return slide if abs(slide) > ROUND_OFF * np.abs(frame.point_data["displacement"][upper]).max() else 0.0
+    return float(slides(frame.points[upper], frame.point_data["displacement"][None, upper].astype(float))[0])
+
+
+def slides(points, moves) -> np.ndarray:
+    """Slides (f,) [m], as `slide_of`, of an upper piece whose points (n, 2) [m] move by (f, n, 2) [m]."""
+    height = points[:, 1].max()
+    far = points[:, 1] >= height * (1 - 1e-9)
+    apart = points[far, 0] - points[far, 0].mean()
+    turn = moves[:, far, 1] @ apart / (apart @ apart)  # the far face is held rigid: a slope is its rotation
+    slide = moves[:, far, 0].mean(axis=1) + turn * height
+    return np.where(np.abs(slide) > ROUND_OFF * np.abs(moves).max(axis=(1, 2)), slide, 0.0)
 
 
 def moved(frame: Frame) -> np.ndarray:
@@ -124,15 +129,23 @@ def moved(frame: Frame) -> np.ndarray:
     gap.
     """
     move = frame.points[:, :2] * 0 + frame.point_data["displacement"][:, :2]
-    line = frame.interface()
-    x = frame.points[line, 0]
-    upper = upper_points(frame)
-    height = frame.points[upper, 1].max()
-    face = upper[frame.points[upper, 1] <= 1e-9 * height]
-    face = face[np.argsort(frame.points[face, 0], kind="stable")]
-    shape = move[line, 1] + frame.point_data["gap"][line] - np.interp(x, frame.points[face, 0], move[face, 1])
-    move[upper, 1] += np.interp(frame.points[upper, 0], x, shape) * (1 - frame.points[upper, 1] / height)
+    line, upper = frame.interface(), upper_points(frame)
+    surface = move[line, 1] + frame.point_data["gap"][line]
+    move[upper, 1] += shape(frame.points[upper], move[None, upper, 1], frame.points[line, 0], surface[None])[0]
     return move
+
+
+def shape(points, up, x, surface) -> np.ndarray:
+    """What the shape of its surface adds to the motion (f, n) [m] across the interface of an upper piece, as `moved`.
+
+    points: (n, 2) [m]; up: (f, n) [m]; surface: (f, m) [m], where it is at the places x (m,) [m].
+    """
+    height = points[:, 1].max()
+    face = np.flatnonzero(points[:, 1] <= 1e-9 * height)
+    face = face[np.argsort(points[face, 0], kind="stable")]
+    added = [np.interp(points[:, 0], x, there - np.interp(x, points[face, 0], move[face]))
+             for there, move in zip(surface, up)]
+    return np.array(added) * (1 - points[:, 1] / height)
 
 
 def rounded(factor: float, least: float = 1.0) -> float:
@@ -168,13 +181,20 @@ def middles(frame: Frame) -> np.ndarray:
 
 def areas(frame: Frame) -> np.ndarray:
     """Areas of the cells (cells,) [m2] of a frame, 0 of lines."""
-    size, out = np.diff(frame.offsets), np.zeros(len(frame.types))
-    for count in np.unique(size[size > 2]):
-        mine = size == count
-        corner = frame.points[frame.connectivity[frame.offsets[:-1][mine][:, None] + np.arange(count)], :2]
-        after = np.roll(corner, -1, axis=1)
-        out[mine] = np.abs((corner[..., 0] * after[..., 1] - corner[..., 1] * after[..., 0]).sum(axis=1)) / 2
-    return out
+    return sizes(frame.points[:, :2], corners(frame.connectivity, frame.offsets))
+
+
+def corners(connectivity, offsets) -> np.ndarray:
+    """Corners (m, 4) of lines, triangles and quadrilaterals as VTK lists them, the last one more often in the first."""
+    last = np.diff(offsets)[:, None] - 1
+    return connectivity[offsets[:-1, None] + np.minimum(np.arange(4), last)]
+
+
+def sizes(points, cells) -> np.ndarray:
+    """Areas (m,) of cells of four corners (m, 4) among points (n, 2)."""
+    corner = points[cells]
+    after = np.roll(corner, -1, axis=1)
+    return np.abs((corner[..., 0] * after[..., 1] - corner[..., 1] * after[..., 0]).sum(axis=1)) / 2
 
 
 def curves(frame: Frame, reach: tuple | None = None) -> tuple:

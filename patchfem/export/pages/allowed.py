@@ -15,6 +15,7 @@ import numpy as np
 
 from ...scales import LADDERS, plain, short, step_of
 from ..written import NUMBER, bare, label
+from . import document
 from .changes import lines_of, shown_of
 from .words import linked, zero_below
 
@@ -237,7 +238,7 @@ def table(limits: Limits, measures: dict) -> str:
     """
     if not limits.found:
         return ""
-    key, rows, at = limits.key, "", shown_of(limits.key)
+    key, rows, at = limits.key, [], shown_of(limits.key)
     for one in limits.found:
         if one.beyond is not None:
             far = f"between {bare(at(one.inside), at(one.beyond))} and {at(one.beyond)}" + (
@@ -246,17 +247,14 @@ def table(limits: Limits, measures: dict) -> str:
             far = "in no case" if one.whole else f"not up to {at(one.inside)}; cases after it are open"
         by = f"{100 * WITHIN:g} %" if abs(one.change) < 1 else "double"
         first = short(one.first, measures[one.name][2], 4, zero_below(one.name))
-        rows += (f"<tr><td>{linked(label(one.name), one.name)}</td><td class=n>{escape(first)}</td>"
-                 f"<td class=n>{_change(one.changed)}</td>"
-                 f"<td>{by}</td><td>{escape(far)}</td></tr>")
+        rows.append([linked(label(one.name), one.name), escape(first), _change(one.changed), by, escape(far)])
     several = int(np.sum(np.asarray(key["values"], float) == np.min(np.asarray(key["values"], float)))) > 1
     least = " Of the values of the other keys those are told that allow least." if several else ""
     return (f"<p class=soft>{escape(key['name'])} grows from {escape(at(limits.found[0].start))}. A measure has left "
             "its first value where it differs from it by so much and by more than both numerical errors; cases that "
             "did not settle or miss their tolerance do not count."
-            f"{least}</p><div class=wide><table><thead><tr><th>measure</th>"
-            "<th class=n>first case</th><th class=n>change up to the last</th><th>leaves by</th><th>where</th></tr>"
-            f"</thead><tbody>{rows}</tbody></table></div>")
+            f"{least}</p>" + document.table(
+                ("measure", ">first case", ">change up to the last", "leaves by", "where"), rows, "wide"))
 
 
 def _change(share: float) -> str:

@@ -14,7 +14,7 @@ from ..drawing.charts import COLOURS, mark
 from ..readback import numeric, readable, variables, wanted
 from ..summary import read_summary
 from ..written import NUMBER
-from .document import Section, document
+from .document import Section, document, table
 from .sweep import label
 from .words import linked, meaning, pair
 
@@ -127,9 +127,8 @@ def page(runs: list, read: Run | None = None) -> str:
                          f'aria-label="{escape(one["told"])}"></div><p class=soft>{escape(one["told"])}</p>')
                  for one in charts]
     known = dict.fromkeys(name for run in runs for name in run.summary["measures"])
-    means = "".join(f"<tr id='measure-{escape(name)}'><td>{escape(label(name))}</td><td>{escape(meaning(name))}</td>"
-                    "</tr>" for name in known)
-    sections.append(Section("means", "What the measures are", f"<table><tbody>{means}</tbody></table>"))
+    means = [(f" id='measure-{escape(name)}'", [escape(label(name)), escape(meaning(name))]) for name in known]
+    sections.append(Section("means", "What the measures are", table(("", ""), means)))
     title = " and ".join(names) if len(names) < 4 else f"{len(names)} runs side by side"
     return document(title, f"<p class=verdict>{outcomes}.</p>", sections, {"charts": charts} if charts else None,
                     ("figures.js", "curves.js") if charts else ())
@@ -211,15 +210,9 @@ def _differences(runs: list, names: list) -> str:
             if any(one.get(key) != flat[0].get(key) for one in flat)]
     if not keys:
         return "<p>Nothing: the resolved scenes are the same.</p>"
-    cells = {key: "".join(f"<td>{_written(one.get(key))}</td>" for one in flat) for key in keys}
-    rows = "".join(f"<tr><td>{escape(key)}</td>{cells[key]}</tr>" for key in keys)
+    rows = [[escape(key), *(_written(one.get(key)) for one in flat)] for key in keys]
     return ("<p class=soft>Keys of the resolved scenes whose values are not the same everywhere, in SI.</p>"
-            f"<div class=across><table><thead><tr><th>key</th>{_heads(names)}</tr></thead><tbody>{rows}</tbody></table>"
-            "</div>")
-
-
-def _heads(names: list) -> str:
-    return "".join(f"<th>{escape(name)}</th>" for name in names)
+            + table(("key", *map(escape, names)), rows))
 
 
 def _written(value) -> str:
@@ -232,13 +225,11 @@ def _measures(runs: list, names: list) -> str:
     rows = []
     for name in dict.fromkeys(name for run in runs for name in run.summary["measures"]):
         found = [run.summary["measures"].get(name) for run in runs]
-        cells = "".join(f"<td class=n>{_cell(name, one, found[0] if number else None)}</td>"
-                        for number, one in enumerate(found))
-        rows.append(f"<tr><td>{linked(label(name), name)}</td>{cells}</tr>")
+        rows.append([linked(label(name), name),
+                     *(_cell(name, one, found[0] if number else None) for number, one in enumerate(found))])
     return ("<p class=soft>Value and estimated numerical error. Bold with its change in per cent: differs from the "
             "first run by more than both errors together; a factor from ten times on, a dash where the first is 0 "
-            "within its error.</p><div class='across side'><table><thead><tr><th>measure</th>"
-            f"{_heads(names)}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>")
+            "within its error.</p>" + table(("measure", *(f">{escape(name)}" for name in names)), rows, "across side"))
 
 
 def _cell(name: str, one: dict | None, first: dict | None) -> str:

@@ -2,6 +2,8 @@
 
 import json
 import math
+import re
+from collections.abc import Iterable, Sequence
 from html import escape
 from typing import NamedTuple
 
@@ -21,13 +23,16 @@ class Section(NamedTuple):
     html: str
 
 
-def document(title: str, lead: str, sections: list, data: dict | None = None, scripts: tuple = ()) -> str:
+def document(title: str, lead: str, sections: list, data: dict | None = None, scripts: tuple = (),
+             paper: bool = False) -> str:
     """The whole HTML page.
 
-    title: plain text; lead: HTML under it; sections: of Section; data: what the scripts draw, plain lists and numbers;
-    scripts: names of JavaScript files of this folder. Without scripts no drawing library is put in.
+    title: plain text; lead: HTML under it; sections: of Section, one alone has no contents before it; data: what the
+    scripts draw, plain lists and numbers; scripts: names of JavaScript files of this folder, without which no drawing
+    library is put in; paper: dark on white in the dark too, for pictures that were drawn beforehand.
     """
     contents = "".join(f'<a href="#{one.anchor}">{escape(one.heading)}</a>' for one in sections)
+    contents = f"<nav aria-label=Contents>{contents}</nav>\n" if len(sections) > 1 else ""
     body = "\n".join(f'<section id="{one.anchor}"><h2>{escape(one.heading)}</h2>\n{one.html}</section>'
                      for one in sections)
     drawn = ""
@@ -35,10 +40,43 @@ def document(title: str, lead: str, sections: list, data: dict | None = None, sc
         text = encoded(data or {}).replace("<", "\\u003c")
         drawn = (f"<script>{library.bokeh()}</script>\n<script type=application/json id=data>{text}</script>\n"
                  + "".join(f"<script>{library.inert(library.own(name))}</script>\n" for name in scripts))
-    return (f"<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content='width=device-width, "
-            f"initial-scale=1'><title>{escape(title)}</title><style>{library.own('page.css')}</style></head><body>\n"
-            f"<header><h1>{escape(title)}</h1>{lead}</header>\n<nav aria-label=Contents>{contents}</nav>\n"
-            f"<main>\n{body}\n</main>\n{drawn}</body></html>\n")
+    return (f"<!doctype html><html lang=en{' data-inks=paper' * paper}><head><meta charset=utf-8>"
+            f"<meta name=viewport content='width=device-width, initial-scale=1'><title>{escape(title)}</title>"
+            f"<style>{library.own('page.css')}</style></head><body>\n"
+            f"<header><h1>{escape(title)}</h1>{lead}</header>\n{contents}<main>\n{body}\n</main>\n{drawn}</body></html>\n")
+
+
+def table(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = "") -> str:
+    """HTML of a table in a frame that scrolls sideways.
+
+    heads: HTML of the columns' heads, ">" before that of a column of numbers, all "" for a table without a head; rows:
+    lists of the HTML of their cells, or pairs of attributes and such a list; a cell that begins with "<td" brings its
+    own tag; frame: class of the frame, "wide" for one whose head stays in sight; kind: class of the table.
+    """
+    numbers = [" class=n" * head.startswith(">") for head in heads]
+    top = "".join(f"<th{number}>{head.removeprefix('>')}</th>" for number, head in zip(numbers, heads))
+    body = ""
+    for row in rows:
+        attributes, cells = row if isinstance(row, tuple) else ("", row)
+        body += f"<tr{attributes}>" + "".join(cell if cell.startswith("<td") else f"<td{number}>{cell}</td>"
+                                              for number, cell in zip(numbers, cells)) + "</tr>"
+    return (f"<div class='{frame}'><table{f' class={kind}' if kind else ''}>"
+            f"{f'<thead><tr>{top}</tr></thead>' if any(heads) else ''}<tbody>{body}</tbody></table></div>")
+
+
+def warned(texts: Sequence, heading: str = "") -> str:
+    """A box of warnings under a heading, "" without one."""
+    told = "".join(f"<p>{escape(text)}</p>" for text in texts)
+    return told and f"<div class='verdict warn'>{heading and f'<b>{heading}</b>'}{told}</div>"
+
+
+def figure(number: int | str, svg: str, caption: str, alternative: str) -> str:
+    """A picture drawn beforehand with its caption and the text in its place; one page holds many, so their ids are
+    told apart by the number."""
+    svg = svg.replace("<svg", f'<svg role="img" aria-label="{escape(alternative, quote=True)}"', 1)
+    svg = re.sub(r'\bid="([^"]+)"', rf'id="f{number}\1"', svg)
+    svg = re.sub(r'(url\(|href=")#', rf"\1#f{number}", svg)
+    return f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
 def encoded(value) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...scales import plain, short
 from ..written import label
+from . import document
 from .changes import lines_of, shown_of
 from .words import linked, zero_below
 
@@ -108,12 +109,10 @@ def table(peaks: list) -> str:
     """The peaks as a table; "" without any."""
     if not peaks:
         return ""
-    rows = "".join(f"<tr><td>{escape(one.held)}</td><td class=n>{plain(one.frequency, 5)}</td><td class=n>{_high(one)}"
-                   f"</td><td class=n>{plain(one.width, 2) if np.isfinite(one.width) else '&ndash;'}</td></tr>"
-                   for one in peaks)
-    head = "".join(f"<th class=n>{one}</th>" for one in ("at [Hz]", "height", "half-power width [Hz]"))
+    rows = [[escape(one.held), plain(one.frequency, 5), _high(one),
+             plain(one.width, 2) if np.isfinite(one.width) else "&ndash;"] for one in peaks]
     return (f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve, by a parabola "
             "of 1/y&sup2; over f&sup2; through the largest case and its neighbours; a case that has not settled "
             "counts by its steady estimate, one without is left out. A width is given where the curve falls to its "
-            "peak/&radic;2 on both sides within the swept range.</p><div class=wide><table><thead><tr><th></th>"
-            f"{head}</tr></thead><tbody>{rows}</tbody></table></div>")
+            "peak/&radic;2 on both sides within the swept range.</p>"
+            + document.table(("", ">at [Hz]", ">height", ">half-power width [Hz]"), rows, "wide"))

@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 
 from ...scales import axis_unit
+from ..drawing.panels import corners, shape, slides
 from ..fields.series import Series, moving
 from ..fields.vtkhdf import NAME
 from .document import Section
 from .library import own
-from .thinned import corners, spread, thinned
+from .thinned import spread, thinned
 
 FRAMES, CELLS, PLACES = 24, 5000, 400  # at most: frames, cells of a piece, places along the interface
 BYTES = 520_000  # of all frames together, before they are written as text
 COLOURS = (("von Mises stress", False), ("stress along x", True), ("stress across the interface", True),
            ("shear stress", True))  # of a cell; whether it has a sign
 CURVES = (("normal_stress", "pressure"), ("shear_stress", "shear traction"), ("gap", "gap"), ("slip", "slide"))
-ROUND_OFF = 1e-5  # of the largest motion: it is kept in single precision
 NARROW = 0.25  # share of the length below which the contact gets half of what is shown
 MM = 1e3
 
@@ -60,7 +60,7 @@ def reel(folder: Path) -> dict | None:
         places = spread(x, min(PLACES, x.size) - 1, near)
         lower = _piece(series, "lower", numbers, most, near)
         upper = _piece(series, "upper", numbers, most, near)
-        slide = _open(series, numbers, upper, x, line)
+        slide = _open(upper, x, line)
         times = series.times[numbers]
     unit, scale = axis_unit(np.concatenate([piece["colours"].ravel() for piece in (lower, upper)]), "Pa")
     shear = np.any(line.get("shear_stress", 0.0))
@@ -100,21 +100,12 @@ def _piece(series: Series, side: str, numbers: list, most: int, near: tuple | No
             "colours": colours}
 
 
-def _open(series: Series, numbers: list, upper: dict, x, line: dict) -> np.ndarray:
+def _open(upper: dict, x, line: dict) -> np.ndarray:
     """Take the slide as a whole (f,) [m] out of the moves of the upper piece and put the gap into them."""
     points, moves = upper["points"], upper["moves"]
-    height = points[:, 1].max()
-    far, face = points[:, 1] >= height * (1 - 1e-9), np.flatnonzero(points[:, 1] <= 1e-9 * height)
-    face = face[np.argsort(points[face, 0], kind="stable")]
-    apart = points[far, 0] - points[far, 0].mean()
-    turn = moves[:, far, 1] @ apart / (apart @ apart)  # the far face is held rigid: a slope is its rotation
-    slide = moves[:, far, 0].mean(axis=1) + turn * height
-    slide[np.abs(slide) <= ROUND_OFF * np.abs(moves).max(axis=(1, 2))] = 0.0
+    slide = slides(points, moves)
     moves[:, :, 0] -= slide[:, None]
-    fade = 1 - points[:, 1] / height
-    for move, below, gap in zip(moves, line["displacement"][..., 1], line["gap"]):
-        shape = below + gap - np.interp(x, points[face, 0], move[face, 1])
-        move[:, 1] += np.interp(points[:, 0], x, shape) * fade
+    moves[:, :, 1] += shape(points, moves[:, :, 1], x, line["displacement"][..., 1] + line["gap"])
     return slide
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from ...campaigns.sweeps.ranking import ranking
 from ...scales import fitting, plain, short
 from ..written import label
+from . import document
 from .words import linked, zero_below
 
 RANKED = ("relative_displacement_amplitude", "loop_area", "equivalent_damping", "absolute_acceleration_peak",
@@ -98,12 +99,10 @@ def picture(ranks: dict) -> str:
         return ""
     parts = []
     for name, shares in ranks.items():
-        rows = "".join(
-            f"<tr><td>{escape(one.key)}</td><td class=n>{100 * one.first:.0f} %</td><td class=n>{100 * one.total:.0f} %"
-            f"</td><td class=n>{_range(one)}</td><td class=bars>{_bar(one)}</td></tr>" for one in shares)
-        parts.append(f"<h3>{linked(label(name), name)}</h3><div class=wide><table class=shares><thead><tr><th>key</th>"
-                     f"<th class=n>alone</th><th class=n>total</th><th class=n>from, to</th><th></th></tr></thead>"
-                     f"<tbody>{rows}</tbody></table></div>")
+        rows = [[escape(one.key), f"{100 * one.first:.0f} %", f"{100 * one.total:.0f} %", _range(one),
+                 f"<td class=bars>{_bar(one)}</td>"] for one in shares]
+        parts.append(f"<h3>{linked(label(name), name)}</h3>"
+                     + document.table(("key", ">alone", ">total", ">from, to", ""), rows, "wide", "shares"))
     return ("<p class=soft>Shares of the variance over the cases: what a key makes alone (dark) and with all that it "
             "takes part in (light). The line is the interval of the total.</p>" + "".join(parts))
 
@@ -121,13 +120,12 @@ def _range(one) -> str:
 
 def spread(found: dict) -> str:
     """Quantiles, as `quantiles` gives them, as a table; "" where there are none."""
-    rows = ""
+    rows = []
     for name, (unit, values, count) in found.items():
         of, scale = fitting(float(np.abs(values).max()), unit)
-        cells = "".join(f"<td class=n>{plain(one * scale, 4)}</td>" for one in values.tolist())
-        rows += f"<tr><td>{linked(label(name), name)}</td>{cells}<td>{escape(of)}</td><td class=n>{count}</td></tr>"
+        rows.append([linked(label(name), name), *(plain(one * scale, 4) for one in values.tolist()), escape(of),
+                     str(count)])
     if not rows:
         return ""
-    return ("<div class=wide><table><thead><tr><th>measure</th><th class=n>5 %</th><th class=n>half</th>"
-            f"<th class=n>95 %</th><th>unit</th><th class=n>cases</th></tr></thead><tbody>{rows}</tbody></table></div>"
+    return (document.table(("measure", ">5 %", ">half", ">95 %", "unit", ">cases"), rows, "wide") +
             "<p class=soft>So many of the drawn cases, of those that settled within the tolerance, have less.</p>")

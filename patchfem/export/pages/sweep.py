@@ -10,8 +10,8 @@ from ...core import Outcome
 from ...scales import LADDERS, axis_unit, rounded
 from ..missed import over
 from ..written import NUMBER, brief, label
-from . import allowed, peaks, ranked
-from .document import Section, document
+from . import allowed, document, peaks, ranked
+from .document import Section
 from .lead import FIRST, SETTLED, Lead, columns, lead_of
 from .words import linked, zero_below
 
@@ -49,8 +49,8 @@ def page(table: dict) -> str:
                 Section("cases", "Cases", _cases(table)),
                 Section("measures", "What the measures mean", _meanings(table)),
                 Section("again", "The same again", _again(table))]
-    return document(table["title"] or "patchfem sweep", _lead(table, told), sections, data if measures else None,
-                    ("figures.js", "explorer.js") if measures else ())
+    return document.document(table["title"] or "patchfem sweep", _lead(table, told), sections,
+                             data if measures else None, ("figures.js", "explorer.js") if measures else ())
 
 
 def _spread(number: int, most: int) -> np.ndarray:
@@ -117,12 +117,8 @@ def _lead(table: dict, said: Lead) -> str:
     lines += [f"<i>{escape(label(one))}</i>: {escape(one.sentence)}" for one in Outcome
               if one.value in table["outcome"] and one.value not in SETTLED]
     text = "".join(f"<p>{line}</p>" for line in lines)
-    failed = table["messages"]
-    fault = ""
-    if failed:
-        shown = Counter(failed.values()).most_common(5)
-        fault = "<div class='verdict warn'>" + "".join(
-            f"<p>{count} case{'s' if count > 1 else ''} failed: {escape(why)}</p>" for why, count in shown) + "</div>"
+    fault = document.warned([f"{count} case{'s' if count > 1 else ''} failed: {why}"
+                             for why, count in Counter(table["messages"].values()).most_common(5)])
     took = f" &middot; computed in {table['seconds']:.2f} s, all cases together" if isfinite(table["seconds"]) else ""
     scene = f"Scene: {escape(table['of'])} &middot; " if "of" in table else ""
     return (f"<p class=soft>{scene}patchfem {escape(table['version'])}{took}</p>"
@@ -136,25 +132,23 @@ def _cases(table: dict) -> str:
     shown = shown[:6]
     few = slice(LISTED)
     columns = [_measure(name, table["measures"][name], few, table.get("tolerance", np.nan)) for name in shown]
-    head = "".join(f"<th>{escape(one['name'])}</th>" for one in table["keys"]) + "<th>outcome</th>" + "".join(
-        f"<th class=n>{linked(one['label'], one['name'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}</th>"
-        for one in columns)
+    heads = [*(escape(one["name"]) for one in table["keys"]), "outcome",
+             *(f">{linked(one['label'], one['name'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}"
+               for one in columns)]
     rows = []
     for i, outcome in enumerate(table["outcome"][:LISTED]):
-        cells = "".join(f"<td>{escape(brief(str(one['texts'][i])))}</td>" for one in table["keys"])
         said = escape(label(outcome))
         if table["folders"] is not None:
             said = f'<a href="{escape(table["folders"][i])}">{said}</a>'
-        cells += f"<td>{said}</td>" + "".join(
-            f"<td class=n{' data-over' * bool(one['over'][i])}>"
-            f"{_number(one['values'][i], one['errors'][i], one['least'])}</td>" for one in columns)
-        rows.append(f"<tr{'' if outcome in SETTLED else ' class=bad'}>{cells}</tr>")
+        numbers = (f"<td class=n{' data-over' * bool(one['over'][i])}>"
+                   f"{_number(one['values'][i], one['errors'][i], one['least'])}</td>" for one in columns)
+        rows.append(("" if outcome in SETTLED else " class=bad",
+                     [*(escape(brief(str(one["texts"][i]))) for one in table["keys"]), said, *numbers]))
     number = len(table["outcome"])
     more = f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv has all.</p>" if number > LISTED else ""
     files = ("<p class=soft>Every case with every measure and its error: <a href=sweep.csv>sweep.csv</a>, "
              "<a href=sweep.nc>sweep.nc</a>.</p>") if table.get("own", True) else ""
-    return (f"{files}<div class=wide><table><thead><tr>{head}</tr></thead>"
-            f"<tbody>{''.join(rows)}</tbody></table></div>{more}")
+    return f"{files}{document.table(heads, rows, 'wide')}{more}"
 
 
 def _changes(values) -> bool:
@@ -171,10 +165,9 @@ def _number(value: float, error: float, least: float) -> str:
 
 
 def _meanings(table: dict) -> str:
-    rows = "".join(f"<tr id='measure-{escape(name)}'><td>{escape(label(name))}</td><td>{escape(one['unit'])}</td>"
-                   f"<td>{escape(one.get('means', ''))}</td></tr>" for name, one in table["measures"].items())
-    return ("<div class=across><table><thead><tr><th>measure</th><th>unit</th><th>meaning</th></tr></thead>"
-            f"<tbody>{rows}</tbody></table></div>")
+    rows = [(f" id='measure-{escape(name)}'", [escape(label(name)), escape(one["unit"]), escape(one.get("means", ""))])
+            for name, one in table["measures"].items()]
+    return document.table(("measure", "unit", "meaning"), rows)
 
 
 def _again(table: dict) -> str:

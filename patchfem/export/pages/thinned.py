@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..drawing.panels import sizes
+
 WIDE = 3.0  # as many times more columns than rows, where neither has too few lines for it
 
 
@@ -29,19 +31,6 @@ class Thinned:
         return (sums / np.add.reduceat(self.areas, self.starts)[:, None])[self.groups]
 
 
-def corners(connectivity, offsets) -> np.ndarray:
-    """Corners (m, 4) of triangles and quadrilaterals as VTK lists them, the last one twice in a triangle."""
-    last = np.diff(offsets)[:, None] - 1
-    return connectivity[offsets[:-1, None] + np.minimum(np.arange(4), last)]
-
-
-def areas(points, cells) -> np.ndarray:
-    """Areas (m,) of cells of four corners (m, 4) among points (n, 2)."""
-    corner = points[cells]
-    after = np.roll(corner, -1, axis=1)
-    return np.abs((corner[..., 0] * after[..., 1] - corner[..., 1] * after[..., 0]).sum(axis=1)) / 2
-
-
 def thinned(points, cells, material, most: int, near: tuple | None = None) -> Thinned:
     """The mesh of points (n, 2) [m], cells (m, 4) and material (m,) with about `most` cells at most.
 
@@ -49,7 +38,7 @@ def thinned(points, cells, material, most: int, near: tuple | None = None) -> Th
     Of a grid one line in several stays, the outer ones and those between two materials among them; so stays the
     outline. In any other mesh all points of a box between such lines become one of them. Without need nothing changes.
     """
-    count, size = len(cells), areas(points, cells)
+    count, size = len(cells), sizes(points, cells)
     if count <= most:
         every = np.arange(count)
         return Thinned(np.arange(len(points)), cells, every, every, every, size)

@@ -17,7 +17,7 @@ from ...surface.profile import Profile, even, level
 from ...surface.quantity import LEVEL, Quantity
 from ...surface.roughness.parameters import Heights, abbott
 from ...surface.roughness.spectrum import BAND
-from ..drawing import inline
+from ..pages.document import Section, document, figure, table, warned
 from ..pages.words import pair
 from . import pictures
 
@@ -153,18 +153,19 @@ def page(parts: list, found: tuple, pressing: Pressed | None = None) -> str:
     headline, sentences = found
     names = [Path(each.source).name for each in (parts[0].before, parts[0].after)]
     title = f"{names[0]} and {names[1]}: before and after"
-    body = [f"<div class=verdict><b>{escape(headline[0].upper() + headline[1:])}.</b>"
-            + "".join(f"<p>{escape(text)}</p>" for text in sentences) + "</div>"]
-    body.append(inline.warned([f"{text}." for one in parts for text in one.notes]))
+    lead = (f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict>"
+            f"<b>{escape(headline[0].upper() + headline[1:])}.</b>"
+            + "".join(f"<p>{escape(text)}</p>" for text in sentences) + "</div>"
+            + warned([f"{text}." for one in parts for text in one.notes]))
+    sections = []
     for number, one in enumerate(parts):
-        if len(parts) > 1:
-            body.append(f"<h2>Along {escape(one.direction)}</h2>")
-        body += [inline.placed(f"{number}{place}", *each) for place, each in enumerate(figures(one))]
-        body.append(_table(one))
-    body.append(f"<p class=soft>{escape(NOTE)}</p>")
+        body = [*(figure(f"{number}{place}", *each) for place, each in enumerate(figures(one))), _table(one),
+                f"<p class=soft>{escape(NOTE)}</p>"]
+        sections.append(Section(f"changes{number}", f"What changed{one.direction and f' along {one.direction}'}",
+                                "\n".join(body)))
     if pressing is not None:
-        body.append(_pressing(pressing))
-    return inline.page(title, "\n".join(body))
+        sections.append(Section("pressed", f"{pressing.title}, pressed with each surface", _pressing(pressing)))
+    return document(title, lead, sections, paper=True)
 
 
 def figures(one: Comparison) -> list:
@@ -223,32 +224,26 @@ def _table(one: Comparison) -> str:
     rows = []
     for key, quantity in one.values.items():
         value, interval, unit = shown(quantity)
-        cells = f"<td class=n>{escape(value)}</td><td class=n>{escape(interval)}</td><td>{escape(unit)}</td>" \
-            if quantity.value is not None else "<td class=n>&ndash;</td><td></td><td></td>"
+        cells = [escape(value), escape(interval), escape(unit)] if quantity.value is not None else ["&ndash;", "", ""]
         text = quantity.text if quantity.value is not None else f"{quantity.text}: not available"
-        rows.append(f"<tr><td>{escape(WORDS[key])}</td>{cells}<td class=soft>{escape(text)}</td></tr>")
-    return ("<table><tr><th>quantity<th class=n>value<th class=n>95 %<th>unit<th>meaning</tr>"
-            f"{''.join(rows)}</table>")
+        rows.append([escape(WORDS[key]), *cells, f"<td class=soft>{escape(text)}</td>"])
+    return table(("quantity", ">value", ">95 %", "unit", "meaning"), rows)
 
 
 def _pressing(found: Pressed) -> str:
-    parts = [f"<h2>{escape(found.title)}, pressed with each surface</h2>"]
     told = [*found.failed, *(f"{name}: {text}" for name, one in (("before", found.before), ("after", found.after))
                              if one is not None for text in one.warnings)]
-    parts.append(inline.warned(told))
+    parts = [warned(told)]
     sides = [(one.x, one.stress, name) for name, one in (("before", found.before), ("after", found.after))
              if one is not None]
     if sides:
         peaks = ", ".join(f"{name} {_said('pressure_peak', one.measures.get('pressure_peak'))}" for name, one in
                           (("before", found.before), ("after", found.after)) if one is not None)
-        parts.append(inline.placed("p", pictures.pressures(sides), "Normal stress of the pressed patch; all else in "
+        parts.append(figure("p", pictures.pressures(sides), "Normal stress of the pressed patch; all else in "
                                    "the scene is the same.", f"Pressure along the patch, largest: {peaks}"))
-        rows = ""
-        for name, words, *measures in found.rows():
-            cells = "".join(f"<td class=n>{escape(_said(name, one))}</td>" for one in measures)
-            rows += f"<tr><td>{escape(words)}</td>{cells}<td class=n>{_times(*measures)}</td></tr>"
-        parts.append("<table><tr><th>measure<th class=n>before<th class=n>after<th class=n>after / before</tr>"
-                     f"{rows}</table>")
+        rows = [[escape(words), *(escape(_said(name, one)) for one in measures), _times(*measures)]
+                for name, words, *measures in found.rows()]
+        parts.append(table(("measure", ">before", ">after", ">after / before"), rows))
     parts += [f"<p class=soft>{escape(text)}.</p>" for text in found.lacking]
     return "\n".join(parts)
 

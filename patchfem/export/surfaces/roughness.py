@@ -3,12 +3,13 @@
 from html import escape
 from pathlib import Path
 
+from ... import __version__
 from ...core import say
 from ...disk.whole import write_text
 from ...scales import LADDERS, plain, step_of
 from ...surface.quantity import Quantity
 from ...surface.roughness.report import RoughnessReport
-from ..drawing import inline
+from ..pages.document import Section, document, figure, table, warned
 from . import pictures
 
 AREAL = ("Interval: 5 to 95 %, of the mean over all scans of this size on a surface with Gaussian heights and the "
@@ -90,8 +91,8 @@ def data_of(report: RoughnessReport) -> dict:
 def page(reports: list) -> str:
     """The page of one or several surfaces, nothing fetched."""
     title = "Roughness of " + ", ".join(Path(one.source).name for one in reports)
-    body = "\n".join(_section(number, one, len(reports) > 1) for number, one in enumerate(reports))
-    return inline.page(title, body)
+    sections = [_section(number, one) for number, one in enumerate(reports)]
+    return document(title, f"<p class=soft>patchfem {escape(__version__)}</p>", sections, paper=True)
 
 
 def write_page(path: Path, reports: list) -> None:
@@ -99,15 +100,15 @@ def write_page(path: Path, reports: list) -> None:
     write_text(path, page(reports))
 
 
-def _section(number: int, report: RoughnessReport, several: bool) -> str:
-    parts = [f"<h2>{escape(report.source)}</h2>"] if several else []
-    parts += [f"<p class=verdict>{verdict(report)}</p>", f"<p class=soft>{escape(heading(report))}.</p>"]
+def _section(number: int, report: RoughnessReport) -> Section:
+    parts = [f"<p class=verdict>{verdict(report)}</p>", f"<p class=soft>{escape(heading(report))}.</p>"]
     told = [*report.notes, *([report.tip.sentence] if report.tip is not None and not report.tip.reaches else [])]
-    parts.append(inline.warned([f"{text}." for text in told]))
+    parts.append(warned([f"{text}." for text in told]))
     if report.tip is not None and report.tip.reaches:
         parts.append(f"<p class=soft>Stylus: {escape(report.tip.sentence)}.</p>")
-    parts += [inline.placed(f"{number}{place}", *one) for place, one in enumerate(figures(report))]
-    return "\n".join([*parts, _table(report), _printed(report), _definitions(report)])
+    parts += [figure(f"{number}{place}", *one) for place, one in enumerate(figures(report))]
+    parts += [_table(report), _printed(report), _definitions(report)]
+    return Section(f"surface{number}", report.source, "\n".join(parts))
 
 
 def verdict(report: RoughnessReport) -> str:
@@ -156,11 +157,10 @@ def _table(report: RoughnessReport) -> str:
     rows = []
     for one in report.values:
         value, interval, unit = shown(one)
-        text = f"<td class=n>{escape(value)}</td><td class=n>{escape(interval)}</td><td>{escape(unit)}</td>" \
-            if one.value is not None else f"<td colspan=3 class=soft>{escape(one.reason)}</td>"
-        rows.append(f"<tr><td>{escape(one.name)}</td>{text}</tr>")
-    return ("<h2>Parameters</h2><table><tr><th>parameter<th class=n>value<th class=n>5 .. 95 %<th>unit</tr>"
-            f"{''.join(rows)}</table><p class=soft>{escape(AREAL if report.kind == 'areal' else INTERVAL)}</p>")
+        rows.append([escape(one.name), *([escape(value), escape(interval), escape(unit)] if one.value is not None else
+                                         [f"<td colspan=3 class=soft>{escape(one.reason)}</td>"])])
+    return (f"<h3>Parameters</h3>{table(('parameter', '>value', '>5 .. 95 %', 'unit'), rows)}<p class=soft>"
+            f"{escape(AREAL if report.kind == 'areal' else INTERVAL)}</p>")
 
 
 def _printed(report: RoughnessReport) -> str:
@@ -169,13 +169,11 @@ def _printed(report: RoughnessReport) -> str:
     rows = []
     for one in report.printed:
         unit, scale = ("", 1.0) if one.unit == "1" else step_of(LADDERS[one.unit], one.printed)
-        rows.append(f"<tr><td>{escape(one.name)}</td><td class=n>{one.printed * scale:.6g}</td>"
-                    f"<td class=n>{one.here * scale:.6g}</td><td>{escape(unit)}</td></tr>")
-    return ("<h2>What the instrument printed</h2><table><tr><th>result<th class=n>printed<th class=n>from its heights"
-            f"<th>unit</tr>{''.join(rows)}</table><p class=soft>Between the cursors of the file, about the "
-            "least-squares line, nothing filtered.</p>")
+        rows.append([escape(one.name), f"{one.printed * scale:.6g}", f"{one.here * scale:.6g}", escape(unit)])
+    return ("<h3>What the instrument printed</h3>" + table(("result", ">printed", ">from its heights", "unit"), rows)
+            + "<p class=soft>Between the cursors of the file, about the least-squares line, nothing filtered.</p>")
 
 
 def _definitions(report: RoughnessReport) -> str:
-    rows = "".join(f"<tr><td>{escape(one.name)}</td><td>{escape(one.text)}</td></tr>" for one in report.values)
-    return f"<h2>Definitions</h2><table>{rows}</table>"
+    rows = [[escape(one.name), escape(one.text)] for one in report.values]
+    return f"<h3>Definitions</h3>{table(('', ''), rows)}"

@@ -10,10 +10,10 @@ import pytest
 from page_data import data_of
 
 from patchfem.export import report
-from patchfem.export.drawing.panels import panels
+from patchfem.export.drawing.panels import corners, panels, sizes
 from patchfem.export.fields.series import Series, moving
 from patchfem.export.pages import player
-from patchfem.export.pages.thinned import areas, corners, spread, thinned
+from patchfem.export.pages.thinned import spread, thinned
 
 SIDES = ("lower", "upper")
 
@@ -45,7 +45,7 @@ def test_exact_a_thinned_grid_keeps_area_outline_and_coating(graded, most):
     mesh = thinned(points, cells, coated, most)
     kept = points[mesh.nodes]
     assert len(mesh.cells) <= most * 1.15
-    size = areas(kept, mesh.cells)
+    size = sizes(kept, mesh.cells)
     covered = np.add.reduceat(mesh.areas, mesh.starts)[mesh.groups]
     np.testing.assert_allclose(size, covered, rtol=1e-12)  # every cell covers exactly those whose mean it has
     assert size.sum() == pytest.approx(2.0, rel=1e-12)
@@ -58,8 +58,8 @@ def test_exact_means_keep_the_integral_and_a_linear_field_its_middle_value(grade
     mesh = thinned(points, cells, coated, 300)
     middle = points[cells].mean(axis=1)
     field = np.stack([3 + 2 * middle[:, 0] - middle[:, 1], np.sin(9 * middle[:, 0])], axis=1)
-    means, size = mesh.means(field), areas(points[mesh.nodes], mesh.cells)
-    np.testing.assert_allclose(size @ means, areas(points, cells) @ field, rtol=1e-12, atol=1e-13)
+    means, size = mesh.means(field), sizes(points[mesh.nodes], mesh.cells)
+    np.testing.assert_allclose(size @ means, sizes(points, cells) @ field, rtol=1e-12, atol=1e-13)
     own = points[mesh.nodes][mesh.cells].mean(axis=1)
     np.testing.assert_allclose(means[:, 0], 3 + 2 * own[:, 0] - own[:, 1], rtol=1e-12, atol=1e-12)
 
@@ -72,7 +72,7 @@ def test_always_any_mesh_is_thinned_to_whole_cells_of_the_same_outline():
     triangles = np.concatenate([cells[:, [0, 1, 2, 2]], cells[:, [0, 2, 3, 3]]])
     mesh = thinned(points, triangles, np.zeros(len(triangles), bool), 600)
     assert 100 < len(mesh.cells) <= 660
-    size = areas(points[mesh.nodes], mesh.cells)
+    size = sizes(points[mesh.nodes], mesh.cells)
     assert size.min() > 0 and size.sum() == pytest.approx(2.0, rel=0.05)
     kept = points[mesh.nodes]
     assert (kept.min(axis=0) == points.min(axis=0)).all() and (kept.max(axis=0) == points.max(axis=0)).all()
