@@ -131,24 +131,6 @@ def build(scene: Scene) -> Model:
     return replace(found, source=source)
 
 
-def renumbered(model: Model, scene: Scene, tables: frozenset) -> Model:
-    """The model of a scene that differs from that of a lumped `model` under a sine in plain numbers of some tables
-    (scene.changed.Numbered), equal to `build(scene)`; what other tables say is shared."""
-    new, rig = {}, {}
-    if "normal" in tables:
-        new["point"] = of_load.point_asked(scene)
-    if "friction" in tables:
-        new["friction"], rig["interfaces"] = scene.friction, of_rig.rubbings_of(scene)
-    if "structure" in tables:
-        new["rig"] = of_rig.rig_asked(scene)
-    elif "drive" in tables:
-        rig |= {"drive": of_rig.drive_of(scene, model.rig.modes), "frequency": scene.drive.frequency}
-    if rig and "rig" not in new:
-        new["rig"] = replace(model.rig, **rig)
-    found = replace(model, source=None, **new)
-    return replace(found, source=replace(model.source, write=partial(resolved, scene, found), sets=scene.sets))
-
-
 @lru_cache(64)
 def _absent(named: tuple) -> tuple:
     return tuple(absent(named))

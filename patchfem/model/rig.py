@@ -75,8 +75,6 @@ class Rig:
         The mode moves the contact by slide_1 per unit of its coordinate, so (mass omega_1^2/2)(A/slide_1)^2 is its
         energy at a slide of A.
         """
-        if not self.own_frequency or not self.contact_mass:
-            return 0.0
         return self.contact_mass * (2 * np.pi * self.own_frequency)**2
 
     def beside_first(self, modal) -> float:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import Any
 
+import numpy as np
+
 from .lines import key_lines, pieces_of
 from .reader import Draft, apply_set
 from .rules.structure import HEAVY
@@ -87,29 +89,39 @@ class Numbered:
     like: Scene
     places: tuple
 
-    @property
-    def tables(self) -> frozenset[str]:
-        """Names of the tables that change."""
-        return frozenset(place[0] for place in self.places)
+    def holds(self, values: np.ndarray) -> bool:
+        """Whether the rules of a scene need not see these numbers (..., k) [SI]."""
+        return bool(np.all((values > 0) & (values < [place[-1] for place in self.places])))
 
-    def scene(self, values: Sequence[float], sets: Sequence[str]) -> Scene | None:
-        """The scene with these numbers [SI], written as `sets`, equal to that of `Base.changed`; None where the rules
-        of a scene must see them."""
-        new: dict[str, dict] = {}
+    def numbers(self, values: Sequence) -> dict[tuple, Any]:
+        """(table, number of a mode or None, attribute) -> value, of a value per key."""
+        out = {place[:3]: value for place, value in zip(self.places, values)}
+        if ("friction", None, "static") in out and self.like.friction.kinetic is not None:
+            out["friction", None, "kinetic"] = out["friction", None, "static"]  # its default
+        return out
+
+    def table(self, name: str, numbers: dict[tuple, Any]) -> Any:
+        """A table of the scene with its numbers of `numbers`."""
+        new: dict[str, Any] = {key: value for (table, mode, key), value in numbers.items()
+                               if table == name and mode is None}
         modes: dict[int, dict] = {}
-        for (table, mode, name, end), value in zip(self.places, values):
-            if not 0 < value < end:
-                return None
-            (new.setdefault(table, {}) if mode is None else modes.setdefault(mode, {}))[name] = value
-        like = self.like
+        for (_, mode, key), value in numbers.items() if name == "structure" else ():
+            if mode is not None:
+                modes.setdefault(mode, {})[key] = value
         if modes:
-            new.setdefault("structure", {})["mode"] = tuple(
-                _with(one, modes[k]) if k in modes else one for k, one in enumerate(like.structure.mode))
-        if "static" in new.get("friction", ()) and like.friction.kinetic is not None:
-            new["friction"]["kinetic"] = new["friction"]["static"]  # its default
-        count = len(like.sets) - len(self.places)
-        return replace(like, sets=(*like.sets[:count], *sets),
-                       **{table: _with(getattr(like, table), held) for table, held in new.items()})
+            new["mode"] = tuple(_with(one, modes[k]) if k in modes else one
+                                for k, one in enumerate(self.like.structure.mode))
+        return _with(getattr(self.like, name), new)
+
+    def sets(self, sets: Sequence[str]) -> tuple:
+        """All `key=value` strings of a scene in which the keys are set as `sets`."""
+        return (*self.like.sets[:len(self.like.sets) - len(self.places)], *sets)
+
+    def scene(self, values: Sequence[float], sets: Sequence[str]) -> Scene:
+        """The scene with numbers [SI] that `holds` took, written as `sets`, equal to that of `Base.changed`."""
+        numbers = self.numbers(values)
+        return replace(self.like, sets=self.sets(sets),
+                       **{name: self.table(name, numbers) for name in {table for table, _, _ in numbers}})
 
 
 def _with(table: Any, values: dict[str, Any]) -> Any:

@@ -51,8 +51,9 @@ def own_period(modes: ModalBasis) -> float:
 
 def slowest(modes: ModalBasis) -> float:
     """Least rate [1/s] at which a damped coordinate decays, half its diagonal of D; 0 where none is damped."""
-    rates = np.diag(modes.dampers) / 2
-    return float(rates[rates > 0].min(initial=np.inf)) if (rates > 0).any() else 0.0
+    rates = np.diagonal(modes.dampers) / 2  # (..., n) of many rigs at once
+    least = np.where(rates > 0, rates, np.inf).min(axis=-1, initial=np.inf)
+    return np.where(np.isfinite(least), least, 0.0)[()]
 
 
 def largest(drive) -> float:
@@ -80,7 +81,7 @@ def peak_speed(drive, start: Start | None = None) -> float:
     omega = omega_of(drive)
     out = largest(drive) / omega
     if start is not None:
-        out = max(out, float(np.abs(start.v).max(initial=0.0)), omega * float(np.abs(start.z).max(initial=0.0)))
+        out = np.maximum(out, np.maximum(np.abs(start.v).max(initial=0.0), omega * np.abs(start.z).max(initial=0.0)))
     return out
 
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ... import __version__
 from ...core import PatchfemError
-from ...model.model import Model, build, renumbered
+from ...model.alike import Alike
+from ...model.model import Model, build
 from ...scene.changed import Base
 from ...scene.scene import Scene, SceneError, axes_of, is_there, loads, with_files
 
@@ -49,22 +52,27 @@ class Asked:
         except Exception as error:  # a defect of one case must not cost the answers of a thousand others
             raise PatchfemError(f"internal fault, please report it: {type(error).__name__}: {error}") from error
 
+    def alike(self, keys: Sequence[str], values: np.ndarray, sets: Callable, cases: np.ndarray) -> Alike | None:
+        """Models of cases that differ in numbers values (n, k) [SI] of these keys alone; None where the rules of a
+        scene must see one of them. sets: of a case, its `key=value` strings."""
+        keys, known = tuple(keys), _first(self)
+        if keys not in known:
+            base = _base(self)
+            scene = base and self.scene(sets(int(cases[0])))
+            numbered = base and base.numbered(scene, keys)
+            known[keys] = numbered and (numbered, build(scene))
+        if not known[keys] or not known[keys][0].holds(values):
+            return None
+        return Alike(*known[keys], values, sets, cases)
+
     def _like(self, sets: Sequence[str], values: Sequence) -> Model | None:
         """The model of a case made from the first valid one with the same keys; None where the rules of a scene must
         see it."""
         if not values or not all(isinstance(value, float) for value in values):
             return None
-        keys, known = tuple(one.partition("=")[0] for one in sets), _first(self)
-        if keys not in known:
-            base = _base(self)
-            scene = base and self.scene(sets)
-            numbered = base and base.numbered(scene, keys)
-            known[keys] = numbered and (numbered, numbered.tables, build(scene))
-        if not known[keys]:
-            return None
-        numbered, tables, first = known[keys]
-        scene = numbered.scene(values, sets)
-        return scene and renumbered(first, scene, tables)
+        keys = [one.partition("=")[0] for one in sets]
+        found = self.alike(keys, np.array([values]), lambda _: tuple(sets), np.zeros(1, int))
+        return found and found[0]
 
     def mistakes(self, sets: Sequence[str]) -> list[str]:
         """Every mistake of the scene of a case; none where it is valid."""

@@ -60,6 +60,14 @@ class Cases:
         """Values of a case, axis by axis: floats in SI, texts where a key has no number."""
         return tuple(axis.values[place] for axis, place in zip(self.axes, self.places(number)))
 
+    def columns(self, numbers: Sequence[int]) -> np.ndarray | None:
+        """Values of cases (n, k) in SI; None where a key has no numbers."""
+        if not all(isinstance(axis.values[0], float) for axis in self.axes):
+            return None
+        places = [numbers] * len(self.axes) if self.rows else np.unravel_index(numbers, self.shape)
+        return np.array([[axis.values[place] for place in np.asarray(some).tolist()]
+                         for axis, some in zip(self.axes, places)]).T
+
     def spread(self, most: int) -> list[int]:
         """Numbers of `most` cases or somewhat fewer, spread over all axes with the ends of each; all where there are no
         more."""

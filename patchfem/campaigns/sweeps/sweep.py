@@ -7,7 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
+import numpy as np
+
 from ...core import PatchfemError
+from ...model.alike import Alike
 from ...model.model import Model
 from ...runs import plan
 from ...runs.many import many
@@ -61,7 +64,7 @@ def warmed(work: Work) -> None:
 def answer(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple[Answers | None, list]:
     """Answers of some cases, and of each what `work.tell` makes of it; None and nothing where `work.write` has written
     them. This is what a worker does with a chunk."""
-    models = [_model(work, number) for number in numbers]
+    models = _alike(work, numbers) or [_model(work, number) for number in numbers]
     keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
     found = many.answers(models, keep, say, work.estimate, len(work.cases))
     told = [] if work.tell is None else [work.tell(number, model, found, case)
@@ -72,6 +75,17 @@ def answer(work: Work, numbers: Sequence[int], say: Callable | None = None) -> t
 def handed(work: Work, numbers: Sequence[int], found: Answers, told: list) -> tuple[Answers | None, list]:
     """What a worker hands on of its answers: nothing of those that `work.write` has written."""
     return (None, []) if work.write is not None and work.write(numbers, found, told) else (found, told)
+
+
+def _alike(work: Work, numbers: Sequence[int]) -> Alike | None:
+    """The models of cases that differ in plain numbers alone; None of others."""
+    cases, values = np.asarray(numbers), work.cases.columns(numbers)
+    if work.keep is not None or values is None:
+        return None
+    try:
+        return work.asked.alike([axis.key for axis in work.cases.axes], values, work.cases.sets, cases)
+    except PatchfemError:  # the first of them has no model
+        return None
 
 
 def _model(work: Work, number: int):

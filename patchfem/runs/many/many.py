@@ -7,8 +7,11 @@ from functools import cache, partial
 from importlib import import_module
 from typing import NamedTuple
 
+import numpy as np
+
 from ... import compiled
 from ...core import PatchfemError
+from ...model.alike import Alike
 from ...model.model import Model
 from . import one_by_one
 from .answers import Answers
@@ -21,7 +24,8 @@ class Batch(NamedTuple):
     say) -> Answers of a group, equal to single runs to 1e-12, bars too, whatever else is in the group; share: seconds
     of a case over those of its own run, 0 where they are next to nothing; compile: CPU seconds of the first group;
     least: fewest cases of a study that it serves: such a batch gives answers with bars of their own, each the same
-    whatever else is in the group.
+    whatever else is in the group; parts(Alike) -> [(places, whether it takes them)], a group each, where it reads the
+    columns of models.
     """
 
     name: str
@@ -31,9 +35,11 @@ class Batch(NamedTuple):
     share: float = 0.0
     compile: float = 0.0
     least: int = 0
+    parts: Callable | None = None
 
 
-def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least: int = 0) -> Batch:
+def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least: int = 0,
+           columns: bool = False) -> Batch:
     """The batch of the module of this name, which takes models of this kind and is imported for the first of them."""
     @cache
     def module():
@@ -44,11 +50,12 @@ def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least
 
     asked = of("refuses")
     return Batch(name, lambda model: asked(model) if model.kind == kind else f"it is a {model.kind}", of("group"),
-                 of("solve"), share, compile, least)
+                 of("solve"), share, compile, least, of("parts") if columns else None)
 
 
 # the first that does not refuse a model takes it
-BATCHES: tuple[Batch, ...] = (_batch("patches", "patch"), _batch("lumped.lanes", "rig", compile=6.0, least=64),
+BATCHES: tuple[Batch, ...] = (_batch("patches", "patch"),
+                              _batch("lumped.lanes", "rig", compile=6.0, least=64, columns=True),
                               _batch("lumped.lumped", "rig", compile=12.0),
                               _batch("lumped.sheared", "rig", 0.4, 12.0))
 
@@ -80,6 +87,8 @@ def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = Non
     errors, where they run one by one (a batch has its errors from the same work); study: cases of the whole that these
     are a part of, 0 where they are all of it.
     """
+    if isinstance(models, Alike) and len(models):
+        return _alike(models, say, estimate, study or len(models))
     found, groups = Answers.blank(len(models)), {}
     for case, model in enumerate(models):
         if isinstance(model, PatchfemError):
@@ -89,6 +98,18 @@ def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = Non
     for (batch, _), cases in groups.items():
         found.place(cases, _solved(batch, [models[case] for case in cases],
                                    partial(one_by_one.solve, keep=_of(keep, cases), estimate=estimate), say))
+    return found
+
+
+def _alike(models: Alike, say: Callable | None, estimate: bool, study: int) -> Answers:
+    """Answers of models that differ in plain numbers, as `answers` gives them: those that a batch takes as columns are
+    not made one by one."""
+    batch = next((one for one in BATCHES if one.parts is not None and study >= one.least), None)
+    found = Answers.blank(len(models))
+    for cases, takes in batch.parts(models) if batch is not None else [(np.arange(len(models)), False)]:
+        own = models.some(cases)
+        found.place(cases, _solved(batch, own, partial(one_by_one.solve, estimate=estimate), say) if takes else
+                    answers(list(own), None, say, estimate, study))
     return found
 
 

@@ -1,6 +1,7 @@
 """Models of cases that differ in plain numbers, made from the first of them, beside those built from their text."""
 
 from dataclasses import fields, is_dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ from scene_texts import COULOMB, DRIVE, MODE, POINT, SECOND
 
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.core import PatchfemError
+from patchfem.model.alike import columns_of
+from patchfem.runs.many.lumped import columns, lanes
 from patchfem.scene.changed import PLAIN
 
 PLASTIC = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"\n'
@@ -68,6 +71,36 @@ def test_exact_models_made_from_the_first_are_those_built_from_text(name):
         assert same(found, built), sets
         alike += asked._like(sets, values) is not None if not isinstance(built, str) else 0
     assert alike == 0 if name == "duration" else alike > 5
+
+
+ONE = POINT + "{}" + MODE + DRIVE
+LUMPED = {"coulomb": ONE.format(COULOMB), "elastic-plastic": ONE.format(PLASTIC),
+          "tanh": ONE.format('[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n'),
+          "start": ONE.format(COULOMB) + '[structure.start]\nvelocity = ["0.1 m/s"]\n'}
+
+
+def written(keys: list, values: np.ndarray, case: int) -> list:
+    """The case as `key=value` strings."""
+    return [f"{key}={value!r} {UNITS.get(key.rpartition('.')[2], '')}".strip()
+            for key, value in zip(keys, values[case].tolist())]
+
+
+@pytest.mark.parametrize("name", LUMPED)
+def test_exact_columns_of_models_are_the_numbers_of_each(name):
+    """Of models as one, with an array in place of each number that differs: what lanes and measures take of them."""
+    r, asked = np.random.default_rng(len(name)), Asked(Path("a.toml"), LUMPED[name])
+    for _ in range(20):
+        keys = list(r.choice([key for key in KEYS if ".1." not in key], r.integers(1, 5), replace=False))
+        keys = [key for key in keys if name == "elastic-plastic" or not key.endswith("bond_length")] or KEYS[:1]
+        values = 10.0 ** r.uniform(-3, -0.4, (7, len(keys)))
+        alike = asked.alike(keys, values, partial(written, keys, values), np.arange(7))
+        single = list(alike)
+        for row in (lanes._row, lanes._rate):
+            np.testing.assert_array_equal(columns_of(alike, row), columns_of(single, row))
+        for mine, theirs in zip(columns.sizes_of(alike), columns.sizes_of(single)):
+            np.testing.assert_array_equal(mine, theirs)
+        few = columns_of(alike.some([4, 2]), lanes._row)
+        np.testing.assert_array_equal(few, columns_of(single, lanes._row)[:, [4, 2]])
 
 
 def test_exact_a_rule_sees_what_it_tells_apart():

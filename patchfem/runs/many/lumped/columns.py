@@ -2,18 +2,20 @@
 
 from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 
 from ....core import Measure, Outcome
 from ....effects import has
+from ....model.alike import Alike, columns_of
 from ....response.errors import total_error
 from ....response.measures import energy_balance
 from ....response.outcome import SMALL, moves_on, settled, steady_error
 from ....response.reasons import CYCLIC, without_value
 from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
-from ....structure.drive_sizes import largest, omega_of, sinusoidal, slowest
+from ....structure.drive_sizes import largest, slowest
 from ...remedies import Seen, beyond_tolerance
 from ...results.notes import BOOKS
 from ...results.result import without_folders
@@ -23,6 +25,24 @@ from ..answers import Answers
 
 ENDS = 5  # last windows whose phasors tell a steady motion (response.settling)
 MAIN, PHASE = "relative_displacement_amplitude", "slip_start_phase"
+
+
+class Sizes(NamedTuple):
+    """What a scene says of each of n models, (n,): tolerance; scale of the displacements to expect [m]; largest
+    acceleration of the drive [m s-2], its period [s]; least rate of a decay [1/s]."""
+
+    tolerance: np.ndarray
+    moved: np.ndarray
+    largest: np.ndarray
+    period: np.ndarray
+    decay: np.ndarray
+
+
+def sizes_of(models) -> Sizes:
+    """The Sizes of models."""
+    return Sizes(*columns_of(models, lambda model: (
+        model.accuracy.tolerance, model.rig.displacement, largest(model.rig.drive), model.rig.drive.period,
+        slowest(model.rig.modes))))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -74,9 +94,9 @@ def batch_answers(models, runs: Runs, numerics: dict) -> tuple:
     nothing = np.zeros(n)
     errors = {name: total_error(name, value, [runs.errors.get(name, nothing)], runs.least, values[MAIN])
               for name, value in values.items()}
-    tolerance = np.array([model.accuracy.tolerance for model in models])
-    moved = np.array([model.rig.displacement for model in models])
-    outcome, (steady, error) = _outcome(models, runs, tolerance, moves_on(
+    sizes = sizes_of(models)
+    tolerance, moved = sizes.tolerance, sizes.moved
+    outcome, (steady, error) = _outcome(sizes, runs, moves_on(
         values["drift_per_cycle"], errors["drift_per_cycle"], values[MAIN], tolerance,
         floor_of("drift_per_cycle", moved)))
     found = Answers.blank(n)
@@ -102,44 +122,53 @@ def batch_answers(models, runs: Runs, numerics: dict) -> tuple:
         found.units[name], found.values[name] = row.unit, value
         found.errors[name] = np.where(there & ~grows, errors[name], np.nan)
         found.floors[name] = np.where(there, floor, np.nan)
-    _reasons(models, runs, found)
-    for case, model in enumerate(models):
-        found.numerics[case] = numerics | runs.chosen[case] if runs.chosen else numerics
-        remarks = [*model.source.remarks, *knobs_idle(model, numerics["engine"]), *model.rig.notes]
-        if warnings := [*remarks, *warned(model, outcome[case], found, case, wide_of[case])]:
+    _reasons(models, sizes, runs, found)
+    found.numerics.update({case: numerics | runs.chosen[case] for case in range(n)} if runs.chosen
+                          else dict.fromkeys(range(n), numerics))
+    alike = isinstance(models, Alike)
+    remarks = _remarks(models[0], numerics["engine"]) if alike else ()
+    for case in range(n) if remarks or not alike or has(models[0].friction.law, "bonds") \
+            else np.flatnonzero(wide_of).tolist():
+        model = models[case]
+        said = remarks if alike else _remarks(model, numerics["engine"])
+        if warnings := [*said, *warned(model, outcome[case], found, case, wide_of[case])]:
             found.warnings[case] = without_folders(warnings, model.source.path)
     return found, alone, resolved
 
 
-def _outcome(models, runs: Runs, tolerance, moves) -> tuple:
+def _remarks(model, engine: str) -> list:
+    """What is said of a model, whatever its run finds."""
+    return [*model.source.remarks, *knobs_idle(model, engine), *model.rig.notes]
+
+
+def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
     """Outcomes (n), and the steady amplitudes and their errors, (n,) [m] each; moves: (n,), whose middle moves on, so
     that none is steady."""
     pick = np.arange(runs.cycles - 1, -1, -runs.window)[::-1]
     ends = (runs.extremes[:, pick, 1] - runs.extremes[:, pick, 0]) / 2
-    floor = SMALL * np.array([largest(m.rig.drive) / omega_of(m.rig.drive)**2 for m in models])
-    decay = np.array([slowest(m.rig.modes) * runs.window * m.rig.drive.period for m in models])
+    floor = SMALL * (sizes.largest / (2 * np.pi / sizes.period)**2)
+    decay = sizes.decay * runs.window * sizes.period
     with np.errstate(all="ignore"):
         steady, bounded = steady_amplitudes(ends[:, -ENDS:], runs.phasors[:, -ENDS:]), False
         if runs.steady is not None:
             bounded = ~np.isnan(runs.steady[0])
             steady = [np.where(bounded, known, seen) for known, seen in zip(runs.steady, steady)]
         number, *steady = settled(windows_of(runs.extremes, runs.window)[0], runs.extremes, runs.window, steady,
-                                  (tolerance, floor, decay), bounded)
+                                  (sizes.tolerance, floor, decay), bounded)
     number = np.where((number == STEADY) & moves, 0, number)
     ends = [Outcome.STUCK if stuck else CLASSES[k] for stuck, k in zip(runs.stuck, number)]
     return [Outcome.TRANSIENT if loads else one for loads, one in zip(np.broadcast_to(runs.loads, len(ends)), ends)], \
         steady
 
 
-def _reasons(models, runs: Runs, found: Answers) -> None:
+def _reasons(models, sizes: Sizes, runs: Runs, found: Answers) -> None:
     """Why cases have no value of a measure that such runs can have."""
     names = [*CYCLIC, PHASE]
     for name in names:
         found.measure(name, TABLE[name].unit)
     lacking = np.array([np.isnan(found.values[name]) for name in names])
     holds = found.values["stick_fraction"] == 1 if "stick_fraction" in found.values else lacking[0] & False
-    ends = np.array([sinusoidal(model.rig.drive) for model in models])
-    signs = np.array([*lacking, holds, ends])  # all that a reason hangs on
+    signs = np.array([*lacking, holds, sizes.largest != 0])  # all that a reason hangs on, of a sine
     patterns, which = np.unique(signs, axis=1, return_inverse=True)
     for place in np.flatnonzero(patterns[:len(names)].any(axis=0)).tolist():
         cases = np.flatnonzero(which.ravel() == place).tolist()

@@ -14,6 +14,7 @@ import numpy as np
 from ....dynamics.lanes import names_kernels as at
 from ....dynamics.lanes import reading
 from ....dynamics.lanes import run as march
+from ....model.alike import Alike, columns_of, some
 from ....model.model import Model
 from ....response.errors import APART, GAPS, MAIN, ROUND
 from ....response.measures import energy_balance
@@ -45,6 +46,11 @@ RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a 
 
 def refuses(model: Model) -> str:
     """Why lanes do not take a model; "" where they do."""
+    return no_lanes(model) or ("" if steps_of([model])[0] else "it rings too fast beside its drive")
+
+
+def no_lanes(model: Model) -> str:
+    """Why lanes do not take a model, nor any that differs from it in plain numbers; "" where they may."""
     if why := lumped.not_one_point(model):
         return why
     if not SHORTEST <= model.rig.cycles <= LONGEST or not model.friction.static > 0:
@@ -53,32 +59,43 @@ def refuses(model: Model) -> str:
         return "its law does not march in lanes"
     if model.accuracy.method != "auto" or pinned(model.accuracy) or model.accuracy.tolerance < TIGHTEST:
         return "it asks for another method, or for more than lanes state"
-    return "" if _steps(model) else "it rings too fast beside its drive"
+    return ""
 
 
-def _steps(model: Model) -> int:
-    """Steps per cycle of a model, 0 where they would be too many."""
+def steps_of(models: Sequence[Model]) -> np.ndarray:
+    """Steps per cycle (n,) of models of one law, 0 where they would be too many."""
+    rate, = columns_of(models, _rate)
+    ends = [(steps / (2 * np.pi), steps) for steps in SMOOTH] if models[0].friction.law == "tanh" else RATES
+    return np.append([steps for _, steps in ends], 0)[np.searchsorted([end for end, _ in ends], rate)]
+
+
+def _rate(model: Model) -> tuple:
+    """Fastest rate of a model over that of its drive."""
     modes, omega, stiff = model.rig.modes, model.rig.drive.omega, 0.0
     if model.friction.law == "tanh":
         rate = model.limits(model.point.load)[0] / model.friction.reference_speed * modes.slide[0]**2 / modes.mass
-        rate = max(rate + modes.dampers[0, 0], modes.omega[0]) / omega
-        return next((steps for steps in SMOOTH if 2 * np.pi * rate <= steps), 0)
+        return np.maximum(rate + modes.dampers[0, 0], modes.omega[0]) / omega,
     if model.friction.law == "elastic-plastic":
         stiff = model.limits(model.point.load)[0] / model.friction.bond_length * modes.slide[0]**2 / modes.mass
-    fastest = np.sqrt(modes.omega[0]**2 + stiff) + modes.dampers[0, 0]
-    return next((steps for rate, steps in RATES if fastest <= rate * omega), 0)
+    return (np.sqrt(modes.omega[0]**2 + stiff) + modes.dampers[0, 0]) / omega,
 
 
 def group(model: Model) -> tuple:
     """Equal for models of one compiled call."""
-    return int(model.rig.cycles), model.friction.law, _steps(model)
+    return int(model.rig.cycles), model.friction.law, int(steps_of([model])[0])
+
+
+def parts(models: Alike) -> list[tuple[np.ndarray, bool]]:
+    """(places, whether lanes take them) of models of each compiled call."""
+    steps = np.zeros(len(models), int) if no_lanes(models[0]) else steps_of(models)
+    return [(np.flatnonzero(steps == one), one > 0) for one in np.unique(steps)]
 
 
 def solve(models: Sequence[Model], say=None) -> Answers:
     """Answers of models of one group."""
     found = Answers.blank(len(models))
     for first in range(0, len(models), TOGETHER):
-        part = models[first:first + TOGETHER]
+        part = some(models, range(first, min(first + TOGETHER, len(models))))
         found.place(range(first, first + len(part)), _solved(part, say))
     return found
 
@@ -93,13 +110,14 @@ def _solved(models: Sequence[Model], say, steps: int = 0) -> Answers:
     unsettled = found.outcome == "grows" if law != "elastic-plastic" else found.outcome != "steady"
     wide = too_wide(models, found)
     exact |= alone | wide | unsettled
-    for case in range(len(models)):
-        found.numerics[case] = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
+    chosen = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
+    found.numerics.update(dict.fromkeys(range(len(models)), chosen))
+    for case in range(len(models)) if law == "tanh" else ():
         if notes := creeping_note(models[case].friction):
             found.notes[case] = notes
     found.seconds[:] = (perf_counter() - begin) / len(models)
     looked = checked(marks, ~exact, FEWEST if steps == least else 0)
-    ones = exactly([models[case] for case in looked], say) if looked else None
+    ones = exactly(some(models, looked), say) if looked else None
     if wrong := contradicted(found, ones, looked):
         exact[:] = True
         note = f"lanes said {wrong} otherwise than the exact engine in a check of {len(looked)} cases, so all are exact"
@@ -107,10 +125,10 @@ def _solved(models: Sequence[Model], say, steps: int = 0) -> Answers:
     exact &= ~finer
     if cases := np.flatnonzero(finer).tolist():
         lumped.take_out(found, cases)
-        found.place(cases, _solved([models[case] for case in cases], say, FINER * steps))
+        found.place(cases, _solved(some(models, cases), say, FINER * steps))
     if cases := np.flatnonzero(exact).tolist():
         lumped.take_out(found, cases)
-        found.place(cases, exactly([models[case] for case in cases], say))
+        found.place(cases, exactly(some(models, cases), say))
         for case in cases if wrong else ():
             found.notes[case] = [*found.notes.get(case, ()), note]
     return found
@@ -118,6 +136,7 @@ def _solved(models: Sequence[Model], say, steps: int = 0) -> Answers:
 
 def exactly(models: Sequence[Model], say) -> Answers:
     """Answers of models of a group by the exact batch; by runs of their own where that refuses them."""
+    models = list(models)
     found, fit = Answers.blank(len(models)), np.array([not lumped.refuses(model) for model in models])
     for cases, batch in ((np.flatnonzero(fit), lumped), (np.flatnonzero(~fit), one_by_one)):
         if cases.size:
@@ -127,7 +146,7 @@ def exactly(models: Sequence[Model], say) -> Answers:
 
 def too_wide(models, found: Answers) -> np.ndarray:
     """(n,) whether a bar misses the tolerance of a case."""
-    tolerance, out = np.array([model.accuracy.tolerance for model in models]), np.zeros(len(models), bool)
+    tolerance, out = columns_of(models, lambda model: (model.accuracy.tolerance,))[0], np.zeros(len(models), bool)
     for name, values in found.values.items():
         out |= found.errors[name] > tolerance * np.abs(values) + found.floors[name]
     return out
@@ -185,20 +204,8 @@ def runs_of(models, cycles: int, window: int, steps: int) -> tuple:
 
 def cases_of(models) -> tuple:
     """(Cases of models, what else is told of them by name, (n,) each: SI)."""
-    rows = []
-    for model in models:
-        modes, drive, start, (static, kinetic) = model.rig.modes, model.rig.drive, model.rig.start, \
-            model.limits(model.point.load)
-        law = KINDS[model.friction.law]
-        kinetic = kinetic if law == "rigid" and model.friction.kinetic is not None else static
-        length = model.friction.bond_length if law == "yielding" else \
-            model.friction.reference_speed / drive.omega if law == "creeping" else 0.0
-        rows.append((modes.omega[0], modes.dampers[0, 0], modes.slide[0], modes.base[0], modes.output[0], modes.mass,
-                     drive.acceleration, drive.omega, drive.moving, static,
-                     kinetic, length, *((0.0, 0.0) if start is None else
-                     (start.z[0], start.v[0])), model.rig.stiffness, model.point.load, largest(drive)))
     own, damping, slide, share, output, mass, drive, w, moving, static, kinetic, length, z, v, stiffness, load, size = \
-        np.array(rows, float).T
+        columns_of(models, _row)
     scale = slide**2 / (mass * w**2)
     springs = KINDS[models[0].friction.law] == "yielding"
     spring = scale * static / length if springs else 0.0 * scale
@@ -206,6 +213,20 @@ def cases_of(models) -> tuple:
                         spring, length, output / slide * w**2, drive * moving, slide * z, slide * v / w)
     return cases, {"omega": w, "energy": mass * (w / slide)**2, "ratio": output / slide,
                    "held": 1e-3 * length * springs, "stiffness": stiffness, "load": load, "size": size}
+
+
+def _row(model: Model) -> tuple:
+    """The numbers of a model that `cases_of` takes."""
+    modes, drive, start, (static, kinetic) = model.rig.modes, model.rig.drive, model.rig.start, \
+        model.limits(model.point.load)
+    law = KINDS[model.friction.law]
+    kinetic = kinetic if law == "rigid" and model.friction.kinetic is not None else static
+    length = model.friction.bond_length if law == "yielding" else \
+        model.friction.reference_speed / drive.omega if law == "creeping" else 0.0
+    return (modes.omega[0], modes.dampers[0, 0], modes.slide[0], modes.base[0], modes.output[0], modes.mass,
+            drive.acceleration, drive.omega, drive.moving, static, kinetic, length,
+            *((0.0, 0.0) if start is None else (start.z[0], start.v[0])), model.rig.stiffness, model.point.load,
+            largest(drive))
 
 
 def _measured(law: str, cases, c: dict, found) -> tuple:

@@ -1,0 +1,121 @@
+"""Models that are one lumped model under a sine with other plain numbers: one by one, or as columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..core import frozen_array
+from . import load as of_load
+from . import rig as of_rig
+from .model import Model, resolved
+
+if TYPE_CHECKING:
+    from ..scene.changed import Numbered
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Alike(Sequence):
+    """n models that differ in plain numbers alone.
+
+    like: their scene and the keys that differ; first: the model of that scene; values (n, k) [SI] of these keys, none
+    of which a rule tells from another; sets: of a place in `cases`, the case as `key=value` strings; cases (n,).
+    """
+
+    like: Numbered
+    first: Model
+    values: np.ndarray
+    sets: Callable[[int], tuple]
+    cases: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, case: int) -> Model:
+        return renumbered(self.first, self.like, self.values[case].tolist(), self.sets(int(self.cases[case])))
+
+    def some(self, cases: np.ndarray) -> Alike:
+        """The models at these places."""
+        return replace(self, values=self.values[cases], cases=self.cases[cases])
+
+    def columns(self) -> Model:
+        """All models as one, each number that differs as an array of n behind its other axes."""
+        return renumbered(self.first, self.like, list(self.values.T))
+
+
+def some(models: Sequence[Model], cases: Sequence[int]) -> Sequence[Model]:
+    """The models at these places."""
+    return models.some(np.asarray(cases, int)) if isinstance(models, Alike) else [models[case] for case in cases]
+
+
+def columns_of(models: Sequence[Model], row: Callable[[Model], tuple]) -> np.ndarray:
+    """(k, n) numbers of models: row(model) -> k numbers, of formulas that take arrays as well."""
+    if isinstance(models, Alike):
+        out = np.empty((len(row(models.first)), len(models)))
+        for line, values in zip(out, row(models.columns())):
+            line[:] = values
+        return out
+    return np.array([row(model) for model in models], float).T
+
+
+def renumbered(model: Model, like: Numbered, values: Sequence, sets: tuple = ()) -> Model:
+    """The model of a scene with other plain numbers, equal to `build` of it; what they do not touch is shared.
+
+    model: of the scene of `like`; values: one per key of `like`, floats, or (n,) each for what `Alike.columns` says.
+    """
+    numbers, scene, rig, new = like.numbers(values), like.like, {}, {}
+    tables = {table for table, _, _ in numbers}
+    if "normal" in tables:
+        new["point"] = replace(model.point, load=numbers["normal", None, "load"])
+    if "friction" in tables:
+        new["friction"] = like.table("friction", numbers)
+        rig["interfaces"] = tuple(replace(one, numbers=new["friction"]) for one in model.rig.interfaces)
+    if "drive" in tables:
+        rig |= _driven(model.rig.drive, scene.drive, numbers)
+    if "structure" in tables:
+        if scene.structure.bonded is not None:
+            return _again(model, like, values, sets)
+        rig |= _shaken(model.rig, scene.structure, numbers)
+    found = replace(model, source=None, **new, **({"rig": replace(model.rig, **rig)} if rig else {}))
+    write = partial(_resolved, like, tuple(values), sets, found)
+    return replace(found, source=replace(model.source, write=write, sets=like.sets(sets)))
+
+
+def _driven(drive, asked, numbers: dict) -> dict:
+    """What of a rig hangs on the numbers of its drive; asked: the table [drive]."""
+    frequency = numbers.get(("drive", None, "frequency"), asked.frequency)
+    omega, size = 2 * np.pi * frequency, numbers.get(("drive", None, "acceleration"), asked.acceleration)
+    size = asked.displacement * omega**2 if size is None else size
+    return {"drive": replace(drive, acceleration=size, omega=omega), "frequency": frequency}
+
+
+def _shaken(rig, structure, numbers: dict) -> dict:
+    """What of a rig hangs on the numbers of its modes; structure: the table [structure], without a bonded spring."""
+    mass = numbers.get(("structure", None, "moving_mass"), structure.moving_mass)
+    frequency, damping = np.split(np.array(np.broadcast_arrays(*(
+        numbers.get(("structure", k, name), getattr(mode, name)) for name in ("frequency", "damping")
+        for k, mode in enumerate(structure.mode)))), 2)
+    omega, many = 2 * np.pi * frequency, frequency.ndim > 1
+    first = next((k for k, mode in enumerate(structure.mode) if mode.frequency > 0), 0)
+    modes = replace(rig.modes, omega=frozen_array(omega), zeta=frozen_array(damping), mass=mass)
+    if many:
+        modes = replace(modes, damping=np.eye(len(omega))[:, :, None] * (2 * damping * omega))
+    own = frequency[first]
+    return {"modes": modes, "mass": mass, "own_frequency": own if many else float(own), "frequencies": frequency,
+            "contact_mass": rig.contact_mass and mass / float(rig.modes.slide[first])**2}
+
+
+def _again(model: Model, like: Numbered, values: Sequence, sets: tuple) -> Model:
+    """The model where a bonded spring makes other modes of those of the scene."""
+    scene = like.scene(values, sets)
+    found = replace(model, source=None, rig=of_rig.rig_asked(scene), point=of_load.point_asked(scene),
+                    friction=scene.friction)
+    return replace(found, source=replace(model.source, write=partial(resolved, scene, found), sets=scene.sets))
+
+
+def _resolved(like: Numbered, values: Sequence, sets: tuple, found: Model) -> str:
+    return resolved(like.scene(values, sets), found)
