@@ -10,6 +10,7 @@ from ..export.drawing import paraview
 from ..export.drawing import view as viewer
 from ..export.fields import vtu
 from ..export.lab import write
+from ..export.pages import player
 from .shared import Refused, flag, out_in
 
 Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0, the pressed state; the last one unless "
@@ -52,6 +53,11 @@ def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif
 
     Example: patchfem view out/rig -o cycle.gif
     """
+    if out is not None and out.suffix == ".html":
+        if frame is not None or magnify is not None:
+            raise Refused("--frame, --magnify: a page shows the last cycle and has a slider for each")
+        print(player.write_page(folder, out))
+        return
     viewer.view(folder, out, frame, magnify)
 
 

@@ -1,4 +1,4 @@
-"""The pressed pieces through the last cycle as a film: .gif, .mp4 or a page with a slider; needs no OpenGL.
+"""The pressed pieces through the last cycle as a film, .gif or .mp4; needs no OpenGL.
 
 All frames have one scale of colours, one factor of the motion and one window, so that what changes is what moves. The
 slide of the upper piece as a whole is taken out before the rest is magnified, and drawn with a factor of its own: the
@@ -90,7 +90,7 @@ def _hull(windows: list) -> tuple:
 
 
 def images(series: Series, film: Film, head: str) -> Iterator:
-    """(What it shows in words, picture (height, width, 3) uint8) of every frame of a film."""
+    """The picture (height, width, 3) uint8 of every frame of a film."""
     picture = None
     for number in film.numbers:
         frame = series.frame(number)
@@ -100,13 +100,13 @@ def images(series: Series, film: Film, head: str) -> Iterator:
             picture = Picture(frame, text, shown, SIZE, film.reach)
         else:
             picture.show(frame, text, shown)
-        yield text, picture.pixels()
+        yield picture.pixels()
 
 
 def shoot(series: Series, head: str, magnify: float | None, out: Path) -> str:
     """Write the film of a series as the ending of `out` says; one line on it. Missing without what writes it."""
     film = film_of(series, magnify)
-    write(out, images(series, film, head), head, film.seconds)
+    write(out, images(series, film, head), film.seconds)
     first, last = series.times[list(film.numbers)][[0, -1]]
     return f"{len(film.numbers)} frames, {first:.6g} s to {last:.6g} s"
 

@@ -33,7 +33,7 @@ FONT = 20
 
 def view(folder: Path, out: Path | None, frame: int | None = None, magnify: float | None = None) -> None:
     """Open a window on the fields of a results folder (the last frame or `frame`), or draw them into `out`, of which
-    .gif, .mp4 and .html show the last cycle.
+    .gif and .mp4 show the last cycle.
 
     magnify: factor of the drawn motion, one that makes it visible by default. Missing without fields, without a screen
     for the window, without what writes .mp4 or when `out` cannot be written; PatchfemError for another ending, frame or
@@ -45,7 +45,8 @@ def view(folder: Path, out: Path | None, frame: int | None = None, magnify: floa
         _film(folder, Path(out), frame, magnify)
         return
     if out is not None and Path(out).suffix not in ENDINGS:
-        raise PatchfemError(f"{out}: pictures are written as {', '.join(ENDINGS)}, films as {', '.join(reels.ENDINGS)}")
+        raise PatchfemError(f"{out}: pictures are written as {', '.join(ENDINGS)}, films as {', '.join(reels.ENDINGS)}"
+                            " or .html")
     with Series(folder) as series:
         one = series.frame(-1 if frame is None else frame)
         head = series.path.parent.resolve().name

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ...disk.whole import write_text
 from ...scales import axis_unit
 from ..drawing.panels import corners, shape, slides
 from ..fields.series import Series, moving
 from ..fields.vtkhdf import NAME
-from .document import Section
+from .document import Section, document
 from .library import own
 from .thinned import spread, thinned
 
@@ -46,8 +47,18 @@ def reel(folder: Path) -> dict | None:
     (c, 4), coated (c,), moves (f, p, 2) and colours, one (f, c) for each of COLOURS; slide: (f,); curves: of the
     interface, (f, n) over the places x (n,); status: (f, n), 0 open, 1 sticks, 2 slips, where it is known.
     """
-    if not (Path(folder) / NAME).is_file():
-        return None
+    return _reel(folder) if (Path(folder) / NAME).is_file() else None
+
+
+def write_page(folder: Path, out: Path) -> str:
+    """Write a page with the player of the results in a folder; one line on it. Missing without fields."""
+    film = _reel(folder)
+    write_text(out, document(Path(folder).resolve().name, "", [section(film)], {"charts": [], "player": film},
+                             ("figures.js", "stage.js", "player.js")))
+    return f"{out}: {len(film['times'])} frames"
+
+
+def _reel(folder: Path) -> dict:
     with Series(folder) as series:
         cycle = np.array(moving(series.times))
         numbers = cycle[np.linspace(0, cycle.size - 1, min(FRAMES, cycle.size)).round().astype(int)].tolist()

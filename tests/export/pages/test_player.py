@@ -7,6 +7,7 @@ from time import monotonic
 import h5netcdf
 import numpy as np
 import pytest
+from command_line import cli
 from page_data import data_of
 
 from patchfem.export import report
@@ -258,3 +259,12 @@ def test_exact_in_a_browser_both_themes_a_narrow_window_and_paper(opened):
 def test_always_markup_in_a_title_or_a_scene_is_text(opened):
     assert not opened.js("window.hacked") and opened.js("document.getElementById('evil')") is None
     assert opened.js("document.querySelector('h1').textContent").startswith('<img src=x onerror=')
+
+
+def test_exact_view_writes_the_player_on_a_page_of_its_own(bench, film, tmp_path, chromium):
+    answer = cli("view", bench, "-o", tmp_path / "a.html")
+    assert answer.code == 0 and answer.out.endswith(f"a.html: {len(film['times'])} frames\n"), answer.err
+    page = chromium.opened((tmp_path / "a.html").read_text("utf-8"))
+    assert page.faults == [] and page.js("document.querySelector('h1').textContent") == bench.name
+    assert page.js("document.getElementById('play-frame').max") == str(len(film["times"]) - 1)
+    assert told(page).startswith(f"Frame {film['first'] + 1} of ")
