@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..core import NotConverged, PatchfemError
-from ..scene.lines import counted, key_lines
+from ..scene.lines import counted, place_of
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -32,13 +32,8 @@ class Source:
         return self.write()
 
     def where(self, key: str) -> str:
-        """``FILE:LINE: key`` for a message about a key.
-
-        The line is that of its table where the key is not written itself; without either there is none.
-        """
-        lines = key_lines(self.text)
-        line = lines.get(key) or lines.get(key.rpartition(".")[0])
-        return f"{self.path}:{line}: {counted(key)}" if line else f"{self.path}: {counted(key)}"
+        """``FILE:LINE: key`` for a message about a key."""
+        return place_of(self.path, self.text, key)
 
 
 @contextmanager

@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, get_origin
 
-from pydantic import ValidationError
-
 from .keys import quantities
-from .keys.types import choices, keys, kind_of, model_of, parts
-from .reader import _message, _set_value, is_value, owner_of
+from .keys.types import keys, kind_of, model_of, parts
+from .reader import _set_value, held, is_value, known, owner_of
 
 LIMITS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 MOST = 10_000_000  # values of one range
@@ -80,7 +78,7 @@ def _add(found: list, wrong: list, key: str, values: str, sampled: bool) -> None
 
 
 def _axis(key: str, text: str, sampled: bool) -> Axis | Span:
-    _known(key)
+    known(key)
     out, wrong = [], []
     pieces = _split(text)
     for piece in pieces:
@@ -113,7 +111,7 @@ def values_of(key: str, texts: Iterable[str], distinct: bool = True) -> Axis:
 
     A value beyond the limits of its key is no mistake here: its case says so. distinct: no value may stand twice.
     """
-    _known(key)
+    known(key)
     texts, values, wrong = tuple(texts), [], []
     _no_table(key, texts)
     for text in texts:
@@ -167,18 +165,8 @@ def _no_table(key: str, texts: tuple) -> None:
     if inner is None or is_value(model, name) or all(text.startswith(("{", "[", '"', "'")) for text in texts):
         return
     items = ".NAME" if get_origin(model.model_fields[name].annotation) is tuple else ""
-    known = sorted(keys(inner), key=lambda one: not inner.model_fields[keys(inner)[one]].is_required())
-    raise ValueError(f"a table, not a value; name a key in it: {', '.join(f'{key}{items}.{one}' for one in known[:4])}")
-
-
-def _known(key: str) -> None:
-    """ValueError, with the nearest known key, where no scene has the key."""
-    model, _ = owner_of(key)
-    if model is None:
-        table, _, last = key.rpartition(".")
-        owner, at = owner_of(table) if table else (None, "")
-        inner = model_of(owner, at) if owner is not None else None
-        raise ValueError("not a key of a scene" + (f"; {choices(last, keys(inner))}" if inner is not None else ""))
+    first = sorted(keys(inner), key=lambda one: not inner.model_fields[keys(inner)[one]].is_required())[:4]
+    raise ValueError(f"a table, not a value; name a key in it: {', '.join(f'{key}{items}.{one}' for one in first)}")
 
 
 def _types(key: str) -> tuple:
@@ -225,14 +213,8 @@ def _value(key: str, text: str) -> float | str:
     given = _set_value(key, text)
     if model_of(model, name) is not None and isinstance(given, dict):
         return text
-    alias = model.model_fields[name].alias or name
     number = isinstance(given, int | float) and not isinstance(given, bool)
-    try:
-        model.model_validate({alias: float(given) if number and int not in _types(key) else given})
-    except ValidationError as caught:
-        for error in caught.errors(include_url=False):
-            if error["loc"][0] == alias and error["type"] not in ("missing", *LIMITS):
-                raise ValueError(_message(model, name, error, given)) from None
+    held(key, float(given) if number and float in _types(key) else given, LIMITS)
     return float(given) if number else text
 
 

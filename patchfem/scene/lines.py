@@ -35,6 +35,16 @@ def counted(text: str) -> str:
     return found if found == text else counted(found)  # an item of a list in an item
 
 
+def place_of(path, text: str, key: str) -> str:
+    """``FILE:LINE: key`` for a message about a key of a text.
+
+    The line is that of its table where the key is not written itself; without either there is none.
+    """
+    lines = key_lines(text)
+    line = lines.get(key) or lines.get(key.rpartition(".")[0])
+    return f"{path}:{line}: {counted(key)}" if line else f"{path}: {counted(key)}"
+
+
 @lru_cache(16)
 def key_lines(text: str) -> dict[str, int]:
     """Dotted key path -> line (from 1) in a valid TOML text; a table has the line of its header.

@@ -5,13 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
-
-from pydantic import ValidationError
 
 from .keys import quantities
-from .keys.types import choices, keys, kind_of, model_of, parts
-from .reader import _message, _set_value, owner_of
+from .keys.types import kind_of, model_of, parts
+from .reader import _set_value, held, known
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,42 +51,31 @@ def _range(text: str) -> Range:
     low, dots, high = (part.strip() for part in bounds.partition(".."))
     if not equals or not dots or not low or not high:
         raise ValueError(f"{text}: table.key=low..high is wanted, such as friction.bond_length=0.2 um..20 um")
-    model, name = _numeric(key)
-    a, b = (_value(model, name, key, one) for one in (low, high))
-    if not a < b:
-        raise ValueError(f"{key}: the low bound {low} must lie below the high bound {high}")
+    try:
+        model, name = _numeric(key)
+        a, b = (_value(name, key, one) for one in (low, high))
+        if not a < b:
+            raise ValueError(f"the low bound {low} must lie below the high bound {high}")
+    except ValueError as error:
+        raise ValueError(f"{key}: {error}") from None
     return Range(key, a, b, kind_of(model, name))
 
 
 def _numeric(key: str) -> tuple:
     """Model and attribute of a key that holds one number; ValueError with the nearest known key otherwise."""
-    model, name = owner_of(key)
-    if model is None:
-        table, _, last = key.rpartition(".")
-        owner, at = owner_of(table) if table else (None, "")
-        inner = model_of(owner, at) if owner is not None else None
-        help = f"; {choices(last, keys(inner))}" if inner is not None else ""
-        raise ValueError(f"{key}: not a key of a scene{help}")
+    model, name = known(key)
     annotation = model.model_fields[name].annotation
     types = (annotation, *parts(annotation))
     if model_of(model, name) is not None or tuple in types or float not in types:
-        raise ValueError(f"{key}: holds no number that can vary; quantities and plain numbers can be free")
+        raise ValueError("holds no number that can vary; quantities and plain numbers can be free")
     return model, name
 
 
-def _value(model: Any, name: str, key: str, text: str) -> float:
+def _value(name: str, key: str, text: str) -> float:
     written = _set_value(key, text)
     if isinstance(written, int) and not isinstance(written, bool):
         written = float(written)
-    good: dict[str, Any] = {}
-    alias = model.model_fields[name].alias or name
-    try:
-        model.model_validate({alias: written}, context=good)
-    except ValidationError as caught:
-        for error in caught.errors(include_url=False):
-            if error["loc"][0] == alias and error["type"] != "missing":
-                raise ValueError(f"{key}: {_message(model, name, error, written)}") from None
-    value = good.get(name)
+    value = held(key, written).get(name)
     if not isinstance(value, float) or not math.isfinite(value):
-        raise ValueError(f"{key}: '{text}' is not a finite number")
+        raise ValueError(f"'{text}' is not a finite number")
     return value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterable
 from functools import cache, lru_cache
 from typing import Any, Literal, get_args, get_origin
 
@@ -211,6 +212,33 @@ def owner_of(key: str) -> tuple[type[Table] | None, str]:
             return None, ""
         items = model_of(model, name) is not None and get_origin(model.model_fields[name].annotation) is tuple
     return model, name
+
+
+def known(key: str) -> tuple[type[Table], str]:
+    """`owner_of` a key; ValueError, with the nearest known key, where no scene has it."""
+    model, name = owner_of(key)
+    if model is not None:
+        return model, name
+    table, _, last = key.rpartition(".")
+    owner, at = owner_of(table) if table else (None, "")
+    inner = model_of(owner, at) if owner is not None else None
+    raise ValueError("not a key of a scene" + (f"; {choices(last, keys(inner))}" if inner is not None else ""))
+
+
+def held(key: str, value: Any, passed: Iterable[str] = ()) -> dict[str, Any]:
+    """A value as the key holds it, by attribute; ValueError where it cannot hold it.
+
+    passed: kinds of mistakes that are none here.
+    """
+    model, name = owner_of(key)
+    alias, good = model.model_fields[name].alias or name, {}
+    try:
+        model.model_validate({alias: value}, context=good)
+    except ValidationError as caught:
+        for error in caught.errors(include_url=False):
+            if error["loc"][0] == alias and error["type"] not in ("missing", *passed):
+                raise ValueError(_message(model, name, error, value)) from None
+    return good
 
 
 def _table(draft: Draft, model: type[Table], raw: dict[str, Any], at: str) -> Any:

@@ -22,7 +22,7 @@ from . import axes
 from .keys import tables
 from .keys.same import once
 from .keys.types import keys as keys_of
-from .lines import DEEPEST, TooDeep, counted, key_lines
+from .lines import DEEPEST, TooDeep, key_lines, place_of
 from .reader import Draft, apply_set
 from .rules.accuracy import knobs_unused
 from .rules.check import check
@@ -87,10 +87,8 @@ class Scene:
         return effects(self) + ["sweep"] * bool(self.sweep)
 
     def where(self, key: str) -> str:
-        """``FILE:LINE: key`` for a message about a key; the line of its table where it is not written itself."""
-        lines = key_lines(self.text)
-        line = lines.get(key) or lines.get(key.rpartition(".")[0])
-        return f"{self.path}:{line}: {counted(key)}" if line else f"{self.path}: {counted(key)}"
+        """``FILE:LINE: key`` for a message about a key."""
+        return place_of(self.path, self.text, key)
 
     def beside(self, name: str) -> Path:
         """A path written in the scene, which is relative to the scene's own folder."""

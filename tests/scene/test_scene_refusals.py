@@ -23,9 +23,7 @@ from scene_texts import (
     only,
 )
 
-from patchfem.scene.keys.tables import Tables
-from patchfem.scene.keys.types import keys, model_of
-from patchfem.scene.rules.limits import NOT_YET_BUILT, _find
+from patchfem.scene.rules.limits import NOT_YET_BUILT
 from patchfem.scene.scene import SceneError, load, loads
 
 # (text, sets, key whose line is named, what the message says)
@@ -363,16 +361,10 @@ def test_refuses_nothing_unbuilt_before_the_scene_is_otherwise_valid():
     assert "not yet built" not in only(RIG, "friction.breakaway=0.1", "drive.cycles=0")
 
 
-def test_always_the_unbuilt_list_names_keys_of_the_tables():
-    for entry in NOT_YET_BUILT:
-        path, _, value = entry.partition("=")
-        model = Tables
-        *outer, last = path.split(".")
-        for name in outer:
-            model = model_of(model, keys(model)[name])
-        field = model.model_fields[keys(model)[last]]
-        assert not value or f"'{value}'" in str(field.annotation)
-    assert list(_find(loads(RIG).tables(), "structure.mode.name"))[1] == ("structure.mode.1.name", "second")
+def test_refuses_the_key_not_yet_built_in_the_mode_that_has_it():
+    assert NOT_YET_BUILT == "structure.mode.lateral"
+    assert only(RIG, "structure.mode.second.lateral=0.2") == "--set: structure.mode.second.lateral: not yet built"
+    assert loads(RIG, sets=["structure.mode.second.lateral=0"]).structure.mode[1].lateral == 0
 
 
 def test_always_masses_and_interfaces_are_read():

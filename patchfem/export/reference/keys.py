@@ -65,8 +65,6 @@ def _keys() -> list:
         about = " ".join((model.__doc__ or "").split())
         if parent in heads:
             about += f" It carries the keys of {heads[parent][0]} as well."
-        if any(header.strip("[]") in NOT_YET_BUILT for header in named):
-            about += " Not yet built."
         out += ["### " + (", ".join(f"`{header}`" for header in named) if model is not Tables else "At the top"), about]
         if own:
             out.append(grid(("key", "kind", "default", "required", "meaning"),
@@ -83,7 +81,7 @@ def _row(model: type, key: str, at: str) -> tuple:
     elif default:
         default = f"`{default}`"
     required = "yes" if field.is_required() else _needed(model, key, path.rpartition(".")[0])
-    said = meaning(model, key) + ("; not yet built" if path in NOT_YET_BUILT else "")
+    said = meaning(model, key) + ("; not yet built" if path == NOT_YET_BUILT else "")
     return f"`{key}`", _kind(model, name), default, required, said
 
 

@@ -2,7 +2,6 @@
 
 from ...effects import LAWS, has, listed
 from .draft import KNOBS, Draft, acts, pinned
-from .limits import NOT_YET_BUILT
 from .methods import Motion, motion
 
 
@@ -10,7 +9,7 @@ def _quadrature(draft: Draft, kind: str) -> None:
     """An engine of the sum over bonds must be able to sum the law, and the run must have such a sum."""
     accuracy, law, contact = draft.tables.accuracy, draft.tables.friction, draft.tables.contact
     engine = accuracy and accuracy.quadrature
-    if engine in (None, "auto") or f"accuracy.quadrature={engine}" in NOT_YET_BUILT:
+    if engine in (None, "auto"):
         return
     if law is None or not has(law.law, "bonds") or kind not in ("bench", "rig"):
         draft.remark(f"accuracy.quadrature = '{engine}' has no meaning without law 'nonlocal' and is not used")

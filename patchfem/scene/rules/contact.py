@@ -2,7 +2,6 @@
 
 from ..keys.contact import outermost
 from .draft import ASPERITIES, Draft, _needs
-from .limits import NOT_YET_BUILT
 from .outlines import flat_of, outlines
 
 TALLEST = 10_000  # times the length: at 80 000 the stiffness of a piece is lost in its round-off
@@ -17,7 +16,7 @@ def _contact(draft: Draft) -> None:
     if load and approach:
         draft.say("contact.approach", "[contact.approach] and contact.load exclude each other: keep one")
     if not load and not approach:
-        draft.lacks("contact.load", "" if "contact.approach" in NOT_YET_BUILT else "or [contact.approach] instead")
+        draft.lacks("contact.load", "or [contact.approach] instead")
     outlines(draft)
     if contact.height and contact.length and contact.height > TALLEST * contact.length:
         draft.say("contact.height", f"{contact.height:g} m is more than {TALLEST} times contact.length, and the "

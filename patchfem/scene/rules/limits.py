@@ -1,12 +1,11 @@
-"""What a scene may say but no run can do yet: the list of keys without an implementation, and combinations.
+"""What a scene may say but no run can do yet: a key without an implementation, and combinations.
 
-Each message says what serves meanwhile and ends in "not yet built". Building one means deleting its line or rule.
+Each message says what serves meanwhile and ends in "not yet built". Building one means deleting its rule.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from ...effects import MEANWHILE, carries, has, listed, named, refusal, takes, unbuilt
 from ..keys.contact import Contact
@@ -14,35 +13,14 @@ from ..keys.tables import Friction, Tables
 from .draft import Draft
 from .methods import beside_load, changing_load, check_method, climbed, turning
 
-# Valid in a scene but without an implementation -> what serves meanwhile.
-NOT_YET_BUILT: dict[str, str] = {
-    "structure.mode.lateral": "",
-}
+NOT_YET_BUILT = "structure.mode.lateral"  # valid in a scene, but no run can do it
 
 
 def not_yet_built(tables: Tables) -> Iterator[tuple[str, str]]:
-    """Key and message for everything the tables name that has no implementation yet; a zero number names nothing."""
-    for entry, instead in NOT_YET_BUILT.items():
-        path, _, value = entry.partition("=")
-        use = f"use {instead} meanwhile; " if instead else ""
-        for key, found in _find(tables, path):
-            if value and found == value:
-                yield key, f"'{value}': {use}not yet built"
-            elif not value and found not in (None, (), 0, 0.0):
-                yield key, f"{use}not yet built"
-
-
-def _find(table: Any, path: str, at: str = "") -> Iterator[tuple[str, Any]]:
-    name, _, rest = path.partition(".")
-    value = getattr(table, name, None)
-    at = f"{at}.{name}" if at else name
-    if not rest:
-        yield at, value
-    elif isinstance(value, tuple):
-        for index, item in enumerate(value):
-            yield from _find(item, rest, f"{at}.{index}")
-    elif value is not None:
-        yield from _find(value, rest, at)
+    """Key and message of every mode that has the key without an implementation; a zero names nothing."""
+    for index, mode in enumerate(tables.structure.mode if tables.structure else ()):
+        if mode.lateral:
+            yield f"structure.mode.{index}.lateral", "not yet built"
 
 
 def combinations(draft: Draft, kind: str) -> None:
