@@ -20,6 +20,7 @@ from ..export.sweeps import run
 from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, placed, say, texts, word
 
 FIRST = 5  # messages of failed cases that are printed
+TABLE = 1000  # bytes of a lumped case in sweep.csv and sweep.nc
 
 
 @Parameter(name="*")
@@ -60,7 +61,7 @@ class By:
     executor: word("dask (a cluster on this machine) or dask:ADDRESS, such as dask:tcp://10.0.0.2:8786",
                    "--executor") = ""
     shard: word("such as 3/40: the third of 40 parts only, into a folder that all parts share", "--shard") = ""
-    collect: flag("only write the tables of a sweep whose shards are done", "--collect") = False
+    collect: flag("only write the tables of a sweep whose cases are all done", "--collect") = False
     device: word("what the lanes of a sweep run on, as yet only the processor, such as cpu", "--device") = "cpu"
 
     def __post_init__(self):
@@ -168,7 +169,12 @@ def _answer(asked, cases, found, told: Told) -> None:
             print(said)
         if told.page:
             print(f"page: {target / 'report.html'}")
-        print(f"results: {target / 'sweep.csv'} {target / 'sweep.nc'}")
+        tables = [target / name for name in ("sweep.csv", "sweep.nc")]
+        if tables[0].is_file():
+            print(f"results: {tables[0]} {tables[1]}")
+        else:
+            print(f"results: {target / 'sweep.json'}; sweep.csv and sweep.nc of so many cases take some "
+                  f"{1e-6 * TABLE * len(found):.0f} MB: the same command with --collect writes them")
     sys.stdout.flush()
     alike = {}
     for number in failed:

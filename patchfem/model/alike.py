@@ -35,7 +35,9 @@ class Alike(Sequence):
     def __len__(self) -> int:
         return len(self.values)
 
-    def __getitem__(self, case: int) -> Model:
+    def __getitem__(self, case: int | slice) -> Model | list[Model]:
+        if isinstance(case, slice):
+            return [self[one] for one in range(*case.indices(len(self)))]
         return renumbered(self.first, self.like, self.values[case].tolist(), self.sets(int(self.cases[case])))
 
     def some(self, cases: np.ndarray) -> Alike:

@@ -286,6 +286,19 @@ def test_exact_shards_make_the_same_files(swept, scene, tmp_path, monkeypatch):
         assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
 
 
+def test_exact_tables_of_many_cases_are_written_where_they_are_asked_for(swept, scene, tmp_path, monkeypatch):
+    out = tmp_path / "swept"
+    with monkeypatch.context() as many:
+        many.setattr("patchfem.export.sweeps.run.TABLED", 5)
+        said = cli("sweep", scene, *OVER, "-o", out)
+        assert not (out / "sweep.csv").exists() and not (out / "sweep.nc").exists()
+        assert "the same command with --collect writes them" in said.out
+        assert "with --collect" in (out / "report.html").read_text("utf-8")
+        assert cli("sweep", scene, *OVER, "-o", out, "--collect").code == said.code
+    for name in ("sweep.csv", "sweep.nc"):
+        assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
+
+
 def test_always_two_shards_may_put_older_tables_aside_at_once(tmp_path, monkeypatch):
     (tmp_path / "sweep.csv").write_text("older")
     real = os.replace

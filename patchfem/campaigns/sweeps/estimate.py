@@ -12,7 +12,9 @@ LOOKED = 9  # cases that are planned, spread over the sweep
 ONCE = 0.75  # seconds of a plan that a sweep spends once: its start, its files and its page
 TOGETHER = 1.2e-3  # seconds of a case of a batch from its values to its columns (0.8 to 1.5 ms of 2000 lumped cases)
 FEW = 1000  # cases of a sweep that has the summary of each unless it is asked otherwise
-DISK, COLUMNS = 6000, 1600  # bytes of a case with its summary, and without: tables, page and columns of 10 000 cases
+TABLED = 200_000  # cases of a sweep that has its tables unless they are asked for
+# bytes of a case with its summary, and without: tables, page and columns of 10 000 cases, columns of a million
+DISK, COLUMNS, BARE = 6000, 1600, 400
 
 
 def estimate(asked: Asked, cases: Cases) -> dict:
@@ -39,6 +41,6 @@ def estimate(asked: Asked, cases: Cases) -> dict:
     return plans[0].as_json() | {
         "compile_seconds": compiles, "seconds": round(once + each * len(cases), 2), "seconds_per_case": round(each, 4),
         "bytes": max(one.bytes for one in plans), "cases": len(cases),
-        "disk_bytes": (DISK if len(cases) <= FEW else COLUMNS) * len(cases),
+        "disk_bytes": (DISK if len(cases) <= FEW else COLUMNS if len(cases) <= TABLED else BARE) * len(cases),
         "values": {axis.key: len(set(axis.texts)) for axis in cases.axes}}
 

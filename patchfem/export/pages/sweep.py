@@ -146,8 +146,9 @@ def _cases(table: dict) -> str:
                      [*(escape(brief(str(one["texts"][i]))) for one in table["keys"]), said, *numbers]))
     number = len(table["outcome"])
     more = f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv has all.</p>" if number > LISTED else ""
-    files = ("<p class=soft>Every case with every measure and its error: <a href=sweep.csv>sweep.csv</a>, "
-             "<a href=sweep.nc>sweep.nc</a>.</p>") if table.get("own", True) else ""
+    named = "<a href=sweep.csv>sweep.csv</a>, <a href=sweep.nc>sweep.nc</a>" if table.get("tabled", True) else \
+        "sweep.csv and sweep.nc, which the same command writes with --collect"
+    files = f"<p class=soft>Every case with every measure and its error: {named}.</p>" if table.get("own", True) else ""
     return f"{files}{document.table(heads, rows, 'wide')}{more}"
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...campaigns.sweeps.asked import Asked
 from ...campaigns.sweeps.cases import Cases
-from ...campaigns.sweeps.estimate import FEW
+from ...campaigns.sweeps.estimate import FEW, TABLED
 from ...campaigns.sweeps.sweep import Work, solved
 from ...core import Missing, PatchfemError
 from ...runs.many.answers import Answers
@@ -129,26 +129,30 @@ def swept(asked: Asked, cases: Cases, executor, say: Callable | None = None, est
 
 
 def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> Answers:
-    """The tables of a sweep whose shards are all done, from its folder. Missing where cases have no answer yet."""
+    """All tables of a sweep whose shards are all done, from its folder. Missing where cases have no answer yet."""
     with Folder(target, cases.names(asked)) as folder:
         found = folder.answers(Answers.blank(len(cases), folder.target))
         missing = int(np.sum(found.outcome == ""))
         if missing:
             raise Missing(f"{target}: {missing} of {len(cases)} cases have no answer; run their shards again, or go on "
                           "with --resume")
-        write_tables(asked, cases, found, folder, page)
+        write_tables(asked, cases, found, folder, page, True)
         folder.tidy(False)
     return found
 
 
-def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder, page: bool = True) -> None:
-    """Write sweep.csv, sweep.nc, sweep.json and report.html of all cases; without a page, none is left of other
-    cases."""
-    keys = folder.keys()
-    write_csv(cases, found, keys, folder.target / "sweep.csv")
-    table = table_of(asked, cases, found, keys, folder.target)
+def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder, page: bool = True,
+                 every: bool = False) -> None:
+    """Write sweep.json, report.html, and of TABLED cases at most, or where `every` asks for them, sweep.csv and
+    sweep.nc; what is not written is not left of other cases."""
+    keys, tabled = folder.keys(), every or len(cases) <= TABLED
+    table = table_of(asked, cases, found, keys, folder.target) | {"tabled": tabled}
     answer = write_answer(table, folder.target / "sweep.json")
-    netcdf.write(contents(asked, cases, found, keys, answer), folder.target / "sweep.nc")
+    for name in () if tabled else ("sweep.csv", "sweep.nc"):
+        (folder.target / name).unlink(missing_ok=True)
+    if tabled:
+        write_csv(cases, found, keys, folder.target / "sweep.csv")
+        netcdf.write(contents(asked, cases, found, keys, answer), folder.target / "sweep.nc")
     if page:
         write_page(table, folder.target)
     else:

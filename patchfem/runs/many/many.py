@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import compiled
 from ...core import PatchfemError
-from ...model.alike import Alike
+from ...model.alike import Alike, some
 from ...model.model import Model
 from . import one_by_one
 from .answers import Answers
@@ -24,8 +24,7 @@ class Batch(NamedTuple):
     say) -> Answers of a group, equal to single runs to 1e-12, bars too, whatever else is in the group; share: seconds
     of a case over those of its own run, 0 where they are next to nothing; compile: CPU seconds of the first group;
     least: fewest cases of a study that it serves: such a batch gives answers with bars of their own, each the same
-    whatever else is in the group; parts(Alike) -> [(places, whether it takes them)], a group each, where it reads the
-    columns of models.
+    whatever else is in the group; parts(Alike) -> {group: places} of those that it takes, where it reads columns.
     """
 
     name: str
@@ -87,30 +86,28 @@ def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = Non
     errors, where they run one by one (a batch has its errors from the same work); study: cases of the whole that these
     are a part of, 0 where they are all of it.
     """
-    if isinstance(models, Alike) and len(models):
-        return _alike(models, say, estimate, study or len(models))
     found, groups = Answers.blank(len(models)), {}
-    for case, model in enumerate(models):
+    left, study = np.arange(len(models)), study or len(models)
+    if isinstance(models, Alike) and keep is None:
+        left, groups = _by_columns(models, study)
+    for case in left.tolist():
+        model = models[case]
         if isinstance(model, PatchfemError):
             found.fail(case, str(model))
             continue
-        groups.setdefault(_place(model, study or len(models)) if keep is None else (None, None), []).append(case)
+        groups.setdefault(_place(model, study) if keep is None else (None, None), []).append(case)
     for (batch, _), cases in groups.items():
-        found.place(cases, _solved(batch, [models[case] for case in cases],
+        found.place(cases, _solved(batch, some(models, cases),
                                    partial(one_by_one.solve, keep=_of(keep, cases), estimate=estimate), say))
     return found
 
 
-def _alike(models: Alike, say: Callable | None, estimate: bool, study: int) -> Answers:
-    """Answers of models that differ in plain numbers, as `answers` gives them: those that a batch takes as columns are
-    not made one by one."""
+def _by_columns(models: Alike, study: int) -> tuple[np.ndarray, dict]:
+    """(places of the models that no batch takes as columns, {(batch, group): places} of those that one does)."""
     batch = next((one for one in BATCHES if one.parts is not None and study >= one.least), None)
-    found = Answers.blank(len(models))
-    for cases, takes in batch.parts(models) if batch is not None else [(np.arange(len(models)), False)]:
-        own = models.some(cases)
-        found.place(cases, _solved(batch, own, partial(one_by_one.solve, estimate=estimate), say) if takes else
-                    answers(list(own), None, say, estimate, study))
-    return found
+    parts = batch.parts(models) if batch is not None else {}
+    return np.setdiff1d(np.arange(len(models)), [case for cases in parts.values() for case in cases]), \
+        {(batch, group): cases for group, cases in parts.items()}
 
 
 def _place(model: Model, study: int) -> tuple:

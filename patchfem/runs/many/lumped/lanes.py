@@ -85,10 +85,11 @@ def group(model: Model) -> tuple:
     return int(model.rig.cycles), model.friction.law, int(steps_of([model])[0])
 
 
-def parts(models: Alike) -> list[tuple[np.ndarray, bool]]:
-    """(places, whether lanes take them) of models of each compiled call."""
-    steps = np.zeros(len(models), int) if no_lanes(models[0]) else steps_of(models)
-    return [(np.flatnonzero(steps == one), one > 0) for one in np.unique(steps)]
+def parts(models: Alike) -> dict[tuple, list]:
+    """Places of the models that lanes take, by group."""
+    steps = np.zeros(len(models), int) if no_lanes(models.first) else steps_of(models)
+    cycles, law, _ = group(models.first)
+    return {(cycles, law, one): np.flatnonzero(steps == one).tolist() for one in sorted(set(steps.tolist()) - {0})}
 
 
 def solve(models: Sequence[Model], say=None) -> Answers:
