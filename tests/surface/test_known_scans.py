@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from known_scans import KINDS, Place, caps, pair, points_in
+from scans_score import COVERED, errors, line, summary, verdict
 
 
 def residual(one, scan, heights, to_piece) -> float:
@@ -68,3 +69,34 @@ def test_exact_common_region_and_a_hollow():
     assert (area * hollow(x, y)).sum() == pytest.approx(np.pi * 0.4**2 * 3.0 / 2, rel=1e-4)
     moved = Place((2.0, 1.0), (2.0, 1.0), (0.5, -0.25), 0.0)
     assert moved.common().min(0) == pytest.approx([0.0, 0.25]) and moved.common().max(0) == pytest.approx([1.5, 1.0])
+
+
+def answer(truth: dict, **other) -> dict:
+    """What a comparison without a fault says, but for what is `other`."""
+    true = {name: {"value": truth[name], "low": 0.9 * truth[name], "high": 1.1 * truth[name]}
+            for name in COVERED[:5]} | other
+    place = {name: {"value": truth[name], "low": truth[name] - 1e-9, "high": truth[name] + 1e-9}
+             for name in COVERED[5:]} | {"mirrored": truth["mirrored"], "turned": truth["turned"]}
+    return {"verdict": "worn", "sentences": [], "registration": place, "hidden_wear": {"high": None}} | true
+
+
+def test_exact_the_score_of_a_right_a_missed_and_a_false_answer():
+    one = pair(KINDS.index("pile-up"), (170, 150))
+    truth, none = one.truth(), {"value": 0.0, "low": 0.0, "high": 1e-20}
+    right, missed = answer(truth), answer(truth, worn_volume=none)
+    assert verdict(one.kind, truth, right) == ("right", []) and verdict(one.kind, truth, missed)[0] == "missed"
+    found = errors(truth, right)
+    assert set(found) == set(COVERED) and all(each["inside"] and each["error"] == 0 for each in found.values())
+    assert errors(truth, missed)["worn_volume"] == {"error": -1.0, "relative": True, "inside": False}
+    for fault in ({"sentences": ["The files are in the wrong order."]},
+                  {"registration": right["registration"] | {"mirrored": True}}):
+        assert verdict(one.kind, truth, right | fault)[0] == "false"
+    unworn = dict(truth, worn_volume=0.0)
+    assert verdict("deposits", unworn, right) == ("false", ["wear shown where there is none"])
+    apart = dict(truth, comparable=False)
+    assert verdict("elsewhere", apart, right)[0] == "false" and not errors(apart, right)
+    assert verdict("elsewhere", apart, right | {"verdict": "not comparable"})[0] == "right"
+    assert verdict(one.kind, truth, {"error": "no such file"}) == ("refused", ["no such file"])
+    row = {"seed": 6, "kind": one.kind, "style": one.style, "verdict": "missed", "reasons": [], "cpu": 1.0,
+           "memory": 2.0, "errors": errors(truth, missed), "pixel": 1e-6}
+    assert "-100.0!" in line(row) and any("0 of 1 intervals" in text for text in summary([row]))
