@@ -20,7 +20,9 @@ HERE = Path(__file__).parent
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))  # else an edited kernel runs as its old self
 
-COMPILING = ("dynamics", "model", "campaigns", "response", "runs", "commands", "friction")  # folders whose runs compile
+# half of the tests, in folders whose runs compile; then those that compile nothing, then what meets compiled code again
+COMPILING = ("dynamics", "export", "model", "campaigns", "response", "runs", "commands", "friction")
+LATER = ("scene", "identify", "torture", "studies")
 compiled.PATIENCE = -1.0  # a test runs what is compiled, also where nothing is kept and little would have to run
 
 if sys.dont_write_bytecode:  # hundreds of child processes would each compile all that they import
@@ -38,7 +40,11 @@ KEPT = kept()
 
 
 def pytest_configure(config):
-    """How many examples a property test draws; "costly" is for @settings."""
+    """How many examples a property test draws; "costly" is for @settings. Of the workers every other one collects from
+    the end: what one of them has read and rewritten the other finds as bytecode."""
+    if int(getattr(config, "workerinput", {}).get("workerid", "gw0")[2:]) % 2 and len(config.args) == 1:
+        config.args = [str(path) for path in sorted(Path(config.args[0]).iterdir(), reverse=True)
+                       if path.match("test_*.py") or path.is_dir() and path.name[0].isalpha()]
     often = 10 if config.option.markexpr == "slow" else 1
     for name, examples in (("patchfem", 20 * often), ("costly", 5 * often)):
         settings.register_profile(name, max_examples=examples, deadline=None, suppress_health_check=list(HealthCheck),
@@ -69,11 +75,16 @@ def pytest_pycollect_makeitem(collector):
 
 
 def pytest_collection_modifyitems(items):
-    """First the folders whose runs compile, last the studies, which compile too: of two workers one begins here and one
-    in the middle, so that what the first compiles the second finds, and no two compile the same at once."""
-    folders = {item: item.path.relative_to(HERE).parts[0] for item in items}
-    rank = {name: place - len(COMPILING) for place, name in enumerate(COMPILING)} | {"studies": 1}
-    items.sort(key=lambda item: rank.get(folders[item], 0))
+    """Of two workers one begins with the folders whose runs compile, the other in the middle, with those whose tests
+    compile nothing: neither waits for what the other compiles."""
+    rank = {name: place - len(COMPILING) for place, name in enumerate(COMPILING)} | {
+        name: place + 1 for place, name in enumerate(LATER)}
+
+    def place(item) -> tuple:
+        parts = item.path.relative_to(HERE).parts
+        return rank.get(parts[0], 0 if len(parts) > 1 else 1), parts
+
+    items.sort(key=place)
 
 
 def pytest_terminal_summary(terminalreporter):

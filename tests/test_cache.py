@@ -79,10 +79,18 @@ machine.make = make
     end = time.monotonic() + 120
     while not mark.exists() and time.monotonic() < end:
         time.sleep(0.05)
-    other = begun(tmp_path)
-    with pytest.raises(subprocess.TimeoutExpired):  # it waits
-        other.wait(8.0)
-    assert not list(tmp_path.rglob("*.code"))
+    waits = tmp_path / "waits"
+    other = begun(tmp_path, f"""
+import pathlib, time
+from patchfem import compiled
+def sleep(seconds):
+    pathlib.Path({str(waits)!r}).touch()
+    time.sleep(seconds)
+compiled.sleep = sleep
+""")
+    while not waits.exists() and time.monotonic() < end:
+        time.sleep(0.05)
+    assert waits.exists() and other.poll() is None and not list(tmp_path.rglob("*.code"))
     stuck.kill()
     assert json.loads(other.communicate(timeout=300)[0])["numba"] and list(tmp_path.rglob("*.code"))
     stuck.communicate()
@@ -121,7 +129,7 @@ def test_exact_code_that_came_with_the_package_serves_the_first_run(tmp_path):
     """Nothing is compiled, nothing is said; kernels with another text leave it alone."""
     home = copied(tmp_path / "home")
     hook.made(home / "patchfem" / "compiled" / "generic", smallest)
-    first, native = slid(home, tmp_path / "cache"), slid(copied(tmp_path / "other"), tmp_path / "native")
+    first, native = slid(home, tmp_path / "cache"), slid(Path(patchfem.__file__).parents[1], tmp_path / "native")
     assert not first["numba"] and first["said"] == [] and not list((tmp_path / "cache").rglob("*.code"))
     assert native["numba"] and native["said"]
     assert (first["work"], first["peak"]) == pytest.approx((native["work"], native["peak"]), rel=1e-9)

@@ -129,7 +129,7 @@ def _as_given(fit, grown: Registration, bent: bool) -> Registration:
     high = np.asarray(grown.rest) < -2 * REACH * grown.noise
     if high.sum() < FEWEST:
         return grown
-    fit.side, state = 1, fit.improved(fit.state, high, 2)
+    fit.side, state = 1, fit.improved(fit.state, fit.rest(fit.state), high, 2)
     worn = (_bent if bent else _straight)(fit, state, high)
     if worn is not None and worn.noise < 1.5 * grown.noise and worn.used.mean() > 0.15 and any(unworn_ends(worn)):
         return worn
@@ -174,12 +174,12 @@ def _bent(fit, state, used) -> Registration | None:
 def _settled(fit, state, used, free: int):
     """State of the fit of the first `free` numbers once its unworn heights stay the same, None where too few are."""
     for turn in range(ROUNDS):
-        rest, least = fit.rest(state)[0], max(fit.least, fit.blur * 0.5**turn)
-        noise, now = _unworn(fit.side * rest, least)
+        seen, least = fit.rest(state), max(fit.least, fit.blur * 0.5**turn)
+        noise, now = _unworn(fit.side * seen[0], least)
         if now.sum() < FEWEST:
             return None
         same = used.size == now.size and bool((used == now).all())
-        new, used = fit.improved(state, now, free), now
+        new, used = fit.improved(state, seen, now, free), now
         small = np.abs(new - state) <= 1e-9 * fit.scales
         state = new
         if same and small.all() and (noise > least or least == fit.least):
@@ -213,14 +213,15 @@ class _Fit:
         self.least = max(DIGITS * height, 1e-13 * float(np.abs(self.z).max(initial=0.0)), 1e-300)
         tilt = max(height, 1e-12)
         self.scales = np.array([tilt, tilt, step, step / self.half, tilt])
-        inside = self.inside(np.array([0.0, 0.0, shift, 0.0, 0.0]), 0.0)
+        inside = self.inside(self.at(np.array([0.0, 0.0, shift, 0.0, 0.0]), 0.0))
         if inside.sum() < FEWEST:
             raise PatchfemError(f"{self.source}: {inside.sum()} samples lie on {one.source}; {FEWEST} at least are "
                                 "wanted")
         self.centre = float(self.x[inside][0] + self.x[inside][-1]) / 2
 
-    def inside(self, state, centre=None):
-        at, edge = self.at(state, centre), 1e-9 * self.half
+    def inside(self, at):
+        """Which of some places lie on the first trace, and not in a gap of it."""
+        edge = 1e-9 * self.half
         inside = (at >= self.one.x[0] - edge) & (at <= self.one.x[-1] + edge)
         if self.lost.any():
             after = np.clip(np.searchsorted(self.known, at), 1, self.known.size - 1)
@@ -234,9 +235,9 @@ class _Fit:
 
     def rest(self, state) -> tuple:
         """Depth below the first trace, its gradient (n, 5), and which samples of the second these are."""
-        inside = self.inside(state)
-        along = (self.x[inside] - self.centre) / self.half
-        at = self.at(state)[inside]
+        at = self.at(state)
+        inside = self.inside(at)
+        along, at = (self.x[inside] - self.centre) / self.half, at[inside]
         fall = -self.slope(at)
         rest = self.spline(at) - self.z[inside] + state[0] + state[1] * along + state[4] * along**2
         return rest, np.column_stack([np.ones(at.size), along, fall, fall * along * self.half, along**2]), inside
@@ -275,11 +276,14 @@ class _Fit:
         used = np.zeros(x.size, bool)
         used[np.flatnonzero(low)[line.used]] = True
         for _ in range(8):  # the shift of these heights alone, before others come in
-            state = self.improved(state, used, 3) if used.size == self.rest(state)[0].size else state
+            seen = self.rest(state)
+            state = self.improved(state, seen, used, 3) if used.size == seen[0].size else state
         return state, used
 
-    def improved(self, state, used, free: int) -> np.ndarray:
-        rest, gradient, _ = self.rest(state)
+    def improved(self, state, seen, used, free: int) -> np.ndarray:
+        """The state after a step of least squares in its first `free` numbers over the heights `used`; seen: `rest` of
+        the state."""
+        rest, gradient, _ = seen
         step = np.linalg.lstsq(gradient[used, :free], -rest[used], rcond=1e-10)[0]
         most = 4 * self.scales[2:free]
         step[2:4] = np.clip(step[2:4], -most[:2], most[:2])
