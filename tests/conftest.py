@@ -44,7 +44,7 @@ def pytest_configure(config):
     the end: what one of them has read and rewritten the other finds as bytecode."""
     if int(getattr(config, "workerinput", {}).get("workerid", "gw0")[2:]) % 2 and len(config.args) == 1:
         config.args = [str(path) for path in sorted(Path(config.args[0]).iterdir(), reverse=True)
-                       if path.match("test_*.py") or path.is_dir() and path.name[0].isalpha()]
+                       if path.match("test_*.py") or (path.is_dir() and path.name[0].isalpha())]
     often = 10 if config.option.markexpr == "slow" else 1
     for name, examples in (("patchfem", 20 * often), ("costly", 5 * often)):
         settings.register_profile(name, max_examples=examples, deadline=None, suppress_health_check=list(HealthCheck),
