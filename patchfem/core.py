@@ -223,6 +223,12 @@ class Measure:
     text: str = ""
     reason: str = ""
 
+    def beyond(self, tolerance: float) -> float:
+        """Error over what is `allowed` [1], above 1 where it misses the tolerance; 0 without a value or an error."""
+        if self.value is None or self.error is None:
+            return 0.0
+        return self.error / max(allowed(tolerance, self.value, self.floor), 1e-300)
+
     def __str__(self) -> str:
         if self.value is None and self.reason:
             return self.reason
@@ -230,6 +236,11 @@ class Measure:
 
     def __repr__(self) -> str:
         return f"{self} ({self.text})" if self.text else str(self)
+
+
+def allowed(tolerance, value, floor):
+    """Error that a tolerance allows a value: tolerance * |value| + floor, of numbers or (n,) of many."""
+    return tolerance * abs(value) + floor
 
 
 class Row(NamedTuple):

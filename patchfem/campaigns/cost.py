@@ -10,7 +10,7 @@ from math import inf
 from time import perf_counter, process_time
 
 from ..compiled import cache_folder
-from ..core import NotConverged, PatchfemError
+from ..core import NotConverged, PatchfemError, allowed
 from ..model.model import Model
 from ..model.source import placed
 from ..runs.patch.ladder import solve_split
@@ -65,7 +65,7 @@ class Cost:
     def within(self, name: str, tolerance: float) -> bool:
         """Whether the error of a measure is at most tolerance * |value| + floor."""
         off = self.off(name)
-        return off is not None and off <= tolerance * abs(self.values[name]) + self.floors[name]
+        return off is not None and off <= allowed(tolerance, self.values[name], self.floors[name])
 
 
 def curve(model: Model, knob: str, say=None) -> list:

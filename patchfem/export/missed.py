@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..core import allowed
 from ..scales import plain
 from .written import label
 
@@ -20,7 +21,7 @@ def over(one: dict, tolerance) -> np.ndarray:
     values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
     floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
     with np.errstate(invalid="ignore"):
-        return errors > tolerance * np.abs(values) + floors  # no comparison with NaN holds
+        return errors > allowed(tolerance, values, floors)  # no comparison with NaN holds
 
 
 def counted(measures: dict, tolerance) -> dict:
@@ -65,7 +66,7 @@ def _beyond(one: dict, tolerance) -> np.ndarray:
     """Error over what is allowed, case by case."""
     floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(one["errors"], float) / (tolerance * np.abs(np.asarray(one["values"], float)) + floors)
+        return np.asarray(one["errors"], float) / allowed(tolerance, np.asarray(one["values"], float), floors)
 
 
 def _share(one: dict) -> np.ndarray:

@@ -43,9 +43,7 @@ def beyond_tolerance(seen: Seen, coarse=()) -> list:
     """
     model = seen.model
     tolerance = model.accuracy.tolerance
-    wide = {name: min(m.error / max(tolerance * abs(m.value) + m.floor, 1e-300), MOST)
-            for name, m in seen.measures.items()
-            if m.value is not None and m.error is not None and m.error > tolerance * abs(m.value) + m.floor}
+    wide = {name: min(times, MOST) for name, m in seen.measures.items() if (times := m.beyond(tolerance)) > 1}
     pressed = patch_rows.TABLE if seen.patch is not None else ()
     static = {name: times for name, times in wide.items() if name in pressed}
     moving = {name: times for name, times in wide.items() if name not in pressed}

@@ -30,7 +30,6 @@ OF_WHAT = {  # said behind a value that would otherwise be taken for another, or
 BETWEEN = ("jump_level",)  # known to lie between two levels of the drive, whatever the tolerance
 ROUND = 1e-12  # of the friction force times the motion: work that is round-off
 NONE = MappingProxyType({})
-TINY = 1e-300  # where nothing is asked of a measure
 UNKNOWN = " (error unknown)"
 SHARP = "what has no ± is known to its last digit"
 
@@ -169,8 +168,8 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
 def least_known(result: Result) -> str:
     """The measure known least well for the tolerance, as one sentence; "" where one misses it, which a warning says."""
     tolerance = result.plan.model.accuracy.tolerance
-    wide = {name: one.error / max(tolerance * abs(one.value) + one.floor, TINY)
-            for name, one in result.measures.items() if one.value is not None and one.error is not None}
+    wide = {name: one.beyond(tolerance) for name, one in result.measures.items()
+            if one.value is not None and one.error is not None}
     if not wide or max(wide.values()) > 1:
         return ""
     told = {name: pair(name, measure_object(result.measures[name])) for name in wide}

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import edges
-from ...core import Measure, PatchfemError, say
+from ...core import Measure, PatchfemError, allowed, say
 from ...mesh.nested import plan_of
 from ...scene.keys.contact import outermost
 from ..results.patch_rows import DECISIVE, TABLE
@@ -161,7 +161,7 @@ def combined(series: list, least: dict, nested: bool = True, tolerance: float | 
         error = None if len(series) == 1 else 0.0
         return {name: Measure(value, TABLE[name].unit, error, floors[name]) for name, value in mine.items()}
     for name, value in mine.items():
-        wanted = np.inf if tolerance is None else tolerance * abs(value) + floors[name]
+        wanted = np.inf if tolerance is None else allowed(tolerance, value, floors[name])
         known, hidden = [one[name] for one in series], least.get(name, 0.0)
         limited = partial(edge_limit if name in edged else limit, nested=nested)
         best, error = _best(limited, known, wanted, hidden, rough)
@@ -200,8 +200,7 @@ def met(found: dict, tolerance: float) -> bool:
 
 def missed(found: dict, tolerance: float) -> float:
     """Largest error of the decisive measures over what the tolerance allows [1]; no error counts as none."""
-    some = [m for m in (found[name] for name in DECISIVE) if m.value is not None and m.error > 0]
-    return max((m.error / max(tolerance * abs(m.value) + m.floor, 1e-300) for m in some), default=0.0)
+    return max(found[name].beyond(tolerance) for name in DECISIVE)
 
 
 def _bounded(why: str, found: dict) -> dict:

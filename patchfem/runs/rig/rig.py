@@ -194,7 +194,7 @@ def _halved(engine, model, numerics, patch) -> tuple:
 
 def errors_met(measures, tolerance: float) -> bool:
     """Whether the errors of all Measures by name are within a tolerance of their values, or their floors."""
-    return all(one.error <= tolerance * abs(one.value) + one.floor for one in measures.values())
+    return all(one.beyond(tolerance) <= 1 for one in measures.values())
 
 
 def _whole_period(model, numerics, found) -> int:
@@ -210,7 +210,7 @@ def _whole_period(model, numerics, found) -> int:
 def _enough(model, numerics, found, measures) -> bool:
     """Whether the error of the displacement is met, or the steps a cycle cannot be doubled again."""
     main, again = measures["relative_displacement_amplitude"], numerics.steps * 2
-    met = main.error <= model.accuracy.tolerance * abs(main.value) + main.floor
+    met = main.beyond(model.accuracy.tolerance) <= 1
     if numerics.local:
         return met or numerics.local < FINEST
     return met or "steps_per_cycle" in numerics.pinned or again > MOST_STEPS or again * numerics.cycles > 1e7 \

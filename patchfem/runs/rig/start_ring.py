@@ -38,7 +38,7 @@ def start_ring(outcome, measures: dict, window, drive, cycles: float, tolerance:
     change = abs(float(ledger[1][-1] - ledger[1][0])) * drive.period / span
     wide = {name: _wider(measures[name], change / abs(loop.value)) for name in OF_WORK if name in measures}
     missed = {name: one for name, one in wide.items()
-              if one.error > max(_allowed(one, tolerance), 2 * measures[name].error)}  # most of it by the change
+              if one.beyond(tolerance) > 1 and one.error > 2 * measures[name].error}  # most of it by the change
     if not missed:
         return StartRing(measures | wide, {}, [])
     until = max(_until(one, measures, drive, cycles) for one in missed.values())
@@ -54,10 +54,6 @@ def start_ring(outcome, measures: dict, window, drive, cycles: float, tolerance:
 def _wider(one: Measure, share: float) -> Measure:
     """A Measure whose error has a share of its value more."""
     return replace(one, error=one.error + share * abs(one.value))
-
-
-def _allowed(one: Measure, tolerance: float) -> float:
-    return tolerance * abs(one.value) + one.floor
 
 
 def _until(one: Measure, measures: dict, drive, cycles: float) -> float:
