@@ -5,13 +5,14 @@ the number of its process, so that two writers of one name never share it and th
 left.
 """
 
+import csv
 import errno
 import os
 import re
 import shutil
 import stat
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -63,6 +64,12 @@ def whole(path, need: int | None = None) -> Iterator[Path]:
 def write_text(path, text: str, encoding: str = "utf-8") -> None:
     """Write a text as a whole file, with ? for what no encoding has: bytes of a file's name; Missing as `whole`."""
     write_bytes(path, text.encode(encoding, errors="replace"))
+
+
+def write_rows(path, rows: Iterable) -> None:
+    """Write rows of cells as comma-separated text, whole."""
+    with whole(path) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows(rows)
 
 
 def write_bytes(path, data) -> None:

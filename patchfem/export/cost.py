@@ -1,10 +1,9 @@
 """Error against time of the knobs of a scene: a table in a file and a picture of each."""
 
-import csv
 from pathlib import Path
 
 from ..campaigns.cost import cheapest, quickest, sentence, turned_by
-from ..disk.whole import whole, write_text
+from ..disk.whole import write_rows, write_text
 from .drawing.pictures import drawing, styled
 
 AXES = {"element_size": "element size", "steps_per_cycle": "steps per cycle", "shear_modes": "shear modes",
@@ -31,15 +30,12 @@ def write(folder: Path, curves: dict) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     names = list(dict.fromkeys(name for runs in curves.values() for one in runs for name in one.values))
     table = folder / "cost.csv"
-    with whole(table) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file)
-        rows.writerow(["knob", "setting", "seconds", "wall_seconds", "timings",
-                       *(text for name in names for text in (name, f"error_{name}", f"distance_{name}"))])
-        for knob, runs in curves.items():
-            for one in runs:
-                rows.writerow([knob, one.label, f"{one.seconds:.6g}", f"{one.wall_seconds:.6g}", one.timings,
-                               *(repr(float(part[name])) if name in part else "" for name in names
-                                 for part in (one.values, one.errors, one.distances))])
+    head = ["knob", "setting", "seconds", "wall_seconds", "timings",
+            *(text for name in names for text in (name, f"error_{name}", f"distance_{name}"))]
+    write_rows(table, [head, *([knob, one.label, f"{one.seconds:.6g}", f"{one.wall_seconds:.6g}", one.timings,
+                                *(repr(float(part[name])) if name in part else "" for name in names
+                                  for part in (one.values, one.errors, one.distances))]
+                               for knob, runs in curves.items() for one in runs)])
     return table
 
 

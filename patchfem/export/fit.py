@@ -1,11 +1,10 @@
 """A fitted loop on paper: the rows as a table, measured and fitted as a picture, the answer as lines of text."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
 
-from ..disk.whole import whole
+from ..disk import whole
 from ..scales import SPOKEN, axis_unit, fitting, plain, rounded, short
 from .drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
 
@@ -21,11 +20,8 @@ def write_rows(path: Path, time, displacement, measured, model, held, quantity: 
     unit = "[N]" if quantity == "force" else "[1]"
     head = [*([] if time is None else ["time [s]"]), "displacement [m]", f"{quantity} {unit}", "fitted", "held"]
     columns = [*([] if time is None else [time]), displacement, measured, model]
-    with whole(path) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file)
-        rows.writerow(head)
-        for *values, out in zip(*(column.tolist() for column in columns), held.tolist()):
-            rows.writerow([*(repr(value) for value in values), int(out)])
+    whole.write_rows(path, [head, *([*map(repr, values), int(out)] for *values, out in
+                                    zip(*(column.tolist() for column in columns), held.tolist()))])
 
 
 @styled

@@ -1,6 +1,5 @@
 """A rig fitted to rows, on disk and on paper: its object, table, picture, fitted scene, and the answer as text."""
 
-import csv
 import hashlib
 import json
 import math
@@ -13,7 +12,7 @@ from ..campaigns.rows import cells as row_cells
 from ..campaigns.rows.fit import FittedRows
 from ..campaigns.rows.nulls import NULLS
 from ..core import G_N
-from ..disk.whole import whole, write_text
+from ..disk.whole import write_rows, write_text
 from .drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
 from .fit import line_of
 from .fit_folder import scene_text, value_of
@@ -116,15 +115,14 @@ def _rows(fitted: FittedRows) -> list:
 def write_table(path: Path, answer: dict) -> None:
     """Write a CSV of the rows of fit.json in g and mil, with what was computed beside them."""
     head = ["frequency [Hz]", "input [g]", "acceleration [g]", "displacement [mil]", "flag"]
-    with whole(path) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file)
-        rows.writerow([*head, "computed acceleration [g]", "computed displacement [mil]", "held"])
-        for one in answer["rows"]:
-            pairs = [(one["acceleration"], G_N), (one["displacement"], MIL)]
-            read, computed = ([("" if pair[which] is None else f"{pair[which] / unit:.6g}") for pair, unit in pairs]
-                              for which in ("measured", "computed"))
-            held = int(any(pair["held"] for pair, _ in pairs))
-            rows.writerow([f"{one['frequency']:.9g}", f"{one['input'] / G_N:.9g}", *read, one["flag"], *computed, held])
+    rows = [[*head, "computed acceleration [g]", "computed displacement [mil]", "held"]]
+    for one in answer["rows"]:
+        pairs = [(one["acceleration"], G_N), (one["displacement"], MIL)]
+        read, computed = ([("" if pair[which] is None else f"{pair[which] / unit:.6g}") for pair, unit in pairs]
+                          for which in ("measured", "computed"))
+        held = int(any(pair["held"] for pair, _ in pairs))
+        rows.append([f"{one['frequency']:.9g}", f"{one['input'] / G_N:.9g}", *read, one["flag"], *computed, held])
+    write_rows(path, rows)
 
 
 @styled

@@ -31,20 +31,13 @@ def moving(times) -> tuple:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Frame:
-    """One moment of a series: its blocks, and all of them as one mesh.
+class Frame(Block):
+    """One moment of a series: all of its blocks as one mesh, that of `joined`, and each of them.
 
-    blocks: name -> Block; points: (N, 3) [m]; connectivity, offsets (cells + 1,), types, point_data, cell_data: of
-    `joined`; units: name -> unit; time [s]; number: from 0.
+    blocks: name -> Block; units: name -> unit; time [s]; number: from 0.
     """
 
     blocks: dict
-    points: np.ndarray
-    connectivity: np.ndarray
-    offsets: np.ndarray
-    types: np.ndarray
-    point_data: dict
-    cell_data: dict
     units: dict
     time: float
     number: int
@@ -139,7 +132,7 @@ class Series:
         with readable(self.path, f"frame {number}"):
             blocks = {name: self._block(self.root[name], number) for name in NAMES}
         one = joined(blocks)
-        return Frame(blocks, one.points, one.connectivity, one.offsets, one.types, one.point_data, one.cell_data,
+        return Frame(one.points, one.connectivity, one.offsets, one.types, one.point_data, one.cell_data, blocks,
                      self.units | {"part": "1"}, float(self.times[number]), number)
 
     def names(self, block: str, kind: str) -> tuple:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import json
 import tomllib
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from ... import __version__
 from ...campaigns.sweeps.asked import Asked
 from ...campaigns.sweeps.cases import Cases
 from ...core import PatchfemError
-from ...disk.whole import whole
+from ...disk.whole import write_rows
 from ...response import rows
 from ...runs.many.answers import Answers
 from ...runs.results.patch_rows import TABLE as STATIC
@@ -56,10 +56,7 @@ def lines(cases: Cases, found: Answers, keys: Sequence[str] = ()) -> Iterator[li
 
 def write_csv(cases: Cases, found: Answers, keys: Sequence[str], path: Path) -> Path:
     """Write sweep.csv to `path`."""
-    with whole(path) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
-        out = csv.writer(file)
-        out.writerow(head(cases, found, keys))
-        out.writerows(lines(cases, found, keys))
+    write_rows(path, chain([head(cases, found, keys)], lines(cases, found, keys)))
     return path
 
 
