@@ -207,7 +207,7 @@ def groove(draw, middle, size: float, depth: float, shape: str):
         s = np.abs((x - middle[0]) * np.cos(angle) + (y - middle[1]) * np.sin(angle))
         ends = _smooth((length - s) / (0.2 * length)) if np.isfinite(length) else 1.0
         cut = np.maximum(1 - (t / half) ** 2, 0) if shape == "round groove" else _smooth((half - t) / ramp)
-        return ends * (depth * cut - high * np.sin(np.pi * np.clip((t - half) / ridge, 0, 1)) ** 2)
+        return ends * (depth * cut - high * _smooth(1 - np.abs(2 * (t - half) / ridge - 1)))
     return worn
 
 
