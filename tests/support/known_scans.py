@@ -257,7 +257,7 @@ def scanned(draw, heights, axes, at, errors: tuple) -> np.ndarray:
         return soft / soft.std()
 
     score = draw.uniform(0, 1, 3) @ np.array([draw.normal(size=z.shape), blurred(draw.uniform(2, 6)),
-                                              steep / steep.std()]).reshape(3, -1)
+                                              np.minimum(steep / steep.std(), 2)]).reshape(3, -1)
     lost = score.reshape(z.shape) > np.quantile(score, 1 - holes)
     z += noise * (0.9 * draw.normal(size=z.shape) + np.sqrt(0.19) * blurred(draw.uniform(1, 3)))
     for _ in range(3):
