@@ -10,7 +10,7 @@ from ..friction.bonds import parameters, spread
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Rubbing:
+class InterfaceLaw:
     """One interface that rubs, with its law.
 
     key: of its table, for messages; numbers: keys of the law as they act; load: normal load [N] of an interface between
@@ -64,17 +64,17 @@ def bonds_of(f, speed: float, least: float = 0.0):
                  f.rest_speed or max(1e-3 * speed, least), f.initial_bonds, f.breakaway)
 
 
-def rubbings_of(scene) -> tuple:
-    """A Rubbing for every interface of a rig: those of [[structure.interface]], or the one of [friction].
+def interface_laws_of(scene) -> tuple:
+    """An InterfaceLaw for every interface of a rig: those of [[structure.interface]], or the one of [friction].
 
     None, as an empty tuple, without either. PatchfemError where a rate of growth leaves the range of numbers.
     """
     if scene.structure.interface:
-        return tuple(Rubbing(f"structure.interface.{k}", acting(one, None, scene.where), one.load)
+        return tuple(InterfaceLaw(f"structure.interface.{k}", acting(one, None, scene.where), one.load)
                      for k, one in enumerate(scene.structure.interface))
     if scene.friction is None:
         return ()
-    return (Rubbing("friction", acting(scene.friction, pad_width(scene), scene.where), None),)
+    return (InterfaceLaw("friction", acting(scene.friction, pad_width(scene), scene.where), None),)
 
 
 def pad_width(scene) -> float | None:

@@ -7,7 +7,7 @@ import numpy as np
 from ..core import ModalBasis, Start
 from ..structure.drive_sizes import omega_of, peak_speed
 from .drive import cycles_of, cycles_per_level, drive_of, levelled
-from .law import interface_names, rubbings_of
+from .law import interface_laws_of, interface_names
 from .structure import acts, first_of, frequencies, modes_of, notes_of, own_modes, start_of, yaws
 
 NOTHING = 1e-9  # of the largest slide of a mode: one below it is round-off
@@ -20,7 +20,7 @@ class Rig:
     start: None at rest. kind: "base", "force" or "free"; waveform as in the scene; frequency [Hz] of a sine or of
     levels, else None; levels: accelerations [m s-2] of a drive in levels, or forces over the modal mass, level_cycles
     of each; onset: what their onset means, (kind, length [m] or None); cycles of the whole run; force [N] of a force
-    drive, else None. interfaces: a Rubbing each, none in a linear rig; names: of interfaces between masses.
+    drive, else None. interfaces: an InterfaceLaw each, none in a linear rig; names: of interfaces between masses.
     load_varies: the normal load changes with the motion or in time; strips_slide_apart: modes yaw a patch in strips.
     travel [m], infinite without a stop; cubic [N/m3] stiffening at the output or None; interlock: (stiffness [N/m],
     wavelength [m]) of a bonded spring that bends, or None. mass [kg] and own_frequency [Hz] of the first mode that is
@@ -101,7 +101,7 @@ def rig_asked(scene) -> Rig:
     return Rig(modes, drive, start_of(scene, modes), asked.kind, asked.waveform, asked.frequency,
                tuple(part.amplitude for part in drive.segments) if rows else (),
                cycles_per_level(asked) if rows else 0.0, float(cycles_of(asked, drive)),
-               asked.force if asked.kind == "force" else None, rubbings_of(scene), tuple(interface_names(structure)),
+               asked.force if asked.kind == "force" else None, interface_laws_of(scene), tuple(interface_names(structure)),
                acts(scene), yaws(scene), structure.travel or np.inf,
                structure.stiffening.cubic if structure.stiffening is not None else None,
                (bonded.stiffness, bonded.wavelength) if bends else None,

@@ -89,7 +89,7 @@ def test_exact_a_run_makes_nothing_of_the_model_again(text, sets, monkeypatch):
     """Every maker is called at most once, and none once the model stands."""
     calls = []
     for place, names in ((patch, ("patch_asked",)), (slide, ("slide_asked",)), (load, ("point_asked",)),
-                         (rig, ("rig_asked", "modes_of", "drive_of", "start_of", "rubbings_of"))):
+                         (rig, ("rig_asked", "modes_of", "drive_of", "start_of", "interface_laws_of"))):
         for name in names:
             made = getattr(place, name)
             monkeypatch.setattr(place, name, lambda *words, name=name, made=made: calls.append(name) or made(*words))

@@ -12,7 +12,7 @@ from ...friction.laws.elastic_plastic import parallel
 from ...friction.laws.stretch import points_element
 from ...friction.protocol import Element
 from ...friction.record import law_from
-from ...model.law import Rubbing, bonds_of
+from ...model.law import InterfaceLaw, bonds_of
 from ...model.model import Model
 from ...slip.fields import shear_of
 from ...structure.drive_sizes import omega_of
@@ -76,7 +76,7 @@ def flank_of(model: Model, patch):
     return periodic.ElasticFlank(_climbing(model, patch))
 
 
-def _element(one: Rubbing, load: float, speed: float) -> Element:
+def _element(one: InterfaceLaw, load: float, speed: float) -> Element:
     """The law of an interface under a load [N]; speed [m/s] to expect."""
     f = one.numbers
     if has(f.law, "bonds"):
