@@ -26,7 +26,7 @@ FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_
          "pressure_peak", "contact_fraction")
 
 
-class Seen(NamedTuple):
+class Finding(NamedTuple):
     """What warnings and cures are told by: measures by name, patch and `extra` as a Result has them."""
 
     model: object
@@ -35,7 +35,7 @@ class Seen(NamedTuple):
     extra: Mapping = MappingProxyType({})
 
 
-def beyond_tolerance(seen: Seen, coarse=()) -> list:
+def beyond_tolerance(seen: Finding, coarse=()) -> list:
     """A warning for the mesh and one for the motion, each with the measures that miss the tolerance and the cure.
 
     Where any that a run answers first, FIRST, do so, these are named and the worst of them is cured. coarse:

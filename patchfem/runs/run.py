@@ -18,7 +18,7 @@ from ..model.source import placed
 from . import memory
 from .patch import result as of_patch
 from .plan import Plan, plan, refuse_size
-from .remedies import Seen, beyond_tolerance
+from .remedies import Finding, beyond_tolerance
 from .results.result import Result, with_meanings, without_folders
 from .rig import engines
 from .wear import evolve, measures
@@ -108,7 +108,7 @@ def _whole(result: Result, notes: list, begin: float, coarse=()) -> Result:
     """The result with its time since `begin`, its notes, and words that name no folder."""
     result.seconds["total"], model = perf_counter() - begin, result.plan.model
     apart = "strip" if model.patch is not None else "interface"
-    wide = beyond_tolerance(Seen(model, result.measures, result.patch, result.extra), coarse)
+    wide = beyond_tolerance(Finding(model, result.measures, result.patch, result.extra), coarse)
     warned, noted = result.warnings + wide, [*notes, *result.extra.get("notes", [])]
     warned, noted = (without_folders(texts, model.source.path) for texts in (warned, noted))
     return replace(result, measures=with_meanings(result.measures, apart), warnings=warned,

@@ -12,7 +12,7 @@ from patchfem.core import Measure
 from patchfem.model.model import build
 from patchfem.runs.patch import ladder
 from patchfem.runs.plan import plan
-from patchfem.runs.remedies import Seen, beyond_tolerance
+from patchfem.runs.remedies import Finding, beyond_tolerance
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -96,7 +96,7 @@ def test_exact_what_a_run_answers_first_is_named_first(wide, first):
     """Errors of 16 steps; that of second order falls by 16 at 64 steps, by 64 at 128."""
     measures = {name: Measure(1.0, "1", error) for name, error in wide.items()}
     left = {"parts": {"steps": wide}, "orders": dict.fromkeys(wide, 2.0)}
-    seen = Seen(build(loads(SHAKEN + FEW)), measures, None, {"steps_per_cycle": 16, "left_open": left})
+    seen = Finding(build(loads(SHAKEN + FEW)), measures, None, {"steps_per_cycle": 16, "left_open": left})
     assert beyond_tolerance(seen) == [first]
 
 
