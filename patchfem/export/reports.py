@@ -34,7 +34,7 @@ def report_of(folders: list, out: Path | None = None, measured: Path | None = No
     return _written(sweep.page(tables[0] if len(tables) == 1 else sweeps.joined(tables, names)), out)
 
 
-def _read(path: Path, runs: list) -> beside.Run:
+def _read(path: Path, runs: list) -> beside.FinishedRun:
     found = laboratory.read_records(path, records.wanted(())).values
     if not found.keys() & beside.KNOWN.keys() - {"time"}:
         raise PatchfemError(f"--measured {path}: none of {', '.join(beside.KNOWN)} in it (there: {', '.join(found)})")

@@ -36,7 +36,7 @@ CHARTS = (  # title, x: (variable, label), y: (variable, label); only the last c
     ("Steady motions", ("curve_frequency", "frequency"), ("curve_amplitude", "displacement amplitude")))
 
 
-class Run(NamedTuple):
+class FinishedRun(NamedTuple):
     """A finished run as its folder holds it.
 
     name: of the folder; summary: of summary.json; resolved: the scene with every default, as nested tables; arrays:
@@ -49,7 +49,7 @@ class Run(NamedTuple):
     arrays: dict
 
 
-def read(folder: Path) -> Run:
+def read(folder: Path) -> FinishedRun:
     """The run in a results folder; PatchfemError where there is none."""
     folder = Path(folder)
     try:
@@ -61,7 +61,7 @@ def read(folder: Path) -> Run:
         raise PatchfemError(f"{folder}: no results folder: it has no {Path(fault.filename).name}") from None
     except (ValueError, OSError, RecursionError) as fault:
         raise PatchfemError(f"{folder}: its results cannot be read: {fault}") from None
-    return Run(folder.resolve().name, summary, resolved, _arrays(folder / "result.nc"))
+    return FinishedRun(folder.resolve().name, summary, resolved, _arrays(folder / "result.nc"))
 
 
 def _arrays(path: Path) -> dict:
@@ -78,22 +78,22 @@ def _arrays(path: Path) -> dict:
     return out
 
 
-def measured(name: str, values: dict, like: Run) -> Run:
-    """A measurement as a Run without measures, shown beside runs like `like`.
+def measured(name: str, values: dict, like: FinishedRun) -> FinishedRun:
+    """A measurement as a FinishedRun without measures, shown beside runs like `like`.
 
     values: name -> (k,) in SI as `inputs.laboratory` reads them: time, displacement, acceleration, force. Where both
     move under a sine its time is shifted until the first harmonics of both displacements, or accelerations, agree in
     phase.
     """
     arrays = {KNOWN[key]: (np.asarray(rows, float), UNITS[key]) for key, rows in values.items() if key in KNOWN}
-    one = Run(name, {"kind": like.summary["kind"], "measures": {}, "outcome": MEASURED}, like.resolved, arrays)
+    one = FinishedRun(name, {"kind": like.summary["kind"], "measures": {}, "outcome": MEASURED}, like.resolved, arrays)
     if "time" in arrays:
         end = like.arrays["time"][0][-1] if "time" in like.arrays else arrays["time"][0][-1]
         one.arrays["time"] = (arrays["time"][0] + _lag(one, like) - end, "s")  # 0 is the end of the run
     return one
 
 
-def _lag(one: Run, like: Run) -> float:
+def _lag(one: FinishedRun, like: FinishedRun) -> float:
     """Time [s] that a measurement is shifted by: its end to that of the run, then on to the same phase."""
     shift = like.arrays["time"][0][-1] - one.arrays["time"][0][-1] if "time" in like.arrays else 0.0
     period = _period(like)
@@ -110,8 +110,8 @@ def _lag(one: Run, like: Run) -> float:
     return shift + ((turns[0] - turns[1] + 0.5) % 1.0 - 0.5) * period
 
 
-def page(runs: list, read: Run | None = None) -> str:
-    """The whole HTML page of several `Run`s, in their order; differences are from the first.
+def page(runs: list, read: FinishedRun | None = None) -> str:
+    """The whole HTML page of several `FinishedRun`s, in their order; differences are from the first.
 
     read: a measurement, of `measured`, laid over their pictures.
     """
@@ -177,13 +177,13 @@ def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list)
                       for colour, (name, a, b) in zip(COLOURS * len(lines), lines)]}
 
 
-def _period(run: Run) -> float | None:
+def _period(run: FinishedRun) -> float | None:
     """Period [s] of the sine that drives a run; None where none does."""
     written = NUMBER.match(str(run.resolved.get("drive", {}).get("frequency", "")))
     return 1 / float(written[1]) if written and float(written[1]) > 0 else None
 
 
-def _late(run: Run) -> np.ndarray:
+def _late(run: FinishedRun) -> np.ndarray:
     """Which samples lie in the last CYCLES cycles of a sine, or in the last tenth of a run without one."""
     time, period = run.arrays["time"][0], _period(run)
     span = CYCLES * period if period else np.ptp(time) / 10
