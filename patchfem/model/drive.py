@@ -8,7 +8,7 @@ from ..core import BaseSine, ModalBasis, PatchfemError
 from ..effects import module_of
 from ..inputs import signals
 from ..structure import drives
-from ..structure.drive_sizes import Asked, level_cycles, own_period
+from ..structure.drive_sizes import DriveKeys, level_cycles, own_period
 
 
 def drive_of(scene, modes: ModalBasis):
@@ -17,7 +17,7 @@ def drive_of(scene, modes: ModalBasis):
     drive = scene.drive
     if drive.kind == "free":
         return drives.release(own_period(modes))
-    asked = Asked(drive, modes.mass, own_period(modes), lambda: recorded(scene))
+    asked = DriveKeys(drive, modes.mass, own_period(modes), lambda: recorded(scene))
     if drive.waveform == "sine":
         omega = 2 * np.pi * drive.frequency
         return BaseSine(float(asked.size(omega)), float(omega), asked.moving)

@@ -8,7 +8,7 @@ import numpy as np
 from ..core import BaseSine, ModalBasis, Start
 
 
-class Asked(NamedTuple):
+class DriveKeys(NamedTuple):
     """What a scene asks of its drive.
 
     keys: those of [drive] in SI; mass [kg] of the modes; period [s] of the first coordinate that is not rigid; read()

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core import PatchfemError, Segment
 from .drive_series import chirp, steady
-from .drive_sizes import Asked, level_cycles
+from .drive_sizes import DriveKeys, level_cycles
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -205,17 +205,17 @@ class Recorded:
         return np.interp(np.asarray(t, float), self.time, self.value, right=0.0)
 
 
-def _levels(asked: Asked) -> Piecewise:
+def _levels(asked: DriveKeys) -> Piecewise:
     return levels(asked.levels, 2 * np.pi * asked.keys.frequency, level_cycles(asked.keys), asked.moving)
 
 
-def _step(asked: Asked) -> Piecewise:
+def _step(asked: DriveKeys) -> Piecewise:
     if asked.moving and asked.keys.acceleration is None:
         return release(asked.period)  # the base jumps: the start says so
     return step(float(asked.size(0.0)), asked.period, asked.moving)
 
 
-def _sweep(asked: Asked) -> Sweep:
+def _sweep(asked: DriveKeys) -> Sweep:
     keys, low, high = asked.keys, asked.keys.from_, asked.keys.to
     displaced = keys.displacement if asked.moving and keys.acceleration is None else None
     size = 0.0 if displaced is not None else float(asked.size(0.0))
@@ -223,7 +223,7 @@ def _sweep(asked: Asked) -> Sweep:
     return Sweep(low, high, duration, size, displaced, keys.rate is None, asked.moving)
 
 
-def _recorded(asked: Asked) -> Recorded:
+def _recorded(asked: DriveKeys) -> Recorded:
     time, value = asked.read()
     scale = 1.0 if asked.moving else 1 / asked.mass
     return Recorded(time, scale * value, asked.period, asked.moving)
