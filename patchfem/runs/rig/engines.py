@@ -39,7 +39,7 @@ class Variant(NamedTuple):
 CLOSED = 1e-8  # gap of an energy balance that is kept to round-off: a billion steps leave less
 
 
-def late(where: str) -> Callable:
+def function_of(where: str) -> Callable:
     """The function that "module function" of this folder names, imported now."""
     module, function = where.split()
     return getattr(import_module(f"patchfem.runs.rig.{module}"), function)
@@ -82,7 +82,7 @@ class Engine(NamedTuple):
     @property
     def run(self) -> Callable:
         """The function that solves, imported when it is first wanted."""
-        solve = late(self.solve)
+        solve = function_of(self.solve)
         return lambda model, *given: gauged(model, solve(model, *given))
 
     def lacks(self, model: Model, steady: bool = False) -> str:
@@ -90,10 +90,10 @@ class Engine(NamedTuple):
         under the sine of a curve, not the drive's own waveform."""
         return methods.lacking(self.name, _met(model, steady))
 
-    def ask(self, hook: str, *given) -> Any:
+    def call(self, hook: str, *given) -> Any:
         """What the function of one of its fields gives, None where it has none."""
         where = getattr(self, hook)
-        return late(where)(*given) if where else None
+        return function_of(where)(*given) if where else None
 
 
 def inexact(model: Model, steady: bool = False) -> str:

@@ -59,7 +59,7 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     pinned = {k for k in ("steps_per_cycle", "tail", "merge", "shear_modes") if getattr(accuracy, k) is not None}
     found = Numerics(engine.name, steps, rig.cycles, window, accuracy.shear_modes, per_point or model.side == "lower",
                      frozenset(pinned))
-    return engine.ask("chosen", model, found) or found
+    return engine.call("chosen", model, found) or found
 
 
 def by_steps(model: Model, found: Numerics) -> Numerics:

@@ -26,7 +26,7 @@ def chain(rig) -> dict:
 def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
     """Engine, steps of all passes and seconds of a coupled run; sizes that are foreseen go into `unknowns`."""
     numerics = choose(model, per_point)
-    return numerics.engine, *ENGINES[numerics.engine].ask("cost", model, numerics, unknowns)
+    return numerics.engine, *ENGINES[numerics.engine].call("cost", model, numerics, unknowns)
 
 
 def march_cost(model: Model, numerics, unknowns: dict) -> tuple:
@@ -120,7 +120,7 @@ def sum_words(model: Model) -> list:
     if model.friction is None:
         return []
     numerics = choose(model)
-    return ENGINES[numerics.engine].ask("words", model, numerics)
+    return ENGINES[numerics.engine].call("words", model, numerics)
 
 
 def steady_words(model: Model, numerics) -> list:

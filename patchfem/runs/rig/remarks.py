@@ -44,7 +44,7 @@ def notes_of(run) -> list:
                 *run.rings.notes, *ended]
     out, f = [*_of_bonds(model, run.patch, raw), *climbing_as_one(model, run.patch)], model.friction
     if len(rig.interfaces):
-        out += ENGINES[run.numerics.engine].ask("notes", model, run.numerics, run.patch, raw) or []
+        out += ENGINES[run.numerics.engine].call("notes", model, run.numerics, run.patch, raw) or []
     if raw.levels and rig.onset[0] == "slip" and raw.held > 0:
         out.append(f"onset_level: a slip amplitude counts from {length(raw.held)} on, a thousandth of the slide over "
                    "which the interface gives way; below it a part of the interface may slip already")

@@ -59,7 +59,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
                             "drive.kind")
     numerics = choose(model, per_point)
     engine = ENGINES[numerics.engine]
-    engine.ask("refuse", model, numerics)
+    engine.call("refuse", model, numerics)
     raw, numerics, measures = _solved(model, numerics, patch, coarse[0], seconds, say, progress, estimate)
     if wrong := unbalanced(engine, measures):
         raw = replace(raw, outcome=Outcome.NOT_CONVERGED, message=raw.message or wrong)
