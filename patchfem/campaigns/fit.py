@@ -15,7 +15,7 @@ from ..scene.keys.quantities import KINDS
 from ..scene.ranges import ranges
 from ..scene.scene import Scene, SceneError
 from .fit_model import BenchModel
-from .fit_path import NOTHING, Beside, offsets_of
+from .fit_path import NOTHING, LoopOptions, offsets_of
 
 MOST_PIECES = 64  # steps between two rows
 FEWER = 0.6  # share of the rows below which their correlation is said
@@ -55,7 +55,7 @@ class Fitted:
         return self.found.outcome
 
 
-def fit_loop(scene: Scene, to: Path, free, hold=(), say=None, beside: Beside = NOTHING) -> Fitted:
+def fit_loop(scene: Scene, to: Path, free, hold=(), say=None, options: LoopOptions = NOTHING) -> Fitted:
     """Fit the keys `free` ("table.key=low..high" texts) of a bench scene to the loop in the file `to`.
 
     The model starts unstressed in the first row and follows the measured rows, straight between them; rows named by
@@ -75,12 +75,12 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None, beside: Beside = N
     for one in hold:
         held |= loop.rows_of(one)
     used = np.count_nonzero(~held)
-    offsets = offsets_of(beside.offsets, loop)
+    offsets = offsets_of(options.offsets, loop)
     everything = [*wanted, *(one.range for one in offsets)]
     if used <= len(everything):
         raise PatchfemError(f"{to}: {used} rows that are not held cannot determine {len(everything)} values and their "
                             "intervals")
-    bench = BenchModel(scene, loop, wanted, offsets, beside.warm, say)
+    bench = BenchModel(scene, loop, wanted, offsets, options.warm, say)
     scale = float(np.abs(loop.reading[~held]).max())
 
     def residual(values):
@@ -99,7 +99,7 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None, beside: Beside = N
     warnings = [*scene.remarks, *bench.notes, *remarks(found, [one.key for one in everything])]
     fitted = Fitted(scene, loop, wanted, offsets, found, model, held, rms[0], rms[1], step_error, bench.pieces, sets,
                     warnings, perf_counter() - begin)
-    return replace(fitted, warnings=[*warnings, *_doubts(fitted, bool(offsets) or beside.warm)])
+    return replace(fitted, warnings=[*warnings, *_doubts(fitted, bool(offsets) or options.warm)])
 
 
 def _refined(bench, residual, wanted, say) -> tuple:

@@ -25,14 +25,14 @@ class Offset:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Beside:
+class LoopOptions:
     """What a fit settles besides the values of the scene: names of OFFSETS, and whether it warms up (`lead_in`)."""
 
     offsets: tuple = ()
     warm: bool = False
 
 
-NOTHING = Beside()
+NOTHING = LoopOptions()
 
 
 def offsets_of(names, loop: Loop) -> list:

@@ -113,7 +113,8 @@ def fit(scene: Path, /, *, to: Annotated[str, Parameter(
     if found.wear is not None:
         _fit_wear(found, to, free, out, json_, quiet)
         return
-    fitted = loop_fits.fit_loop(found, Path(to), free, hold, None if quiet else say, fit_path.Beside(offset, warm_up))
+    options = fit_path.LoopOptions(offset, warm_up)
+    fitted = loop_fits.fit_loop(found, Path(to), free, hold, None if quiet else say, options)
     target = placed(out, f"{found.path.stem}-fit")
     _print_fit(fit_folder.fit_into(fitted, target), fit_lines.lines_of, target, json_)
 
@@ -134,8 +135,8 @@ def _fit_rows(found, to: str, asked: tuple, out: Path | None, json_: bool, quiet
                     path.read_bytes() if path.is_file() else "")
         starts = written.Starts(folder.path / results.STARTS, question, rows.resume)
         how = row_fits.Search(rows.starts, rows.seed, rows.unstable, starts)
-        beside = row_fits.Beside(hold, rows.leave_out, rows.placebo, how)
-        fitted = row_fits.fit_rows(asking.Question(found, wanted, path), beside, None if quiet else say, progress)
+        options = row_fits.RowsOptions(hold, rows.leave_out, rows.placebo, how)
+        fitted = row_fits.fit_rows(asking.Question(found, wanted, path), options, None if quiet else say, progress)
         answer = written.fit_into(fitted, folder.path, folder.target)
     _print_fit(answer, written.lines_of, target, json_)
 

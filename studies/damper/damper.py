@@ -23,7 +23,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 
 from patchfem.campaigns.fit import LOAD_UNITS, fit_loop
-from patchfem.campaigns.fit_path import Beside
+from patchfem.campaigns.fit_path import LoopOptions
 from patchfem.inputs.loops import read_loop
 from patchfem.scene.scene import loads
 
@@ -95,7 +95,7 @@ def main(file, names=tuple(LAWS)) -> list:
 
     for name in names:
         text, free = LAWS[name]
-        found = fit_loop(loads(SCENE.format(text)), Path(file), free, beside=Beside(("force",), True))
+        found = fit_loop(loads(SCENE.format(text)), Path(file), free, options=LoopOptions(("force",), True))
         miss = found.model - loop.reading
         rows.append(Row(name, len(free), found.rms, float(np.sqrt(np.mean(miss[flat]**2))), work(found.model),
                         work(loop.reading), found))

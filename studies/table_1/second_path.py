@@ -19,7 +19,7 @@ import numpy as np
 from patchfem.campaigns.rows.asked import Question
 from patchfem.campaigns.rows.cells import cells_of, scores
 from patchfem.campaigns.rows.computed import Computed
-from patchfem.campaigns.rows.fit import Beside, Search, fit_rows
+from patchfem.campaigns.rows.fit import RowsOptions, Search, fit_rows
 from patchfem.scene.ranges import ranges
 from patchfem.scene.scene import load, loads
 
@@ -58,7 +58,7 @@ def as_it_stands(point: bool = False) -> dict:
 
 def fitted(point: bool = False, starts: int = 8):
     """The numbers fitted to 143 Hz from random starts, as FittedRows."""
-    return fit_rows(question(point), Beside(hold=(HELD,), how=Search(starts)))
+    return fit_rows(question(point), RowsOptions(hold=(HELD,), how=Search(starts)))
 
 
 def main(starts: int = 8) -> dict:

@@ -8,7 +8,7 @@ from command_line import cli
 from test_fit import LAWS, LOAD, POINT, SINE, dahl, free_of, play, rows, scene_of, table
 
 from patchfem.campaigns.fit import fit_loop
-from patchfem.campaigns.fit_path import Beside, lead_in, whole_cycles
+from patchfem.campaigns.fit_path import LoopOptions, lead_in, whole_cycles
 from patchfem.core import PatchfemError
 from patchfem.inputs.loops import read_loop
 from patchfem.model.model import build
@@ -26,7 +26,7 @@ def test_exact_a_steady_loop_with_an_offset_of_the_force(tmp_path):
     cut = slice(93, 280)
     loop = table(tmp_path / "loop.csv", time[cut], slide[cut], force[cut])
     scene = scene_of(tmp_path, "bonds")
-    found = fit_loop(scene, loop, free_of(*NAMES), beside=Beside(("force",), True))
+    found = fit_loop(scene, loop, free_of(*NAMES), options=LoopOptions(("force",), True))
     assert found.found.values == pytest.approx([*TRUTH, 7.0], rel=1e-5)
     assert found.rms < 1e-5 * LOAD and found.warnings == []
     plain = fit_loop(scene, loop, free_of(*NAMES))
@@ -39,7 +39,8 @@ def test_exact_the_unstressed_place_is_found(tmp_path):
     place = 1.1e-6 + slide
     force = play(np.concatenate([[0.0], place]), *TRUTH)[1:]
     loop = table(tmp_path / "loop.csv", time, slide, force)
-    found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, free_of(*NAMES), beside=Beside(("displacement",)))
+    found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, free_of(*NAMES),
+                     options=LoopOptions(("displacement",)))
     assert found.found.values == pytest.approx([*TRUTH, 1.1e-6], rel=1e-5)
 
 
@@ -60,9 +61,9 @@ def test_refuses_a_warm_up_of_a_record_without_a_cycle(tmp_path):
     time, slide = rows(80, 1)
     loop = table(tmp_path / "loop.csv", time[:30], slide[:30], np.ones(30))
     with pytest.raises(PatchfemError, match="comes back to its first displacement"):
-        fit_loop(scene_of(tmp_path, "bonds"), loop, free_of(*NAMES), beside=Beside((), True))
+        fit_loop(scene_of(tmp_path, "bonds"), loop, free_of(*NAMES), options=LoopOptions((), True))
     with pytest.raises(PatchfemError, match="--offset time: known are force and displacement"):
-        fit_loop(scene_of(tmp_path, "bonds"), loop, free_of(*NAMES), beside=Beside(("time",)))
+        fit_loop(scene_of(tmp_path, "bonds"), loop, free_of(*NAMES), options=LoopOptions(("time",)))
 
 
 def test_always_the_verb_writes_its_offsets(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 import patchfem
 from patchfem.effects import LAWS
-from patchfem.runs.rig.engines import AUTOMATIC, ENGINES, FINDERS, late
+from patchfem.runs.rig.engines import AUTOMATIC, ENGINES, FINDERS, function_of
 from patchfem.scene.keys.tables import Friction
 from patchfem.scene.rules.methods import BESIDE, TAKES, Motion, lacking
 
@@ -48,7 +48,7 @@ def test_always_every_engine_has_a_row_of_what_it_takes():
 @pytest.mark.parametrize("name", ENGINES)
 def test_always_the_functions_of_a_record_exist(name):
     for where in (getattr(ENGINES[name], hook) for hook in HOOKS):
-        assert not where or callable(late(where))
+        assert not where or callable(function_of(where))
 
 
 def motions():

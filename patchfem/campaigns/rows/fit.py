@@ -86,7 +86,7 @@ class FittedRows:
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class RowsOptions:
     """What stands beside a fit: rows held out ("column=value,value" texts), the column of which each value is left out
     in turn, placebos ("key=value,value" texts), and how it searches."""
 
@@ -96,28 +96,28 @@ class Beside:
     how: Search = field(default_factory=Search)
 
 
-def fit_rows(question: Question, beside: Beside, say: Callable | None = None,
+def fit_rows(question: Question, options: RowsOptions, say: Callable | None = None,
              progress: Callable | None = None) -> FittedRows:
     """Fit what a Question asks for.
 
     say: called with one line when compiled code has to be made; progress: called with the share of starts that is done.
     SceneError and PatchfemError name bad input, NotConverged a fit of which every start fails.
     """
-    begin, how, count = perf_counter(), beside.how, len(question.wanted)
+    begin, how, count = perf_counter(), options.how, len(question.wanted)
     cells = cells_of(question.measured)
     held = np.zeros(cells.row.size, bool)
-    for one in beside.hold:
+    for one in options.hold:
         held |= cells.chosen(one)
     _enough(cells, ~held, count, how)
     asked = question.asked(cells.conditions)
     computed = Computed(asked, say)
-    parts = cells.parts(beside.leave_out, ~held) if beside.leave_out else []
+    parts = cells.parts(options.leave_out, ~held) if options.leave_out else []
     if len(parts) == 1:
-        raise PatchfemError(f"--leave-out {beside.leave_out}: the rows that are not held have one value of it, so that "
-                            "nothing would be left")
+        raise PatchfemError(f"--leave-out {options.leave_out}: the rows that are not held have one value of it, so "
+                            "that nothing would be left")
     for _, part in parts:
         _enough(cells, ~held & ~part, count, how)
-    placebos = [(text, question.asked(cells.conditions, text)) for one in beside.placebos
+    placebos = [(text, question.asked(cells.conditions, text)) for one in options.placebos
                 for text in _texts(one, question.wanted)]  # what is wrong with them is said before hours of work
     tell = _told(progress, how.starts * (1 + len(parts) + len(placebos)))
     found = searched(cells, computed, ~held, how, name="all", tell=tell)

@@ -10,7 +10,7 @@ from command_line import cli
 from patchfem.campaigns.rows.asked import Asked, Question
 from patchfem.campaigns.rows.cells import cells_of
 from patchfem.campaigns.rows.computed import Computed
-from patchfem.campaigns.rows.fit import Beside, Search, fit_rows
+from patchfem.campaigns.rows.fit import RowsOptions, Search, fit_rows
 from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fit_rows import Starts
@@ -96,7 +96,7 @@ def free(*texts):
 
 def fitted(scene, path, wanted, **beside):
     how = Search(beside.pop("starts", 2), beside.pop("seed", 0), beside.pop("unstable", "bound"))
-    return fit_rows(Question(scene, wanted, path), Beside(how=how, **beside))
+    return fit_rows(Question(scene, wanted, path), RowsOptions(how=how, **beside))
 
 
 LINEAR_FREE = ("structure.mode.axial.frequency=120 Hz..160 Hz,structure.mode.axial.damping=0.005..0.2",)
@@ -310,7 +310,7 @@ def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
 
     def go(question, resume):
         how = Search(2, 0, "bound", Starts(file, question, resume))
-        return fit_rows(Question(scene, wanted, path), Beside(how=how))
+        return fit_rows(Question(scene, wanted, path), RowsOptions(how=how))
 
     first = go("one", False)
     again = go("one", True)

@@ -8,7 +8,7 @@ motion that repeats with the drive; its regime, multipliers and stability are na
 from dataclasses import replace
 
 from ....core import BaseSine, NotConverged
-from ..engines import FINDERS, PIECES, late, steady_by
+from ..engines import FINDERS, PIECES, function_of, steady_by
 from ..solution import Solution
 from .curves import curve_columns, largest_of, motion_at_levels
 
@@ -20,11 +20,11 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
     """
     by = steady_by(model)
     try:
-        return _found(late(by.solve)(model, numerics, patch, frames, say), model)
+        return _found(function_of(by.solve)(model, numerics, patch, frames, say), model)
     except NotConverged:
         if by.like != PIECES.name or len(model.rig.interfaces) > 1:
             raise
-    return _found(late(FINDERS["balance"].solve)(model, numerics, patch, frames, say), model)
+    return _found(function_of(FINDERS["balance"].solve)(model, numerics, patch, frames, say), model)
 
 
 def _found(finder, model) -> Solution:
