@@ -42,6 +42,7 @@ def test_a_punch_with_rounded_ends_from_a_file_is_that_in_closed_form(tmp_path, 
         assert measure.error <= tolerance * truth or found.warnings
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("size", ["", "32 um"])
 def test_beside_asperities_the_stiffness_does_not_hang_on_the_cells(tmp_path, size):
     """The trace ends and the law begins at a two-hundredth of the length, whatever the mesh; a note names it."""

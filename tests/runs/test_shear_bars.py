@@ -8,7 +8,7 @@ import patchfem as pf
 from patchfem.scene.scene import loads
 
 
-@pytest.mark.parametrize("kind, seeds", [("joint", (3002, 3024)), ("rig", (3000, 3002))])
+@pytest.mark.parametrize("kind, seeds", [("joint", (3024,)), ("rig", (3000,))])
 def test_always_the_bars_of_random_pieces_behind_their_shear_hold(kind, seeds):
     """By the change on a coarser mesh alone joint 3024 missed the bar of its work 22 times, rig 3000 its peak 2.3."""
     for seed in seeds:

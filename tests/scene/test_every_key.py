@@ -7,6 +7,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from march_paths import share_one_loop
 from scene_texts import COATED, DRIVE, FORCED, GROWING, KILOGRAM, MODE, NONLOCAL, PAIR, PIECE, PLASTIC, POINT
 from torture.toml import known, text_of
 
@@ -121,7 +122,8 @@ def silent(scene: str) -> list:
 
 @pytest.mark.share(*QUICK)
 @pytest.mark.parametrize("scene", SCENES)
-def test_always_each_key_changes_an_answer_or_is_told(scene):
+def test_always_each_key_changes_an_answer_or_is_told(scene, monkeypatch):
+    share_one_loop(monkeypatch)
     assert silent(scene) == []
 
 

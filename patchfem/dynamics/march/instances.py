@@ -52,7 +52,7 @@ def loop_of(kind: tuple, laws: tuple = (), load: str = STEADY, there: bool = Tru
 def march(model, *arguments) -> tuple:
     """`loop_kernels.march` with the faces of a model: (steps done, status)."""
     there = not model.joints or getattr(model, "patch", None) is not None
-    several = len(model.joints) + there > 1
+    several = len(model.joints) + there > 1 or len(model.laws) > 1  # a loop of several laws is one text
     return loop_of(model.kind, model.laws, model.loading, there, several).march(*arguments)
 
 

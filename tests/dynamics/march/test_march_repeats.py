@@ -4,7 +4,7 @@ from time import process_time
 
 import numpy as np
 import pytest
-from march_paths import OMEGA, one_mode
+from march_paths import ALL, OMEGA, one_mode
 from test_joints import chain, coulomb, elastic_plastic
 from test_march_loop import half_plane
 from test_varying_shear import reduced
@@ -32,7 +32,7 @@ def sheared():
 
 def pair(*joints):
     basis = chain([OMEGA**2, 2 * OMEGA**2], zeta=0.05)
-    return basis, JointsModel(None, joints, basis.interfaces, 20.0)
+    return basis, JointsModel(None, joints, basis.interfaces, 20.0, ALL)
 
 
 CASES = {

@@ -5,14 +5,15 @@ import pytest
 from event_run import simulate
 from scipy.integrate import solve_ivp
 
+from patchfem.compiled.plain import plain
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.contacts.arrays import Stops
-from patchfem.dynamics.march import stops_kernels as stops
 from patchfem.dynamics.march import varying_load
 from patchfem.dynamics.march.march import march, modal_arrays
 from patchfem.dynamics.march.models import coulomb_model
-from patchfem.dynamics.modal_kernels import ended
 from patchfem.dynamics.propagator import propagator
+
+stops, modal = map(plain, ("patchfem.dynamics.march.stops_kernels", "patchfem.dynamics.modal_kernels"))  # as Python
 
 
 def one(zeta=0.02):
@@ -231,7 +232,7 @@ def test_exact_force_that_holds_at_the_end_of_a_step(coupled):
     v -= slide * (slide @ v) / (slide @ slide)
     need = slide @ pull(end, z, v) * mass / (slide @ slide)
     plant, room, out = modal_arrays(modes, prop), np.zeros((3, n)), np.zeros((2, n))
-    ended(motion, plant.free, plant.push, plant.dense, table, at, -slide * used / mass, out)
+    modal.ended(motion, plant.free, plant.push, plant.dense, table, at, -slide * used / mass, out)
     assert out == pytest.approx(done.y[:, -1].reshape(2, n), rel=1e-9)
     one = face(0.0, 0.0, 0.0, (1.0, 1.0, slide @ slide / mass), (1e9, 1e9), (1.0, 1.0), True)._replace(rows=slide[None])
     there = float(drive.values(np.array([end]))[0])
