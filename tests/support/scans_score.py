@@ -108,9 +108,10 @@ def verdict(kind: str, truth: dict, said: dict) -> tuple:
     if kind == "exchanged" and not exchanged:
         missed.append("not called exchanged")
     if truth["hidden"]:
-        value, _, high = quantity(said, "hidden_wear")
-        if "hidden_wear" not in said or (high is not None and high < truth["worn_depth_mean"]):
-            false.append(f"hidden wear limited to {high}, {truth['worn_depth_mean']:.3g} is true, value {value}")
+        missed += [] if "hidden_wear" in said else ["hidden wear is not told"]
+        high = quantity(said, "hidden_wear")[2]
+        if high is not None and high < truth["worn_depth_mean"]:
+            false.append(f"hidden wear limited to {high:.3g} m where {truth['worn_depth_mean']:.3g} m is true")
     return ("false", false + missed) if false else ("missed", missed) if missed else ("right", [])
 
 

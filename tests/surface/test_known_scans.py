@@ -96,6 +96,10 @@ def test_exact_the_score_of_a_right_a_missed_and_a_false_answer():
     apart = dict(truth, comparable=False)
     assert verdict("elsewhere", apart, right)[0] == "false" and not errors(apart, right)
     assert verdict("elsewhere", apart, right | {"verdict": "not comparable"})[0] == "right"
+    even = dict(unworn, hidden=True, worn_depth_mean=2e-7)
+    for high, word in ((1e-7, "false"), (3e-7, "right"), (None, "right")):
+        told = answer(truth, worn_volume=none, grown_volume=none, hidden_wear={"value": 0.0, "low": 0.0, "high": high})
+        assert verdict("even", dict(even, grown_volume=0.0), told)[0] == word
     assert verdict(one.kind, truth, {"error": "no such file"}) == ("refused", ["no such file"])
     row = {"seed": 6, "kind": one.kind, "style": one.style, "verdict": "missed", "reasons": [], "cpu": 1.0,
            "memory": 2.0, "errors": errors(truth, missed), "pixel": 1e-6}
