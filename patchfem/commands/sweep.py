@@ -135,13 +135,12 @@ class Progress:
     """Cases done and time left on stderr: a line that renews itself on a terminal, one every ten seconds elsewhere."""
 
     def __init__(self, silent: bool):
-        self.silent, self.done, self.clock, self.said = silent, 0, None, perf_counter()
+        self.silent, self.done, self.said = silent, 0, perf_counter()
         self.open = sys.stderr.isatty()
 
-    def __call__(self, done: int, total: int) -> None:
-        if self.clock is None:
-            self.clock = sweeping.Clock(total, done)
-        text, self.done = self.clock(done - self.clock.done), done
+    def __call__(self, done: int, total: int, left: float | None) -> None:
+        text, self.done = f"{done}/{total} cases", done
+        text += f", {sweeping.lasting(left)} left" if left is not None else ""
         if self.silent or perf_counter() - self.said < (0.2 if self.open else 10.0):
             return
         self.said = perf_counter()

@@ -139,6 +139,19 @@ class Kernels:
         return self._bring()
 
 
+SPENT = [0.0]  # seconds in which this process made code, or waited for one that did
+
+
+@contextmanager
+def spending():
+    """What is done within counts among the seconds of `SPENT`."""
+    begin = monotonic()
+    try:
+        yield
+    finally:
+        SPENT[0] += monotonic() - begin
+
+
 @contextmanager
 def tidied_later():
     """No search for cyclic garbage within: a seventh of the time of a compilation, which makes millions of objects."""
@@ -230,9 +243,10 @@ class Entry:
                 with np.errstate(all="ignore"):
                     return getattr(plain(self.home.__name__), self.name)(*arguments)
             if code is None:
-                code = self._made(path, arguments)
+                with spending():
+                    code = self._made(path, arguments)
             if code is None:
-                with tidied_later():
+                with spending(), tidied_later():
                     answer = self.function()(*arguments)
                     if not machine.keep(path, self.function(), arguments):
                         UNKEPT.add(self.kept[:-1])

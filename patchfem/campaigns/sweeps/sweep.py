@@ -9,6 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
+from ... import compiled
 from ...core import PatchfemError
 from ...model.alike import Alike
 from ...model.model import Model
@@ -70,6 +71,13 @@ def answer(work: Work, numbers: Sequence[int], say: Callable | None = None) -> t
     told = [] if work.tell is None else [work.tell(number, model, found, case)
                                          for case, (number, model) in enumerate(zip(numbers, models))]
     return handed(work, numbers, found, told)
+
+
+def timed(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple:
+    """(seconds, what `answer` gives), without the time in which compiled code was made: no later case takes it."""
+    begin, made = perf_counter(), compiled.SPENT[0]
+    found = answer(work, numbers, say)
+    return perf_counter() - begin - (compiled.SPENT[0] - made), found
 
 
 def handed(work: Work, numbers: Sequence[int], found: Answers, told: list) -> tuple[Answers | None, list]:
@@ -144,8 +152,8 @@ class Chunks:
 
 
 def solved(work: Work, numbers: Sequence[int], executor, say: Callable | None = None) -> Iterator[tuple]:
-    """(numbers, Answers or None, told) of chunk after chunk as they come in, as `answer` gives them; told is None of
-    cases that died.
+    """(numbers, Answers or None, told, seconds) of chunk after chunk as they come in, as `answer` gives them; told is
+    None of cases that died.
 
     executor: has `workers` and run(work, take, say), which gives (chunk, seconds, what `answer` gives or Died) of
     every chunk that `take` hands out until it hands out none; where it has begin(work, count, say), that is told of the
@@ -172,28 +180,24 @@ def _handed(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
                 failed = Answers.blank(len(lost))
                 for case in range(len(lost)):
                     failed.fail(case, f"{found.reason}, {TRIES} times")
-                yield lost, failed, None
+                yield lost, failed, None, seconds
             continue
         chunks.done(chunk, seconds)
-        yield chunk, *found
+        yield chunk, *found, seconds
 
 
 class Clock:
-    """How far a sweep is, and how long it will still take."""
+    """How long what is left of `total` cases will take, by the work of the chunks before, the last of them first."""
 
-    def __init__(self, total: int, there: int):
-        self.total, self.done, self.begin, self.new = total, there, None, 0
+    def __init__(self, total: int, workers: int):
+        self.left, self.workers, self.chunks, self.work, self.cases = total, max(workers, 1), 0, 0.0, 0.0
 
-    def __call__(self, count: int) -> str:
-        """The line after `count` more cases: "12/144 cases, 3 min left"."""
-        self.done, text = self.done + count, f"{self.done + count}/{self.total} cases"
-        if self.begin is None:  # the first cases bring or compile what all of them run by
-            self.begin = perf_counter() if count else None
-            return text
-        self.new += count
-        if not self.new:
-            return text
-        return f"{text}, {lasting((self.total - self.done) * (perf_counter() - self.begin) / self.new)} left"
+    def __call__(self, count: int, seconds: float) -> float | None:
+        """Seconds left after a chunk of `count` cases that took so many; None while nobody knows."""
+        self.left, self.chunks = self.left - count, self.chunks + 1
+        if self.chunks > self.workers:  # the first chunk of each brings what all of them run by
+            self.work, self.cases = self.work / 2 + seconds, self.cases / 2 + count
+        return self.left * self.work / self.cases / self.workers if self.cases else None
 
 
 def lasting(seconds: float) -> str:

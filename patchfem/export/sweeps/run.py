@@ -13,7 +13,7 @@ import numpy as np
 from ...campaigns.sweeps.asked import Asked
 from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.estimate import FEW, TABLED
-from ...campaigns.sweeps.sweep import Work, solved
+from ...campaigns.sweeps.sweep import Clock, Work, solved
 from ...core import Missing, PatchfemError
 from ...runs.many.answers import Answers
 from .. import netcdf
@@ -48,8 +48,8 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
                told: Callable | None = None) -> Answers:
     """Answer the cases into a folder and write its tables; a shard writes none.
 
-    told(done, total): called as cases are done, first with those that were there. What was answered is kept when an
-    exception or an interrupt ends the sweep, and stands in its tables.
+    told(done, total, seconds left or None): called as cases are done, first with those that were there. What was
+    answered is kept when an exception or an interrupt ends the sweep, and stands in its tables.
     """
     shared, keep = place.shard is not None, place.kept(len(cases))
     with Folder(place.target, cases.names(asked), shared) as folder:
@@ -64,11 +64,11 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
         if left.size:
             folder.unfinish()
         if told is not None:
-            told(there.size, wanted.size)
+            told(there.size, wanted.size, None)
         total = Answers.blank(len(cases), folder.target)
         try:
             died = _solve(Jobs(asked, cases, folder, keep), left, executor, say,
-                          told and (lambda done: told(there.size + done, wanted.size)))
+                          told and (lambda done, seconds: told(there.size + done, wanted.size, seconds)))
         except (KeyboardInterrupt, PatchfemError):
             if not shared:
                 with suppress(PatchfemError):
@@ -102,26 +102,27 @@ class Jobs(NamedTuple):
 
 def _solve(jobs: Jobs, numbers: np.ndarray, executor, say: Callable | None, told: Callable | None) -> list:
     """Answer cases into the folder: (numbers, Answers) of those whose worker died, which are not written, so that a
-    resumed sweep tries them again. told(done): called as cases are done."""
-    keep, folder, names, died, done = jobs.keep, jobs.folder, jobs.folder.chunks.names, [], 0
+    resumed sweep tries them again. told(done, seconds left or None): called as cases are done."""
+    keep, folder, names, died = jobs.keep, jobs.folder, jobs.folder.chunks.names, []
+    clock = Clock(numbers.size, executor.workers)
     writer = Writer(folder.target, folder.shown, names, keep, folder.token)
     whole = Whole(folder.target, names, keep == "pages") if keep in ("results", "pages") else None
     work = Work(jobs.asked, jobs.cases, None if keep == "none" else Summaries(jobs.cases), whole, writer)
-    for chunk, found, texts in solved(work, numbers.tolist(), executor, say):
+    for chunk, found, texts, seconds in solved(work, numbers.tolist(), executor, say):
         if texts is None:
             died.append((chunk, found))
         elif found is not None:  # the folder is not seen from where its worker runs, or has no room
             writer.put(chunk, found, texts)
-        done += len(chunk)
+        left = clock(len(chunk), seconds)
         if told is not None:
-            told(done)
+            told(numbers.size - clock.left, left)
     return died
 
 
 def swept(asked: Asked, cases: Cases, executor, say: Callable | None = None, estimate: bool = True) -> Answers:
     """Answers of the cases in memory alone; estimate: False leaves out the errors of cases that run one by one."""
     total = Answers.blank(len(cases))
-    for numbers, found, _ in solved(Work(asked, cases, estimate=estimate), range(len(cases)), executor, say):
+    for numbers, found, *_ in solved(Work(asked, cases, estimate=estimate), range(len(cases)), executor, say):
         for part in (found.warnings, found.notes, found.numerics):  # in no table
             part.clear()
         total.place(numbers, found)

@@ -15,6 +15,7 @@ from command_line import cli
 from deadly_cases import Deadly
 from scene_texts import BENCH, COULOMB, POINT, SHORT
 
+from patchfem import compiled
 from patchfem.campaigns.sweeps import executors
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.campaigns.sweeps.cases import Cases
@@ -39,7 +40,7 @@ def all_of(asked: Work, executor) -> tuple:
     """(Answers in the order of the cases, what was told in that order)."""
     count = len(asked.cases)
     parts = list(solved(asked, range(count), executor))
-    assert sorted(number for numbers, _, _ in parts for number in numbers) == list(range(count))
+    assert sorted(number for numbers, *_ in parts for number in numbers) == list(range(count))
     pairs = dict(pair for one in parts for pair in zip(one[0], one[2] or ()))
     return joined_answers(count, [part[:2] for part in parts]), pairs
 
@@ -112,10 +113,23 @@ def test_exact_what_died_is_tried_alone_after_all_others_and_given_up():
 
 
 def test_exact_the_time_left_is_told_when_something_was_done():
-    """0/4000 cases, 0 s left."""
-    clock = Clock(4000, 0)
-    assert clock(0) == "0/4000 cases" and clock(1) == "1/4000 cases"  # it compiled, perhaps
-    assert clock(2).startswith("3/4000 cases, ") and clock(0).endswith(" left")
+    """By the work of all workers but of their first chunks, the last chunk counting most."""
+    clock = Clock(4000, 2)
+    assert clock(1, 7.0) is None and clock(1, 9.0) is None  # each brings what its cases run by
+    assert clock(998, 9.98) == pytest.approx(15.0)  # 3000 cases of 10 ms on two workers
+    assert clock(1000, 2.0) < 2000 * 0.01 / 2 and clock.left == 2000
+
+
+def test_always_the_time_of_a_chunk_is_without_what_compiles(monkeypatch):
+    def slow(*_):
+        with compiled.spending():
+            time.sleep(0.3)
+        return "answer"
+
+    monkeypatch.setattr("patchfem.campaigns.sweeps.sweep.answer", slow)
+    left = [[0, 1]]
+    (chunk, seconds, found), = Here().run(None, lambda: left.pop() if left else None)
+    assert (chunk, found) == ([0, 1], "answer") and seconds < 0.2
 
 
 class Prompt:

@@ -5,10 +5,9 @@ hands out. `of` finds one by its name; read `Here` first.
 """
 
 from collections.abc import Callable, Iterator
-from time import perf_counter
 
 from ....core import PatchfemError
-from ..sweep import Work, answer
+from ..sweep import Work, timed
 from . import cluster, pool
 
 
@@ -20,9 +19,7 @@ class Here:
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
         """(chunk, seconds, what `answer` gives) of each chunk that `take` hands out."""
         while (chunk := take()) is not None:
-            begin = perf_counter()
-            found = answer(work, chunk, say)
-            yield chunk, perf_counter() - begin, found
+            yield chunk, *timed(work, chunk, say)
 
 
 def of(name: str = "", jobs: int = 1):

@@ -10,13 +10,12 @@ from functools import cache
 from hashlib import sha256
 from logging import CRITICAL, getLogger
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 
 from .... import __version__
 from ....core import Missing, PatchfemError
-from ..sweep import Died, Work, answer, handed
+from ..sweep import Died, Work, handed, timed
 
 _TLS = "DASK_DISTRIBUTED__COMM__TLS__"
 CERTIFICATES = f"{_TLS}CA_FILE, {_TLS}CLIENT__CERT and {_TLS}CLIENT__KEY"
@@ -142,8 +141,7 @@ def _answer(work: Work, chunk: list, asked: tuple) -> tuple | dict:
     want, path = asked
     if (own := own_of(work)) != want:
         return own
-    begin = perf_counter()
-    found, told = answer(replace(work, write=None), chunk)
+    seconds, (found, told) = timed(replace(work, write=None), chunk)
     folder, named = f"{work.asked.path.parent}{os.sep}", str(path.parent / "_")[:-1]
     found.messages.update({case: text.replace(folder, named) for case, text in found.messages.items()})
-    return perf_counter() - begin, handed(work, chunk, found, told)
+    return seconds, handed(work, chunk, found, told)

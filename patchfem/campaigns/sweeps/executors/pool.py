@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from time import perf_counter
 
 from ....core import Missing
 from ..sweep import Died, Work
@@ -45,7 +44,7 @@ class Worker:
                                         env=os.environ | ONE_THREAD)
         there.close()  # so that the death of the process closes the pipe
         self.pipe: Connection = here
-        self.chunk, self.begin = None, 0.0
+        self.chunk = None
         self.pipe.send(work)
 
     def tell(self, work: Work) -> None:
@@ -57,7 +56,7 @@ class Worker:
 
     def give(self, chunk: list) -> None:
         """Send a chunk."""
-        self.chunk, self.begin = chunk, perf_counter()
+        self.chunk = chunk
         try:
             self.pipe.send(chunk)
         except OSError:
@@ -66,11 +65,11 @@ class Worker:
     def taken(self) -> tuple:
         """(chunk, seconds, its answer), or Died in place of the answer."""
         try:
-            found = self.pipe.recv()
+            seconds, found = self.pipe.recv()
         except (EOFError, OSError):
-            found = Died(f"its process died ({_how(self.process.wait())})")
+            seconds, found = 0.0, Died(f"its process died ({_how(self.process.wait())})")
         chunk, self.chunk = self.chunk, None
-        return chunk, perf_counter() - self.begin, found
+        return chunk, seconds, found
 
     def end(self) -> None:
         """Stop the process, whatever it does."""

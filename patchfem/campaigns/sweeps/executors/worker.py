@@ -23,7 +23,7 @@ def main() -> None:
             if isinstance(asked, sweep.Work):  # the same with what was made of all cases
                 work = asked
             else:
-                pipe.send(sweep.answer(work, asked, None if sys.argv[2] else _say))
+                pipe.send(sweep.timed(work, asked, None if sys.argv[2] else _say))
     except (EOFError, BrokenPipeError, ConnectionResetError):  # who asked is gone
         return
 

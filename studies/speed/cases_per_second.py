@@ -1,0 +1,200 @@
+"""How many friction cases does a second of one processor answer, and to what error?
+
+ANSWER
+
+Random blocks on a spring (m = k = 1, damping ratio .003 to .1, friction .1 to .9 of the push) under 200 cycles of a base
+acceleration at their own frequency, from rest; the amplitude in the last cycle beside that of the exact engine. Lanes
+and the exact engine are timed from the values of the keys to columns of some 20 measures with error bars; the loop of
+thirty lines gives an amplitude alone, and no error; SciPy's DOP853 and SUNDIALS' CVODE go from event to event, in
+Python, no step longer than an eighth of a cycle, by a case each few thousand of the others. CPU seconds of one thread,
+all in one run, compiled code made before.
+
+Run: python studies/speed/cases_per_second.py            (2000 cases, 3 by DOP853 and CVODE)
+     python studies/speed/cases_per_second.py --full     (10 000 cases, 10 by DOP853 and CVODE)
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "integrators"))
+from engine_peers import PEERS
+from engines import advancer
+from numba import njit
+from peer import Peer, run, timed
+from switched import PROBLEMS, follow
+
+from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.cases import Cases
+from patchfem.campaigns.sweeps.executors import Here
+from patchfem.core import Missing
+from patchfem.export.sweeps.run import swept
+from patchfem.runs.many import many
+from patchfem.scene.axes import values_of
+
+CYCLES, POINTS, LANES = 200, 200, 64
+AMPLITUDE = "relative_displacement_amplitude"
+SCENE = f"""[normal]
+load = "1 N"
+[friction]
+law = "coulomb"
+static = 0.5
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "block"
+frequency = "{1 / (2 * np.pi)!r} Hz"
+damping = 0.01
+slide = 1.0
+[drive]
+kind = "base"
+acceleration = "1 m/s^2"
+frequency = "{1 / (2 * np.pi)!r} Hz"
+cycles = {CYCLES}
+[accuracy]
+tolerance = 1e-3
+"""
+
+
+def drawn(count: int, seed: int = 1) -> np.ndarray:
+    """Friction over the push and damping ratio (count, 2) of random blocks."""
+    r = np.random.default_rng(seed)
+    return np.stack([r.uniform(0.1, 0.9, count), 10 ** r.uniform(np.log10(0.003), -1, count)], 1)
+
+
+@njit(fastmath=True, error_model="numpy")
+def loop(limit, turn, part, steps, cycles, out):
+    """The loop of thirty lines: amplitude out (n,) of n blocks, LANES side by side; limit (n,); turn (4, n): what a
+    step without push makes of place and speed; part (n,): cosine part of the motion without friction; n in LANES."""
+    h = 2 * np.pi / steps
+    x, v, way, low, high = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    for first in range(0, len(limit), LANES):
+        x[:], v[:], way[:], low[:], high[:] = 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(cycles * steps):
+            if k == (cycles - 1) * steps:
+                low[:], high[:] = x, x
+            s0, c0, s1, c1 = np.sin(h * k), np.cos(h * k), np.sin(h * (k + 1)), np.cos(h * (k + 1))
+            for i in range(LANES):
+                j = first + i
+                f, p, w, y, u = limit[j], part[j], way[i], x[i], v[i]
+                e, d = y - p * c0 + w * f, u + p * s0  # beside the motion without friction
+                y1, u1 = turn[0, j] * e + turn[1, j] * d + p * c1 - w * f, turn[2, j] * e + turn[3, j] * d - p * s1
+                stops = w != 0.0 and w * u1 < 0.0
+                t = u / (u - u1) if stops else 1.0  # where it stops, the speed a straight line
+                ys = y + 0.5 * h * t * u if stops else y1
+                n0, n1 = -s0 - y, -s1 - y
+                side, rest = (1.0 if n1 > 0.0 else -1.0), (1.0 - t) * h
+                need = -(s0 + t * (s1 - s0)) - ys
+                back = stops and abs(need) > f  # it turns without a stick
+                push = need + w * f
+                goes = w == 0.0 and abs(n1) > f
+                r = h * min(1.0, (abs(n1) - f) / abs(n1 - n0)) if goes else 0.0
+                jerk = (n1 - n0) / h
+                x[i] = (ys + 0.5 * push * rest * rest if back else ys) if w != 0.0 else y + jerk * r * r * r / 6
+                v[i] = (push * rest if back else 0.0 if stops else u1) if w != 0.0 else jerk * r * r / 2
+                way[i] = (-w if back else 0.0 if stops else w) if w != 0.0 else (side if goes else 0.0)
+                high[i], low[i] = max(high[i], max(ys, x[i])), min(low[i], min(ys, x[i]))
+        for i in range(LANES):
+            out[first + i] = (high[i] - low[i]) / 2
+
+
+def by_loop(cases: np.ndarray, steps: int) -> np.ndarray:
+    """Amplitudes (n,) of the loop."""
+    whole = np.resize(cases, (-(-len(cases) // LANES) * LANES, 2))
+    limit, zeta, h, out = whole[:, 0].copy(), whole[:, 1], 2 * np.pi / steps, np.empty(len(whole))
+    w = np.sqrt(1 - zeta**2)
+    decay, c, s = np.exp(-zeta * h), np.cos(w * h), np.sin(w * h) / w
+    turn = decay * np.array([c + zeta * s, s, -s, c - zeta * s])
+    loop(limit, turn, 1 / (2 * zeta), steps, CYCLES, out)
+    return out[:len(cases)]
+
+
+def by_patchfem(cases: np.ndarray):
+    """Answers of the cases from the values of their keys on, by this process: by lanes where they are many."""
+    axes = [values_of(key, map(repr, column), False) for key, column in zip(
+        ("friction.static", "structure.mode.block.damping"), cases.T.tolist())]
+    return swept(Asked(Path("block.toml"), SCENE), Cases(tuple(axes), True), Here())
+
+
+def by_exact(cases: np.ndarray):
+    """The same by the exact engine alone, in its batch."""
+    lanes = many.BATCHES
+    many.BATCHES = tuple(one for one in lanes if one.name != "lumped.lanes")
+    try:
+        return by_patchfem(cases)
+    finally:
+        many.BATCHES = lanes
+
+
+def top(slide: np.ndarray) -> float:
+    """Half the range of samples, each end by the parabola through its three."""
+    ends = []
+    for one in (slide, -slide):
+        k = 1 + int(np.argmax(one[1:-1]))
+        a, b, c = one[k - 1:k + 2]
+        ends.append(b + (a - c)**2 / (8 * (2 * b - a - c)) if 2 * b > a + c else b)
+    return sum(ends) / 2
+
+
+TIMES = 2 * np.pi * (CYCLES - 1 + np.arange(POINTS + 2) / POINTS)
+
+
+def by_dop853(case, tolerance: float) -> float:
+    """Amplitude of one case by SciPy's DOP853 from event to event."""
+    block = PROBLEMS["block"](limit=float(case[0]), xi=float(case[1]))
+    return top(follow(block, advancer(tolerance, 1.0), TIMES, 1 / 8)[0])
+
+
+def by_cvode(child: Peer, cases: np.ndarray, tolerance: float) -> tuple:
+    """(amplitudes (n,), CPU seconds) of SUNDIALS' CVODE with its root finder."""
+    found = [child.ask(problem="block", numbers={"limit": float(limit), "xi": float(xi)}, tolerance=tolerance, scale=1.0,
+                       method="Adams", longest=1 / 8, times=TIMES.tolist()) for limit, xi in cases]
+    return np.array([top(np.array(one["slide"])) for one in found]), sum(one["seconds"] for one in found)
+
+
+def row(name: str, knob: str, seconds: float, amplitudes, exact) -> dict:
+    """Cases per CPU second, median and rms of the error of the amplitude over the exact one."""
+    error = np.abs(np.asarray(amplitudes) / exact - 1)
+    out = {"way": name, "knob": knob, "rate": len(error) / seconds, "median": float(np.median(error)),
+           "rms": float(np.sqrt(np.mean(error**2)))}
+    print(f"{name:28} {knob:>8}  {out['rate']:10.4g} cases/s   error {out['median']:.1e} (rms {out['rms']:.1e})",
+          flush=True)
+    return out
+
+
+def main(count: int = 2000, few: int = 3, steps=(100, 200, 400, 800), tolerances=(1e-3, 1e-5, 1e-8)) -> list[dict]:
+    """Measure all ways and print them; the rows."""
+    cases = drawn(count)
+    warm = cases[:LANES]
+    for way in (by_patchfem, by_exact, lambda some: by_loop(some, 20)):
+        way(warm)
+    found, seconds = timed(lambda: by_exact(cases))
+    exact = found.values[AMPLITUDE].copy()
+    rows = [row("exact engine, in a batch", "", seconds, exact, exact)]
+    found, seconds = timed(lambda: by_patchfem(cases))
+    rows.append(row("lanes, with bars", "1e-3", seconds, found.values[AMPLITUDE], exact))
+    miss = np.abs(found.values[AMPLITUDE] - exact) > found.errors[AMPLITUDE] + 1e-12 * exact
+    rows[-1]["outside"] = int(miss.sum())
+    print(f"  outside their bars: {miss.sum()} of {count}")
+    for one in steps:
+        amplitudes, seconds = timed(lambda one=one: by_loop(cases, one))
+        rows.append(row("loop of thirty lines", str(one), seconds, amplitudes, exact))
+    some = cases[:few]
+    for tolerance in tolerances:
+        amplitudes, seconds = timed(lambda tolerance=tolerance: [by_dop853(case, tolerance) for case in some])
+        rows.append(row("DOP853 with events", f"{tolerance:g}", seconds, amplitudes, exact[:few]))
+    _, _, _, script, variable, remedy = PEERS["SUNDIALS CVODE"]
+    try:
+        with Peer("SUNDIALS CVODE", script, variable, sys.executable, remedy) as child:
+            for tolerance in tolerances:
+                amplitudes, seconds = by_cvode(child, some, tolerance)
+                rows.append(row("SUNDIALS CVODE", f"{tolerance:g}", seconds, amplitudes, exact[:few]))
+    except Missing as missing:
+        print(missing, file=sys.stderr)
+    return rows
+
+
+if __name__ == "__main__":
+    raise SystemExit(run(lambda: main(10_000, 10) if "--full" in sys.argv[1:] else main()))
