@@ -223,7 +223,7 @@ def _ends(key: str, low: str, high: str) -> tuple:
     model, name = owner_of(key)
     kind = kind_of(model, name)
     if kind is None:
-        if any(re.fullmatch(quantities._NUMBER, end) is None for end in (low, high)):
+        if any(re.fullmatch(quantities.NUMBER, end) is None for end in (low, high)):
             raise ValueError(f"{low}..{high}: both ends of the range are plain numbers here")
         return Fraction(low), Fraction(high), ""
     for end in (low, high):

@@ -5,17 +5,14 @@ What an editor cannot know (which keys go together, which files exist) is left t
 
 import re
 
-from .keys.contact import Asperities, Material
+from .keys.contact import Material
 from .keys.materials import MATERIALS
-from .keys.quantities import KINDS
-from .keys.tables import Friction, Slide, Tables
+from .keys.quantities import KINDS, NUMBER
+from .keys.tables import Tables
 from .keys.types import Table, keys, kind_of, meaning, model_of, whole_tables
-from .rules.draft import ASPERITIES, LAWS, SLIDES
+from .rules.draft import SELECTORS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
-SELECTORS = (  # of a table: the key that decides which others it wants, and what each value wants and uses
-    (Friction, "law", LAWS), (Slide, "kind", SLIDES), (Asperities, "law", ASPERITIES))
 SPELLED = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ": "[ ·]"}
 
 
@@ -70,7 +67,7 @@ def _key(model: type[Table], key: str, given: dict) -> dict:
 
 def _selected(model: type[Table], key: str) -> str:
     """Which keys each value of a selector wants, or which values of its selector want or use a key; "" for others."""
-    selector, values = next((each for table, *each in SELECTORS if issubclass(model, table)), ("", {}))
+    selector, values = next((each for table, *each in SELECTORS.values() if issubclass(model, table)), ("", {}))
     if key == selector:
         return "; ".join(f"'{value}' wants {', '.join(needs.split())}" for value, (needs, _) in values.items() if needs)
     wanted, used = ([f"'{value}'" for value, words in values.items() if key in words[place].split()]

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
-from .keys.contact import Asperities, Material, OnePiece
+from .keys.contact import Material, OnePiece
 from .keys.quantities import format_si
 from .keys.same import once
-from .keys.tables import Accuracy, Drive, Friction, Measured, Slide, Tables
+from .keys.tables import Accuracy, Drive, Measured, Tables
 from .keys.types import Table, keys, kind_of, model_of
-from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
+from .rules.draft import SELECTORS, unused
 from .rules.drive import drive_unused, waveform_unused
 
 _SELECTORS = ("kind", "law", "reading", "waveform")
@@ -70,7 +70,7 @@ def _named_by(model: type[Table]) -> tuple[list[str], list[str]]:
 
 
 def _unused(table: Table) -> set[str]:
-    for model, selector, used in ((Friction, "law", LAWS), (Slide, "kind", SLIDES), (Asperities, "law", ASPERITIES)):
+    for model, selector, used in SELECTORS.values():
         if isinstance(table, model):
             return unused(table, selector, used)
     if isinstance(table, Measured):

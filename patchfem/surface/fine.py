@@ -38,14 +38,6 @@ def fine_share(profile: Profile, length: float) -> float:
     return float(np.sqrt(_below(waves, power, length)))
 
 
-def element_for(profile: Profile, kept: float) -> float:
-    """Largest element [m] whose waves of two elements and more keep the share `kept` of the height (rms).
-
-    It is inf for a flat trace. PatchfemError for missing heights and unless 0 < kept < 1.
-    """
-    return _element(*spectrum(profile), kept)
-
-
 def too_fine(profile: Profile, element: float, limit: float = LIMIT) -> str | None:
     """Sentence for a scene whose elements [m] are too long for the trace, None where `limit` is kept.
 
@@ -55,7 +47,7 @@ def too_fine(profile: Profile, element: float, limit: float = LIMIT) -> str | No
     share = float(np.sqrt(_below(waves, power, ELEMENTS * element)))
     if share <= limit:
         return None
-    most, nearly = (_two_digits(_element(waves, power, kept)) for kept in (1 - limit, 1 - limit / 10))
+    most, nearly = (_two_digits(element_for(waves, power, kept)) for kept in (1 - limit, 1 - limit / 10))
     return (f"{profile.source} holds {100 * share:.0f} % of its height below {ELEMENTS} elements "
             f'({say(ELEMENTS * element)}): add [contact.asperities] or set element_size = "{say(most)}" '
             f'({100 - 100 * limit:g} % kept; "{say(nearly)}" keeps {100 - 10 * limit:g} %)')
@@ -66,7 +58,11 @@ def _below(waves, power, length: float) -> float:
     return float(power[waves < length * (1 - 1e-9)].sum() / total) if total > 0 else 0.0
 
 
-def _element(waves, power, kept: float) -> float:
+def element_for(waves, power, kept: float) -> float:
+    """Largest element [m] whose waves of two elements and more keep the share `kept` of the height (rms).
+
+    waves, power: (k,) as `spectrum` gives them. It is inf for a flat trace. PatchfemError unless 0 < kept < 1.
+    """
     total = power.sum()
     if not 0 < kept < 1:
         raise PatchfemError(f"the share kept is {kept:g}; it lies between 0 and 1")

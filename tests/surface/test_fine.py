@@ -46,13 +46,13 @@ def test_exact_share_of_three_waves(length, share):
 def test_exact_elements_that_keep_three_waves():
     profile = cosines([6, 40, 300], [3.0, 2.0, 1.0])  # lost: 27 % without the finest, 60 % without the finest two
     for kept, order in ((0.99, 300), (0.74, 300), (0.72, 40), (0.41, 40), (0.39, 6)):
-        assert element_for(profile, kept) == pytest.approx(LENGTH / order, rel=1e-12)
+        assert element_for(*spectrum(profile), kept) == pytest.approx(LENGTH / order, rel=1e-12)
 
 
 @given(st.integers(0, 1000), st.floats(0.05, 0.95))
 def test_always_the_element_just_keeps_what_was_asked(seed, kept):
     profile = self_affine(LENGTH, 1000, 2e-6, 0.6, 3e-3, 40e-6, seed)
-    element = element_for(profile, kept)
+    element = element_for(*spectrum(profile), kept)
     assert fine_share(profile, 2 * element) <= 1 - kept + 1e-12
     assert fine_share(profile, 2 * element * 1.3) >= fine_share(profile, 2 * element * 1.001) > 1 - kept
 
@@ -109,5 +109,5 @@ def test_refuses_missing_heights_and_no_share():
     with pytest.raises(PatchfemError, match=r"a\.csv: 1 heights are missing; clean the trace first"):
         fine_share(Profile(X, np.where(X == X[7], np.nan, X), "a.csv"), 1.0)
     with pytest.raises(PatchfemError, match="the share kept is 1; it lies between 0 and 1"):
-        element_for(sine(X, 1.0, LENGTH), 1.0)
-    assert element_for(Profile(X, 0 * X, "a"), 0.9) == np.inf
+        element_for(*spectrum(sine(X, 1.0, LENGTH)), 1.0)
+    assert element_for(*spectrum(Profile(X, 0 * X, "a")), 0.9) == np.inf

@@ -10,13 +10,13 @@ from ...scene.keys.quantities import EXAMPLES, KINDS
 from ...scene.keys.tables import Tables
 from ...scene.keys.types import keys, kind_of, meaning, model_of, parts, record
 from ...scene.reader import is_value
-from ...scene.rules.draft import ASPERITIES, LAWS, SLIDES
+from ...scene.rules.draft import SELECTORS
 from ...scene.rules.limits import NOT_YET_BUILT
 
 FOLDER = Path(__file__).parents[2] / "scene"
 FILE = FOLDER / "README.md"
-NEEDS = {"friction.law": LAWS, "slide.kind": SLIDES, "contact.asperities.law": ASPERITIES,
-         "drive.waveform": {name: one.keys for name, one in WAVEFORMS.items()}}
+NEEDS = {f"{table}.{key}": used for table, (_, key, used) in SELECTORS.items()} | {
+    "drive.waveform": {name: one.keys for name, one in WAVEFORMS.items()}}
 SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 HEAD = """\
 # What a scene may say

@@ -55,10 +55,10 @@ EXAMPLES: dict[str, str] = {
     "participation": "2 rad/m", "areal density": "1e10 1/m^2",
 }
 
-_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
-_QUANTITY = re.compile(rf"({_NUMBER})[ \t]+(\S.*)")
-_BARE = re.compile(_NUMBER)
-_GLUED = re.compile(rf"({_NUMBER})([^\s0-9.,#+±-].*)")
+NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_QUANTITY = re.compile(rf"({NUMBER})[ \t]+(\S.*)")
+_BARE = re.compile(NUMBER)
+_GLUED = re.compile(rf"({NUMBER})([^\s0-9.,#+±-].*)")
 _COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
 _LONGEST = 100
 

@@ -6,7 +6,8 @@ from typing import Any, NamedTuple, Protocol
 from pydantic import BaseModel
 
 from ... import effects
-from ..keys.tables import Tables
+from ..keys.contact import Asperities
+from ..keys.tables import Friction, Slide, Tables
 from ..keys.types import keys
 
 # selector value -> keys it needs, keys it can use; a key of the table that stands in neither list is not used
@@ -23,6 +24,11 @@ ASPERITIES: dict[str, tuple[str, str]] = {
     "exponential": ("decay_length", "normal_stiffness tangential_ratio"),
     "hertz": ("radius density height_deviation", "tangential_ratio"),
 }
+
+
+SELECTORS = {  # table: its model, the key that decides which others it wants, what each value needs and can use
+    "friction": (Friction, "law", LAWS), "slide": (Slide, "kind", SLIDES),
+    "contact.asperities": (Asperities, "law", ASPERITIES)}
 
 
 class Acts(NamedTuple):
