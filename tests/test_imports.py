@@ -3,8 +3,10 @@
 import os
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
+from tempfile import TemporaryDirectory
 
 import pytest
 from command_line import FROM_PYTHON, FROM_SHELL, MODULES, absent, loaded
@@ -23,8 +25,17 @@ def scene(tmp_path):
     return write
 
 
-def test_exact_a_patch_needs_no_motion(scene):
-    modules = loaded(FROM_PYTHON, scene(PATCH))
+@cache
+def run_of(text: str) -> set:
+    """Names in sys.modules after a run of a scene from Python, each scene once."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "scene.toml")
+        path.write_text(text, "utf-8")
+        return loaded(FROM_PYTHON, path)
+
+
+def test_exact_a_patch_needs_no_motion():
+    modules = run_of(PATCH)
     absent(modules, "friction", "structure", "dynamics", "response", "inputs", "wear", "identify", "runs.bench",
            "runs.rig", "runs.wear", "model.slide", "model.structure", "closed_forms.contact", "compiled", "surface",
            "contact.skin", "contact.skin_laws", "contact.strips", "contact.gradients", "elasticity.mortar",
@@ -37,21 +48,21 @@ def test_exact_a_patch_needs_no_motion(scene):
     ('[contact.asperities]\nlaw = "exponential"\ndecay_length = "1 um"\n', "contact.skin"),
     ("[contact.strips]\ncount = 2\n", "contact.strips"),
 ], ids=["skin", "strips"])
-def test_exact_an_effect_brings_its_own_module(scene, table, module):
-    modules = loaded(FROM_PYTHON, scene(PATCH + table))
+def test_exact_an_effect_brings_its_own_module(table, module):
+    modules = run_of(PATCH + table)
     assert f"patchfem.{module}" in modules
     absent(modules, *{"elasticity.mortar", "surface", "slip.tangent"})
 
 
-def test_exact_a_rubbing_point_needs_no_patch(scene):
-    modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE))
+def test_exact_a_rubbing_point_needs_no_patch():
+    modules = run_of(POINT + COULOMB + STRUCTURE)
     absent(modules, "contact", "mesh", "elasticity", "slip", "skfem", "runs.patch", "runs.bench", "dynamics.march")
     assert {"patchfem.dynamics.events.histories", "patchfem.structure.modes"} <= modules
 
 
-def test_exact_a_rubbing_point_needs_no_other_rig(scene):
+def test_exact_a_rubbing_point_needs_no_other_rig():
     """One mode, one sine, one point: no masses, files, springs, heave, other drives, other engines."""
-    modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE))
+    modules = run_of(POINT + COULOMB + STRUCTURE)
     absent(modules, "structure.matrices", "structure.masses", "structure.arrays", "structure.universal",
            "structure.bonded", "structure.identify", "structure.drives", "dynamics.comparison.duhamel",
            "dynamics.comparison.newmark",
@@ -70,16 +81,16 @@ def test_exact_a_rubbing_point_needs_no_other_rig(scene):
     ('[accuracy]\nmethod = "newmark"\nstick_speed = "10 um/s"\n', "dynamics.comparison.newmark"),
     ('[accuracy]\nmethod = "harmonic"\n', "dynamics.events.stick_steady"),
 ], ids=["stiffening", "bonded", "newmark", "harmonic"])
-def test_exact_a_rig_brings_what_it_names(scene, lines, module):
-    modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE + lines))
+def test_exact_a_rig_brings_what_it_names(lines, module):
+    modules = run_of(POINT + COULOMB + STRUCTURE + lines)
     assert f"patchfem.{module}" in modules
     others = {"dynamics.march.joints", "structure.bonded", "dynamics.comparison.newmark",
               "dynamics.events.stick_steady"} - {module}
     assert not {f"patchfem.{name}" for name in others} & modules
 
 
-def test_exact_a_linear_structure_needs_no_patch_no_friction_and_no_march(scene):
-    modules = loaded(FROM_PYTHON, scene(STRUCTURE))
+def test_exact_a_linear_structure_needs_no_patch_no_friction_and_no_march():
+    modules = run_of(STRUCTURE)
     absent(modules, "contact", "mesh", "elasticity", "slip", "skfem", "friction", "inputs", "runs.patch", "runs.bench",
            "dynamics.march")
     assert "patchfem.dynamics.events.histories" in modules
@@ -95,9 +106,9 @@ def test_exact_a_short_history_compiles_nothing(scene, tmp_path, monkeypatch, te
     assert "llvmlite" not in modules and not [*tmp_path.rglob("*.code"), *tmp_path.rglob("*.nbi")]
 
 
-def test_exact_a_bench_needs_no_structure(scene):
+def test_exact_a_bench_needs_no_structure():
     """Of the engines the noun for what one integrated and the check of its work alone."""
-    modules = loaded(FROM_PYTHON, scene(BENCH))
+    modules = run_of(BENCH)
     absent(modules - {"patchfem.dynamics.integrated", "patchfem.dynamics.work_check"}, "contact", "mesh", "elasticity",
            "slip", "skfem", "runs.patch", "runs.rig", "structure", "dynamics", "compiled")
     assert "patchfem.friction.laws.coulomb" in modules
@@ -154,7 +165,7 @@ def test_always_an_answer_before_pyplot_is_imported(scene, words):
 
 
 def test_exact_a_scene_without_a_sweep_imports_none_of_it(scene):
-    absent(loaded(FROM_PYTHON, scene(BENCH)), "campaigns", "export.sweeps", "scene.axes", "runs.many")
+    absent(run_of(BENCH), "campaigns", "export.sweeps", "scene.axes", "runs.many")
     absent(loaded(FROM_SHELL, "check", scene(BENCH)), "campaigns", "export.sweeps", "scene.axes", "runs.many")
 
 

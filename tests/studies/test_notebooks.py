@@ -36,7 +36,7 @@ def kernel(tmp_path_factory):
             manager.shutdown_kernel(now=True)
 
 
-@pytest.mark.share(0, 2)
+@pytest.mark.share(0)
 @pytest.mark.parametrize("name", NAMES)
 def test_always_what_a_notebook_says_holds(name, kernel):
     """Each cell runs in an emptied namespace, the asserts among them; pictures are shown, nothing is complained of."""
