@@ -13,7 +13,7 @@ from ...model.model import Model
 from ..patch import result as of_patch
 from ..patch import static
 from ..patch.meshes import geometry_of
-from ..remedies import Seen, beyond_tolerance
+from ..remedies import Finding, beyond_tolerance
 from ..results.result import without_folders
 from . import one_by_one
 from .answers import Answers, joined_answers
@@ -51,7 +51,7 @@ def solve(models: Sequence[Model], say: Callable | None = None) -> Answers:
         out.put(case, Outcome.DONE, measures, 0.0)
         out.numerics[case] = nodes
         warned = [*model.source.remarks, *of_patch.strained_by(model.patch, one.top, one.approach),
-                *beyond_tolerance(Seen(model, measures, _Nodes(np.broadcast_to(0.0, one.nodes))))]
+                *beyond_tolerance(Finding(model, measures, _Nodes(np.broadcast_to(0.0, one.nodes))))]
         if warned:
             out.warnings[case] = without_folders(warned, model.source.path)
         notes = [*of_patch.slender(model.patch, measures["normal_load"].value / area), *one.band]

@@ -16,7 +16,7 @@ from ....response.reasons import CYCLIC, without_value
 from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
 from ....structure.drive_sizes import largest, slowest
-from ...remedies import Seen, beyond_tolerance
+from ...remedies import Finding, beyond_tolerance
 from ...results.notes import BOOKS
 from ...results.result import without_folders
 from ...rig.engines import knobs_idle
@@ -187,7 +187,7 @@ def warned(model, outcome, found: Answers, case: int, wide: bool) -> list:
         return []
     known = known_of(found, case)
     drift = {name: one for name, one in known.items() if name == "drift_per_cycle"}
-    return [*law_warnings(model, outcome, drift, 0.0), *beyond_tolerance(Seen(model, known))]
+    return [*law_warnings(model, outcome, drift, 0.0), *beyond_tolerance(Finding(model, known))]
 
 
 def known_of(found: Answers, case: int) -> dict:

@@ -17,7 +17,7 @@ from ....model.model import Model
 from ....model.source import placed
 from ....response.errors import pieces_error
 from ...patch import result as of_patch
-from ...remedies import Seen, beyond_tolerance
+from ...remedies import Finding, beyond_tolerance
 from ...results.result import without_folders
 from ...results.travel import outcome_on_piece, travelled
 from ...rig.engines import PIECES, engine_of
@@ -134,7 +134,7 @@ def _tell(found: Answers, case: int, model: Model, one: _Pressed, extremes) -> N
     found.outcome[case] = str(outcome_on_piece(Outcome(found.outcome[case]), model.patch, one.patch, slide))
     known = known_of(found, case)
     found.fill(case, one.measures)
-    seen = Seen(model, one.measures | {name: m for name, m in known.items() if name != "normal_load"}, one.patch)
+    seen = Finding(model, one.measures | {name: m for name, m in known.items() if name != "normal_load"}, one.patch)
     warned = without_folders([*one.warnings, *model.rig.notes, *travelled(one.patch, slide), *beyond_tolerance(seen)],
                              model.source.path)
     found.warnings.pop(case, None)
