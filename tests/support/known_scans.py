@@ -13,6 +13,8 @@ with the middle of the scan before and R anticlockwise for rotation > 0. A mirro
 "x") or rows ("y") in reverse, one turned over its heights negative; shift and rotation are those before that was done.
 Worn depth is height before less height after, > 0 where material went. The common region is that part of the rectangle
 between the first and the last points of the scan before that lies in the rectangle of the scan after, holes included.
+The slow distortion, not the noise, bounds how well a shift can be known: laid on the exact surface, scans of four
+unworn pairs come out 0.001 to 0.05 pixels from the truth, and within 1.7 standard deviations of the noise without it.
 Seeds below 1000 serve to build a method, those from 1000 on to examine it.
 """
 
