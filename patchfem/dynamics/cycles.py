@@ -27,24 +27,24 @@ def thinned(rows, run) -> np.ndarray:
     return np.flatnonzero(kept)[:MOST_TURNS]
 
 
-def extremes_of(rows, modes, dt) -> tuple:
-    """(smallest, largest) output [m] of a cycle, found between the samples by the cubic through values and rates.
+def extremes_of(rows, modes, dt) -> list:
+    """(smallest, largest) output [m] of each cycle, found between the samples by the cubic through values and rates.
 
-    rows: (k, >= 2n) of a march, modal displacements and velocities first; dt [s] between them.
+    rows: (c, k, >= 2n) of a march, modal displacements and velocities first; dt [s] between them.
     """
     n = modes.omega.size
-    y, v = rows[:, :n] @ modes.output, rows[:, n:2 * n] @ modes.output
-    return hermite_extremes(y, v, dt)
+    return list(zip(*(one.tolist() for one in hermite_extremes(
+        rows[..., :n] @ modes.output, rows[..., n:2 * n] @ modes.output, dt))))
 
 
-def phasor(rows, modes, first: int, around: int) -> complex:
-    """Complex amplitude c [m] of the output Re(c exp(i omega t)) over a cycle of samples, omega that of the drive.
+def phasors_of(rows, modes, first: int, around: int) -> list:
+    """Complex amplitude c [m] of the output Re(c exp(i omega t)) over each cycle of samples, omega that of the drive.
 
-    rows: (k, >= n), modal displacements first, the last row that of the next cycle; first: number of the first step,
+    rows: (c, k, >= n), modal displacements first, the last row that of the next cycle; first: number of the first step,
     whose phase is 2 pi first/around; around: steps in a cycle. 0 of no samples.
     """
-    y = rows[:-1, :modes.omega.size] @ modes.output
-    return complex(2 * (y @ _carrier(first % around, y.size, around)) / y.size) if y.size else 0j
+    y = rows[:, :-1, :modes.omega.size] @ modes.output
+    return (2 * (y @ _carrier(first % around, y.shape[1], around)) / max(y.shape[1], 1)).tolist()
 
 
 @lru_cache(maxsize=4)
@@ -54,18 +54,20 @@ def _carrier(first: int, count: int, around: int) -> np.ndarray:
 
 
 def hermite_extremes(y, v, dt) -> tuple:
-    """Smallest and largest value of the piecewise cubic through values y (k,) with rates v (k,) at spacing dt [s]."""
-    low, high = float(y.min()), float(y.max())
-    at = np.flatnonzero(v[:-1] * v[1:] < 0)
+    """Smallest and largest value (...) of the piecewise cubic through values y (..., k) with rates v at spacing dt
+    [s]."""
+    before, y, v = y.shape[:-1], y.reshape(-1, y.shape[-1]), v.reshape(-1, y.shape[-1])
+    low, high = y.min(axis=1), y.max(axis=1)
+    row, at = np.nonzero(v[:, :-1] * v[:, 1:] < 0)
     if at.size:
-        a, b, p, q = y[at], y[at + 1], v[at] * dt, v[at + 1] * dt
+        a, b, p, q = y[row, at], y[row, at + 1], v[row, at] * dt, v[row, at + 1] * dt
         # derivative 3 s^2 A + 2 s B + p of a + p s + B s^2 + A s^3
         big, mid = 2 * (a - b) + p + q, 3 * (b - a) - 2 * p - q
         root = np.sqrt(np.maximum(mid**2 - 3 * big * p, 0))
         denominator = mid + SIGNS * root
         there = denominator != 0
         s = np.where(there, -p / np.where(there, denominator, 1), -1.0)
-        value = (a + p * s + mid * s**2 + big * s**3)[(s >= 0) & (s <= 1)]
-        if value.size:
-            low, high = min(low, float(value.min())), max(high, float(value.max()))
-    return low, high
+        value = np.where((s >= 0) & (s <= 1), a + p * s + mid * s**2 + big * s**3, a)
+        np.minimum.at(low, row, value.min(axis=0))
+        np.maximum.at(high, row, value.max(axis=0))
+    return low.reshape(before), high.reshape(before)

@@ -70,21 +70,36 @@ def propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Pro
     that show an error march the same ones again.
     """
     if rows is None and modes.omega.size <= FEW:
-        return _of_interfaces(modes, drive, steps_per_cycle)
-    return _made(modes, drive, steps_per_cycle, np.array(modes.interfaces if rows is None else rows, float))
+        return _of_interfaces(_Basis(modes), drive.period, steps_per_cycle)
+    return _made(modes, drive.period, steps_per_cycle, np.array(modes.interfaces if rows is None else rows, float))
+
+
+class _Basis:
+    """A ModalBasis that equals any other one with the same numbers."""
+
+    def __init__(self, modes: ModalBasis):
+        self.modes = modes
+        self.key = tuple(np.asarray(0.0 if part is None else part, float).tobytes() for part in (
+            modes.omega, modes.zeta, modes.damping, modes.interfaces, modes.base, modes.mass))
+
+    def __eq__(self, other) -> bool:
+        return self.key == other.key
+
+    def __hash__(self) -> int:
+        return hash(self.key)
 
 
 @lru_cache(maxsize=KEPT)
-def _of_interfaces(modes: ModalBasis, drive, steps_per_cycle: int) -> Propagator:
-    return _made(modes, drive, steps_per_cycle, np.array(modes.interfaces, float))
+def _of_interfaces(basis: _Basis, period: float, steps_per_cycle: int) -> Propagator:
+    return _made(basis.modes, period, steps_per_cycle, np.array(basis.modes.interfaces, float))
 
 
-def _made(modes: ModalBasis, drive, steps_per_cycle: int, rows) -> Propagator:
-    dt = drive.period / steps_per_cycle
-    fastest = max(fastest_rate(modes), 2 * np.pi / drive.period)
+def _made(modes: ModalBasis, period: float, steps_per_cycle: int, rows) -> Propagator:
+    dt = period / steps_per_cycle
+    fastest = max(fastest_rate(modes), 2 * np.pi / period)
     n, coupled = modes.omega.size, modes.damping is not None
     if fastest * dt > STIFF:
-        (at_end, push, parts, quadratic), nodes = _stiff(modes, dt, fastest, 2 * np.pi / drive.period)
+        (at_end, push, parts, quadratic), nodes = _stiff(modes, dt, fastest, 2 * np.pi / period)
     else:
         # two points more for each radian of the fastest motion
         nodes, weight = _gauss(dt, int(np.clip(LEAST + 2 * np.ceil(fastest * dt), LEAST, MOST)))

@@ -68,7 +68,8 @@ class PatchModel:
     of the holder. skin: asperities; strips: (count, roll [rad], lateral place [m] of the load line or None where the
     roll is held); shear: the pieces are compliant tangentially; gives_way: the effect that lets the patch slip part by
     part, as the scene writes it; mesh_tolerance: relative error that a chosen mesh is to meet, None: the tolerance of
-    the run. meshes: those that serve all cases of a sweep, None: the patch has its own.
+    the run. meshes: those that serve all cases of a sweep, None: the patch has its own. gathers: fields of its motion
+    are not asked for, so that few points may stand for it.
     """
 
     length: float
@@ -97,6 +98,7 @@ class PatchModel:
     gives_way: str
     mesh_tolerance: float | None = None
     meshes: Meshes | None = None
+    gathers: bool = False
 
     @property
     def alike(self) -> bool:

@@ -40,14 +40,14 @@ def point_fields(patch, law: Bonds, shear, states) -> tuple:
     return tau, local
 
 
-def shear_of(patch, law: Bonds, count: int | None, tolerance: float):
+def shear_of(patch, law: Bonds, count: int | None, tolerance: float, least: int = SHEAR_MODES):
     """ShearModes of the pressed patch for a bond law: `count` of them, or as many as the tolerance asks for.
 
     The limit of a node is mu_s sigma_n times its share of the interface [N]; the bonds' length [m] is a spring in
-    series. Unless named, the number is doubled until the error of the backbone is a tenth of the tolerance.
+    series. Unless named, the number is doubled from `least` until the error of the backbone is within `tolerance`.
     """
     limit = law.static * patch.pressure.sigma_n * patch.pieces.interface.weight
     weakening = 1 / law.ratio if law.ratio > 0 else np.inf
     if count is not None:
         return shear_modes(patch.giving, limit, law.length, count, weakening)
-    return enough_modes(patch.giving, limit, law.length, SHEAR_MODES, 0.1 * tolerance, weakening)
+    return enough_modes(patch.giving, limit, law.length, least, tolerance, weakening)

@@ -11,7 +11,8 @@ would cost their load, 1.4 % for the six of that patch.
 * Points with a memory law share the modes of D^1/2 C D^1/2, D = mu sigma_n weight. A few modes carry the resultant.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -21,7 +22,8 @@ from ..core import PatchfemError, frozen_array
 from ..elasticity.lapack import dpotrf, dpotri, one_thread
 
 KERNELS = "slip.yield_kernels"
-SHEAR_MODES = 8  # modes a shear reduction starts from
+SHEAR_MODES = 4  # modes a shear reduction starts from: of bare pieces they leave 1e-6 of the friction limit
+GATHERED = 16, 32, 64  # points that may stand for all of a patch
 BACK = 2.0  # bond lengths: exp(2) of the stiffness at rest
 
 
@@ -44,19 +46,62 @@ class JenkinsSet:
     error: float = 0.0
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """All modes of D^1/2 C D^1/2, the most compliant first, whose backbones say what a few of them leave out.
+
+    points: (a,) indices of the contact set; limit: D (a,) [N]; shape: (a, n) slide of a point per unit mode coordinate;
+    values: (n,) [m/N] of the coordinates; length [m]: of the bonds.
+    """
+
+    points: np.ndarray
+    limit: np.ndarray
+    shape: np.ndarray
+    values: np.ndarray
+    length: float
+
+    @cached_property
+    def slides(self) -> np.ndarray:
+        """Slides (24,) [m] that backbones are compared on."""
+        # six bond lengths: exp(-6) of the bonds' stretch is left; the square sets more slides where the backbone bends
+        elastic = 2 * np.abs(self.shape @ (self.values * (self.shape.T @ self.limit))).max()
+        return (6 * self.length + elastic) * (np.arange(1, 25) / 24) ** 2
+
+    def modes(self, count: int) -> "ShearModes":
+        """The first `count` modes."""
+        return ShearModes(self.points, frozen_array(self.shape[:, :count]), frozen_array(1 / self.values[:count]), self)
+
+    def backbone(self, count: int, shape=None, limit=None) -> np.ndarray:
+        """Resultant [N] on `slides` with `count` modes, of these points or of others with a shape (k, count) and limits
+        (k,) [N]."""
+        shape, limit = (self.shape[:, :count], self.limit) if shape is None else (shape, limit)
+        with one_thread(), np.errstate(over="ignore", invalid="ignore"):
+            return _backbone(limit, shape, self.values[:count], self.length, self.slides)
+
+    def share(self, one, other) -> float:
+        """Largest difference of two backbones over the friction limit; inf of one that bonds are too short for."""
+        error = float(np.abs(one - other).max() / self.limit.sum())
+        return error if np.isfinite(error) else np.inf
+
+
+@dataclass(frozen=True, eq=False)
 class ShearModes:
     """The most compliant shear modes of the pieces.
 
     points: (a,) indices of the contact set; shape: (a, r) slide of a point per unit mode coordinate; stiffness: (r,)
-    [N/m] of the coordinates; backbone_error: worst error of the resultant [1] against 64 modes, or four times as many
-    as are kept.
+    [N/m] of the coordinates; of: all modes.
     """
 
     points: np.ndarray
     shape: np.ndarray
     stiffness: np.ndarray
-    backbone_error: float
+    of: Spectrum
+
+    @cached_property
+    def backbone_error(self) -> float:
+        """Worst error of the resultant [1] against 64 modes, or four times as many as are kept."""
+        count = self.stiffness.size
+        return self.of.share(self.of.backbone(max(64, 4 * count)), self.of.backbone(count))
 
 
 def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float = 0.0) -> JenkinsSet:
@@ -173,6 +218,11 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
     tangential: (m, m) [m/N]; limit: D (m,) [N]; bond_length [m]; weakening: static over kinetic friction. PatchfemError
     where a weakening contact could jump by itself: lambda_max(k C)(eps_0/eps_k - 1) >= 1.
     """
+    return _spectrum(tangential, limit, bond_length, weakening).modes(count)
+
+
+def _spectrum(tangential, limit, bond_length: float, weakening: float) -> Spectrum:
+    """The Spectrum of points; arguments and refusals as of `shear_modes`."""
     index = np.flatnonzero(limit > 0)
     root = np.sqrt(limit[index])
     even = np.ptp(tangential) == 0  # a spring before points of one rigid piece: one mode is all of it
@@ -183,67 +233,83 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
     if jump >= 1:
         raise PatchfemError(f"contact.shear with friction.kinetic below static: the patch could jump by itself "
                             f"({jump:.3g} >= 1); raise friction.bond_length or friction.kinetic")
-    if even:
-        return ShearModes(frozen_array(index, np.int64), frozen_array(np.ones((index.size, 1))),
-                          frozen_array([1 / tangential[0, 0]]), 0.0)
-    count = min(count, index.size)
-    shape = vectors / root[:, None]
-    elastic = 2 * np.abs(shape @ (values * (shape.T @ limit[index]))).max()
-    # six bond lengths: exp(-6) of the bonds' stretch is left; the square sets more slides where the backbone bends
-    slides = (6 * bond_length + elastic) * (np.arange(1, 25) / 24) ** 2
-    many = max(64, 4 * count)
-    with one_thread(), np.errstate(over="ignore", invalid="ignore"):
-        full = _backbone(limit[index], shape[:, :many], values[:many], bond_length, slides)
-        few = _backbone(limit[index], shape[:, :count], values[:count], bond_length, slides)
-    error = float(np.abs(full - few).max() / limit.sum())
-    error = error if np.isfinite(error) else np.inf  # bonds too short for the backbone: nothing is known
-    return ShearModes(frozen_array(index, np.int64), frozen_array(shape[:, :count]),
-                      frozen_array(1 / values[:count]), error)
+    shape, values = (np.ones((index.size, 1)), tangential[:1, 0]) if even else (vectors / root[:, None], values)
+    return Spectrum(frozen_array(index, np.int64), limit[index], shape, values, bond_length)
 
 
 def enough_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, count: int, tolerance: float,
                  weakening: float = 1.0, most: int = 64) -> ShearModes:
     """The fewest `shear_modes` whose backbone error meets `tolerance`, doubled from `count` up to `most`.
 
-    A soft skin spreads the compliance over many modes; the pieces alone need eight.
+    A soft skin spreads the compliance over many modes; the pieces alone need four.
     """
-    found = shear_modes(tangential, limit, bond_length, count, weakening)
-    while found.backbone_error > tolerance and found.stiffness.size == count and count < most:
+    spectrum = _spectrum(tangential, limit, bond_length, weakening)
+    found = spectrum.modes(count)
+    while found.stiffness.size == count and count < most and found.backbone_error > tolerance:
         count = min(2 * count, most)
-        found = shear_modes(tangential, limit, bond_length, count, weakening)
+        found = spectrum.modes(count)
     return found
 
 
+def gathered(found: ShearModes, x: np.ndarray, tolerance: float) -> tuple:
+    """(modes of few points in place of all, limits (k,) of these [N]): for a motion whose fields nobody asks for.
+
+    x: (a,) [m] places of the points. The few are the Gauss points of the friction limit along the patch, at which the
+    shapes are read between the nodes; as many of GATHERED as leave the backbone within `tolerance` of the limit, all
+    points where that is more than half of them. Their numbers count from 0.
+    """
+    of, r = found.of, found.stiffness.size
+    whole = of.backbone(r)
+    for count in GATHERED:
+        if 2 * count > x.size:
+            break
+        place, share = gauss(x, of.limit, count)
+        shape = np.stack([np.interp(place, x, one) for one in found.shape.T], axis=1)
+        if of.share(whole, of.backbone(r, shape, share)) <= tolerance:
+            return replace(found, points=frozen_array(np.arange(count), np.int64), shape=frozen_array(shape)), share
+    return replace(found, points=frozen_array(np.arange(x.size), np.int64)), of.limit
+
+
+def gauss(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
+    """Places (count,) and weights of the Gauss rule of a sum over points x (a,) with `weight` (a,) > 0: exact of
+    polynomials to the order 2 count - 1. By Lanczos' method, each vector made orthogonal to all before it."""
+    at, total = 2 * (x - x.mean()) / np.ptp(x), weight.sum()
+    basis, diagonal, beside = [np.sqrt(weight / total)], [], []
+    for _ in range(count):
+        new = at * basis[-1]
+        diagonal.append(new @ basis[-1])
+        for _ in range(2):  # once leaves the round-off of the first
+            new = new - np.array(basis).T @ (np.array(basis) @ new)
+        beside.append(np.linalg.norm(new))
+        basis.append(new / beside[-1])
+    places, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(beside[:-1], 1) + np.diag(beside[:-1], -1))
+    return x.mean() + places * np.ptp(x) / 2, total * vectors[0] ** 2
+
+
 def _backbone(limit, shape, values, length, slides) -> np.ndarray:
-    """Resultant [N] on the virgin slides (k,) for the saturating law D (1 - exp(-xi/length)), by Newton.
+    """Resultant [N] on the virgin slides (k,) for the saturating law D (1 - exp(-xi/length)), by Newton on all of them.
 
     No step takes a point further back than BACK lengths, where the law is so steep that Newton does not come back. NaN
     where it does not come to an end.
     """
-    b = np.zeros(values.size)
-    out = []
-    for slide in slides:
-        for _ in range(200):
-            xi = slide - shape @ b
-            decay = np.exp(np.minimum(-xi / length, 700.0))
-            traction, slope = 1 - decay, decay / length
-            missing = b / values - shape.T @ (limit * traction)
-            tangent = np.diag(1 / values) + shape.T @ ((limit * slope)[:, None] * shape)
-            step = np.linalg.solve(tangent, missing)
-            change = shape @ step  # of xi
-            back = change < 0
-            part = np.min((xi[back] + BACK * length) / -change[back], initial=1.0)
-            if 0 < part < 1:
-                b = b - part * step
-                continue
-            b = b - step
-            if np.abs(step).max() <= 1e-11 * (np.abs(b).max() + 1e-300):  # quadratic: the next one is round-off
-                break
-        else:
-            if not np.abs(step).max() <= 1e-6 * np.abs(b).max():
-                return np.full(len(slides), np.nan)
-        out.append(limit @ -np.expm1(np.minimum(-(slide - shape @ b) / length, 700.0)))
-    return np.array(out)
+    b, going = np.zeros((slides.size, values.size)), np.arange(slides.size)
+    for _ in range(400):
+        xi = slides[going, None] - b[going] @ shape.T
+        decay = np.exp(np.minimum(-xi / length, 700.0))
+        missing = b[going] / values - (limit * (1 - decay)) @ shape
+        tangent = np.diag(1 / values) + shape.T @ ((limit * decay / length)[:, :, None] * shape)
+        step = np.linalg.solve(tangent, missing[:, :, None])[:, :, 0]
+        change = step @ shape.T  # of xi
+        part = np.where(change < 0, (xi + BACK * length) / np.where(change < 0, -change, 1.0), 1.0).min(axis=1)
+        part = np.where((part > 0) & (part < 1), part, 1.0)
+        b[going] -= part[:, None] * step
+        size = np.abs(b[going]).max(axis=1) + 1e-300
+        going = going[~((part == 1.0) & (np.abs(step).max(axis=1) <= 1e-11 * size))]  # quadratic: the next is round-off
+        if not going.size:
+            break
+    out = -np.expm1(np.minimum(-(slides[:, None] - b @ shape.T) / length, 700.0)) @ limit
+    out[going] = np.nan
+    return out
 
 
 def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:

@@ -15,6 +15,7 @@ from march_paths import share_one_loop
 from scene_texts import BENCH, COATED, DRIVE, FORCED, GROWING, MODE, NONLOCAL, PAIR, PLASTIC, POINT, SECOND
 
 from patchfem.dynamics import resume
+from patchfem.dynamics.march import march
 from patchfem.export.results import is_state
 
 MARCH = '[accuracy]\nmethod = "march"\nsteps_per_cycle = 60\n'
@@ -34,7 +35,8 @@ RIGS = {
 
 @pytest.fixture
 def often(monkeypatch):
-    """Marches keep their state after every cycle; the list has a number per state."""
+    """Marches keep their state after every second cycle; the list has a number per state."""
+    monkeypatch.setattr(march, "PIECES", 2)
     saved, save = [], resume.save
 
     def counted(*of):

@@ -1,5 +1,7 @@
 """Runs of one patch share it: pressed and measured once, with the answers of runs that share nothing."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scene_texts import COATED, MODE, PLASTIC, SHEAR
@@ -84,11 +86,14 @@ def test_exact_marches_of_one_patch_share_its_shear_modes(monkeypatch):
 
     made = []
     monkeypatch.setattr(interface, "shear_of", lambda *given: made.append(given[1:]) or object())
+    def asked(tolerance):
+        return SimpleNamespace(accuracy=SimpleNamespace(tolerance=tolerance), patch=SimpleNamespace(gathers=False))
+
     law, one, other = Bonds(0.3, 1e-6), Pressed(), Pressed()
-    first = interface._shear_modes(one, law, None, 0.01)
-    assert interface._shear_modes(one, Bonds(0.3, 1e-6), None, 0.01) is first and len(made) == 1
-    for given in ((other, law, None, 0.01), (one, Bonds(0.4, 1e-6), None, 0.01), (one, law, 4, 0.01),
-                  (one, law, None, 0.1)):
+    first = interface._shear_modes(one, law, None, asked(0.01))
+    assert interface._shear_modes(one, Bonds(0.3, 1e-6), None, asked(0.01)) is first and len(made) == 1
+    for given in ((other, law, None, asked(0.01)), (one, Bonds(0.4, 1e-6), None, asked(0.01)),
+                  (one, law, 4, asked(0.01)), (one, law, None, asked(0.1))):
         assert interface._shear_modes(*given) is not first
     assert len(made) == 5
     kept = len(interface._MADE)

@@ -16,6 +16,8 @@ from patchfem.core import PatchfemError
 from patchfem.slip.shear_modes import (
     JenkinsSet,
     enough_modes,
+    gathered,
+    gauss,
     jenkins_set,
     merged,
     normal_stiffness,
@@ -302,6 +304,30 @@ def test_exact_backbone_error_is_the_error_of_the_resultant(angle):
         modes = shear_modes(pair.tangential, limit, length, count)
         few = np.array([few_modes(modes, limit, length, q) for q in slides])
         assert modes.backbone_error == pytest.approx(np.abs(few - whole).max() / limit.sum(), abs=1e-12)
+
+
+@pytest.mark.parametrize("count", [4, 9])
+def test_exact_gauss_points_of_a_sum(count):
+    r = np.random.default_rng(count)
+    x, weight = np.sort(r.uniform(-2e-3, 5e-3, 60)), r.uniform(0.1, 1.0, 60)
+    place, share = gauss(x, weight, count)
+    assert (share > 0).all() and x[0] < place.min() and place.max() < x[-1]
+    for power in range(2 * count):
+        assert share @ (place / 5e-3)**power == pytest.approx(weight @ (x / 5e-3)**power, rel=1e-11, abs=1e-11)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-4])
+def test_always_gathered_points_leave_the_backbone(angle):
+    """On three times as many slides as they are chosen by; where nothing can be left out all points stay."""
+    pair, limit = coated_pair(200), friction_limit(200, angle)
+    modes = shear_modes(pair.tangential, limit, 1e-6, 4)
+    few, share = gathered(modes, pair.interface.x[modes.points], 1e-5)
+    assert few.points.size in (16, 32) and share.sum() == pytest.approx(limit.sum(), rel=1e-12)
+    for slide in 8e-6 * (np.arange(1, 73) / 72)**2:
+        whole = few_modes(modes, limit, 1e-6, slide)
+        assert abs(few_modes(few, share, 1e-6, slide) - whole) <= 2e-5 * limit.sum()
+    all_, same = gathered(modes, pair.interface.x[modes.points], 1e-16)
+    assert all_.shape is modes.shape and (same == limit[modes.points]).all()
 
 
 def test_refuses_a_patch_that_could_jump_by_itself():

@@ -23,11 +23,12 @@ class Sheared(NamedTuple):
 
     weight (m,) makes a traction of the law a force [N]: mu_s area/eps_0 of bonds under a load in Pa; eps (2,): bond
     length [m] at the start and in the middle of the step; growth (6,) of eq. 2.10 and of the breakaway share; modes
-    psi (r, m), kappa (r,) [N/m], coordinates b (r,) [m]. points (9, m), rows named in `shear_points_kernels`: m, z, s2,
-    local slide and play of bonds, their load, and slide, force and slope in the step. count (1,):
-    how many of its columns, and of those of psi, are points under load. Of the solve: y (2, 1 + r) = (dq, db) of the
-    step and of what springs back, last (1 + r,) of the step before, scale (1 + r,), room (3, 1 + r), hess (2, 1 + r,
-    1 + r) with ready (2,): 1 where it is a factor.
+    psi (r, m), kappa (r,) [N/m], coordinates b (r,) [m]. points (8, m), rows named in `shear_points_kernels`: m, z, s2
+    and play of bonds, their load, and slide, force and slope in the step. count (1,):
+    how many of its columns, and of those of psi, are points under load. drag (3, 1 + r), flow (2,): of points that all
+    drag under a load that stays, as `shear_kernels` has it. Of the solve: y (2, 1 + r) = (dq, db) of the
+    step and of what springs back, last (2, 1 + r) of the two steps before, scale (1 + r,), room (3, 1 + r), hess (2,
+    1 + r, 1 + r) with ready (2,): 1 where it is a factor.
     """
 
     weight: np.ndarray
@@ -38,6 +39,8 @@ class Sheared(NamedTuple):
     b: np.ndarray
     points: np.ndarray
     count: np.ndarray
+    drag: np.ndarray
+    flow: np.ndarray
     y: np.ndarray
     last: np.ndarray
     scale: np.ndarray
@@ -46,17 +49,23 @@ class Sheared(NamedTuple):
     ready: np.ndarray
 
 
-def sheared(weight, length: float, growth, psi, kappa, lanes: int = 1) -> dict:
+def sheared(weight, length: float, growth, psi, kappa, lanes: int = 1, load=None) -> dict:
     """The fields of `Sheared` at rest; psi (m, r), no modes of pieces that are rigid in shear.
 
-    lanes: m is filled up to a multiple of it by points that bear and move nothing.
+    lanes: m is filled up to a multiple of it by points that bear and move nothing; load (m,) [Pa]: one that stays.
     """
     (m, r), size = psi.shape, 1 + len(kappa)
-    more = -m % lanes
+    more, points, drag = -m % lanes, np.zeros((8, m + -m % lanes)), np.zeros((3, size))
+    if load is not None:
+        points[4, :m] = load
+        pull = length * weight * load
+        drag[:] = (np.append(pull.sum(), psi.T @ pull), np.append(0.0, np.abs(psi).max(axis=0)),
+                   np.append(1.0, psi.T @ pull / pull.sum()))
     return {"weight": np.pad(np.array(weight, float), (0, more)), "eps": np.full(2, length),
             "growth": np.array(growth, float), "psi": np.pad(np.array(psi.T, order="C"), ((0, 0), (0, more))),
-            "kappa": np.array(kappa, float), "b": np.zeros(r), "points": np.zeros((9, m + more)),
-            "count": np.full(1, m + more), "y": np.zeros((2, size)), "last": np.zeros(size),
+            "kappa": np.array(kappa, float), "b": np.zeros(r), "points": points,
+            "count": np.full(1, m + more), "drag": drag, "flow": np.zeros(2),
+            "y": np.zeros((2, size)), "last": np.zeros((2, size)),
             "scale": np.append(1.0, 1 / np.sqrt((psi**2).mean(axis=0))), "room": np.zeros((3, size)),
             "hess": np.zeros((2, size, size)), "ready": np.zeros(2)}
 
@@ -204,7 +213,7 @@ def carried(contact, element=None) -> list | None:
     if isinstance(contact, Element):
         return memory_rows(element, contact.mem[0])
     if isinstance(contact, Sheared):
-        return [contact.eps, contact.b, *contact.points[:6]]
+        return [contact.eps, contact.b, contact.flow[1:], *contact.points[:5]]
     return [contact.eps, contact.b, contact.now, *contact.memory] if isinstance(contact, Rub) else None
 
 

@@ -10,7 +10,7 @@ from ...friction.flags_kernels import FAST, LEAN
 from ...friction.laws.elastic_plastic_kernels import spring_end, spring_mean
 
 PLASTIC, POINTS = 1, 2
-DENSITY, STRETCH, SQUARE, MOVED, PLAY, LOAD, SLIDE, FORCE, SLOPE = range(9)  # elastic-plastic: traction/mu, springs
+DENSITY, STRETCH, SQUARE, PLAY, LOAD, SLIDE, FORCE, SLOPE = range(8)  # elastic-plastic: traction/mu, springs
 
 
 @njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)

@@ -17,6 +17,7 @@ from ..modal_kernels import safe_point
 from .shear_points_kernels import FORCE, SLIDE, SLOPE, respond
 
 GRADIENT, STEP, TRIAL = range(3)
+NEAR = 4e-6  # half its square is below the goal of a march, 1e-11
 SLACK = 100.0  # times the goal: a residual that round-off keeps from falling further is taken below it
 
 
@@ -114,12 +115,25 @@ def weighted(out, scale):
     return worst
 
 
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def near(p, c):
+    """Whether a Newton step p (1 + r,) moves no point under a load that stays by more than NEAR bond lengths.
+
+    The mean of a bond bends by less than its limit over the length squared, so half of NEAR^2 of the limit is left.
+    """
+    way = abs(p[0])
+    for k in range(1, p.size):
+        way += c.drag[1, k] * abs(p[k])
+    return way <= NEAR * c.eps[1] and c.drag[0, 0] > 0.0
+
+
 @njit(error_model="numpy", **LEAN)
 def descend(free, beta, kind, ending, c, goal):
     """Minimum over c.y[ending] = (dq, db) in place, from the guess in it, where dq = free - beta force, dq = free for
     beta = 0. goal [N]: of the residual. Returns (force [N], iterations), < 0: failed.
 
     The factor of a Hessian serves all solves of a step of the march, until one with it gains less than a factor of ten.
+    A Newton step that is short enough is the last one, and no residual is asked for after it.
     """
     which = 1 if ending else 0
     y, hess, g, p, trial = c.y[which], c.hess[which], c.room[GRADIENT], c.room[STEP], c.room[TRIAL]
@@ -137,6 +151,11 @@ def descend(free, beta, kind, ending, c, goal):
             for i in range(y.size):
                 p[i] = -g[i]
             fall = -solve(hess, p)
+            if not stale and not ending and beta > 0.0 and near(p, c):
+                for i in range(y.size):
+                    y[i] += p[i]
+                slid(y[0], y[1:], c)
+                return (free - y[0]) / beta, count
         part, low, high = 1.0, 0.0, np.inf
         for _ in range(40):
             for i in range(y.size):
@@ -167,12 +186,12 @@ def descend(free, beta, kind, ending, c, goal):
 
 @njit(error_model="numpy", forceinline=True, **LEAN)
 def went_on(c):
-    """Move the coordinates of the pieces by the solved step and leave the next guess, as the last two went on."""
+    """Move the coordinates of the pieces by the solved step and leave the next guess, as the last three went on."""
     y, last = c.y[0], c.last
     for k in range(c.b.size):
         c.b[k] += y[k + 1]
     for k in range(y.size):
         here = y[k]
-        y[k] = 2 * here - last[k]
-        last[k] = here
+        y[k] = 3 * (here - last[0, k]) + last[1, k]
+        last[0, k], last[1, k] = here, last[0, k]
     c.ready[:] = 0.0

@@ -7,8 +7,7 @@ reduced rank extrapolation, which is exact where a disturbance dies out linearly
 
 import numpy as np
 
-from ..cycles import extremes_of
-from ..march.march import mark_of
+from ..march.march import ends_of, mark_of
 
 LEAD = 6  # cycles from the start to the first guess
 REST = 2  # cycles after a guess that the memory of the contact takes
@@ -55,7 +54,7 @@ def shown(run, frames: int = 0) -> tuple:
     snapshots = []
     part = run.cycle(run.prop.steps, frames, snapshots)
     run.check()
-    return mark_of(run, [part], [extremes_of(part[1], run.modes, run.prop.dt)]), snapshots
+    return mark_of(run, [part], ends_of([part], run)), snapshots
 
 
 def departures(run) -> np.ndarray:

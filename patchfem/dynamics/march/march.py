@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from ...core import BaseSine, ModalBasis, Outcome, Response
 from ..contacts import arrays
 from ..contacts.arrays import ModalArrays
-from ..cycles import extremes_of, phasor, thinned
+from ..cycles import extremes_of, phasors_of, thinned
 from ..integrated import histories
 from ..propagator import propagator
 from ..repeats import APART, ahead, looked_at, until_look
@@ -83,8 +84,14 @@ def _runner(model):
 
 def warm_up(modes: ModalBasis, drive: BaseSine, model: ContactModel, say=None) -> None:
     """Load the compiled loop of a model, or compile it, by a march of no steps; say: told before it compiles."""
-    run = _runner(model)(modes, drive, model, 4, np.inf, load_kernels(say))
-    run.cycle(0, 0, [])
+    kind = _runner(model), model.kind, model.laws, model.loading, modes.damping is None
+    if kind not in _WARM:
+        run = _runner(model)(modes, drive, model, 4, np.inf, load_kernels(say))
+        run.cycle(0, 0, [])
+        _WARM.add(kind)
+
+
+_WARM = set()  # what has been marched: its code is there
 
 
 def fresh(modes: ModalBasis, drive, model, steps_per_cycle: int, travel: float = np.inf, start=None):
@@ -120,14 +127,15 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
     # a fraction of a cycle comes first, the window is whole
     size = (total - run.done) % steps_per_cycle or steps_per_cycle
     while run.done < total and run.outcome is None:
-        final = run.done + size >= total
-        first, rows, work = run.cycle(size, frames if final else 0, snapshots)
-        if whole and len(last) == last.maxlen and room > 0:
-            room -= _shelved(samples, run, last[0])
-        last.append((first, rows, work))
-        if whole:
-            extremes.append(extremes_of(rows, modes, run.prop.dt))
-            phasors.append(phasor(rows, modes, first, steps_per_cycle))
+        stop = min((mark for mark in asked if mark > run.done), default=total)
+        for first, rows, works in run.cycles(size, stop, frames if stop == total else 0, snapshots):
+            for k, work in enumerate(works):
+                if whole and len(last) == last.maxlen and room > 0:
+                    room -= _shelved(samples, run, last[0])
+                last.append((first + k * steps_per_cycle, rows[k], work))
+            if whole:
+                extremes += extremes_of(rows, modes, run.prop.dt)
+                phasors += phasors_of(rows, modes, first, steps_per_cycle)
         if run.done in asked:
             samples.marks.append((run.fork(run.drive), list(last)[-window:], extremes[-window:]))
             found.append(mark_of(*samples.marks[-1], samples.marks[-1][0]))
@@ -141,8 +149,7 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
             progress(run.done / total)
     run.check()
     if not whole:
-        extremes = [extremes_of(rows, modes, run.prop.dt) for _, rows, _ in last]
-        phasors = [phasor(rows, modes, first, steps_per_cycle) for first, rows, _ in last]
+        extremes, phasors = ends_of(last, run), []
     end = mark_of(run, list(last)[-window:], extremes)
     rows, start = _joined(list(last))
     number = np.concatenate([*samples.kept_at, start + np.arange(len(rows))])
@@ -179,6 +186,11 @@ def _left_out(samples: Samples, run, count: int) -> int:
     samples.early(later, (first + pick + run.prop.steps * shown).ravel())
     run.leave_out(count)
     return samples.room
+
+
+def ends_of(cycles, run) -> list:
+    """(smallest, largest) output [m] of each of the cycles (first step, rows, work)."""
+    return [one for _, rows, _ in cycles for one in extremes_of(rows[None], run.modes, run.prop.dt)]
 
 
 def mark_of(run, cycles, extremes, after=None) -> Mark:
@@ -298,7 +310,7 @@ class Run:
             parts.append(self.cycle(self.prop.steps, 0, []))
             if self.outcome is not None:
                 break
-        return mark_of(self, list(parts), [extremes_of(rows, self.modes, self.prop.dt) for _, rows, _ in parts])
+        return mark_of(self, list(parts), ends_of(parts, self))
 
     def table(self, count: int) -> tuple:
         """(table of `propagator.tables`, row of the next step in it) for `count` steps from here."""
@@ -346,17 +358,35 @@ class Run:
                 tell()
         return self.outcome is None
 
-    def cycle(self, size: int, frames: int, snapshots: list) -> tuple:
-        """March `size` steps in `frames` pieces (0: one), with a snapshot after each.
+    def cycles(self, size: int, stop: int, frames: int, snapshots: list) -> list:
+        """March a cycle of `size` steps, or some whole ones at once, none beyond the step `stop` or the next look of
+        `repeats`; with frames the last of them by itself, in so many pieces with a snapshot after each.
 
-        Returns (first step, rows (steps + 1, width), friction work [J]); snapshots: list to add to.
+        Returns parts of cycles (k,): (first step, rows (k, steps + 1, width), friction works (k,) [J]), the whole ones
+        and what was begun of the next where the run ends.
         """
-        first, before, n = self.done, self.ledger[8], 2 * self.modes.omega.size + 6
-        rows = self._moved(size, frames, snapshots)
-        return first, np.concatenate([rows[:, :n], self._sums(rows).T, rows[:, n:]], axis=1), self.ledger[8] - before
+        first, n, whole = self.done, 2 * self.modes.omega.size + 6, self.prop.steps
+        together = min(PIECES, AT_ONCE // whole, (stop - first) // whole, until_look(-(-first // whole)))
+        if frames and first + together * whole == stop:
+            together -= 1
+        count = max(1, together) if size == whole else 1
+        rows = self._moved(count * size, frames if first + size == stop else 0, snapshots)
+        works = self._works(rows)
+        booked = np.concatenate([rows[:, :n], self._sums(rows).T, rows[:, n:]], axis=1)
+        done = (len(rows) - 1) // size if size else 0
+        out = [(first, sliding_window_view(booked, size + 1, axis=0)[::size].swapaxes(1, 2),
+                works[:done * size].reshape(done, size).sum(axis=1))] if done else []
+        if done * size < len(rows) - 1 or not done:
+            out.append((first + done * size, booked[None, done * size:], works[None, done * size:].sum(axis=1)))
+        return out
+
+    def cycle(self, size: int, frames: int, snapshots: list) -> tuple:
+        """March `size` steps as one cycle: (first step, rows (steps + 1, width), friction work [J])."""
+        (first, rows, works), = self.cycles(size, self.done + size, frames, snapshots)
+        return first, rows[0], works[0]
 
     def _moved(self, size: int, frames: int, snapshots: list) -> np.ndarray:
-        """The rows (steps + 1, width) of `size` steps as the loop writes them; arguments as `cycle`."""
+        """The rows (steps + 1, width) of `size` steps as the loop writes them; arguments as `cycles`."""
         parts = []
         edges = np.linspace(0, size, max(min(frames, size), 1) + 1).round().astype(int)
         for piece in np.diff(edges) if size else [0]:

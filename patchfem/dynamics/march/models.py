@@ -89,7 +89,9 @@ class ContactModel:
             return {"bonds": bonds_of(self.element, contact.mem[0]).copy()}
         if not hasattr(contact, "psi"):
             return {}
-        return {"bonds": contact.points[:5, :self.reduction.points.size].copy(), "b": contact.b.copy()}
+        m, z, s2, play = contact.points[:4, :self.reduction.points.size]
+        return {"bonds": np.stack([m, z, s2, contact.flow[1] - self.reduction.shape @ contact.b, play]),
+                "b": contact.b.copy()}
 
     def build(self):
         """The contact with arrays of its own."""
@@ -137,8 +139,8 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
         return element_model(points_element(law, area, sigma, pattern))
     area, sigma = np.asarray(area, float)[shear.points], np.asarray(sigma, float)[shear.points]
     fields = arrays.sheared(law.static * area / law.length, law.length, growth_numbers(law), np.asarray(shear.shape),
-                            shear.stiffness, LANES)
-    fields["points"][np.ix_([0, 5], range(area.size))] = law.initial * sigma, sigma  # m and load of every point
+                            shear.stiffness, LANES, sigma)
+    fields["points"][0, :area.size] = law.initial * sigma
     limit = law.static * float(area @ sigma)
     return ContactModel(f"{HERE}.shear_kernels", limit, fields, law.length, "", shear, None, arrays.Sheared)
 

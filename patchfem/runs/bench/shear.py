@@ -74,7 +74,7 @@ def _points(model, patch, time, slide, frames, watch) -> Slid:
     """Bond points behind the shear modes."""
     law = model.bonds
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
-    shear = shear_of(patch, law, model.accuracy.shear_modes, model.accuracy.tolerance)
+    shear = shear_of(patch, law, model.accuracy.shear_modes, 0.1 * model.accuracy.tolerance)
     done = follow_path(points_model(law, weight, sigma, shear), time, slide, frames, watch, law.grows)
     refuse_missed(done)
     tau, local = point_fields(patch, law, shear, done.states)

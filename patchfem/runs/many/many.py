@@ -56,7 +56,7 @@ def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least
 BATCHES: tuple[Batch, ...] = (_batch("patches", "patch"),
                               _batch("lumped.lanes", "rig", compile=6.0, least=64, columns=True),
                               _batch("lumped.lumped", "rig", compile=12.0),
-                              _batch("lumped.sheared", "rig", 0.4, 12.0))
+                              _batch("lumped.sheared", "rig", 0.4, 12.0), _batch("gathered", "rig", 0.2, least=32))
 
 
 def batch_compile_seconds(batch: Batch, model: Model) -> float:

@@ -197,12 +197,15 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     steps."""
     few, varies, out = _fewer(numerics, 4), model.rig.load_varies, []
     quarter = Variant(few, patch)
-    if coarse is not None and (varies or model.soft):
-        out.append(space_rung(Variant(few, coarse), quarter))
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
+    if coarse is not None and (varies or model.soft):
+        fixed = few if shape is None else replace(few, shear_modes=shape.size)  # one change at a time
+        out.append(space_rung(Variant(fixed, coarse), quarter))
     climbs = model.grooves is not None
     if shape is not None and (varies or climbs or (coarse is not None and has(model.friction.law, "bonds"))):
-        out.append(space_rung(Variant(replace(few, shear_modes=max(1, shape.size // 2)), patch), quarter, "modes"))
+        # of as few modes as a motion without fields has, twice as many say more than half of them
+        other = 2 * shape.size if model.patch is not None and model.patch.gathers else max(1, shape.size // 2)
+        out.append(space_rung(Variant(replace(few, shear_modes=other), patch), quarter, "modes"))
     return [*out, *_summed(model, few, patch, solution)]
 
 

@@ -15,12 +15,15 @@ from ...friction.record import law_from
 from ...model.law import InterfaceLaw, bonds_of
 from ...model.model import Model
 from ...slip.fields import shear_of
+from ...slip.shear_modes import gathered
 from ...structure.drive_sizes import omega_of
 from ..bench import averaged, rigid
 from ..patch.kept import elements, strip_elements
 from . import strips, varying_load
 from .lists import quadrature_of
 from .numerics import Numerics
+
+FEWER = 1e-3  # of the tolerance, by which few modes, and few points for all, may each miss the backbone of the patch
 
 
 def contact_of(model: Model, numerics: Numerics, patch):
@@ -115,20 +118,27 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
     if found.engine != "recursion":
         return models.list_model(law, limit, found.reach(law.order), found.merge)
     if model.soft:
-        reduced = _shear_modes(patch, law, numerics.shear_modes, model.accuracy.tolerance)
-        return models.points_model(law, patch.pieces.interface.weight, patch.pressure.sigma_n, reduced)
+        reduced, force = _shear_modes(patch, law, numerics.shear_modes, model)
+        pressed = (patch.pieces.interface.weight, patch.pressure.sigma_n) if force is None else (force, np.ones_like(
+            force))
+        return models.points_model(law, *pressed, reduced)
     if numerics.per_point:
         x, weight, sigma = patch.x, patch.pieces.interface.weight, patch.pressure.sigma_n
         return models.points_model(law, weight, sigma, None, (x, sigma) if model.side == "lower" else None)
     return models.points_model(law, [1.0], [load])
 
 
-def _shear_modes(patch, law, count: int | None, tolerance: float):
-    """`shear_of`, made once for all marches of a pressed patch."""
-    made = _MADE.setdefault(patch, {})
-    if (law, count, tolerance) not in made:
-        made[law, count, tolerance] = shear_of(patch, law, count, tolerance)
-    return made[law, count, tolerance]
+def _shear_modes(patch, law, count: int | None, model) -> tuple:
+    """(`shear_of`, normal forces (k,) [N] of its points where few stand for all of them, else None), made once for all
+    marches of a pressed patch."""
+    made, tolerance, few = _MADE.setdefault(patch, {}), model.accuracy.tolerance, model.patch.gathers
+    if (law, count, tolerance, few) not in made:
+        found, force = shear_of(patch, law, count, *((FEWER * tolerance, 2) if few else (0.1 * tolerance,))), None
+        if few:
+            found, force = gathered(found, patch.x[found.points], FEWER * tolerance)
+            force = force / law.static
+        made[law, count, tolerance, few] = found, force
+    return made[law, count, tolerance, few]
 
 
 _MADE = WeakKeyDictionary()  # Patch -> shear modes by what they are made of, for as long as it lives

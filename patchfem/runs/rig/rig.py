@@ -142,7 +142,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
 
     Steps a cycle that the scene does not pin are doubled until the error of the displacement is met.
     """
-    engine, frames, made = ENGINES[numerics.engine], FRAMES if patch is not None else 0, {}
+    engine, frames, made = ENGINES[numerics.engine], 0 if patch is None or model.patch.gathers else FRAMES, {}
     go, size = engine.run, model.rig.displacement
     found = go(model, numerics, patch, frames, say, progress)
     seconds |= {"march": found.seconds} | (found.prepare or {})

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from patchfem.core import BaseSine, ModalBasis, Outcome
 from patchfem.dynamics.contacts.arrays import Single, Steady
-from patchfem.dynamics.march.march import GOAL, march, modal_arrays
+from patchfem.dynamics.march.march import GOAL, fresh, march, modal_arrays
 from patchfem.dynamics.march.models import jenkins_model, list_model, load_kernels, points_model
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.bonds.parameters import Bonds
@@ -113,6 +113,27 @@ def test_exact_ledger_with_shear_modes():
     assert bad == 0
     assert work == pytest.approx(energies[:-1, 0] + np.diff(energies[:, 1]), abs=1e-10)
     assert energies[:-1, 0].min() >= -1e-13
+
+
+@pytest.mark.parametrize("size", [3.0, 30.0])
+def test_exact_points_that_drag_move_as_their_bonds_say(size):
+    """A march whose steps drag in closed form, beside the same steps by the solve of all points: gross slip of many
+    bond lengths a step, and a few."""
+    law, compliance, x = Bonds(0.4, 1e-6), *half_plane(24, 1e-10)
+    area, sigma = np.full(24, 1 / 24), 50 * (1 + 0.8 * x)
+    model = points_model(law, area, sigma, shear_modes(compliance, law.static * area * sigma, law.length, 8))
+    modes, drive = one_mode(OMEGA, 0.05, 1.0), BaseSine(size * 9.80665, OMEGA)
+    quick, plain = (fresh(modes, drive, model, 200) for _ in range(2))
+    rows = quick.cycle(600, 0, [])[1]
+    dragged, every = 0, []
+    for _ in range(600):
+        plain.contact.flow[0] = 0.0
+        every.append(plain.cycle(1, 0, [])[1][0])
+        dragged += plain.contact.flow[0] != 0.0
+    assert dragged > 100 and quick.ledger[5] < plain.ledger[5] - dragged / 2
+    scale = np.abs(rows).max(axis=0)
+    np.testing.assert_allclose(rows[:-1, :6] / scale[:6], np.array(every)[:, :6] / scale[:6], atol=2e-9)
+    assert quick.ledger[[0, 1, 3, 8]] == pytest.approx(plain.ledger[[0, 1, 3, 8]], rel=1e-9)
 
 
 def test_exact_masing_loop_of_a_jenkins_set():

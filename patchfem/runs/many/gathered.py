@@ -1,0 +1,34 @@
+"""Patches with bonds behind shear, of a study of many: each runs by itself, a few points in place of all its nodes.
+
+Nobody sees the fields of such a run. What the points leave out of the backbone is a thousandth of the tolerance
+(`rig.interface.FEWER`), far below the bars.
+"""
+
+from collections.abc import Hashable, Sequence
+from dataclasses import replace
+
+from ...effects import has, listed
+from ...model.model import Model
+from ..rig.engines import MARCH, engine_of
+from . import one_by_one
+from .answers import Answers
+
+
+def refuses(model: Model) -> str:
+    """Why all points of a model move; "" where a few may stand for them."""
+    if model.patch is None or not model.soft or model.friction is None or not has(model.friction.law, "bonds") \
+            or listed(model.friction):
+        return "it is no patch with bonds behind shear"
+    if model.rig.load_varies or model.patch.strips is not None or model.grooves is not None or model.wear is not None:
+        return "its load changes, or it wears"
+    return "" if engine_of(model) is MARCH else "it does not march"
+
+
+def group(model: Model) -> Hashable:
+    """Equal for all: each runs by itself."""
+    return None
+
+
+def solve(models: Sequence[Model], say=None) -> Answers:
+    """Answers of models."""
+    return one_by_one.solve([replace(model, patch=replace(model.patch, gathers=True)) for model in models], say)
