@@ -9,7 +9,7 @@ from resource import RUSAGE_CHILDREN, getrusage
 from tempfile import TemporaryDirectory
 
 import pytest
-from command_line import FROM_PYTHON, FROM_SHELL, MODULES, absent, loaded
+from command_line import FROM_PYTHON, FROM_SHELL, MODULES, absent, loaded, loaded_again
 from scene_texts import BENCH, COATED, COULOMB, PLASTIC, POINT, STRUCTURE
 
 RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
@@ -181,7 +181,6 @@ def test_exact_a_batch_brings_the_kind_of_its_cases_alone(scene, law):
     """Nor numba, where its code is kept, nor Dask for a Dataset of numbers."""
     code = f"import sys, patchfem\npatchfem.sweep(sys.argv[1], {{'friction.static': [0.1, 0.2]}})\n{MODULES}"
     path = scene(POINT + law + STRUCTURE.replace("cycles = 30", "cycles = 20"))
-    loaded(code, path)  # keeps the code
-    modules = loaded(code, path)
+    modules = loaded_again(code, path)
     absent(modules, "dynamics.smooth")
     assert "xarray" in modules and "dask.array" not in modules

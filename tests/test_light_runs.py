@@ -6,7 +6,7 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
-from command_line import FROM_SHELL, cli, loaded
+from command_line import FROM_SHELL, cli, loaded, loaded_again
 from scene_texts import COULOMB, POINT, STRUCTURE
 
 from patchfem.export.summary import PACKAGES, versions
@@ -45,8 +45,7 @@ def test_exact_a_rig_with_its_page_loads_no_dice_and_no_benches(tmp_path):
     """Each takes 10 to 30 ms: numpy's generators, the writer of completions, the benches behind wear,
     the mails that importlib.metadata reads versions with."""
     words = ("run", RIG, "--set", "drive.cycles=12", "-o", tmp_path / "out", "-q")
-    loaded(FROM_SHELL, *words)  # keeps compiled code
-    modules = loaded(FROM_SHELL, *words)
+    modules = loaded_again(FROM_SHELL, *words)
     assert "patchfem.dynamics.march.march" in modules and (tmp_path / "out" / "report.html").is_file()
     unwanted = {"numpy.random", "cyclopts.completion", "numba", "patchfem.runs.bench.bench",
                 "patchfem.runs.wear", "email", "socket"}

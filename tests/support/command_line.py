@@ -64,6 +64,12 @@ def loaded(code: str, *words) -> set:
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 
+def loaded_again(code: str, *words) -> set:
+    """What `loaded` gives where all compiled code is kept: a run that had to compile is run once more."""
+    modules = loaded(code, *words)
+    return loaded(code, *words) if "numba" in modules else modules
+
+
 def absent(modules: set, *stages) -> None:
     """None of the packages of ALWAYS and none of these stages (and packages) are among the modules; the `__init__` of a
     folder that holds nothing but words does not count, for a module that is only named brings it."""
