@@ -178,9 +178,9 @@ def test_always_twenty_thousand_unknowns_condense_within_a_second():
     assert 2 * (len(mesh.points) - mesh.far.size) > 18000 and mesh.interface.size == 201
     seconds = []
     for _ in range(3):
-        begin = time.perf_counter()
+        begin = time.process_time()
         condense(assemble(mesh, COATED))
-        seconds.append(time.perf_counter() - begin)
+        seconds.append(time.process_time() - begin)
     assert min(seconds) < 1.0
 
 
