@@ -21,6 +21,7 @@ from .names_kernels import (
     EVENT,
     F_FIRST,
     F_LAST,
+    FELT,
     FIRST,
     FORCE,
     HIGH,
@@ -31,6 +32,8 @@ from .names_kernels import (
     LOST,
     LOW,
     MEAN,
+    NEXT_FELT,
+    NEXT_SQUARE,
     NUMBER,
     NUMBERS,
     OUT,
@@ -51,6 +54,7 @@ from .names_kernels import (
     SIN,
     SLIP_HIGH,
     SLIP_LOW,
+    SQUARE,
     START_COS,
     START_SIN,
     STARTS,
@@ -78,6 +82,8 @@ def step(room, i, s0, c0, s1, c1, h):
     x1, v1, way1, place1, u, _, ve, pe, turn, kink = done
     room[X * LANES + i], room[V * LANES + i] = x1, v1
     room[WAY * LANES + i], room[PLACE * LANES + i] = way1, place1
+    if law.STRETCHES:
+        room[FELT * LANES + i], room[SQUARE * LANES + i] = room[NEXT_FELT * LANES + i], room[NEXT_SQUARE * LANES + i]
     room[PATH * LANES + i] += law.path(place, pe, place1, v1, room, i)
     # what a jump of the acceleration inside the step leaves of the trapezoidal rule
     edge = kink * h * (u * (1 - u) / 2 - 1 / 12)
@@ -100,6 +106,10 @@ def glide(room, i, s0, c0, s1, c1):
     room[EVENT * LANES + i] = 1.0 - on
     room[X * LANES + i], room[V * LANES + i] = x if event else x1, v if event else v1
     room[PLACE * LANES + i] = place if event else place1
+    if law.STRETCHES:
+        felt, square = room[FELT * LANES + i], room[SQUARE * LANES + i]
+        room[FELT * LANES + i] = felt if event else room[NEXT_FELT * LANES + i]
+        room[SQUARE * LANES + i] = square if event else room[NEXT_SQUARE * LANES + i]
     power = on * (s1 * v1)
     room[PATH * LANES + i] += on * law.path(place, place1, place1, v1, room, i)
     room[IN * LANES + i] += power
@@ -146,13 +156,13 @@ def look(room, i, s0, c0, s1, c1, h):
     x1, v1, way1, place1, u, xe, ve, pe, turn, _ = done
     out, base = room[OUT * LANES + i], room[BASE * LANES + i]
     damp, push, square = room[D * LANES + i], room[P * LANES + i], room[W * LANES + i]
-    f0, f1 = law.felt(x, way, place, s0, room, i), law.felt(x1, way1, place1, s1, room, i)
+    f0, f1 = law.felt(x, v, way, place, s0, room, i), law.felt(x1, v1, way1, place1, s1, room, i)
     a0, a1 = push * s0 - damp * v - square * x - f0, push * s1 - damp * v1 - square * x1 - f1
     # the acceleration on both sides of an event, and at its vertices between it and the ends
     t = u * h
     se = s0 * (1 - t * t / 2 + t**4 / 24) + c0 * t * (1 - t * t / 6 + t**4 / 120)
     ce = c0 * (1 - t * t / 2 + t**4 / 24) - s0 * t * (1 - t * t / 6 + t**4 / 120)
-    before, after = law.felt(xe, way, pe, se, room, i), law.felt(xe, way1, pe, se, room, i)
+    before, after = law.felt(xe, ve, way, pe, se, room, i), law.felt(xe, ve, way1, pe, se, room, i)
     rest = push * se - damp * ve - square * xe
     ae, af = rest - before, rest - after
     moves, moves1 = 0.0 if law.RESTS and way == 0.0 else out, 0.0 if law.RESTS and way1 == 0.0 else out
@@ -167,23 +177,31 @@ def look(room, i, s0, c0, s1, c1, h):
                        (h - t) * (moves1 * (push * c1 - damp * a1 - square * v1) + base * c1) - moves1 * r1))
     room[ACCELERATION * LANES + i] = max(room[ACCELERATION * LANES + i], best)
     # sticks and releases
-    stuck = (u if way == 0.0 else 0.0) + (1 - u if way1 == 0.0 else 0.0)
-    room[STUCK * LANES + i] += h * stuck
-    run = room[STICK * LANES + i] + h * (u if way == 0.0 else 0.0)
+    stick, slips, slid = law.held((x, v, a0, place), (xe, ve, ae, pe), way, room, i, t)
+    stick1, slips1, slid1 = law.held((xe, ve, af, pe), (x1, v1, a1, place1), way1, room, i, h - t)
+    stuck = u * stick, (1 - u) * stick1
+    room[STUCK * LANES + i] += h * (stuck[0] + stuck[1])
+    run = room[STICK * LANES + i] + h * stuck[0]
     longest = max(room[LONGEST * LANES + i], run)
     room[LONGEST * LANES + i] = longest
-    run = run if way == 0.0 and u >= 1.0 else 0.0
-    room[STICK * LANES + i] = run + h * (1 - u if way1 == 0.0 else 0.0)
-    begins = 1.0 if way == 0.0 and way1 != 0.0 else 0.0
+    run = run if stick > 0.0 and u >= 1.0 else 0.0
+    room[STICK * LANES + i] = run + h * stuck[1]
+    lets_go = way == 0.0 and way1 != 0.0
+    start = t if lets_go else t * slips if slips <= 1.0 else t + (h - t) * slips1
+    begins = 1.0 if lets_go or slips <= 1.0 or slips1 <= 1.0 else 0.0
+    sb = s0 * (1 - start * start / 2 + start**4 / 24) + c0 * start * (1 - start * start / 6 + start**4 / 120)
+    cb = c0 * (1 - start * start / 2 + start**4 / 24) - s0 * start * (1 - start * start / 6 + start**4 / 120)
     room[STARTS * LANES + i] += begins
-    room[START_COS * LANES + i] += begins * (1 - 2 * se * se)
-    room[START_SIN * LANES + i] += begins * 2 * se * ce
+    room[START_COS * LANES + i] += begins * (1 - 2 * sb * sb)
+    room[START_SIN * LANES + i] += begins * 2 * sb * cb
     # the loop
-    fold_t = law.felt(turn, way, place, se, room, i)
+    pull = law.at_turn(turn, way, place, pe, room, i)
     peak = max(highest(f0, before, r0, re), highest(after, f1, rf, r1))
-    room[FORCE * LANES + i] = max(room[FORCE * LANES + i], peak if turn == x1 else max(peak, abs(fold_t)))
-    room[SLIP_HIGH * LANES + i] = max(room[SLIP_HIGH * LANES + i], max(law.slid(xe, pe), law.slid(x1, place1)))
-    room[SLIP_LOW * LANES + i] = min(room[SLIP_LOW * LANES + i], min(law.slid(xe, pe), law.slid(x1, place1)))
+    room[FORCE * LANES + i] = max(room[FORCE * LANES + i], peak if turn == x1 else max(peak, abs(pull)))
+    room[SLIP_HIGH * LANES + i] = max(max(room[SLIP_HIGH * LANES + i], max(law.slid(xe, pe), law.slid(x1, place1))),
+                                         max(slid, slid1))
+    room[SLIP_LOW * LANES + i] = min(min(room[SLIP_LOW * LANES + i], min(law.slid(xe, pe), law.slid(x1, place1))),
+                                        min(slid, slid1))
     one, two = 0.5 * (f0 + before) * (xe - x), 0.5 * (after + f1) * (x1 - xe)
     room[TURNED * LANES + i] += one + two
     room[PASSED * LANES + i] += abs(one) + abs(two)
@@ -193,7 +211,6 @@ def look(room, i, s0, c0, s1, c1, h):
     room[S3 * LANES + i] += x1 * s1 * (3 - 4 * s1 * s1)
     room[MEAN * LANES + i] += x1
     room[PULL * LANES + i] += f1
-    pull = law.at_turn(turn, way, place, room, i)
     turned = v != 0.0 and v * v1 <= 0.0
     higher, lower = max(x1, turn) > high, min(x1, turn) < low
     room[PULL_HIGH * LANES + i] = (pull if turned else nan) if higher else room[PULL_HIGH * LANES + i]
@@ -210,6 +227,9 @@ def fetch(case, i, cases, motion, room):
     room[CASE * LANES + i], room[CYCLE * LANES + i] = case, 0.0
     room[WAS_X * LANES + i], room[WAS_V * LANES + i] = room[X * LANES + i], room[V * LANES + i]
     room[WAS_PLACE * LANES + i] = room[PLACE * LANES + i]
+    if law.STRETCHES:
+        room[FELT * LANES + i] = law.felt(room[X * LANES + i], room[V * LANES + i], room[WAY * LANES + i],
+                                          room[PLACE * LANES + i], 0.0, room, i)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)

@@ -7,7 +7,8 @@ from patchfem.compiled.plain import plain
 from patchfem.dynamics.lanes import names_kernels as at
 from patchfem.dynamics.lanes import reading, run
 
-LAWS = "rigid", "yielding", "creeping"
+FLOWS = tuple(f"friction.laws.{law}_kernels" for law in ("tanh", "stretch", "bouc_wen", "lugre"))
+LAWS = "rigid", "yielding", *FLOWS
 
 
 def cases(law: str, count: int, seed: int = 1) -> run.Cases:
@@ -17,16 +18,23 @@ def cases(law: str, count: int, seed: int = 1) -> run.Cases:
     slip = 10 ** r.uniform(-1.5, -0.1, count)
     spring = r.uniform(0.5, 5, count) if law == "yielding" else 0 * one
     length = slip / np.where(spring > 0, spring, 1) * (spring > 0)
-    if law == "creeping":
-        length = slip * r.uniform(0.3, 2, count)
-    return run.Cases(2 * np.sqrt(square) * 10 ** r.uniform(-3, -0.5, count), square, one, slip,
+    numbers = np.zeros((count, 0))
+    if law in FLOWS:
+        speed, length = slip * r.uniform(0.3, 2, count), (0 if "tanh" in law else 1) * r.uniform(0.6, 2, count)
+        spring = np.divide(slip, length, out=0 * slip, where=length > 0)
+        numbers = np.array({"tanh": [slip, speed], "stretch": [spring, length],
+                            "bouc_wen": [slip, length, r.choice([1, 2, 1.5], count), r.uniform(0.5, 1, count)],
+                            "lugre": [spring, slip * r.uniform(0.6, 1, count), slip, speed,
+                                      *(r.uniform(0, 0.2, count) * slip / speed for _ in range(2))],
+                            }[law.split(".")[2].removesuffix("_kernels")]).T
+    return run.Cases(2 * np.sqrt(square) * 10 ** r.uniform(-1 if law in FLOWS else -3, -0.5, count), square, one, slip,
                      slip * (r.choice([1, 1.3], count) if law == "rigid" else 1), spring,
-                     length, -one, one, 0 * one, 0.1 * r.choice([0, 1], count))
+                     length, -one, one, 0 * one, 0.1 * r.choice([0, 1], count), numbers)
 
 
 def test_exact_the_hyperbolic_tangent_of_lanes():
     """Its error is below 2e-13, as its text states."""
-    tangent = plain("patchfem.dynamics.lanes.creeping_kernels").hyperbolic
+    tangent = plain("patchfem.friction.laws.tanh_kernels").hyperbolic
     places = np.concatenate([np.linspace(-25, 25, 5001), [-1e-9, 0.0, 1e-9, 300.0]])
     np.testing.assert_allclose([tangent(y) for y in places], np.tanh(places), rtol=0, atol=2e-13)
 
@@ -38,7 +46,10 @@ def test_exact_lanes_are_the_text_as_python(law, monkeypatch):
     some = cases(law, 3)
     fast = run.march(law, some, 2, 1, 24)
     text = plain("patchfem.dynamics.lanes.loop_kernels")
-    monkeypatch.setattr(text, "law", plain(f"patchfem.dynamics.lanes.{law}_kernels"))
+    flowing = plain("patchfem.dynamics.lanes.flowing_kernels")
+    monkeypatch.setattr(text, "law", flowing if law in FLOWS else plain(f"patchfem.dynamics.lanes.{law}_kernels"))
+    if law in FLOWS:
+        monkeypatch.setattr(flowing, "friction", plain(f"patchfem.{law}"))
     monkeypatch.setattr(run, "kernels", lambda law: text)
     with np.errstate(all="ignore"):
         slow = run.march(law, some, 2, 1, 24)
@@ -65,7 +76,7 @@ def test_order_of_events_is_above_three(law):
     reach = [np.ptp(run.march(law, some, 60, 6, steps).history[:, -6:, :2], axis=(1, 2)) / 2
              for steps in (48, 96, 768)]
     coarse, fine = (np.abs(one - reach[2]) / reach[2] for one in reach[:2])
-    assert np.quantile(fine, 0.9) < (1e-4 if law == "creeping" else 1e-5)
+    assert np.quantile(fine, 0.9) < (1e-4 if law in FLOWS else 1e-5)
     counts = coarse > 1e-9
     assert np.median(np.log2(coarse[counts] / np.maximum(fine[counts], 1e-14))) > 2.9
 
@@ -87,7 +98,8 @@ def test_exact_without_friction_a_march_is_the_closed_form():
     """At any steps the motion after some cycles is that of the linear oscillator."""
     none = np.zeros(3)
     damp, square = np.array([0.02, 0.3, 2.5]), np.array([1.0, 2.0, 1.3])
-    some = run.Cases(damp, square, np.ones(3), none, none, none, none, np.ones(3), none, none, 0.1 + none)
+    some = run.Cases(damp, square, np.ones(3), none, none, none, none, np.ones(3), none, none, 0.1 + none,
+                     np.zeros((3, 0)))
     for steps in (16, 48):
         found = run.march("rigid", some, 7, 2, steps)
         for k in range(3):

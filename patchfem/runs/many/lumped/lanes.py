@@ -1,11 +1,13 @@
-"""The batch of lanes: lumped Coulomb, elastic-plastic and tanh cases side by side, with bars from half the steps.
+"""The batch of lanes: lumped cases of one law side by side, with bars from half the steps.
 
-A tanh case whose bars miss its tolerance marches by finer steps. A case goes to the exact batch `lumped`, a tanh case
-to a run of its own, where a bar still misses its tolerance, where nothing slips, rings are to be told or a motion still
-has to settle. So does every case of a batch of which these contradict one of a few.
+A case of a law of a stretch (tanh, Bouc-Wen, LuGre, bonds of a constant length) marches by a quarter of the steps too,
+which shows how its errors fall, and by finer steps where its bars miss its tolerance. A case goes to the exact batch
+`lumped`, or under these laws to a run of its own, where a bar still misses its tolerance, where nothing slips, rings
+are to be told or a motion still has to settle. So does every case of a batch of which these contradict one of a few.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from time import perf_counter
 from zlib import crc32
 
@@ -14,6 +16,7 @@ import numpy as np
 from ....dynamics.lanes import names_kernels as at
 from ....dynamics.lanes import reading
 from ....dynamics.lanes import run as march
+from ....effects import has, listed
 from ....model.alike import Alike, columns_of, some
 from ....model.model import Model
 from ....response.errors import APART, GAPS, MAIN, ROUND
@@ -32,14 +35,18 @@ from .pieces import LONGEST, SHORTEST
 LEAST = 64  # cases of a study that lanes serve
 TIGHTEST = 1e-4  # tolerance that lanes serve
 TOGETHER = 4096  # cases of one compiled call
-KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "tanh": "creeping"}  # law -> that of `dynamics.lanes`
-SMOOTH = 128, 256, 512, 1024, 2048  # steps of a cycle under the rate law, whose own rate is 1 a step then
-FINER = 4  # times as many steps has a case under the rate law whose bars miss its tolerance
+# law -> that of `dynamics.lanes`
+KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "tanh": "friction.laws.tanh_kernels",
+         "bouc-wen": "friction.laws.bouc_wen_kernels", "lugre": "friction.laws.lugre_kernels",
+         "nonlocal": "friction.laws.stretch_kernels"}
+SMOOTH, CALM = (128, 256, 512, 1024, 2048), 0.5  # steps of a cycle under a law of a stretch, its rate in a step then
+FINER = 4  # times as many steps has a case under such a law whose bars miss its tolerance
 RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
 # of the change at half the steps, of that of the main measures, and of the measure itself, as both marches can miss an
 # event alike: 2 of 4077 random cases had an error beyond
 OF_CHANGE, OF_TYPICAL, OF_SIZE = 2.0, 1.0, 2e-5
-WIDER = 2.0  # times these are the bars of tanh cases: 493 of 500 had no error beyond half of them
+OF_MIDDLE = 1e-6  # of the amplitude, by which its middle errs under a law of a stretch, of which no event is missed
+ORDERLY, SHOWN = 6.0, 0.25  # a change at half the steps that falls by this shows a high order, and is so much of itself
 CHECKED, FEWEST = 200, 2  # one of so many cases is held against the exact engine, so many of a batch at least
 RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a ring is looked for
 
@@ -57,27 +64,66 @@ def no_lanes(model: Model) -> str:
         return "its cycles are too few or too many, or nothing rubs"
     if model.friction.law not in KINDS:
         return "its law does not march in lanes"
+    if why := _manifold(model.friction):
+        return why
     if model.accuracy.method != "auto" or pinned(model.accuracy) or model.accuracy.tolerance < TIGHTEST:
         return "it asks for another method, or for more than lanes state"
     return ""
 
 
+def _manifold(friction) -> str:
+    """Why a law of a stretch has more than that to follow; "" where it has not."""
+    grows = has(friction.law, "bonds") and (listed(friction) or friction.slip_growth is not None)
+    return "its bonds grow, or have more than one stretch" if grows else ""
+
+
+def _creates(model: Model):
+    """Whether a law of a stretch may create energy, or its bonds have more than one stretch."""
+    f = model.friction
+    if has(f.law, "bonds"):
+        return np.not_equal(f.breakaway or 0.0, 0.0) | np.not_equal(f.initial_bonds, 1.0)
+    if f.law == "lugre":  # the power of its damping is below zero from there on
+        return np.greater(f.micro_damping * model.rig.speed, 4 * of_law(model)[1])
+    return np.less(f.shape, 0.5) if f.law == "bouc-wen" else False
+
+
+def of_law(model: Model) -> tuple:
+    """Numbers of a law of a stretch, as its `flowing` takes them, and the length [m] over which it gives way, 0 for
+    none."""
+    f, load, limit = model.friction, model.point.load, model.limits(model.point.load)[0]
+    if f.law == "tanh":
+        return limit, f.reference_speed, 0.0
+    if has(f.law, "bonds"):
+        return limit / f.bond_length, f.bond_length, f.bond_length
+    if f.law == "bouc-wen":
+        return limit, limit / f.stiffness, f.exponent, f.shape, limit / f.stiffness
+    kinetic = f.static if f.kinetic is None else f.kinetic
+    return f.stiffness, kinetic * load, limit, f.stribeck_speed, f.micro_damping, f.viscous, limit / f.stiffness
+
+
 def steps_of(models: Sequence[Model]) -> np.ndarray:
     """Steps per cycle (n,) of models of one law, 0 where they would be too many."""
     rate, = columns_of(models, _rate)
-    ends = [(steps / (2 * np.pi), steps) for steps in SMOOTH] if models[0].friction.law == "tanh" else RATES
+    smooth = march.flows(KINDS[models[0].friction.law])
+    ends = [(CALM * steps / (2 * np.pi), steps) for steps in SMOOTH] if smooth else RATES
     return np.append([steps for _, steps in ends], 0)[np.searchsorted([end for end, _ in ends], rate)]
 
 
 def _rate(model: Model) -> tuple:
-    """Fastest rate of a model over that of its drive."""
-    modes, omega, stiff = model.rig.modes, model.rig.drive.omega, 0.0
-    if model.friction.law == "tanh":
-        rate = model.limits(model.point.load)[0] / model.friction.reference_speed * modes.slide[0]**2 / modes.mass
-        return np.maximum(rate + modes.dampers[0, 0], modes.omega[0]) / omega,
+    """Fastest rate of a model over that of its drive; infinite where lanes do not follow it."""
+    modes, omega, stiff, damper = model.rig.modes, model.rig.drive.omega, 0.0, model.rig.modes.dampers[0, 0]
+    scale, limit = modes.slide[0]**2 / modes.mass, model.limits(model.point.load)[0]
+    if march.flows(KINDS[model.friction.law]):
+        length = of_law(model)[-1]
+        if model.friction.law == "tanh":
+            rate = limit / model.friction.reference_speed * scale + damper
+        else:
+            rate, stiff = damper, limit / length * scale
+        rate = np.maximum(rate, np.sqrt(modes.omega[0]**2 + stiff)) / omega
+        return np.where(_creates(model), np.inf, rate),
     if model.friction.law == "elastic-plastic":
-        stiff = model.limits(model.point.load)[0] / model.friction.bond_length * modes.slide[0]**2 / modes.mass
-    return (np.sqrt(modes.omega[0]**2 + stiff) + modes.dampers[0, 0]) / omega,
+        stiff = limit / model.friction.bond_length * scale
+    return (np.sqrt(modes.omega[0]**2 + stiff) + damper) / omega,
 
 
 def group(model: Model) -> tuple:
@@ -105,11 +151,11 @@ def _solved(models: Sequence[Model], say, steps: int = 0) -> Answers:
     begin, (cycles, law, least) = perf_counter(), group(models[0])
     steps = max(steps, least)
     window = min(10, cycles // 10)
-    runs, exact, marks = runs_of(models, cycles, window, steps)
+    runs, exact, lost, marks = runs_of(models, cycles, window, steps)
     found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window})
     # elastic-plastic motions that have not settled have a steady estimate by the map of their yields
     unsettled = found.outcome == "grows" if law != "elastic-plastic" else found.outcome != "steady"
-    wide = too_wide(models, found)
+    wide = too_wide(models, found) | lost
     exact |= alone | wide | unsettled
     chosen = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
     found.numerics.update(dict.fromkeys(range(len(models)), chosen))
@@ -122,7 +168,7 @@ def _solved(models: Sequence[Model], say, steps: int = 0) -> Answers:
     if wrong := contradicted(found, ones, looked):
         exact[:] = True
         note = f"lanes said {wrong} otherwise than the exact engine in a check of {len(looked)} cases, so all are exact"
-    finer = (wide | alone) & (law == "tanh" and not wrong and FINER * steps <= SMOOTH[-1])
+    finer = (wide | alone) & (march.flows(KINDS[law]) and not wrong and FINER * steps <= SMOOTH[-1])
     exact &= ~finer
     if cases := np.flatnonzero(finer).tolist():
         lumped.take_out(found, cases)
@@ -149,6 +195,8 @@ def too_wide(models, found: Answers) -> np.ndarray:
     """(n,) whether a bar misses the tolerance of a case."""
     tolerance, out = columns_of(models, lambda model: (model.accuracy.tolerance,))[0], np.zeros(len(models), bool)
     for name, values in found.values.items():
+        if name.endswith("_steady"):  # what it leaves open is no matter of steps
+            continue
         out |= found.errors[name] > tolerance * np.abs(values) + found.floors[name]
     return out
 
@@ -179,41 +227,45 @@ def contradicted(found: Answers, ones: Answers | None, looked: list) -> str:
 
 
 def runs_of(models, cycles: int, window: int, steps: int) -> tuple:
-    """(Runs of models of a group, (n,) which must be run otherwise, (n, k) numbers that tell each from any other)."""
+    """(Runs of models of a group, (n,) which must be run otherwise, (n,) which need finer steps at least, (n, k)
+    numbers that tell each from any other)."""
     law = KINDS[models[0].friction.law]
     cases, c = cases_of(models)
-    fine, coarse = (_measured(law, cases, c, march.march(law, cases, cycles, window, count))
-                    for count in (steps, steps // 2))
-    values, book, found, extremes = fine
-    changes = {name: np.abs(value - coarse[0][name]) for name, value in values.items()}
-    changes["slip_start_phase"] = np.minimum(changes["slip_start_phase"], np.pi - changes["slip_start_phase"])
+    fine, *coarser = (_measured(law, cases, c, march.march(law, cases, cycles, window, steps // share))
+                      for share in ((1, 2, 4) if march.flows(law) else (1, 2)))
+    (values, book, found, extremes), coarse = fine, coarser[0]
+    changes = changed(values, [one[0] for one in coarser])
     slips = found.shown[:, at.SLIP_HIGH - at.SHOW] - found.shown[:, at.SLIP_LOW - at.SHOW]
     stuck = slips / 2 <= np.maximum(c["held"], ROUND * np.abs(found.history[:, :, :2]).max(axis=(1, 2)))
     exact = stuck | np.any([np.isnan(values[name]) != np.isnan(coarse[0][name]) for name in values], axis=0)
-    if law == "yielding":
+    if law != "rigid":
         own = np.sqrt(np.maximum(cases.square + cases.spring - cases.damp**2 / 4, 0.0))
         exact |= found.shown[:, at.LONGEST - at.SHOW] * own >= RINGS
     phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
-    errors = {name: (WIDER if law == "creeping" else 1.0) * one for name, one in bars(values, changes).items()}
+    errors = bars(values, changes, march.flows(law))
     none = {name: np.full(len(models), np.nan) for name in ("ring_frequency", "ring_damping")}
     nowhere = np.zeros(len(models), bool)  # what sticks or is lost goes elsewhere
     runs = Runs(cycles, window, values | none, book, extremes, phasors[:, ends], nowhere, nowhere, errors, 1e-9, np.inf,
                 again=False)
-    return runs, exact, np.array(cases).T.copy()
+    lost = ~np.isfinite(found.motion[:, at.X] + coarse[2].motion[:, at.X])
+    return runs, exact, lost, np.column_stack(cases)
 
 
 def cases_of(models) -> tuple:
     """(Cases of models, what else is told of them by name, (n,) each: SI)."""
+    law = KINDS[models[0].friction.law]
     own, damping, slide, share, output, mass, drive, w, moving, static, kinetic, length, z, v, stiffness, load, size = \
         columns_of(models, _row)
-    scale = slide**2 / (mass * w**2)
-    springs = KINDS[models[0].friction.law] == "yielding"
-    spring = scale * static / length if springs else 0.0 * scale
+    scale, numbers = slide**2 / (mass * w**2), np.zeros((len(w), 0))
+    if march.flows(law):
+        *numbers, length = columns_of(models, of_law)
+        numbers = np.transpose(numbers) * march.scales(law, scale, w)
+    spring = np.divide(scale * static, length, out=0.0 * scale, where=length > 0)
     cases = march.Cases(damping / w, (own / w)**2, -slide * share * drive / w**2, scale * kinetic, scale * static,
-                        spring, length, output / slide * w**2, drive * moving, slide * z, slide * v / w)
+                        spring, length, output / slide * w**2, drive * moving, slide * z, slide * v / w, numbers)
     return cases, {"omega": w, "energy": mass * (w / slide)**2, "ratio": output / slide,
-                   "held": 1e-3 * length * springs, "stiffness": stiffness, "load": load, "size": size}
+                   "held": 1e-3 * length, "stiffness": stiffness, "load": load, "size": size}
 
 
 def _row(model: Model) -> tuple:
@@ -222,8 +274,7 @@ def _row(model: Model) -> tuple:
         model.limits(model.point.load)
     law = KINDS[model.friction.law]
     kinetic = kinetic if law == "rigid" and model.friction.kinetic is not None else static
-    length = model.friction.bond_length if law == "yielding" else \
-        model.friction.reference_speed / drive.omega if law == "creeping" else 0.0
+    length = model.friction.bond_length if law == "yielding" else 0.0
     return (modes.omega[0], modes.dampers[0, 0], modes.slide[0], modes.base[0], modes.output[0], modes.mass,
             drive.acceleration, drive.omega, drive.moving, static, kinetic, length,
             *((0.0, 0.0) if start is None else (start.z[0], start.v[0])), model.rig.stiffness, model.point.load,
@@ -243,19 +294,39 @@ def _measured(law: str, cases, c: dict, found) -> tuple:
     return values, book, found, extremes
 
 
-def bars(values: dict, changes: dict) -> dict:
-    """Errors by name, (n,) each, of values whose changes at half the steps are known: the change, and a share of the
-    median relative change of the main measures, as one change can be small by chance."""
+def changed(values: dict, coarser: list) -> dict:
+    """Changes by name, (n,) each, of values at half the steps; where a quarter of them, the last of `coarser`, shows
+    that they fall with the step as those of a high order do, a share of them."""
+    changes = []
+    for fine, coarse in pairwise([values, *coarser]):
+        changes.append({name: np.abs(fine[name] - coarse[name]) for name in values})
+        changes[-1]["slip_start_phase"] = np.minimum(changes[-1]["slip_start_phase"],
+                                                     np.pi - changes[-1]["slip_start_phase"])
+    if len(changes) == 1:
+        return changes[0]
+    last, before = changes
     with np.errstate(all="ignore"):
-        shares = [np.where(changes[name] > 0, changes[name] / np.abs(values[name]), np.nan) for name in MAIN
-                  if name in values]
-        typical = np.nan_to_num(np.nanmedian(shares, axis=0))
+        falls = np.array([before[name] >= ORDERLY * last[name] for name in MAIN]).sum(axis=0) > len(MAIN) / 2
+        return {name: np.where(falls & (before[name] >= ORDERLY * last[name]) & np.isfinite(before[name]),
+                               np.fmax(SHOWN * last[name], SHOWN**2 * before[name]), last[name]) for name in values}
+
+
+def bars(values: dict, changes: dict, smooth: bool = False) -> dict:
+    """Errors by name, (n,) each, of values whose changes at half the steps are known: the change, and a share of the
+    median relative change of the main measures, as one change can be small by chance; smooth: under a law of a
+    stretch, whose force no limit holds."""
+    with np.errstate(all="ignore"):
+        shares = np.array([np.where(changes[name] > 0, changes[name] / np.abs(values[name]), np.nan) for name in MAIN
+                           if name in values])
+        shares[:, np.isnan(shares).all(axis=0)] = 0.0
+        typical = np.nanmedian(shares, axis=0)
     out = {}
     for name, change in changes.items():
         size = first_harmonic(values) if name == "equivalent_stiffness" else 1.0 if TABLE[name].term is not None \
             and name not in GAPS and name != "drift_per_cycle" else np.abs(values[name])
         if name == "drift_per_cycle":
             size = np.abs(values[MAIN[0]])
-        chance = 0.0 if name in (*APART[:1], "normal_load", *GAPS) else (OF_TYPICAL * typical + OF_SIZE) * size
+        least, held = OF_MIDDLE if smooth and name == "drift_per_cycle" else OF_SIZE, () if smooth else APART[:1]
+        chance = 0.0 if name in (*held, "normal_load", *GAPS) else (OF_TYPICAL * typical + least) * size
         out[name] = np.maximum(OF_CHANGE * np.nan_to_num(change), chance)
     return out
