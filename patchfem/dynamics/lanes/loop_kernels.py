@@ -21,7 +21,6 @@ from .names_kernels import (
     EVENT,
     F_FIRST,
     F_LAST,
-    FELT,
     FIRST,
     FORCE,
     HIGH,
@@ -32,11 +31,10 @@ from .names_kernels import (
     LOST,
     LOW,
     MEAN,
-    NEXT_FELT,
-    NEXT_SQUARE,
     NUMBER,
     NUMBERS,
     OUT,
+    OWN,
     PASSED,
     PATH,
     PLACE,
@@ -54,7 +52,6 @@ from .names_kernels import (
     SIN,
     SLIP_HIGH,
     SLIP_LOW,
-    SQUARE,
     START_COS,
     START_SIN,
     STARTS,
@@ -82,8 +79,6 @@ def step(room, i, s0, c0, s1, c1, h):
     x1, v1, way1, place1, u, _, ve, pe, turn, kink = done
     room[X * LANES + i], room[V * LANES + i] = x1, v1
     room[WAY * LANES + i], room[PLACE * LANES + i] = way1, place1
-    if law.STRETCHES:
-        room[FELT * LANES + i], room[SQUARE * LANES + i] = room[NEXT_FELT * LANES + i], room[NEXT_SQUARE * LANES + i]
     room[PATH * LANES + i] += law.path(place, pe, place1, v1, room, i)
     # what a jump of the acceleration inside the step leaves of the trapezoidal rule
     edge = kink * h * (u * (1 - u) / 2 - 1 / 12)
@@ -106,10 +101,6 @@ def glide(room, i, s0, c0, s1, c1):
     room[EVENT * LANES + i] = 1.0 - on
     room[X * LANES + i], room[V * LANES + i] = x if event else x1, v if event else v1
     room[PLACE * LANES + i] = place if event else place1
-    if law.STRETCHES:
-        felt, square = room[FELT * LANES + i], room[SQUARE * LANES + i]
-        room[FELT * LANES + i] = felt if event else room[NEXT_FELT * LANES + i]
-        room[SQUARE * LANES + i] = square if event else room[NEXT_SQUARE * LANES + i]
     power = on * (s1 * v1)
     room[PATH * LANES + i] += on * law.path(place, place1, place1, v1, room, i)
     room[IN * LANES + i] += power
@@ -156,19 +147,19 @@ def look(room, i, s0, c0, s1, c1, h):
     x1, v1, way1, place1, u, xe, ve, pe, turn, _ = done
     out, base = room[OUT * LANES + i], room[BASE * LANES + i]
     damp, push, square = room[D * LANES + i], room[P * LANES + i], room[W * LANES + i]
-    f0, f1 = law.felt(x, v, way, place, s0, room, i), law.felt(x1, v1, way1, place1, s1, room, i)
+    f0, f1 = law.felt(x, way, place, s0, room, i), law.felt(x1, way1, place1, s1, room, i)
     a0, a1 = push * s0 - damp * v - square * x - f0, push * s1 - damp * v1 - square * x1 - f1
     # the acceleration on both sides of an event, and at its vertices between it and the ends
     t = u * h
     se = s0 * (1 - t * t / 2 + t**4 / 24) + c0 * t * (1 - t * t / 6 + t**4 / 120)
     ce = c0 * (1 - t * t / 2 + t**4 / 24) - s0 * t * (1 - t * t / 6 + t**4 / 120)
-    before, after = law.felt(xe, ve, way, pe, se, room, i), law.felt(xe, ve, way1, pe, se, room, i)
+    before, after = law.felt(xe, way, pe, se, room, i), law.felt(xe, way1, pe, se, room, i)
     rest = push * se - damp * ve - square * xe
     ae, af = rest - before, rest - after
     moves, moves1 = 0.0 if law.RESTS and way == 0.0 else out, 0.0 if law.RESTS and way1 == 0.0 else out
     # slopes of the friction
-    r0, re = t * law.rise(v, a0, way, place, room, i), t * law.rise(ve, ae, way, pe, room, i)
-    rf, r1 = (h - t) * law.rise(ve, af, way1, pe, room, i), (h - t) * law.rise(v1, a1, way1, place1, room, i)
+    r0, re = t * law.rise(v, a0, way, place, room, i, 0), t * law.rise(ve, ae, way, pe, room, i, 1)
+    rf, r1 = (h - t) * law.rise(ve, af, way1, pe, room, i, 2), (h - t) * law.rise(v1, a1, way1, place1, room, i, 3)
     best = max(highest(out * a0 + base * s0, out * ae + base * se,
                        t * (moves * (push * c0 - damp * a0 - square * v) + base * c0) - moves * r0,
                        t * (moves * (push * ce - damp * ae - square * ve) + base * ce) - moves * re),
@@ -177,31 +168,24 @@ def look(room, i, s0, c0, s1, c1, h):
                        (h - t) * (moves1 * (push * c1 - damp * a1 - square * v1) + base * c1) - moves1 * r1))
     room[ACCELERATION * LANES + i] = max(room[ACCELERATION * LANES + i], best)
     # sticks and releases
-    stick, slips, slid = law.held((x, v, a0, place), (xe, ve, ae, pe), way, room, i, t)
-    stick1, slips1, slid1 = law.held((xe, ve, af, pe), (x1, v1, a1, place1), way1, room, i, h - t)
-    stuck = u * stick, (1 - u) * stick1
-    room[STUCK * LANES + i] += h * (stuck[0] + stuck[1])
-    run = room[STICK * LANES + i] + h * stuck[0]
+    stuck = (u if way == 0.0 else 0.0) + (1 - u if way1 == 0.0 else 0.0)
+    room[STUCK * LANES + i] += h * stuck
+    run = room[STICK * LANES + i] + h * (u if way == 0.0 else 0.0)
     longest = max(room[LONGEST * LANES + i], run)
     room[LONGEST * LANES + i] = longest
-    run = run if stick > 0.0 and u >= 1.0 else 0.0
-    room[STICK * LANES + i] = run + h * stuck[1]
-    lets_go = way == 0.0 and way1 != 0.0
-    start = t if lets_go else t * slips if slips <= 1.0 else t + (h - t) * slips1
-    begins = 1.0 if lets_go or slips <= 1.0 or slips1 <= 1.0 else 0.0
-    sb = s0 * (1 - start * start / 2 + start**4 / 24) + c0 * start * (1 - start * start / 6 + start**4 / 120)
-    cb = c0 * (1 - start * start / 2 + start**4 / 24) - s0 * start * (1 - start * start / 6 + start**4 / 120)
+    run = run if way == 0.0 and (u >= 1.0 or (law.TURNS_HELD and way1 == 0.0)) else 0.0
+    room[STICK * LANES + i] = run + h * (1 - u if way1 == 0.0 else 0.0)
+    begins = 1.0 if way == 0.0 and way1 != 0.0 else 0.0
     room[STARTS * LANES + i] += begins
-    room[START_COS * LANES + i] += begins * (1 - 2 * sb * sb)
-    room[START_SIN * LANES + i] += begins * 2 * sb * cb
+    room[START_COS * LANES + i] += begins * (1 - 2 * se * se)
+    room[START_SIN * LANES + i] += begins * 2 * se * ce
     # the loop
-    pull = law.at_turn(turn, way, place, pe, room, i)
+    fold_t = law.felt(turn, way, place, se, room, i)
     peak = max(highest(f0, before, r0, re), highest(after, f1, rf, r1))
-    room[FORCE * LANES + i] = max(room[FORCE * LANES + i], peak if turn == x1 else max(peak, abs(pull)))
-    room[SLIP_HIGH * LANES + i] = max(max(room[SLIP_HIGH * LANES + i], max(law.slid(xe, pe), law.slid(x1, place1))),
-                                         max(slid, slid1))
-    room[SLIP_LOW * LANES + i] = min(min(room[SLIP_LOW * LANES + i], min(law.slid(xe, pe), law.slid(x1, place1))),
-                                        min(slid, slid1))
+    room[FORCE * LANES + i] = max(room[FORCE * LANES + i], peak if turn == x1 else max(peak, abs(fold_t)))
+    slipped, slipped1 = law.slid(xe, pe, room, i), law.slid(x1, place1, room, i)
+    room[SLIP_HIGH * LANES + i] = max(room[SLIP_HIGH * LANES + i], max(slipped, slipped1))
+    room[SLIP_LOW * LANES + i] = min(room[SLIP_LOW * LANES + i], min(slipped, slipped1))
     one, two = 0.5 * (f0 + before) * (xe - x), 0.5 * (after + f1) * (x1 - xe)
     room[TURNED * LANES + i] += one + two
     room[PASSED * LANES + i] += abs(one) + abs(two)
@@ -211,6 +195,7 @@ def look(room, i, s0, c0, s1, c1, h):
     room[S3 * LANES + i] += x1 * s1 * (3 - 4 * s1 * s1)
     room[MEAN * LANES + i] += x1
     room[PULL * LANES + i] += f1
+    pull = law.at_turn(turn, way, place, room, i)
     turned = v != 0.0 and v * v1 <= 0.0
     higher, lower = max(x1, turn) > high, min(x1, turn) < low
     room[PULL_HIGH * LANES + i] = (pull if turned else nan) if higher else room[PULL_HIGH * LANES + i]
@@ -222,14 +207,18 @@ def fetch(case, i, cases, motion, room):
     """Put a case in the lane i."""
     for n in range(NUMBERS):
         room[(NUMBER + n) * LANES + i] = cases[case, n]
-    for n in range(STATE):
-        room[n * LANES + i] = motion[case, n]
+    for n in range(motion.shape[1]):
+        room[(n if n < STATE else n - STATE + OWN) * LANES + i] = motion[case, n]
     room[CASE * LANES + i], room[CYCLE * LANES + i] = case, 0.0
     room[WAS_X * LANES + i], room[WAS_V * LANES + i] = room[X * LANES + i], room[V * LANES + i]
     room[WAS_PLACE * LANES + i] = room[PLACE * LANES + i]
-    if law.STRETCHES:
-        room[FELT * LANES + i] = law.felt(room[X * LANES + i], room[V * LANES + i], room[WAY * LANES + i],
-                                          room[PLACE * LANES + i], 0.0, room, i)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def bring(case, i, room, motion):
+    """Keep the motion of the lane i as that of a case."""
+    for n in range(motion.shape[1]):
+        motion[case, n] = room[(n if n < STATE else n - STATE + OWN) * LANES + i]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -258,10 +247,10 @@ def repeats(i, room):
 def march(cases, order, motion, table, until, history, ended, room, marked):
     """March cases up to the end of the cycle `until`, or of one that repeats. A lane that is done takes the next case.
 
-    cases (n, NUMBERS); order (m,): numbers of those that march; motion (n, STATE): at their begin, and at their end;
+    cases (n, NUMBERS); order (m,): numbers of those that march; motion (n, STATE and more): at their begin, and end;
     table (3, s + 1): sine and cosine at the steps of a cycle, and the step; history (n, c, 4): least and largest slide
-    of a cycle [m], and its phasor [m]; ended (n,): cycles done; room (ROOM * LANES,), marked (LANES + 1,): of the
-    lanes. Cost: 2 to 5 ns a step of a case.
+    of a cycle [m], and its phasor [m]; ended (n,): cycles done; room (numbers of a lane times LANES,), marked
+    (LANES + 1,): of the lanes. Cost: 2 to 5 ns a step of a case.
     """
     share, given = 2 / (table.shape[1] - 1), min(LANES, len(order))
     for i in range(LANES):
@@ -280,8 +269,7 @@ def march(cases, order, motion, table, until, history, ended, room, marked):
             if k + 1 < until and not same:
                 continue
             ended[case] = k + 1
-            for n in range(STATE):
-                motion[case, n] = room[n * LANES + i]
+            bring(case, i, room, motion)
             if given < len(order):
                 fetch(order[given], i, cases, motion, room)
                 given += 1
@@ -328,7 +316,7 @@ def read(cases, order, motion, table, cycles, history, ended, shown, room):
             fetch(order[min(begin + i, len(order) - 1)], i, cases, motion, room)
             for n in range(SHOW, SHOW + SHOWN):
                 room[n * LANES + i] = 0.0
-            room[SLIP_HIGH * LANES + i] = law.slid(room[X * LANES + i], room[PLACE * LANES + i])
+            room[SLIP_HIGH * LANES + i] = law.slid(room[X * LANES + i], room[PLACE * LANES + i], room, i)
             room[SLIP_LOW * LANES + i] = room[SLIP_HIGH * LANES + i]
         for k in range(cycles):
             for i in range(LANES):
@@ -344,5 +332,4 @@ def read(cases, order, motion, table, cycles, history, ended, shown, room):
         for i in range(min(LANES, len(order) - begin)):
             for n in range(SHOWN):
                 shown[order[begin + i], n] = room[(SHOW + n) * LANES + i]
-            for n in range(STATE):
-                motion[order[begin + i], n] = room[n * LANES + i]
+            bring(order[begin + i], i, room, motion)

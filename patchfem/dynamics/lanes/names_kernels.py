@@ -8,10 +8,9 @@ drive, so forces over the mass are in m and energies over it in m^2.
 LANES = 32
 CLOSE = 1e-9  # of the range of a cycle, by which the next one may differ that is the same
 
-# the motion: state, with friction and mean square of the stretches under a law of a stretch; then sums of the run, then
-# extremes and phasor of a cycle; whether the next step holds an event
-X, V, WAY, PLACE, FELT, SQUARE, PATH, IN, LOST, POWER, HIGH, LOW, COS, SIN, EVENT = range(15)
-STATE = 15
+# the motion: state, then sums of the run, then extremes and phasor of a cycle; whether the next step holds an event
+X, V, WAY, PLACE, PATH, IN, LOST, POWER, HIGH, LOW, COS, SIN, EVENT = range(13)
+STATE = 13
 
 # the case: x and x' after a step from x, x', a constant force, the sine and the cosine of the drive, in a slip and with
 # the spring of a stick; then the equation itself, acceleration of the output over x'' and of the base over the sine
@@ -19,8 +18,6 @@ NUMBER = STATE
 (A11, A12, A21, A22, RX, RV, SX, SV, CX, CV, B11, B12, B21, B22, QX, QV, TX, TV, UX, UV, D, W, P, GK, GS, K, LENGTH,
  OUT, BASE) = range(NUMBER, NUMBER + 29)
 NUMBERS = 29
-# of a law of a stretch in place of the first of these: the step, half of one over the cosine of half of it, its numbers
-H, MIDDLE, FIRST_OF_LAW, OF_LAW = A11, A12, A21, 6
 
 # what the last cycles show
 SHOW = NUMBER + NUMBERS
@@ -31,6 +28,4 @@ SHOWN = 28
 
 # which case a lane has, -1 none, its cycle and where that began
 CASE, CYCLE, WAS_X, WAS_V, WAS_PLACE = range(SHOW + SHOWN, SHOW + SHOWN + 5)
-# what a step comes to: friction, mean square of the stretches, friction work
-NEXT_FELT, NEXT_SQUARE, WORK = range(SHOW + SHOWN + 5, SHOW + SHOWN + 8)
-ROOM = SHOW + SHOWN + 8
+OWN = SHOW + SHOWN + 5  # from here on what the state of a law has besides; it stands behind STATE in a motion

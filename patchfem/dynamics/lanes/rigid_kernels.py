@@ -8,7 +8,8 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from .names_kernels import A11, A12, A21, A22, CV, CX, GK, GS, LANES, RV, RX, SV, SX, WAY, D, P, V, W, X
 
-RESTS, STRETCHES = True, False  # nothing moves in a stick; nothing of the motion but a place and a direction
+RESTS = True  # nothing moves in a stick
+TURNS_HELD = False  # an event may leave a stick as it is
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -26,20 +27,20 @@ def root(y0, y1, m0, m1, least):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def felt(x, v, way, place, sine, room, i):
+def felt(x, way, place, sine, room, i):
     """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
     held, most = room[P * LANES + i] * sine - room[W * LANES + i] * x, room[GS * LANES + i]
     return min(max(held, -most), most) if way == 0.0 else way * room[GK * LANES + i]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def rise(v, a, way, place, room, i):
+def rise(v, a, way, place, room, i, when):
     """Rate of the friction at a speed v and an acceleration a; 0 for a rigid contact, whose stick has no motion."""
     return 0.0
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def slid(x, place):
+def slid(x, place, room, i):
     """Irreversible part of the slide."""
     return place
 
@@ -51,16 +52,9 @@ def path(place, pe, place1, v1, room, i):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def at_turn(x, way, place, turned, room, i):
+def at_turn(x, way, place, room, i):
     """Friction at a turn of the slide, the mean of what it is before and after it."""
     return 0.0
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def held(begin, end, way, room, i, h):
-    """(share of a part of a step in which the contact sticks; share inside it at which it begins to slip, 2: nowhere;
-    irreversible part of the slide where that turns inside it, that of its end without)."""
-    return 1.0 if way == 0.0 else 0.0, 2.0, slid(end[0], end[3])
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)

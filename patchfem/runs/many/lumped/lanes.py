@@ -1,13 +1,13 @@
-"""The batch of lanes: lumped cases of one law side by side, with bars from half the steps.
+"""The batch of lanes: lumped Coulomb, elastic-plastic, tanh and Iwan cases side by side, with bars from half the steps.
 
-A case of a law of a stretch (tanh, Bouc-Wen, LuGre, bonds of a constant length) marches by a quarter of the steps too,
-which shows how its errors fall, and by finer steps where its bars miss its tolerance. A case goes to the exact batch
-`lumped`, or under these laws to a run of its own, where a bar still misses its tolerance, where nothing slips, rings
-are to be told or a motion still has to settle. So does every case of a batch of which these contradict one of a few.
+A tanh or Iwan case whose bars miss its tolerance marches by finer steps; an Iwan case that has not settled marches on.
+A case goes to the exact batch `lumped`, a tanh case to a run of its own, where a bar still misses its tolerance, where
+nothing slips (but of Iwan), rings are to be told or a motion still has to settle. So does every case of a batch of
+which these contradict one of a few.
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
+from functools import partial
 from time import perf_counter
 from zlib import crc32
 
@@ -16,15 +16,16 @@ import numpy as np
 from ....dynamics.lanes import names_kernels as at
 from ....dynamics.lanes import reading
 from ....dynamics.lanes import run as march
-from ....effects import has, listed
+from ....friction.laws.iwan import largest as largest_slide
 from ....model.alike import Alike, columns_of, some
 from ....model.model import Model
 from ....response.errors import APART, GAPS, MAIN, ROUND
 from ....response.measures import energy_balance
 from ....response.rows import TABLE, first_harmonic
+from ....response.settling import steady_amplitudes, windows_of
 from ....scene.rules.draft import pinned
 from ....structure.drive_sizes import largest
-from ...rig.pieces import read_off
+from ...rig.pieces import CHANGES, read_off
 from ...rig.remarks import creeping_note
 from .. import one_by_one
 from ..answers import Answers
@@ -35,18 +36,21 @@ from .pieces import LONGEST, SHORTEST
 LEAST = 64  # cases of a study that lanes serve
 TIGHTEST = 1e-4  # tolerance that lanes serve
 TOGETHER = 4096  # cases of one compiled call
-# law -> that of `dynamics.lanes`
-KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "tanh": "friction.laws.tanh_kernels",
-         "bouc-wen": "friction.laws.bouc_wen_kernels", "lugre": "friction.laws.lugre_kernels",
-         "nonlocal": "friction.laws.stretch_kernels"}
-SMOOTH, CALM = (128, 256, 512, 1024, 2048), 0.5  # steps of a cycle under a law of a stretch, its rate in a step then
-FINER = 4  # times as many steps has a case under such a law whose bars miss its tolerance
+KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "tanh": "creeping",
+         "iwan": "masing"}  # law -> that of `dynamics.lanes`
+SMOOTH = 128, 256, 512, 1024, 2048  # steps of a cycle under the rate law, whose own rate is 1 a step then
+FINER = 4  # times as many steps has a case under the rate law whose bars miss its tolerance
 RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
 # of the change at half the steps, of that of the main measures, and of the measure itself, as both marches can miss an
 # event alike: 2 of 4077 random cases had an error beyond
 OF_CHANGE, OF_TYPICAL, OF_SIZE = 2.0, 1.0, 2e-5
-OF_MIDDLE = 1e-6  # of the amplitude, by which its middle errs under a law of a stretch, of which no event is missed
-ORDERLY, SHOWN = 6.0, 0.25  # a change at half the steps that falls by this shows a high order, and is so much of itself
+OF_DRIFT = 1e-6  # of the amplitude in its place, of the drift behind sliders: their march misses no event
+MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; change over a tenth of these that is left
+# times twice as many cells as a run by itself has in a check of Iwan, and of its bars by half of them: with 48 cells 1
+# of 10 has an error beyond both, up to 5 times as large
+FINER_CELLS, SHORT = 4, 5.0
+DROPPED = 1e-2  # share of a loop by which another may be larger that is forgotten for want of room
+WIDER = 2.0  # times these are the bars of tanh cases: 493 of 500 had no error beyond half of them
 CHECKED, FEWEST = 200, 2  # one of so many cases is held against the exact engine, so many of a batch at least
 RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a ring is looked for
 
@@ -64,66 +68,39 @@ def no_lanes(model: Model) -> str:
         return "its cycles are too few or too many, or nothing rubs"
     if model.friction.law not in KINDS:
         return "its law does not march in lanes"
-    if why := _manifold(model.friction):
-        return why
     if model.accuracy.method != "auto" or pinned(model.accuracy) or model.accuracy.tolerance < TIGHTEST:
         return "it asks for another method, or for more than lanes state"
     return ""
 
 
-def _manifold(friction) -> str:
-    """Why a law of a stretch has more than that to follow; "" where it has not."""
-    grows = has(friction.law, "bonds") and (listed(friction) or friction.slip_growth is not None)
-    return "its bonds grow, or have more than one stretch" if grows else ""
-
-
-def _creates(model: Model):
-    """Whether a law of a stretch may create energy, or its bonds have more than one stretch."""
-    f = model.friction
-    if has(f.law, "bonds"):
-        return np.not_equal(f.breakaway or 0.0, 0.0) | np.not_equal(f.initial_bonds, 1.0)
-    if f.law == "lugre":  # the power of its damping is below zero from there on
-        return np.greater(f.micro_damping * model.rig.speed, 4 * of_law(model)[1])
-    return np.less(f.shape, 0.5) if f.law == "bouc-wen" else False
-
-
-def of_law(model: Model) -> tuple:
-    """Numbers of a law of a stretch, as its `flowing` takes them, and the length [m] over which it gives way, 0 for
-    none."""
-    f, load, limit = model.friction, model.point.load, model.limits(model.point.load)[0]
-    if f.law == "tanh":
-        return limit, f.reference_speed, 0.0
-    if has(f.law, "bonds"):
-        return limit / f.bond_length, f.bond_length, f.bond_length
-    if f.law == "bouc-wen":
-        return limit, limit / f.stiffness, f.exponent, f.shape, limit / f.stiffness
-    kinetic = f.static if f.kinetic is None else f.kinetic
-    return f.stiffness, kinetic * load, limit, f.stribeck_speed, f.micro_damping, f.viscous, limit / f.stiffness
-
-
 def steps_of(models: Sequence[Model]) -> np.ndarray:
     """Steps per cycle (n,) of models of one law, 0 where they would be too many."""
     rate, = columns_of(models, _rate)
-    smooth = march.flows(KINDS[models[0].friction.law])
-    ends = [(CALM * steps / (2 * np.pi), steps) for steps in SMOOTH] if smooth else RATES
+    ends = [(steps / (2 * np.pi), steps) for steps in SMOOTH] if models[0].friction.law == "tanh" else RATES
     return np.append([steps for _, steps in ends], 0)[np.searchsorted([end for end, _ in ends], rate)]
 
 
 def _rate(model: Model) -> tuple:
-    """Fastest rate of a model over that of its drive; infinite where lanes do not follow it."""
-    modes, omega, stiff, damper = model.rig.modes, model.rig.drive.omega, 0.0, model.rig.modes.dampers[0, 0]
-    scale, limit = modes.slide[0]**2 / modes.mass, model.limits(model.point.load)[0]
-    if march.flows(KINDS[model.friction.law]):
-        length = of_law(model)[-1]
-        if model.friction.law == "tanh":
-            rate = limit / model.friction.reference_speed * scale + damper
-        else:
-            rate, stiff = damper, limit / length * scale
-        rate = np.maximum(rate, np.sqrt(modes.omega[0]**2 + stiff)) / omega
-        return np.where(_creates(model), np.inf, rate),
-    if model.friction.law == "elastic-plastic":
-        stiff = limit / model.friction.bond_length * scale
-    return (np.sqrt(modes.omega[0]**2 + stiff) + damper) / omega,
+    """Fastest rate of a model over that of its drive."""
+    modes, omega = model.rig.modes, model.rig.drive.omega
+    if model.friction.law == "tanh":
+        rate = model.limits(model.point.load)[0] / model.friction.reference_speed * modes.slide[0]**2 / modes.mass
+        return np.maximum(rate + modes.dampers[0, 0], modes.omega[0]) / omega,
+    stiff = _contact(model)[0] * modes.slide[0]**2 / modes.mass
+    return (np.sqrt(modes.omega[0]**2 + stiff) + modes.dampers[0, 0]) / omega,
+
+
+def _contact(model: Model) -> tuple:
+    """(stiffness before it slips [N/m], length [m], what else there is) of a contact, as `Cases` has them."""
+    friction, static = model.friction, model.limits(model.point.load)[0]
+    if friction.law == "iwan":
+        chi, share = friction.chi, 1 / (1 + friction.beta)
+        slips = share * (chi + 1) / (chi + 2 - share)  # of the friction, before the last slider does
+        half = np.minimum(1.0, (0.5 / slips)**(1 / (chi + 2)))
+        return friction.stiffness, largest_slide(static, friction.stiffness, chi, friction.beta), chi + 1, share, half
+    if friction.law == "elastic-plastic":
+        return static / friction.bond_length, friction.bond_length
+    return 0.0, friction.reference_speed / model.rig.drive.omega if friction.law == "tanh" else 0.0
 
 
 def group(model: Model) -> tuple:
@@ -151,11 +128,11 @@ def _solved(models: Sequence[Model], say, steps: int = 0) -> Answers:
     begin, (cycles, law, least) = perf_counter(), group(models[0])
     steps = max(steps, least)
     window = min(10, cycles // 10)
-    runs, exact, lost, marks = runs_of(models, cycles, window, steps)
+    runs, exact, marks = runs_of(models, cycles, window, steps)
     found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window})
     # elastic-plastic motions that have not settled have a steady estimate by the map of their yields
     unsettled = found.outcome == "grows" if law != "elastic-plastic" else found.outcome != "steady"
-    wide = too_wide(models, found) | lost
+    wide = too_wide(models, found)
     exact |= alone | wide | unsettled
     chosen = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
     found.numerics.update(dict.fromkeys(range(len(models)), chosen))
@@ -164,11 +141,11 @@ def _solved(models: Sequence[Model], say, steps: int = 0) -> Answers:
             found.notes[case] = notes
     found.seconds[:] = (perf_counter() - begin) / len(models)
     looked = checked(marks, ~exact, FEWEST if steps == least else 0)
-    ones = exactly(some(models, looked), say) if looked else None
-    if wrong := contradicted(found, ones, looked):
+    ones = exactly(some(models, looked), say, FINER_CELLS if law == "iwan" else 0) if looked else None
+    if wrong := contradicted(found, ones, looked, SHORT if law == "iwan" else 1.0):
         exact[:] = True
         note = f"lanes said {wrong} otherwise than the exact engine in a check of {len(looked)} cases, so all are exact"
-    finer = (wide | alone) & (march.flows(KINDS[law]) and not wrong and FINER * steps <= SMOOTH[-1])
+    finer = (wide | alone) & (law in ("tanh", "iwan") and not wrong and FINER * steps <= SMOOTH[-1])
     exact &= ~finer
     if cases := np.flatnonzero(finer).tolist():
         lumped.take_out(found, cases)
@@ -181,13 +158,15 @@ def _solved(models: Sequence[Model], say, steps: int = 0) -> Answers:
     return found
 
 
-def exactly(models: Sequence[Model], say) -> Answers:
-    """Answers of models of a group by the exact batch; by runs of their own where that refuses them."""
+def exactly(models: Sequence[Model], say, finer: int = 0) -> Answers:
+    """Answers of models of a group by the exact batch; by runs of their own where that refuses them. finer: how often
+    twice the cells of a density are taken."""
     models = list(models)
     found, fit = Answers.blank(len(models)), np.array([not lumped.refuses(model) for model in models])
-    for cases, batch in ((np.flatnonzero(fit), lumped), (np.flatnonzero(~fit), one_by_one)):
+    for cases, solves in ((np.flatnonzero(fit), partial(lumped.solve, finer=finer)),
+                          (np.flatnonzero(~fit), one_by_one.solve)):
         if cases.size:
-            found.place(cases, batch.solve([models[case] for case in cases], say))
+            found.place(cases, solves([models[case] for case in cases], say))
     return found
 
 
@@ -195,8 +174,6 @@ def too_wide(models, found: Answers) -> np.ndarray:
     """(n,) whether a bar misses the tolerance of a case."""
     tolerance, out = columns_of(models, lambda model: (model.accuracy.tolerance,))[0], np.zeros(len(models), bool)
     for name, values in found.values.items():
-        if name.endswith("_steady"):  # what it leaves open is no matter of steps
-            continue
         out |= found.errors[name] > tolerance * np.abs(values) + found.floors[name]
     return out
 
@@ -210,9 +187,9 @@ def checked(marks, free, fewest: int) -> list:
     return order[:max(few, fewest)]
 
 
-def contradicted(found: Answers, ones: Answers | None, looked: list) -> str:
-    """The first measure that exact answers of some cases contradict, beyond the sum of both bars and the floor, or "".
-    """
+def contradicted(found: Answers, ones: Answers | None, looked: list, times: float = 1.0) -> str:
+    """The first measure that exact answers of some cases contradict, beyond the sum of both bars and the floor, or "";
+    times: their bars are taken."""
     for place, case in enumerate(looked):
         for name, column in found.values.items():
             if not (name in ones.values and ones.has(name, place)):
@@ -220,52 +197,81 @@ def contradicted(found: Answers, ones: Answers | None, looked: list) -> str:
             apart = abs(column[case] - ones.values[name][place])
             if name == "slip_start_phase":
                 apart = min(apart, np.pi - apart)
-            bars = np.nan_to_num(found.errors[name][case]) + np.nan_to_num(ones.errors[name][place])
+            bars = np.nan_to_num(found.errors[name][case]) + times * np.nan_to_num(ones.errors[name][place])
             if apart > bars + found.floors[name][case]:
                 return name
     return ""
 
 
 def runs_of(models, cycles: int, window: int, steps: int) -> tuple:
-    """(Runs of models of a group, (n,) which must be run otherwise, (n,) which need finer steps at least, (n, k)
-    numbers that tell each from any other)."""
+    """(Runs of models of a group, (n,) which must be run otherwise, (n, k) numbers that tell each from any other)."""
     law = KINDS[models[0].friction.law]
     cases, c = cases_of(models)
-    fine, *coarser = (_measured(law, cases, c, march.march(law, cases, cycles, window, steps // share))
-                      for share in ((1, 2, 4) if march.flows(law) else (1, 2)))
-    (values, book, found, extremes), coarse = fine, coarser[0]
-    changes = changed(values, [one[0] for one in coarser])
+    fine, coarse = (_measured(law, cases, c, march.march(law, cases, cycles, window, count))
+                    for count in (steps, steps // 2))
+    values, book, found, extremes, rise = fine
+    changes = {name: np.abs(value - coarse[0][name]) for name, value in values.items()}
+    changes["slip_start_phase"] = np.minimum(changes["slip_start_phase"], np.pi - changes["slip_start_phase"])
     slips = found.shown[:, at.SLIP_HIGH - at.SHOW] - found.shown[:, at.SLIP_LOW - at.SHOW]
     stuck = slips / 2 <= np.maximum(c["held"], ROUND * np.abs(found.history[:, :, :2]).max(axis=(1, 2)))
-    exact = stuck | np.any([np.isnan(values[name]) != np.isnan(coarse[0][name]) for name in values], axis=0)
-    if law != "rigid":
+    exact = np.any([np.isnan(values[name]) != np.isnan(coarse[0][name]) for name in values], axis=0)
+    exact |= stuck & (law != "masing")
+    if law in ("yielding", "masing"):
         own = np.sqrt(np.maximum(cases.square + cases.spring - cases.damp**2 / 4, 0.0))
-        exact |= found.shown[:, at.LONGEST - at.SHOW] * own >= RINGS
+        rings = found.shown[:, at.LONGEST - at.SHOW] * own >= RINGS
+        exact |= rings & (law == "yielding" or march.of_sliders(found.motion, "EVER") > 0)
+    steady = None
+    if law == "masing":
+        exact |= march.of_sliders(found.motion, "DROPPED") > DROPPED
+        steady, lost = _settled(law, cases, found, steps, windows_of(extremes, window)[0], ~stuck)
+        steady, exact = tuple(np.abs(c["ratio"]) * one for one in steady), exact | lost
     phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
-    errors = bars(values, changes, march.flows(law))
+    errors = {name: (WIDER if law == "creeping" else 1.0) * one
+              for name, one in bars(values, changes, law).items()}
     none = {name: np.full(len(models), np.nan) for name in ("ring_frequency", "ring_damping")}
-    nowhere = np.zeros(len(models), bool)  # what sticks or is lost goes elsewhere
-    runs = Runs(cycles, window, values | none, book, extremes, phasors[:, ends], nowhere, nowhere, errors, 1e-9, np.inf,
-                again=False)
-    lost = ~np.isfinite(found.motion[:, at.X] + coarse[2].motion[:, at.X])
-    return runs, exact, lost, np.column_stack(cases)
+    nowhere = np.zeros(len(models), bool)  # what is lost goes elsewhere, and what sticks but for sliders
+    tolerance, = columns_of(models, lambda model: (model.accuracy.tolerance,))
+    runs = Runs(cycles, window, values | none, book, extremes, phasors[:, ends], stuck & (law == "masing"), nowhere,
+                errors, 1e-9, np.inf, stuck & (rise > tolerance * values["friction_force_peak"]), steady, again=False)
+    return runs, exact, np.column_stack(cases)
+
+
+def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
+    """((half the range of the slide that motions settle to [m], its error), (n,) each, NaN of those that need none;
+    (n,) which of them do not show it after MORE times their cycles, nor by how they come near).
+
+    amplitudes (n, w) [m] of the output by windows; free: (n,) which may.
+    """
+    out, cycles = np.full((2, len(free)), np.nan), MORE * found.history.shape[1]
+    if amplitudes.shape[1] > 2:
+        free = free & (np.ptp(amplitudes[:, -3:], axis=1) > CHANGES * TIGHTEST * amplitudes[:, -1])
+    lost = np.zeros(len(free), bool)
+    where = np.flatnonzero(free)
+    history = march.march_on(law, march.Cases(*(part[where] for part in cases)), found.motion[where], cycles, steps)
+    ranges, ends = np.ptp(history[:, :, :2], axis=2) / 2, np.arange(cycles - 1, 0, -cycles // MORE)[::-1]
+    last, left = ranges[:, -1], 2 * np.ptp(ranges[:, -cycles // MORE:], axis=1)
+    with np.errstate(all="ignore"):
+        value, error = steady_amplitudes(ranges[:, ends], history[:, ends, 2:] @ [1, 1j])
+    closes = left < SETTLED * last
+    value, error = np.where(closes, last, value), np.where(closes, left + 1e-9 * last, error)
+    known = error < 10 * SETTLED * last
+    out[:, where] = np.where(known, (value, error), np.nan)
+    lost[where] = ~known
+    return tuple(out), lost
 
 
 def cases_of(models) -> tuple:
     """(Cases of models, what else is told of them by name, (n,) each: SI)."""
-    law = KINDS[models[0].friction.law]
-    own, damping, slide, share, output, mass, drive, w, moving, static, kinetic, length, z, v, stiffness, load, size = \
-        columns_of(models, _row)
-    scale, numbers = slide**2 / (mass * w**2), np.zeros((len(w), 0))
-    if march.flows(law):
-        *numbers, length = columns_of(models, of_law)
-        numbers = np.transpose(numbers) * march.scales(law, scale, w)
-    spring = np.divide(scale * static, length, out=0.0 * scale, where=length > 0)
+    own, damping, slide, share, output, mass, drive, w, moving, static, kinetic, z, v, stiffness, load, size, spring, \
+        length, *shape = columns_of(models, _row)
+    scale = slide**2 / (mass * w**2)
     cases = march.Cases(damping / w, (own / w)**2, -slide * share * drive / w**2, scale * kinetic, scale * static,
-                        spring, length, output / slide * w**2, drive * moving, slide * z, slide * v / w, numbers)
+                        scale * spring, length, output / slide * w**2, drive * moving, slide * z, slide * v / w,
+                        np.array(shape).T.reshape(len(w), -1))
     return cases, {"omega": w, "energy": mass * (w / slide)**2, "ratio": output / slide,
-                   "held": 1e-3 * length, "stiffness": stiffness, "load": load, "size": size}
+                   "held": 1e-3 * np.divide(static, spring, out=0 * w, where=spring > 0), "stiffness": stiffness,
+                   "load": load, "size": size}
 
 
 def _row(model: Model) -> tuple:
@@ -274,15 +280,14 @@ def _row(model: Model) -> tuple:
         model.limits(model.point.load)
     law = KINDS[model.friction.law]
     kinetic = kinetic if law == "rigid" and model.friction.kinetic is not None else static
-    length = model.friction.bond_length if law == "yielding" else 0.0
     return (modes.omega[0], modes.dampers[0, 0], modes.slide[0], modes.base[0], modes.output[0], modes.mass,
-            drive.acceleration, drive.omega, drive.moving, static, kinetic, length,
+            drive.acceleration, drive.omega, drive.moving, static, kinetic,
             *((0.0, 0.0) if start is None else (start.z[0], start.v[0])), model.rig.stiffness, model.point.load,
-            largest(drive))
+            largest(drive), *_contact(model))
 
 
 def _measured(law: str, cases, c: dict, found) -> tuple:
-    """(values, books, Marched, extremes of the output (n, c, 2) [m]) of a march."""
+    """(values, books, Marched, extremes of the output (n, c, 2) [m], rise of the force [N]) of a march."""
     extremes = np.sort(found.history[:, :, :2] * c["ratio"][:, None, None], axis=2)
     window = min(10, extremes.shape[1] // 10)
     book = reading.books(law, cases, found, c["energy"])
@@ -291,42 +296,24 @@ def _measured(law: str, cases, c: dict, found) -> tuple:
         values = read_off(seen, book, True, True, c["stiffness"], c["size"])
     values |= {"normal_load": c["load"], "friction_work": book["friction"], "energy_dissipated": book.pop("lost"),
                "energy_created": np.zeros(len(c["load"])), "energy_balance": energy_balance(book)}
-    return values, book, found, extremes
+    return values, book, found, extremes, seen.rise
 
 
-def changed(values: dict, coarser: list) -> dict:
-    """Changes by name, (n,) each, of values at half the steps; where a quarter of them, the last of `coarser`, shows
-    that they fall with the step as those of a high order do, a share of them."""
-    changes = []
-    for fine, coarse in pairwise([values, *coarser]):
-        changes.append({name: np.abs(fine[name] - coarse[name]) for name in values})
-        changes[-1]["slip_start_phase"] = np.minimum(changes[-1]["slip_start_phase"],
-                                                     np.pi - changes[-1]["slip_start_phase"])
-    if len(changes) == 1:
-        return changes[0]
-    last, before = changes
-    with np.errstate(all="ignore"):
-        falls = np.array([before[name] >= ORDERLY * last[name] for name in MAIN]).sum(axis=0) > len(MAIN) / 2
-        return {name: np.where(falls & (before[name] >= ORDERLY * last[name]) & np.isfinite(before[name]),
-                               np.fmax(SHOWN * last[name], SHOWN**2 * before[name]), last[name]) for name in values}
-
-
-def bars(values: dict, changes: dict, smooth: bool = False) -> dict:
+def bars(values: dict, changes: dict, law: str = "") -> dict:
     """Errors by name, (n,) each, of values whose changes at half the steps are known: the change, and a share of the
-    median relative change of the main measures, as one change can be small by chance; smooth: under a law of a
-    stretch, whose force no limit holds."""
+    median relative change of the main measures, as one change can be small by chance, and OF_SIZE of the value."""
     with np.errstate(all="ignore"):
-        shares = np.array([np.where(changes[name] > 0, changes[name] / np.abs(values[name]), np.nan) for name in MAIN
-                           if name in values])
-        shares[:, np.isnan(shares).all(axis=0)] = 0.0
-        typical = np.nanmedian(shares, axis=0)
+        shares = [np.where(changes[name] > 0, changes[name] / np.abs(values[name]), np.nan) for name in MAIN
+                  if name in values]
+        typical = np.nan_to_num(np.nanmedian(shares, axis=0))
     out = {}
     for name, change in changes.items():
         size = first_harmonic(values) if name == "equivalent_stiffness" else 1.0 if TABLE[name].term is not None \
             and name not in GAPS and name != "drift_per_cycle" else np.abs(values[name])
         if name == "drift_per_cycle":
             size = np.abs(values[MAIN[0]])
-        least, held = OF_MIDDLE if smooth and name == "drift_per_cycle" else OF_SIZE, () if smooth else APART[:1]
-        chance = 0.0 if name in (*held, "normal_load", *GAPS) else (OF_TYPICAL * typical + least) * size
+        least = OF_DRIFT if law == "masing" and name == "drift_per_cycle" else OF_SIZE
+        known = name in ("normal_load", *GAPS) or (name == APART[0] and law != "masing")
+        chance = 0.0 if known else (OF_TYPICAL * typical + least) * size
         out[name] = np.maximum(OF_CHANGE * np.nan_to_num(change), chance)
     return out

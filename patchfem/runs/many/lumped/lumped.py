@@ -48,12 +48,13 @@ def group(model: Model) -> tuple:
     return int(model.rig.cycles), model.friction.law, pieces.coarsened(model)
 
 
-def solve(models: Sequence[Model], say=None) -> Answers:
-    """Answers of models of one group; a case that needs it is run by itself."""
+def solve(models: Sequence[Model], say=None, finer: int = 0) -> Answers:
+    """Answers of models of one group; a case that needs it is run by itself. finer: how often twice the cells of a
+    density are taken."""
     found = Answers.blank(len(models))
     for first in range(0, len(models), TOGETHER):
         part = models[first:first + TOGETHER]
-        found.place(range(first, first + len(part)), _solved(part, say, pieces.coarsened(part[0])))
+        found.place(range(first, first + len(part)), _solved(part, say, max(0, pieces.coarsened(part[0]) - finer)))
     return found
 
 

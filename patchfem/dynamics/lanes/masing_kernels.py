@@ -1,0 +1,302 @@
+"""A step of one mode behind sliders side by side (Segalman's Iwan law), of one case: of the fourth order between turns
+of the slide and closings of its loops, each found inside its step.
+
+Equation, in the angle of the drive: x'' + D x' + W x = P sin - f. Since the slide turned at FROM with the friction HELD
+it is f = HELD + side m G(|x - FROM|/m), where m = 2 (Masing's rule), and m = 1 from the start, and where
+
+    G(u) = K LENGTH w (1 - q w^(chi + 1)/(chi + 2)), w = u/LENGTH up to 1
+
+is the force of a first loading: no cells. A loop that closes is forgotten. The place of a case is its friction. Twin:
+many elements, from event to event (`dynamics.events`).
+"""
+
+import numpy as np
+
+from ...compiled.inner import njit
+from ...friction.flags_kernels import FAST, LEAN
+from .names_kernels import A11, A12, A21, A22, GK, LANES, LENGTH, OWN, PLACE, WAY, D, K, P, V, W, X
+
+RESTS = False  # it never holds
+TURNS_HELD = True  # an event may leave a stick as it is
+H, EXPONENT, SHARE, HALF = A11, A12, A21, A22  # of the numbers of a case: step, chi + 1, q, w from which half slips
+# of its own state: sign of the motion; m; slide, friction, irreversible slide and energy at the last turn; slide at
+# which something happens next; stiffness now, and in the step: at its begin, before and after its event, at its end;
+# path of slip in the step; friction at the last turn that was; whether it ever slipped, whether the first loading is
+# remembered, whether all sliders slip; largest gap of a loop that was dropped for want of room, over its size; number
+# of points behind
+(SIDE, M, FROM, HELD, SLIP_FROM, ENERGY_FROM, NEXT, STIFF, STIFF_0, STIFF_1, STIFF_2, STIFF_3, GONE, AT_TURN, EVER,
+ VIRGIN, ALL, DROPPED, BEHIND) = range(OWN, OWN + 19)
+STACK, EACH, DEPTH = OWN + 19, 4, 24  # those points: slide, friction, irreversible slide and energy of each
+OWN_STATE = 19 + EACH * DEPTH
+LEAST = 1e-30  # of w
+MOST = 8  # events of a step
+NOTHING, PASSES, TURNS, SLIPS = 0, 1, 2, 3  # what happens, what counts more last
+FAR = 1e300
+
+
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def power(w, a):
+    """w^a to 3e-13 for LEAST <= w <= 2 and 0 < a <= 1, by the bits of a number: no branch and no call, so that a
+    compiler takes several lanes at once; no fast-math, as its roundings are meant."""
+    bits = np.float64(w).view(np.int64)
+    part = np.int64((bits & 0xFFFFFFFFFFFFF) | 0x3FF0000000000000).view(np.float64)
+    more = 1.0 if part > 1.4142135623730951 else 0.0
+    part = part * (1 - 0.5 * more)
+    t = (part - 1) / (part + 1)
+    z = t * t
+    log = 2.8853900817779268 * t * (1 + z * (1 / 3 + z * (1 / 5 + z * (1 / 7 + z * (1 / 9 + z * (1 / 11 + z * (
+        1 / 13 + z * (1 / 15 + z / 17))))))))
+    y = a * (((bits >> 52) - 1023) + more + log)
+    whole = y + 6755399441055744.0  # 1.5 of 2^52: its last bits are the whole number next to y
+    g = 0.6931471805599453 * (y - (whole - 6755399441055744.0))
+    e = 1 + g * (1 + g * (1 / 2 + g * (1 / 6 + g * (1 / 24 + g * (1 / 120 + g * (1 / 720 + g * (1 / 5040 + g * (
+        1 / 40320 + g * (1 / 362880 + g / 3628800)))))))))
+    return np.int64(np.float64(e).view(np.int64) + (np.float64(whole).view(np.int64) << 52)).view(np.float64)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def friction(x, room, i):
+    """(f, its slope over the slide) at x; up to twice the slide at which all slip as if they did not yet, which tells a
+    step beyond it where that is."""
+    m, side, length = room[M * LANES + i], room[SIDE * LANES + i], room[LENGTH * LANES + i]
+    stiff, share, e = room[K * LANES + i], room[SHARE * LANES + i], room[EXPONENT * LANES + i]
+    far = side * (x - room[FROM * LANES + i]) / (m * length)
+    every = room[ALL * LANES + i]
+    w = min(max(far, LEAST), 2.0 - every)
+    p = share * power(w, e)
+    return room[HELD * LANES + i] + side * m * stiff * length * w * (1 - p / (e + 1)), \
+        (1.0 - every) * stiff * (1 - p)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def slid(x, place, room, i):
+    """Irreversible part of the slide, the mean over the sliders by what each carries at most."""
+    m, side, length = room[M * LANES + i], room[SIDE * LANES + i], room[LENGTH * LANES + i]
+    stiff, e = room[K * LANES + i], room[EXPONENT * LANES + i]
+    u = side * (x - room[FROM * LANES + i]) / (m * length)
+    w = min(u, 1.0)
+    missing = w - side * (place - room[HELD * LANES + i]) / (m * stiff * length)  # q w^(chi + 2)/(chi + 2)
+    return room[SLIP_FROM * LANES + i] + side * m * length * (
+        stiff * length / room[GK * LANES + i] * e / (e + 2) * w * missing + (u - w))
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def energy(x, place, room, i):
+    """Elastic energy of the sliders [m^2]: what the friction took since the last turn without what slip lost."""
+    m, side, length = room[M * LANES + i], room[SIDE * LANES + i], room[LENGTH * LANES + i]
+    stiff, e, far = room[K * LANES + i], room[EXPONENT * LANES + i], side * (x - room[FROM * LANES + i])
+    held, most = side * room[HELD * LANES + i], room[GK * LANES + i]
+    w = min(far / (m * length), 1.0)
+    missing = w - (side * place - held) / (m * stiff * length)
+    work = m * m * (stiff * length**2 * w * (w / 2 - missing / (e + 2)) + most * (far / m - w * length))
+    lost = most * side * (slid(x, place, room, i) - room[SLIP_FROM * LANES + i])
+    return room[ENERGY_FROM * LANES + i] + held * far + work - lost
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def felt(x, way, place, sine, room, i):
+    """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
+    return place
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def rise(v, a, way, place, room, i, when):
+    """Rate of the friction at a speed v at the begin of the last step (0), before and after its event, at its end."""
+    return v * room[(STIFF_0 + when) * LANES + i]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def at_turn(x, way, place, room, i):
+    """Friction at the last turn of the slide."""
+    return room[AT_TURN * LANES + i]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def path(place, pe, place1, v1, room, i):
+    """What the last step adds to the path of slip [m]."""
+    return room[GONE * LANES + i]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def flow(x, v, f, k, s0, c0, s1, c1, h, room, i):
+    """(x, x', f, its slope) after an angle h, by the rule of Hermite on the acceleration and its rate at both ends: its
+    law is asked for at a place that Taylor foretells, and followed from there by its slope."""
+    damp, square, push = room[D * LANES + i], room[W * LANES + i], room[P * LANES + i]
+    a0 = push * s0 - damp * v - square * x - f
+    j0 = push * c0 - damp * a0 - (square + k) * v
+    ahead_x, v1 = x + h * (v + h * (a0 / 2 + h * j0 / 6)), v + h * (a0 + h * j0 / 2)
+    ahead_f, k1 = friction(ahead_x, room, i)
+    x1 = ahead_x
+    for _ in range(2):
+        a1 = push * s1 - damp * v1 - square * x1 - ahead_f - k1 * (x1 - ahead_x)
+        j1 = push * c1 - damp * a1 - (square + k1) * v1
+        x1 = x + h * (v + h * ((7 * a0 + 3 * a1) / 20 + h * (3 * j0 - 2 * j1) / 60))
+        v1 = v + h * ((a0 + a1) / 2 + h * (j0 - j1) / 12)
+    return x1, v1, ahead_f + k1 * (x1 - ahead_x), k1
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def ahead(room, i, s0, c0, s1, c1):
+    """(x, x', friction after a step without a turn or a closing in it; whether there is one)."""
+    x, v, f, k = room[X * LANES + i], room[V * LANES + i], room[PLACE * LANES + i], room[STIFF * LANES + i]
+    side = room[SIDE * LANES + i]
+    x1, v1, f1, k1 = flow(x, v, f, k, s0, c0, s1, c1, room[H * LANES + i], room, i)
+    event = side * v1 < 0.0 or side * (x1 - room[NEXT * LANES + i]) > 0.0
+    room[STIFF * LANES + i] = k if event else k1
+    room[GONE * LANES + i] = side * (slid(x1, f1, room, i) - slid(x, f, room, i))
+    return x1, v1, f1, event
+
+
+@njit(error_model="numpy", **LEAN)
+def first_event(x, v, a0, x1, v1, a1, h, room, i):
+    """(share of a step at which something happens first, 1 where nothing does; what)."""
+    side, next_one = room[SIDE * LANES + i], room[NEXT * LANES + i]
+    # the speed as a cubic over the step, the slide as its integral
+    m0, m1 = h * a0, h * a1
+    c2, c3 = 3 * (v1 - v) - 2 * m0 - m1, m0 + m1 - 2 * (v1 - v)
+    share, what, far = 1.0, NOTHING, x1
+    if side * v1 < 0.0:
+        u = v / (v - v1) if side * v > 0.0 else 1.0 if side * m0 > 0.0 else 0.0
+        for _ in range(6):
+            slope = m0 + u * (2 * c2 + 3 * c3 * u)
+            u = u - (v + u * (m0 + u * (c2 + u * c3))) / slope if slope != 0.0 else u
+            u = min(max(u, 0.0), 1.0)
+        share, what = u, TURNS
+        far = x + h * u * (v + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4)))
+    if side * (far - next_one) > 0.0:
+        u, most = share * min(max((next_one - x) / (far - x), 0.0), 1.0), share
+        for _ in range(6):
+            speed = side * (v + u * (m0 + u * (c2 + u * c3)))
+            gap = side * (x + h * u * (v + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4))) - next_one)
+            u = min(max(u - gap / (h * speed), 0.0), most) if speed > 0.0 else u
+        share, what = u, PASSES
+    return share, what
+
+
+@njit(error_model="numpy", **LEAN)
+def recall(k, room, i):
+    """Go on from the point k behind, with all after it forgotten."""
+    for n in range(EACH):
+        room[(FROM + n) * LANES + i] = room[(STACK + EACH * k + n) * LANES + i]
+    room[BEHIND * LANES + i] = k
+    room[M * LANES + i] = 1.0 if k == 0 and room[VIRGIN * LANES + i] > 0.0 else 2.0
+
+
+@njit(error_model="numpy", **LEAN)
+def drop(room, i):
+    """Forget the loop behind whose closing changes the least: the one beside a loop of nearly its size."""
+    best, gap = 1, FAR
+    for k in range(1, DEPTH - 2):
+        apart = abs(room[(STACK + EACH * (k + 2)) * LANES + i] - room[(STACK + EACH * k) * LANES + i])
+        best, gap = (k, apart) if apart < gap else (best, gap)
+    size = abs(room[(STACK + EACH * best) * LANES + i] - room[(STACK + EACH * (best + 1)) * LANES + i])
+    room[DROPPED * LANES + i] = max(room[DROPPED * LANES + i], gap / size)
+    for k in range(best, DEPTH - 2):
+        for n in range(EACH):
+            room[(STACK + EACH * k + n) * LANES + i] = room[(STACK + EACH * (k + 2) + n) * LANES + i]
+    room[BEHIND * LANES + i] = DEPTH - 2
+
+
+@njit(error_model="numpy", **LEAN)
+def turn_round(x, f, room, i):
+    """Begin a branch where the slide turns."""
+    side, slip, stored = room[SIDE * LANES + i], slid(x, f, room, i), energy(x, f, room, i)
+    if room[ALL * LANES + i] > 0.0:
+        room[VIRGIN * LANES + i] = room[BEHIND * LANES + i] = 0.0
+    else:
+        if room[BEHIND * LANES + i] >= DEPTH:
+            drop(room, i)
+        k = int(room[BEHIND * LANES + i])
+        for n in range(EACH):
+            room[(STACK + EACH * k + n) * LANES + i] = room[(FROM + n) * LANES + i]
+        room[BEHIND * LANES + i] = k + 1
+    room[FROM * LANES + i], room[HELD * LANES + i] = x, f
+    room[SLIP_FROM * LANES + i], room[ENERGY_FROM * LANES + i] = slip, stored
+    room[AT_TURN * LANES + i], room[SIDE * LANES + i], room[M * LANES + i] = f, -side, 2.0
+    room[ALL * LANES + i] = 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def close(x, f, room, i):
+    """Forget the loop that closes here, if one does; a slide that all sliders follow goes on from where it would have
+    had to turn."""
+    k, side, length = int(room[BEHIND * LANES + i]), room[SIDE * LANES + i], room[LENGTH * LANES + i]
+    if side * (x - closing(room, i)) < 0.0 or k == 0:
+        return
+    if k == 1 and room[VIRGIN * LANES + i] == 0.0:
+        slip, stiff, e = slid(x, f, room, i), room[K * LANES + i], room[EXPONENT * LANES + i]
+        most, share = room[GK * LANES + i], room[SHARE * LANES + i]
+        room[BEHIND * LANES + i], room[M * LANES + i] = 0.0, 2.0
+        room[FROM * LANES + i], room[HELD * LANES + i] = x - side * 2 * length, -side * most
+        gone = stiff * length / most * e / (e + 2) * share / (e + 1)
+        room[SLIP_FROM * LANES + i] = slip - side * 2 * length * gone
+        room[ENERGY_FROM * LANES + i] = stiff * length * length * (0.5 - share / (e + 2))
+    else:
+        recall(k - 1 if k == 1 else k - 2, room, i)
+
+
+@njit(error_model="numpy", **LEAN)
+def closing(room, i):
+    """Slide at which the loop closes, or all sliders slip."""
+    k, side, start = int(room[BEHIND * LANES + i]), room[SIDE * LANES + i], room[FROM * LANES + i]
+    if k == 0:
+        return start + side * room[M * LANES + i] * room[LENGTH * LANES + i]
+    before = room[(STACK + EACH * (k - 1)) * LANES + i]
+    return 2 * before - start if k == 1 and room[VIRGIN * LANES + i] > 0.0 else before
+
+
+@njit(error_model="numpy", **LEAN)
+def look_ahead(x, room, i):
+    """Note where something happens next, and whether half of the friction slips."""
+    side, size = room[SIDE * LANES + i], room[M * LANES + i] * room[LENGTH * LANES + i]
+    far, end = side * (x - room[FROM * LANES + i]), closing(room, i)
+    slips = far >= size * room[HALF * LANES + i] * (1 - 1e-9)
+    half = room[FROM * LANES + i] + side * size * room[HALF * LANES + i]
+    if far >= size * (1 - 1e-9) and room[BEHIND * LANES + i] == 0.0:
+        end, room[ALL * LANES + i] = side * FAR, 1.0
+    room[NEXT * LANES + i] = end if slips or side * (half - end) > 0.0 else half
+    room[WAY * LANES + i] = side if slips else 0.0
+    room[EVER * LANES + i] = 1.0 if slips else room[EVER * LANES + i]
+
+
+@njit(error_model="numpy", **LEAN)
+def advance(room, i, s0, c0, s1, c1, h):
+    """(x, v, way, friction at the end of a step h; share u of the step up to the event that counts: where half of the
+    friction slips from or no longer, else a turn; x, v and friction there; x where the slide turns, that of the end
+    without a turn; kink: 0, as no acceleration jumps)."""
+    x, v, f, k = room[X * LANES + i], room[V * LANES + i], room[PLACE * LANES + i], room[STIFF * LANES + i]
+    damp, square, push = room[D * LANES + i], room[W * LANES + i], room[P * LANES + i]
+    s, c, left, gone, weight = s0, c0, h, 0.0, NOTHING
+    room[STIFF_0 * LANES + i] = k
+    u, xe, ve, fe, turn, turned = 1.0, x, v, f, x, False
+    for events in range(MOST + 1):
+        x1, v1, f1, k1 = flow(x, v, f, k, s, c, s1, c1, left, room, i)
+        share, what = first_event(x, v, push * s - damp * v - square * x - f, x1, v1,
+                                  push * s1 - damp * v1 - square * x1 - f1, left, room, i)
+        if what == NOTHING or events == MOST or left <= 0.0:
+            break
+        t = share * left
+        se, ce = s * (1 - t * t / 2 + t**4 / 24) + c * t * (1 - t * t / 6 + t**4 / 120), \
+            c * (1 - t * t / 2 + t**4 / 24) - s * t * (1 - t * t / 6 + t**4 / 120)
+        begun, was = slid(x, f, room, i), room[WAY * LANES + i]
+        x, v, f, k = flow(x, v, f, k, s, c, se, ce, t, room, i)
+        f, before = friction(x, room, i)
+        gone += abs(slid(x, f, room, i) - begun)
+        s, c, left = se, ce, left - t
+        if what == TURNS:
+            v, turn, turned = 0.0, x, True
+            turn_round(x, f, room, i)
+        else:
+            close(x, f, room, i)
+        look_ahead(x, room, i)
+        f, k = friction(x, room, i)
+        now = SLIPS if room[WAY * LANES + i] != was else what
+        if now >= weight:
+            weight, u, xe, ve, fe = now, 1 - left / h, x, v, f
+            room[STIFF_1 * LANES + i], room[STIFF_2 * LANES + i] = before, k
+    room[GONE * LANES + i] = gone + abs(slid(x1, f1, room, i) - slid(x, f, room, i))
+    room[STIFF * LANES + i] = room[STIFF_3 * LANES + i] = k1
+    if weight == NOTHING:
+        xe, ve, fe = x1, v1, f1
+        room[STIFF_1 * LANES + i] = room[STIFF_2 * LANES + i] = k1
+    return x1, v1, room[WAY * LANES + i], f1, u, xe, ve, fe, turn if turned else x1, 0.0
