@@ -1,7 +1,7 @@
 """Errors of a run from coarser runs of the same model: one estimate for every engine.
 
-An engine names its ladder: rungs in which a run is coarser, in time, in space, in modes or in its sum over bonds. Every
-rung says which runs it takes and how their measures become an error. A run that several rungs take is made once.
+An engine names its ladder: the ways in which a run is coarser, in time, in space, in modes or in its sum over bonds.
+Each says which runs it takes and how their measures become an error. A run that several of them take is made once.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from typing import NamedTuple
 from .errors import change, orders
 
 
-class Rung(NamedTuple):
+class Coarser(NamedTuple):
     """One way in which a run can be coarser.
 
     runs: variants, hashable arguments of `solve`, coarse to coarser; rule(values of the run beside, *values of the
@@ -26,10 +26,10 @@ class Rung(NamedTuple):
 
 
 def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> tuple:
-    """Errors by measure name, one dict per rung, and the seconds of the coarser runs.
+    """Errors by measure name, one dict per `Coarser`, and the seconds of the coarser runs.
 
-    solve(variant) -> a run with `values`; fine: measures of the run itself; ladder: Rungs; made: variant -> run, those
-    that are made already; it is filled.
+    solve(variant) -> a run with `values`; fine: measures of the run itself; ladder: of `Coarser`; made: variant -> run,
+    those that are made already; it is filled.
     """
     begin, made = perf_counter(), {} if made is None else made
 
@@ -38,16 +38,16 @@ def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> t
             made[variant] = solve(variant)
         return made[variant].values
 
-    errors = [rung.rule(fine if rung.beside is None else values(rung.beside), *map(values, rung.runs))
-              for rung in ladder]
+    errors = [way.rule(fine if way.beside is None else values(way.beside), *map(values, way.runs))
+              for way in ladder]
     return errors, perf_counter() - begin
 
 
 def left_open(kinds, errors, runs) -> dict:
     """What leaves the measures of a run open: errors by name under each of `kinds`, and the `orders` of the steps.
 
-    kinds: what each rung makes coarser, "end" for a run that ends beside the asked end; errors: by name, one dict per
-    rung; runs: measures of the run, at half and at a quarter of its steps, fewer where it has no steps.
+    kinds: what each of the ladder makes coarser, "end" for a run that ends beside the asked end; errors: by name, one
+    dict per kind; runs: measures of the run, at half and at a quarter of its steps, fewer where it has no steps.
     """
     out: dict = {}
     for kind, part in zip(kinds, errors, strict=True):
@@ -57,9 +57,9 @@ def left_open(kinds, errors, runs) -> dict:
     return {"parts": out, "orders": orders(*runs) if len(runs) == 3 else {}}
 
 
-def space_rung(coarser, beside=None, of: str = "mesh") -> Rung:
-    """Rung whose one run has a coarser mesh, or fewer modes, and whose change is the error.
+def coarser_space(coarser, beside=None, of: str = "mesh") -> Coarser:
+    """The `Coarser` whose one run has a coarser mesh, or fewer modes, and whose change is the error.
 
-    coarser, beside, of: as in `Rung`.
+    coarser, beside, of: as in `Coarser`.
     """
-    return Rung((coarser,), change, beside, of)
+    return Coarser((coarser,), change, beside, of)

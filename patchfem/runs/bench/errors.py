@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects import listed
-from ...response.coarser import Rung, estimate, left_open, space_rung
+from ...response.coarser import Coarser, coarser_space, estimate, left_open
 from ...response.errors import change, step_error
 from . import bench, shear
 from .engine import LIST, PLANE, STEPPED, slips_by_elements
@@ -44,8 +44,8 @@ def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
 
 
 def ladder_of(model, patch, coarse, fine, steps: int) -> list:
-    """Rungs of a bench: half and a quarter of the steps; at a quarter of them the coarser mesh, where there is one, and
-    for a merged list of bonds narrower strips."""
+    """The coarser runs of a bench: half and a quarter of the steps; at a quarter of them the coarser mesh, where there
+    is one, and for a merged list of bonds narrower strips."""
     choice = fine.engine.choice
     half, few = Pass(max(4, steps // 8 * 4), False, choice), Pass(max(4, steps // 16 * 4), False, choice)
     times = 2.0 if model.load_varies else 1.0  # first order
@@ -53,14 +53,14 @@ def ladder_of(model, patch, coarse, fine, steps: int) -> list:
     def rule(*values) -> dict:
         return {name: times * error for name, error in step_error(*values, steps).items()}
 
-    out, meshed = [Rung((half, few), rule, of="steps")], coarse is not None
+    out, meshed = [Coarser((half, few), rule, of="steps")], coarse is not None
     if meshed and slips_by_elements(model):
-        out.append(shear.mesh_rung(model, patch, coarse, few))
+        out.append(shear.coarser_elements(model, patch, coarse, few))
     elif meshed:
-        out.append(space_rung(few._replace(rough=True), few))
+        out.append(coarser_space(few._replace(rough=True), few))
     if fine.engine.kind == LIST and choice.merge > 0:
         narrow = few._replace(choice=replace(choice, merge=FINER * choice.merge))
-        out.append(Rung((narrow,), lambda a, b: {name: MERGED * gap for name, gap in change(a, b).items()}, few,
+        out.append(Coarser((narrow,), lambda a, b: {name: MERGED * gap for name, gap in change(a, b).items()}, few,
                         "bonds"))
     return out
 

@@ -7,7 +7,7 @@ from ...core import NotConverged
 from ...dynamics.march.models import jenkins_model, points_model
 from ...effects import has
 from ...friction.record import law_from
-from ...response.coarser import Rung
+from ...response.coarser import Coarser
 from ...response.errors import GAPS, change
 from ...slip.fields import element_fields, point_fields, shear_of
 from ...slip.grain import spread, stiffer
@@ -81,12 +81,12 @@ def _points(model, patch, time, slide, frames, watch) -> Slid:
     return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)
 
 
-def mesh_rung(model, patch, coarse, few) -> Rung:
-    """The rung of the mesh of a bench of elements; patch, coarse: on both meshes; few: variant of `errors` beside."""
+def coarser_elements(model, patch, coarse, few) -> Coarser:
+    """The coarser mesh of a bench of elements; patch, coarse: on both meshes; few: variant of `errors` beside."""
     length = law_from(model.friction).element(1.0).length
     stiff = stiffer(*(elements(one, model.friction.static, length).stiffness.sum() for one in (patch, coarse)))
     runs = few._replace(rough=True), few._replace(springs=spread), few._replace(springs=stiff)
-    return Rung(runs, mesh_error, few, "mesh")
+    return Coarser(runs, mesh_error, few, "mesh")
 
 
 def mesh_error(fine: dict, rough: dict, spread: dict, stiff: dict) -> dict:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...effects import has
 from ...model.model import Model
-from ...response.coarser import Rung, space_rung
+from ...response.coarser import Coarser, coarser_space
 from ...response.errors import cells_error, change, pieces_error, step_error, tolerance_error
 from ...scene.rules import methods
 from ...scene.rules.draft import acts, pinned
@@ -54,7 +54,7 @@ class Engine(NamedTuple):
     numerics), which raises Missing where a run would not end; cost: function(model, numerics, unknowns) -> (steps,
     seconds); words: function(model, numerics) -> sentences of a plan; notes: function(model, numerics, patch, Solution)
     -> notes of a run. All of these are "module function" of this folder, "" where there is none. in_time(model,
-    numerics, patch) and in_space(model, numerics, patch, coarse, solution) -> Rungs of its error; least: relative error
+    numerics, patch) and in_space(model, numerics, patch, coarse, solution) -> list of `Coarser`; least: relative error
     that stays; closes: gap of the energy balance beyond which a run has not converged, None where the engine's own
     error of the balance says it, infinite of methods that are shown with what they lose. tells: numbers of a run that
     its summary has; resumes: it keeps its state on the way; keeps: every step of it is kept; steady: it finds
@@ -145,7 +145,7 @@ def steady_by(model: Model) -> Finder:
     return FINDERS["balance" if named or PIECES.lacks(model) or pieces_per_cycle(model) > MOST_PIECES else "yields"]
 
 
-def _no_rungs(*_) -> list:
+def _none(*_) -> list:
     return []
 
 
@@ -157,23 +157,25 @@ def sampling_errors(values: dict) -> dict:
 
 
 def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """Rungs of the exact engine: the mesh, where the loads of strips or the limit of an averaged law come from it.
+    """The coarser runs of the exact engine: the mesh, where the loads of strips or the limit of an averaged law hang on
+    it.
 
     Strips that slide apart are read off 400 samples a cycle besides, by the trapezoidal rule.
     """
     averaged = model.friction is not None and has(model.friction.law, "averaged")
     meshed = coarse is not None and (model.rig.strips_slide_apart or averaged)
-    samples = [Rung((), sampling_errors)] if model.rig.strips_slide_apart else []
-    return [*samples, space_rung(Variant(numerics, coarse))] if meshed else samples
+    samples = [Coarser((), sampling_errors)] if model.rig.strips_slide_apart else []
+    return [*samples, coarser_space(Variant(numerics, coarse))] if meshed else samples
 
 
 def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """Rungs of the engine of pieces: the mesh, where its nodes make the elements, and half the cells of a density."""
-    out = [Rung((Variant(numerics, coarse),), pieces_error, of="mesh")] if coarse is not None and model.soft else []
+    """The coarser runs of the engine of pieces: the mesh, where its nodes make the elements, and half the cells of a
+    density."""
+    out = [Coarser((Variant(numerics, coarse),), pieces_error, of="mesh")] if coarse is not None and model.soft else []
     cells = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
     if not cells:
         return out
-    return [*out, Rung((Variant(replace(numerics, pairs=numerics.pairs + 1), patch),), cells_error, of="cells")]
+    return [*out, Coarser((Variant(replace(numerics, pairs=numerics.pairs + 1), patch),), cells_error, of="cells")]
 
 
 def _fewer(numerics, share: int):
@@ -182,10 +184,11 @@ def _fewer(numerics, share: int):
 
 
 def _march_in_time(model: Model, numerics, patch) -> list:
-    """Rungs of the march in time: half and a quarter of the steps."""
+    """The coarser runs of the march in time: half and a quarter of the steps."""
     size, f = model.rig.displacement, model.friction
     turn = f.bond_length if f is not None and has(f.law, "bonds") else 0.0
-    return [Rung(_halves(numerics, patch), lambda *values: step_error(*values, numerics.steps, size, turn), of="steps")]
+    return [Coarser(_halves(numerics, patch), lambda *values: step_error(*values, numerics.steps, size, turn),
+                    of="steps")]
 
 
 def _halves(numerics, patch) -> tuple:
@@ -193,34 +196,34 @@ def _halves(numerics, patch) -> tuple:
 
 
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """Rungs of the march in space: the mesh, the number of shear modes and the sum over bonds, at a quarter of the
-    steps."""
+    """The coarser runs of the march in space: the mesh, the number of shear modes and the sum over bonds, at a quarter
+    of the steps."""
     few, varies, out = _fewer(numerics, 4), model.rig.load_varies, []
     quarter = Variant(few, patch)
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     if coarse is not None and (varies or model.soft):
         fixed = few if shape is None else replace(few, shear_modes=shape.size)  # one change at a time
-        out.append(space_rung(Variant(fixed, coarse), quarter))
+        out.append(coarser_space(Variant(fixed, coarse), quarter))
     climbs = model.grooves is not None
     if shape is not None and (varies or climbs or (coarse is not None and has(model.friction.law, "bonds"))):
         # of as few modes as a motion without fields has, twice as many say more than half of them
         other = 2 * shape.size if model.patch is not None and model.patch.gathers else max(1, shape.size // 2)
-        out.append(space_rung(Variant(replace(few, shear_modes=other), patch), quarter, "modes"))
+        out.append(coarser_space(Variant(replace(few, shear_modes=other), patch), quarter, "modes"))
     return [*out, *_summed(model, few, patch, solution)]
 
 
 def _summed(model: Model, few, patch, solution) -> list:
-    """Rungs of a list of bonds: its stated bound on forces and energies, and, where it merges or its tail was set
-    loose, the change of the motion with narrower strips and a smaller tail, at the steps of `few`."""
+    """The coarser runs of a list of bonds: its stated bound on forces and energies, and, where it merges or its tail
+    was set loose, the change of the motion with narrower strips and a smaller tail, at the steps of `few`."""
     choice = solution.summed
     if choice is None or not choice.error:
         return []
-    out = [Rung((), lambda fine: sum_errors(model, patch, choice.error, fine, solution), of="bonds")]
+    out = [Coarser((), lambda fine: sum_errors(model, patch, choice.error, fine, solution), of="bonds")]
     if choice.merge > 0 or choice.tail > LOOSE * model.accuracy.tolerance:
         finer = replace(choice, merge=FINER * choice.merge, tail=LESS * choice.tail)
         same, narrow = (Variant(replace(few, choice=one), patch) for one in (choice, finer))
-        out.append(Rung((narrow,), lambda wide, fine: {name: MERGED * gap for name, gap in change(wide, fine).items()},
-                        same, "bonds"))
+        out.append(Coarser((narrow,), lambda wide, fine: {name: MERGED * gap for name, gap in
+                                                          change(wide, fine).items()}, same, "bonds"))
     return out
 
 
@@ -242,13 +245,13 @@ def sum_errors(model: Model, patch, error: float, values: dict, solution) -> dic
 
 
 def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
-    """Rungs of what a run itself leaves open: the residual of a balance and the change at half the harmonics, or what
-    samples do not resolve."""
-    return [Rung((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})]
+    """What a run itself leaves open: the residual of a balance and the change at half the harmonics, or what samples do
+    not resolve."""
+    return [Coarser((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})]
 
 
 def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """Rungs of a steady motion: what it leaves open itself, and the mesh where its nodes make the elements."""
+    """The coarser runs of a steady motion: what it leaves open itself, and the mesh where nodes are elements."""
     meshed = _pieces_in_space(model, numerics, patch, coarse, solution) if steady_by(model).like == PIECES.name else []
     return [*_own_errors(model, numerics, patch, coarse, solution), *meshed]
 
@@ -257,24 +260,24 @@ COARSER = 30.0  # times the error of a step
 
 
 def _smooth_in_time(model: Model, numerics, patch) -> list:
-    """Rung of the smooth engine: a run whose steps may make COARSER times the error.
+    """The coarser runs of the smooth engine: a run whose steps may make COARSER times the error.
 
     The error of a run follows that of its steps, `response.errors.tolerance_error`.
     """
     wider = Variant(replace(numerics, local=numerics.local * COARSER), patch)
-    return [Rung((wider,), lambda *values: tolerance_error(*values, model.rig.displacement))]
+    return [Coarser((wider,), lambda *values: tolerance_error(*values, model.rig.displacement))]
 
 
-EXACT = Engine("exact", "exact", "pieces run_exact", _no_rungs, _exact_in_space, "costs exact_cost",
+EXACT = Engine("exact", "exact", "pieces run_exact", _none, _exact_in_space, "costs exact_cost",
                dearer=dear_events, refuse="costs refuse_endless")
-PIECES = Engine("piecewise", "exact", "pieces run_piecewise", _no_rungs, _pieces_in_space, "costs exact_cost",
+PIECES = Engine("piecewise", "exact", "pieces run_piecewise", _none, _pieces_in_space, "costs exact_cost",
                 dearer=dear_elements, chosen="numerics by_pieces", refuse="costs refuse_endless")
 SMOOTH = Engine("smooth", "", "smooth run_smooth", _smooth_in_time, _own_errors, "costs smooth_cost",
                 dearer=not_smooth, chosen="numerics by_error", least=3e-8, closes=None, tells=("iterations",))
 MARCH = Engine("march", "march", "march run_march", _march_in_time, _march_in_space, "plan march_cost",
                chosen="numerics by_steps", refuse="lists refuse_long_list",
                notes="remarks marched_elements", tells=("steps_per_cycle", "iterations"), resumes=True)
-HARMONIC = Engine("harmonic", "harmonic", "steady.steady run_steady", _no_rungs, _steady_in_space, "costs steady_cost",
+HARMONIC = Engine("harmonic", "harmonic", "steady.steady run_steady", _none, _steady_in_space, "costs steady_cost",
                   words="plan steady_words", notes="remarks unmoved_elements", least=0.0, closes=None, steady=True)
 ENGINES = {one.name: one for one in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC, *(
     Engine(name, name, "comparison run_comparison", _march_in_time, _march_in_space, "plan march_cost",

@@ -19,10 +19,10 @@ def level_ends(rig) -> tuple:
     return tuple(rig.level_cycles * (k + 1) for k in range(len(rig.levels)))
 
 
-def levels_with_errors(levels, rungs, made: dict) -> tuple:
-    """The levels with what the Rungs of their run leave open at each of them, over what is a level's own.
+def levels_with_errors(levels, ways, made: dict) -> tuple:
+    """The levels with what the coarser runs of theirs leave open at each of them, over what is a level's own.
 
-    made: variant -> Solution of the runs that the rungs take. What a coarser run does not reach is as uncertain as it
+    made: variant -> Solution of the runs that the ladder takes. What a coarser run does not reach is as uncertain as it
     is large.
     """
     def seen(variant, number: int) -> dict:
@@ -30,8 +30,8 @@ def levels_with_errors(levels, rungs, made: dict) -> tuple:
         return found[number].values if number < len(found) else {}
 
     def open_at(number: int, level: Level) -> dict:
-        parts = [rung.rule(level.values if rung.beside is None else seen(rung.beside, number),
-                           *(seen(one, number) for one in rung.runs)) for rung in rungs]
+        parts = [way.rule(level.values if way.beside is None else seen(way.beside, number),
+                           *(seen(one, number) for one in way.runs)) for way in ways]
         return {name: level.errors.get(name, 0.0) + sum(part.get(name, abs(value)) for part in parts)
                 for name, value in level.values.items()}
 

@@ -159,14 +159,14 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
     meshed = engine.in_space(model, numerics, patch, coarse, found)
     space, spent = estimate(solve, found.values, meshed, made)
     while True:
-        rungs = engine.in_time(model, numerics, patch)
-        time, more = estimate(solve, found.values, rungs, made)
+        ways = engine.in_time(model, numerics, patch)
+        time, more = estimate(solve, found.values, ways, made)
         spent += more
         measures = with_errors(found.values, *time, *space, least=engine.least, size=size)
         if numerics.pairs and not errors_met(measures, model.accuracy.tolerance):
             return _solved(model, numerics.finer(), patch, coarse, seconds, say, progress, estimated)
         if found.levels:
-            apart = [one for one in (*rungs, *meshed) if one.runs or found.errors is None]  # else levels have their own
+            apart = [one for one in (*ways, *meshed) if one.runs or found.errors is None]  # else levels have their own
             found = replace(found, levels=levels.levels_with_errors(found.levels, apart, made),
                             coarser=tuple((made[one.runs[0]], one.beside and made[one.beside]) for one in apart
                                           if one.runs and one.runs[0].numerics.choice is None))  # a list has its bound
@@ -175,7 +175,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
                 seconds["error"] = spent
             runs = [found.values, *(made[one].values for one in _halved(engine, model, numerics, patch))]
             late = [one for one in (found.extra.get("late"),) if one]
-            kinds = [*(one.of for one in (*rungs, *meshed)), *["end"] * len(late)]
+            kinds = [*(one.of for one in (*ways, *meshed)), *["end"] * len(late)]
             left = left_open(kinds, [*time, *space, *late], runs)
             found = replace(found, extra=found.extra | {"left_open": left})
             return found, numerics, measures | curve_measures(found.extra)
@@ -188,8 +188,8 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
 
 def _halved(engine, model, numerics, patch) -> tuple:
     """Variants at half and a quarter of the steps of an engine that has steps, as `left_open` compares them."""
-    rungs = engine.in_time(model, numerics, patch)
-    return rungs[0].runs if rungs and not numerics.local else ()
+    ways = engine.in_time(model, numerics, patch)
+    return ways[0].runs if ways and not numerics.local else ()
 
 
 def errors_met(measures, tolerance: float) -> bool:
