@@ -19,24 +19,22 @@ from .quantities import EXAMPLES, parse
 
 
 @dataclass(frozen=True, slots=True)
-class Before:
-    """pydantic's BeforeValidator of a function of the value alone; that one looks at its signature for every key of
-    every table, which is a twentieth of a short command."""
+class Check:
+    """pydantic's BeforeValidator or AfterValidator of a function of the value alone; those look at its signature for
+    every key of every table, which is a twentieth of a short command.
 
+    made: the schema of pydantic_core of the function and of what it checks.
+    """
+
+    made: Callable
     function: Callable
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Callable) -> Any:
-        return core_schema.no_info_before_validator_function(self.function, handler(source))
+        return self.made(self.function, handler(source))
 
 
-@dataclass(frozen=True, slots=True)
-class After:
-    """pydantic's AfterValidator, as `Before`."""
-
-    function: Callable
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: Callable) -> Any:
-        return core_schema.no_info_after_validator_function(self.function, handler(source))
+Before = partial(Check, core_schema.no_info_before_validator_function)
+After = partial(Check, core_schema.no_info_after_validator_function)
 
 
 class Kind(str):
