@@ -135,6 +135,23 @@ def march_on(law: str, cases: Cases, motion, cycles: int, steps: int) -> np.ndar
     return history
 
 
+def accelerations(law: str, cases: Cases, motion, cycles: int, steps: int) -> np.ndarray:
+    """(n, cycles steps + 1) absolute acceleration of the output [m s-2] at every step from a motion (n, STATE and
+    more) on, by a march of one step after the other."""
+    n, loop, numbers, table, motion = len(cases.damp), kernels(law), numbers_of(law, cases, steps), table_of(steps), \
+        motion.copy()
+    room, marked = np.zeros((at.OWN + motion.shape[1] - at.STATE) * at.LANES), np.zeros(at.LANES + 1, np.int64)
+    out, order, done = np.empty((n, cycles * steps + 1)), np.arange(n), np.zeros(n, np.int64)
+    for k in range(cycles * steps + 1):
+        sine = table[0, k % steps]
+        x, v = motion[:, at.X], motion[:, at.V]
+        rate = cases.push * sine - cases.damp * v - cases.square * x - motion[:, at.PLACE]
+        out[:, k] = cases.out * rate + cases.base * sine
+        loop.march(numbers, order, motion, table[:, k % steps:k % steps + 2].copy(), 1, np.zeros((n, 1, 4)), done, room,
+                   marked)
+    return out
+
+
 def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> Marched:
     """March cases over `cycles` by so many steps each; the last `window` of them are read, fewer of what repeats."""
     loop, n = kernels(law), len(cases.damp)

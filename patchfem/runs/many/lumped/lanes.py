@@ -2,8 +2,8 @@
 
 A tanh or Iwan case whose bars miss its tolerance marches by finer steps; an Iwan case that has not settled marches on.
 A case goes to the exact batch `lumped`, a tanh case to a run of its own, where a bar still misses its tolerance, where
-nothing slips (but of Iwan), rings are to be told or a motion still has to settle. So does every case of a batch of
-which these contradict one of a few.
+nothing slips (but of Iwan), rings are to be told (but of Iwan in a stick that lasts all the time) or a motion still has
+to settle. So does every case of a batch of which these contradict one of a few.
 """
 
 from collections.abc import Sequence
@@ -21,6 +21,7 @@ from ....model.alike import Alike, columns_of, some
 from ....model.model import Model
 from ....response.errors import APART, GAPS, MAIN, ROUND
 from ....response.measures import energy_balance
+from ....response.ringing import ringing
 from ....response.rows import TABLE, first_harmonic
 from ....response.settling import steady_amplitudes, windows_of
 from ....scene.rules.draft import pinned
@@ -49,6 +50,7 @@ MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; chang
 # times twice as many cells as a run by itself has in a check of Iwan, and of its bars by half of them: with 48 cells 1
 # of 10 has an error beyond both, up to 5 times as large
 FINER_CELLS, SHORT = 4, 5.0
+RING = "ring_frequency", "ring_damping"
 DROPPED = 1e-2  # share of a loop by which another may be larger that is forgotten for want of room
 WIDER = 2.0  # times these are the bars of tanh cases: 493 of 500 had no error beyond half of them
 CHECKED, FEWEST = 200, 2  # one of so many cases is held against the exact engine, so many of a batch at least
@@ -174,6 +176,8 @@ def too_wide(models, found: Answers) -> np.ndarray:
     """(n,) whether a bar misses the tolerance of a case."""
     tolerance, out = columns_of(models, lambda model: (model.accuracy.tolerance,))[0], np.zeros(len(models), bool)
     for name, values in found.values.items():
+        if name in RING:  # the fit of a single run knows it no better
+            continue
         out |= found.errors[name] > tolerance * np.abs(values) + found.floors[name]
     return out
 
@@ -219,9 +223,14 @@ def runs_of(models, cycles: int, window: int, steps: int) -> tuple:
     if law in ("yielding", "masing"):
         own = np.sqrt(np.maximum(cases.square + cases.spring - cases.damp**2 / 4, 0.0))
         rings = found.shown[:, at.LONGEST - at.SHOW] * own >= RINGS
-        exact |= rings & (law == "yielding" or march.of_sliders(found.motion, "EVER") > 0)
-    steady = None
+        rings &= (law == "yielding") | (found.ended >= cycles - window)
+        exact |= rings & (law == "yielding")
+    steady, none = None, {name: np.full(len(models), np.nan) for name in RING}
     if law == "masing":
+        rings &= march.of_sliders(found.motion, "EVER") > 0
+        held = rings & (found.shown[:, at.STUCK - at.SHOW] > 2 * np.pi * (window - 1e-6))
+        exact |= rings & ~held
+        none, told = _rings(law, cases, c, found, np.flatnonzero(held), steps)
         exact |= march.of_sliders(found.motion, "DROPPED") > DROPPED
         steady, lost = _settled(law, cases, found, steps, windows_of(extremes, window)[0], ~stuck)
         steady, exact = tuple(np.abs(c["ratio"]) * one for one in steady), exact | lost
@@ -229,12 +238,30 @@ def runs_of(models, cycles: int, window: int, steps: int) -> tuple:
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
     errors = {name: (WIDER if law == "creeping" else 1.0) * one
               for name, one in bars(values, changes, law).items()}
-    none = {name: np.full(len(models), np.nan) for name in ("ring_frequency", "ring_damping")}
+    errors |= told if law == "masing" else {}
     nowhere = np.zeros(len(models), bool)  # what is lost goes elsewhere, and what sticks but for sliders
     tolerance, = columns_of(models, lambda model: (model.accuracy.tolerance,))
     runs = Runs(cycles, window, values | none, book, extremes, phasors[:, ends], stuck & (law == "masing"), nowhere,
                 errors, 1e-9, np.inf, stuck & (rise > tolerance * values["friction_force_peak"]), steady, again=False)
     return runs, exact, np.column_stack(cases)
+
+
+def _rings(law: str, cases, c: dict, found, held, steps: int) -> tuple:
+    """(ring_frequency [Hz] and ring_damping by name, their errors), (n,) each, of what rings in the cases `held`, which
+    stick through all the cycles that were read; NaN in others."""
+    out = tuple({name: np.full(len(found.ended), np.nan) for name in RING} for _ in range(2))
+    if not held.size:
+        return out
+    part = march.Cases(*(one[held] for one in cases))
+    signals = march.accelerations(law, part, found.begun[held], int(found.cycles[held[0]]), steps)
+    angle = 2 * np.pi / steps * np.arange(signals.shape[1])
+    for case, signal in zip(held.tolist(), signals):
+        omega = float(c["omega"][case])
+        told = ringing(angle / omega, signal, [(0.0, angle[-1] / omega)], omega)
+        for columns, ones in zip(out, told):
+            for name, value in ones.items():
+                columns[name][case] = value
+    return out
 
 
 def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
@@ -310,6 +337,8 @@ def bars(values: dict, changes: dict, law: str = "") -> dict:
     for name, change in changes.items():
         size = first_harmonic(values) if name == "equivalent_stiffness" else 1.0 if TABLE[name].term is not None \
             and name not in GAPS and name != "drift_per_cycle" else np.abs(values[name])
+        if law == "masing" and name == "acceleration_distortion":  # a small part of the acceleration
+            size = np.maximum(size, 1e-3)
         if name == "drift_per_cycle":
             size = np.abs(values[MAIN[0]])
         least = OF_DRIFT if law == "masing" and name == "drift_per_cycle" else OF_SIZE
