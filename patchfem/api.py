@@ -205,9 +205,10 @@ def compare(before: str | Path, after: str | Path, /, *other: str | Path, direct
     before, after: files of two traces or two areal scans; other: the pair of traces of the other direction. direction:
     "x" or "y", along which the first two run. units: of x and of z for files that name none, as ("mm", "um").
     shift [m]: of two traces whose places are known, 0.0 where both start at one mark. keep_spikes: spikes, dropouts and
-    dust stay in the traces. In the dict `verdict` and
-    `sentences` are words; `shift`, `worn_depth_mean`, `amplitude_ratio` and so on have `value`, `low`, `high`, `unit`,
-    and a `reason` where the value is None. PatchfemError for files that do not fit together.
+    dust stay in. In the dict `verdict` and `sentences` are words; `shift`, `worn_depth_mean`, `amplitude_ratio` and so
+    on have `value`, `low`, `high`, `unit`, and a `reason` where the value is None. Two scans have `worn_volume`,
+    `grown_volume`, `worn_share` and the `registration` by x, y and rotation. PatchfemError for files that do not fit
+    together.
     """
     parts = comparison.compared_files((before, after, *other), direction, units, shift, keep_spikes)
     directions = comparison.directions_of(parts)

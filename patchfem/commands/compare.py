@@ -40,8 +40,8 @@ def compare(before: Path, after: Path, /, *other: Path,
             scene: Annotated[Path | None, Parameter(name="--scene", help="press the patch of this scene with each "
                                                     "surface, such as rig.toml")] = None,
             set_: Sets = (), out: Out = None, json_: Json = False, quiet: Quiet = False):
-    """Compare the surface in BEFORE with that in AFTER: registration, worn depth, ratios, a verdict, a page; two more
-    files are the pair of the other direction.
+    """Compare the surface in BEFORE with that in AFTER: registration, worn depth, ratios, a verdict, a page; of areal
+    scans the worn volume and maps; two more files are the pair of the other direction, of traces.
 
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """

@@ -7,6 +7,11 @@ import numpy as np
 from ..core import PatchfemError, frozen_array
 from .profile import Profile
 
+RELAXED, DAMPED = 40, 0.6  # rounds of the surface over missing heights, half of them by the Laplacian; under 5/8
+CROSS = (0, 1), (0, -1), (1, 0), (-1, 0)
+LAPLACE = ((1 / 4, CROSS),)
+BILAPLACE = ((8 / 20, CROSS), (-2 / 20, ((1, 1), (1, -1), (-1, 1), (-1, -1))),
+             (-1 / 20, ((0, 2), (0, -2), (2, 0), (-2, 0))))
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Areal:
@@ -46,6 +51,25 @@ class Areal:
     def _trace(self, along, heights, name: str) -> Profile:
         return Profile(frozen_array(along), frozen_array(heights), f"{self.source}, {name}", self.notes,
                        self.tip_radius)
+
+
+def filled(z, missing) -> np.ndarray:
+    """Heights (m, n) with a smooth surface over what is missing: from the nearest ones on, relaxed towards a zero
+    bi-Laplacian, which a single hole reaches to the fourth order of the step."""
+    from scipy.ndimage import distance_transform_edt
+
+    if not missing.any():
+        return z
+    nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
+    room = np.pad(z[tuple(nearest)], 2, "reflect", reflect_type="odd")
+    rows, columns = (one + 2 for one in np.nonzero(missing))
+    for turn in range(RELAXED):
+        lap = 0.0
+        for weight, moves in (LAPLACE if turn < RELAXED // 2 else BILAPLACE):
+            for down, right in moves:
+                lap = lap + weight * room[rows + down, columns + right]
+        room[rows, columns] += DAMPED * (lap - room[rows, columns])
+    return room[2:-2, 2:-2]
 
 
 def level_plane(scan: Areal) -> Areal:

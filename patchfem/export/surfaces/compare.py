@@ -8,15 +8,17 @@ import numpy as np
 from ... import __version__
 from ...campaigns.compare import Pressed
 from ...campaigns.compare import data_of as pressed_data
+from ...core import say
 from ...disk.whole import write_text
 from ...scales import LADDERS, plain, step_of
 from ...surface.areal import level_plane
-from ...surface.compare.carried import NO_LIMIT
+from ...surface.compare.carried import NO_LIMIT, hidden_wear
 from ...surface.compare.compare import Comparison
 from ...surface.profile import Profile, even, level
 from ...surface.quantity import LEVEL, Quantity
 from ...surface.roughness.parameters import Heights, abbott
 from ...surface.roughness.spectrum import BAND
+from ...surface.scans.change import Change
 from ..pages.document import Section, document, figure, table, warned
 from ..pages.words import pair
 from . import pictures
@@ -29,6 +31,8 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "track_depth_floor": "track depth, floor", "track_area_gross": "track, lost area",
          "track_pile_up": "track, pile-up", "track_area_net": "track, lost less pile-up",
          "hidden_wear": "wear that a wedge may hide, mean",
+         "worn_volume": "worn volume", "grown_volume": "grown volume", "worn_share": "worn share of the region",
+         "shift_x": "shift along x", "shift_y": "shift along y", "rotation": "rotation",
          "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
 NOTE = ("Interval: 95 %. Shift, depth and area: of this place, from the noise of the unworn heights. Ratios: of the "
         "surface, as far as one trace before and one after can tell, for Gaussian heights that are alike everywhere; "
@@ -110,10 +114,19 @@ def data_of(parts: list, found: tuple, directions: list, pressing: Pressed | Non
 def _of_traces(one: Comparison) -> dict:
     """What traces alone have: how they were laid on each other, the longest track, the heights left out."""
     if not isinstance(one.before, Profile):
-        return {}
+        return {} if one.change is None else _of_scans(one.change)
     sizes = {name: _plain(each) for name, each in one.tracks.sizes.items()}
     return {"registration": {"shift": _plain(one.shift), "mirrored": one.mirrored, "turned": one.turned},
             "track": sizes or None, "removed": dict(zip(("before", "after"), one.removed))}
+
+
+def _of_scans(one: Change) -> dict:
+    """How scans were laid on each other, and the heights left out."""
+    guess = None if one.found is None else one.found.guess
+    flags = {"mirrored": bool(guess and guess.mirrored), "turned": bool(guess and guess.turned)}
+    return {"registration": {**{name: _plain(each) for name, each in one.registration.items()}, **flags},
+            "hidden_wear": _plain(hidden_wear(None, None)),
+            "removed": dict(zip(("before", "after"), one.removed))}
 
 
 def _plain(one: Quantity) -> dict:
@@ -182,6 +195,8 @@ def figures(one: Comparison) -> list:
                     "Depth of the trace after below the trace before; blue: the unworn heights that shift, tilt and "
                     "offset were fitted to.",
                     f"Worn depth along the trace: largest {' '.join(shown(one.worn.largest)[::2])}"))
+    elif one.change is not None and one.change.found is not None:
+        out += _maps(one.change)
     elif isinstance(one.before, Profile):
         out.append((pictures.apart(one.before, one.after), "Both traces, each about its least-squares line. They show "
                     "no common place.", "Traces before and after, one above the other"))
@@ -193,11 +208,35 @@ def figures(one: Comparison) -> list:
     curves = [_abbott(each) for each in (one.before, one.after)] if found is None else \
         [_bearing(z - tilt) for z in (found.first, second)]
     spectra = [each.spectrum for each in one.sizes]
-    if all(each.density.any() for each in spectra):
+    if spectra and all(each.density.any() for each in spectra):
         out.append((pictures.both_statistics(curves, spectra, BAND), f"Left: Abbott curves about {about}. Right: "
                     "spectra with the band in which the true density lies with 95 % probability.",
                     f"Abbott curves and spectra: amplitude ratio {shown(one.amplitude_ratio)[0]}"))
     return out
+
+
+def _maps(one: Change) -> list:
+    """Pictures of two scans that lie on each other."""
+    x, y, depth = one.before.x, one.before.y, one.volumes.filled
+    first = level_plane(one.before).z
+    worn = one.volumes.values["worn_volume"]
+    out = [(pictures.maps(x, y, (first, first - depth, depth)), "Left and middle: the scan before and, laid on it, the "
+            "scan after, about the plane of the scan before. Right: depth of the scan after below the scan before; "
+            "white: no height in one of them.",
+            f"Maps of both scans and of the worn depth: worn volume {' '.join(shown(worn)[::2])}")]
+    row, column = (int(one) for one in np.unravel_index(np.nanargmax(_wide(depth)), depth.shape))
+    lines = [(x, first[row], (first - depth)[row], f"along x, at y = {say(float(y[row]), 3)}"),
+             (y, first[:, column], (first - depth)[:, column], f"along y, at x = {say(float(x[column]), 3)}")]
+    out.append((pictures.sections(lines), "Sections through the place of the largest wide depth.",
+                "Heights before and after along two lines through the deepest wear"))
+    return out
+
+
+def _wide(depth) -> np.ndarray:
+    """Depths averaged over 9 x 9 heights, to find a place by."""
+    from scipy.ndimage import uniform_filter
+
+    return np.where(np.isfinite(depth), uniform_filter(np.nan_to_num(depth), 9), -np.inf)
 
 
 def _abbott(surface) -> tuple:

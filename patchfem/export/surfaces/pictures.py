@@ -100,6 +100,39 @@ def scan(x, y, z):
     return figure
 
 
+@styled
+def maps(x, y, heights: tuple):
+    """Draw the scan before, the scan after laid on it and the worn depth, (m, n) [m] each, over x (n,), y (m,) [m]."""
+    figure, panels = drawing(3, float(np.clip(0.8 + 2.6 * np.ptp(y) / np.ptp(x), 1.6, 6.0)))
+    along, mm = axis_unit(np.concatenate([x - x[0], y - y[0]]), "m")
+    known = heights[0][~np.isnan(heights[0])]
+    ends = np.quantile(known, (0.002, 0.998))
+    reach = np.nanquantile(np.abs(heights[2]), 0.998)
+    step = tuple(max(1, count // 400) for count in heights[0].shape)
+    for panel, z, title, (low, high), colours in zip(
+            panels, heights, ("before", "after", "worn depth"), (ends, ends, (-reach, reach)),
+            ("viridis", "viridis", "RdBu_r")):
+        up, um = axis_unit([low, high], "m")
+        mesh = panel.pcolormesh(x[::step[1]] * mm, y[::step[0]] * mm, z[::step[0], ::step[1]] * um, cmap=colours,
+                                vmin=low * um, vmax=high * um, rasterized=True, shading="nearest")
+        name = "depth" if title == "worn depth" else "height"
+        figure.colorbar(mesh, ax=panel, label=f"{name} [{up}]", extend="both", fraction=0.05, pad=0.02)
+        panel.set(xlabel=f"x [{along}]", ylabel=f"y [{along}]", aspect="equal", title=title)
+        panel.grid(False)
+    return figure
+
+
+def sections(lines: list) -> str:
+    """Heights before and after along lines; lines: (place (n,) [m], before (n,) [m], after (n,) [m], title) each."""
+    made = []
+    for place, first, second, title in lines:
+        (along, mm), (up, um) = axis_unit(place, "m"), axis_unit(np.concatenate([first, second]), "m")
+        marks = [line(place[(there := np.isfinite(z))] * mm, z[there] * um, colour, name, most=POINTS, width=0.9)
+                 for z, (colour, name) in zip((first, second), SIDES)]
+        made.append(chart(title, _place("place", along, place * mm), axis("height", up), marks))
+    return draw(made, height=2.9)
+
+
 def overlay(x, first, second, rest, where: tuple) -> str:
     """Both traces (n,) [m] over x (n,) [m], the second laid on the first, and between them what wore off.
 

@@ -10,6 +10,7 @@ from ..files.read import read_surface
 from ..profile import Profile, despiked, even
 from ..quantity import SIDE, Quantity, around, refused
 from ..roughness.spectrum import BAND
+from ..scans.change import Change, changed
 from . import depth as worn_depth
 from .carried import Carried, carried, hidden_wear, raised
 from .depth import Worn
@@ -38,7 +39,7 @@ class Comparison:
     sentences; exchanged: whether material stands above the first trace and none is missing, or a place shows in the
     other order alone; tracks; carried: what carries the registration, None without one; hidden: what a wedge may hide;
     removed: heights missing or left out in each; mirrored, turned: whether one trace was, for the registration; gain:
-    heights after over before where they differ by one factor, None where not.
+    heights after over before where they differ by one factor, None where not. change: of two scans, place by place.
     """
 
     before: Profile | Areal
@@ -65,10 +66,14 @@ class Comparison:
     mirrored: bool = False
     turned: bool = False
     gain: float | None = None
+    change: Change | None = None
 
     @property
     def values(self) -> dict:
         """Every `Quantity` by its name."""
+        if isinstance(self.before, Areal):
+            own = {} if self.change is None else {**self.change.values, **self.change.registration}
+            return {**own, "amplitude_ratio": self.amplitude_ratio, "slope_ratio": self.slope_ratio}
         out = {"shift": self.shift, "worn_depth_max": self.worn.largest, "worn_depth_mean": self.worn.mean,
                "worn_area": self.worn.area, "amplitude_ratio": self.amplitude_ratio, "slope_ratio": self.slope_ratio,
                "tilt": self.tilt, "scale": self.stretch}
@@ -97,7 +102,7 @@ def compared(before: Profile | Areal, after: Profile | Areal, direction: str = "
         raise PatchfemError(f"{before.source} and {after.source}: a trace and an areal scan; two of a kind are wanted")
     if isinstance(before, Areal):
         if shift is not None:
-            raise PatchfemError("compare: a shift is told for traces; areal scans are not laid on each other")
+            raise PatchfemError("compare: a shift is told for traces; areal scans are laid on each other by themselves")
         return _scans(before, after, direction or "x", band)
     sides = (before, after) if keep_spikes else (despiked(before), despiked(after))
     place = found_place(*sides, shift)
@@ -223,9 +228,12 @@ def _told(found: Registration) -> list:
 
 
 def _scans(before: Areal, after: Areal, direction: str, band: tuple) -> Comparison:
-    why = "a worn depth is taken from traces; write one row of each scan to a file with the header `x [um],z [um]`"
-    sizes = tuple(size_along(one, direction, band) for one in (before, after))
-    ratios = [ratio(part, text, sizes[1], sizes[0]) for part, text in (("amplitude", AMPLITUDE), ("slope", SLOPE))]
+    why = "areal scans are compared place by place in both directions at once"
+    try:
+        sizes = tuple(size_along(one, direction, band) for one in (before, after))
+        ratios = [ratio(part, text, *sizes[::-1]) for part, text in (("amplitude", AMPLITUDE), ("slope", SLOPE))]
+    except PatchfemError as error:  # a scan too short for the waves of the band
+        sizes, ratios = (), [refused("1", text, str(error)) for text in (AMPLITUDE, SLOPE)]
     blank = [refused(unit, text, why) for unit, text in (("m", SHIFT), ("1", STRETCH), ("rad", TILT))]
     return Comparison(before, after, direction, "", None, *blank, worn_depth.nowhere(why), *ratios, None, sizes,
                       notes=before.notes + after.notes)
@@ -236,7 +244,7 @@ def directions_of(parts: list) -> list:
 
     Traces are read at the coarsest step of all of them, so that slopes compare.
     """
-    if len(parts) < 2:
+    if len(parts) < 2 or not all(one.sizes for one in parts):
         return []
     along = {one.direction: one for one in parts}
     sides = [(along["x"].before, along["y"].before), (along["x"].after, along["y"].after)]
@@ -272,5 +280,10 @@ def compared_files(paths: tuple, direction: str = "", units: tuple | None = None
     if len(files) == 2 and True not in scans:
         return [compared(*files, direction, shift=shift, keep_spikes=keep_spikes)]
     first = direction or "x"
-    return [compared(*pair, along, keep_spikes=keep_spikes) for pair, along in
-            ((files[:2], first), (files[-2:], "y" if first == "x" else "x"))]
+    parts = [compared(*pair, along, keep_spikes=keep_spikes) for pair, along in
+             ((files[:2], first), (files[-2:], "y" if first == "x" else "x"))]
+    if len(files) == 2:
+        found = changed(*files, keep_spikes)
+        notes = tuple(dict.fromkeys((*found.before.notes, *found.after.notes)))
+        parts = [replace(parts[0], change=found, notes=notes, removed=found.removed), replace(parts[1], notes=())]
+    return parts

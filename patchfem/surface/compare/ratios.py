@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
-from ..areal import Areal, level_plane
+from ..areal import Areal, filled, level_plane
 from ..profile import Profile, even, level
 from ..quantity import LEVEL, SIDE, Quantity, refused
 from ..roughness.intervals import Intervals
@@ -13,6 +13,7 @@ from ..roughness.parameters import Heights
 from ..roughness.spectrum import BAND, Spectrum, amplitude_of, refuse_band, spectrum_of
 
 BEYOND = 0.004  # standard deviation of a ratio by what noise does not tell: the tip, interpolation, the datum
+BRIDGED = 1 / 3  # of the heights of a trace of a scan, at most, may be missing
 PLACES = 6  # parts of a trace whose mean squares scatter from place to place
 
 
@@ -58,15 +59,18 @@ def at_step(trace: Profile, step: float) -> tuple:
 def size_along(scan: Areal, direction: str, band: tuple = BAND) -> Size:
     """Amplitude and slope of all traces of a scan in one direction, rows for x and columns for y.
 
-    Mean squares are averaged. Neighbouring traces tell nearly the same: the degrees of freedom of one trace count as
-    often as traces are independent, by the correlation of their mean squares across the scan. PatchfemError where no
-    whole trace is left, or the traces cannot show the band.
+    Mean squares are averaged. Missing heights, a third of a trace at most, are bridged by a smooth surface.
+    Neighbouring traces tell nearly the same: the degrees of freedom of one trace count as often as traces are
+    independent, by the correlation of their mean squares across the scan. PatchfemError where no whole trace is left,
+    or the traces cannot show the band.
     """
     flat = level_plane(scan)
-    z, x = (flat.z, flat.x) if direction == "x" else (flat.z.T, flat.y)
-    z = z[~np.isnan(z).any(axis=1)]
+    lost, whole = np.isnan(flat.z), filled(flat.z, np.isnan(flat.z))
+    z, lost, x = (whole, lost, flat.x) if direction == "x" else (whole.T, lost.T, flat.y)
+    z = z[lost.mean(axis=1) <= BRIDGED]
     if not len(z):
-        raise PatchfemError(f"{scan.source}: no trace along {direction} without missing heights")
+        raise PatchfemError(f"{scan.source}: along {direction} more than a third of the heights of every trace are "
+                            "missing")
     step = float(x[-1] - x[0]) / (x.size - 1)
     refuse_band(scan.source, *band, step * (x.size - 1), step)
     sizes = [_size(level(Profile(x, row, scan.source)).z, step, band) for row in z]

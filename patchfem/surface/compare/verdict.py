@@ -3,13 +3,14 @@
 import numpy as np
 
 from ...core import say
+from ..areal import Areal
 from ..profile import Profile
 from ..quantity import SIDE, Quantity
+from ..scans import change as scans
 from .carried import may_hide, told
 from .compare import Comparison, identical
 
-EXCHANGED = "material grew, or the files are in the wrong order"
-ELSEWHERE = "not comparable place by place"
+EXCHANGED, ELSEWHERE = scans.GREW, scans.ELSEWHERE
 DEPOSITED = 0.05  # of the worn area, what may stand above without a word
 NEAR = 1e-6  # a ratio that close to one is one but for round-off
 
@@ -27,24 +28,31 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     names = [f" along {one.direction}" if one.direction else "" for one in parts]
     same = len(set(words)) == 1
     headline = words[0] if same else ", ".join(word + name for word, name in zip(words, names))
-    worn = ["worn"] * any(_sure(one.worn.mean) for one in parts)
-    if worn and headline != "no change shown":
+    areal = "" if parts[0].change is None else scans.headline(parts[0].change)
+    worn = ["worn"] * (areal == scans.WORN or any(_sure(one.worn.mean) for one in parts))
+    if areal and set(words) == {"not known"}:
+        headline = areal if areal in (scans.WORN, scans.NONE) else "waves not known"
+    elif worn and headline != "no change shown":
         headline = f"worn, waves {headline}"
     elif headline == "no change shown":
         told = worn + ["flatter"] * any(changed(one.slope_ratio) == "reduced" for one in parts)
         headline = " and ".join(told) + ", no change of the waves shown" if told else headline
-    if any(one.exchanged for one in parts) and not worn:
+    if (areal == EXCHANGED or any(one.exchanged for one in parts)) and not worn:
         headline = f"{EXCHANGED}; as given: {headline}"
-    elif any(_elsewhere(one) for one in parts):
+    elif areal == ELSEWHERE or any(_elsewhere(one) for one in parts):
         headline = f"{ELSEWHERE}; {headline}"
     if any(_gain(one, "") and word != "no change shown" for one, word in zip(parts, words)):
         headline += " by a factor of all heights, as the gain of an instrument"
-    over = _over(parts)
+    over = _over(parts) if parts[0].change is None else scans.over(parts[0].change)
     headline = f"{headline}; {over}" if over else headline
-    out = []
+    out = [] if parts[0].change is None else scans.sentences(parts[0].change)
     for one, word, name in zip(parts, words, names):
-        out += [*_variant(one, name), _worn(one, name), *_reference(one)]
-        out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name), *_gain(one, name)]
+        if not isinstance(one.before, Areal):
+            out += [*_variant(one, name), _worn(one, name), *_reference(one)]
+        if one.sizes or not isinstance(one.before, Areal):
+            out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name), *_gain(one, name)]
+        else:
+            out.append(f"Waves{name}: not available; {one.amplitude_ratio.reason}.")
         out += _apart(one)
     out += [_direction(*each) for each in directions]
     return headline, out

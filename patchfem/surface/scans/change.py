@@ -1,0 +1,201 @@
+"""Two areal scans before and after in one frozen record: place, map, measures, and what they prove in words."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ...core import PatchfemError, frozen_array, say
+from ..areal import Areal, filled
+from ..quantity import SIDE, Quantity, refused
+from .registration import REACH, Laid, laid
+from .search import CLEAR, variant
+from .volumes import Volumes, measured, nothing
+
+SHIFT = "a place of the scan before, turned about its middle, stands so far along {} in the scan after"
+ROTATION = "of the scan after against the scan before, anticlockwise"
+ALIKE = 0.95  # correlation of the unworn heights of both scans, from which on they show the same place
+LIKELY = 0.98  # the same where the search is no clearer than chance, as on a lay that repeats itself
+SPIKE, WIDEST = (10.0, 40.0, 160.0), 12  # scatters off the medians of 5 x 5 heights; heights of a spike at most
+DIGITS = 4
+WORN, NONE = "worn", "no wear shown"
+GREW = "material grew, or the files are in the wrong order"
+ELSEWHERE = "not comparable place by place"
+UNSURE = "the scans agree up to a plane: even wear and a wedge would look the same"
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """What `changed` found.
+
+    before, after: the scans without spikes; found, volumes: None where they show no common place, for the reason why;
+    removed: heights left out of each as spikes; turned_first: whether the scan before was turned over instead of the
+    scan after.
+    """
+
+    before: Areal
+    after: Areal
+    found: Laid | None
+    volumes: Volumes | None
+    why: str = ""
+    removed: tuple = (0, 0)
+    turned_first: bool = False
+    registration: dict = field(default_factory=dict)
+
+    @property
+    def values(self) -> dict:
+        """Every `Quantity` by its name."""
+        if self.volumes is None:
+            return nothing(self.why)
+        found = self.volumes.values
+        if found["worn_volume"].low > 0:
+            return found
+        blank = nothing(UNSURE)
+        return blank | {"grown_volume": found["grown_volume"]} if found["grown_volume"].low > 0 else blank
+
+
+def changed(before: Areal, after: Areal, keep_spikes: bool = False) -> Change:
+    """Compare two scans place by place.
+
+    Spikes are left out unless keep_spikes. The scans are laid on each other as they are, mirrored, or turned over;
+    where no place is common, the record says why.
+    """
+    removed = (0, 0)
+    if not keep_spikes:
+        (before, one), (after, two) = without_spikes(before), without_spikes(after)
+        removed = one, two
+    try:
+        found = laid(before, after)
+    except PatchfemError as error:
+        return Change(before, after, None, None, str(error), removed, registration=_place(None, str(error)))
+    if why := _elsewhere(found):
+        return Change(before, after, None, None, why, removed, registration=_place(None, why))
+    volumes, first = measured(found, before.x, before.y), False
+    if found.guess.turned and volumes.values["grown_volume"].value > volumes.values["worn_volume"].value:
+        before, first = variant(before, "", True), True
+        found = laid(before, variant(after, "", True))
+        volumes = measured(found, before.x, before.y)
+        found = replace(found, guess=found.guess._replace(turned=True))
+    return Change(before, after, found, volumes, "", removed, first, _place(found, ""))
+
+
+def _elsewhere(found: Laid) -> str:
+    """Why two scans show no common place, "" where they do."""
+    if found.like > (ALIKE if found.guess.clear > CLEAR else LIKELY):
+        return ""
+    return (f"the scans show no common place: the heights that agree up to a plane have a correlation of "
+            f"{found.like:.2f} only, {ALIKE:g} is wanted")
+
+
+def _place(found: Laid | None, why: str) -> dict:
+    """Shift and rotation as quantities by name."""
+    texts = {"shift_x": ("m", SHIFT.format("x")), "shift_y": ("m", SHIFT.format("y")), "rotation": ("rad", ROTATION)}
+    if found is None:
+        return {name: refused(*one, why) for name, one in texts.items()}
+    angle = float((found.angle + np.pi) % (2 * np.pi) - np.pi)
+    values = dict(zip(texts, (*found.shift, angle)))
+    errors = dict(zip(texts, (*found.errors[1:], found.errors[0])))
+    return {name: Quantity(float(values[name]), float(values[name] - SIDE * errors[name]),
+                           float(values[name] + SIDE * errors[name]), *texts[name]) for name in texts}
+
+
+def without_spikes(scan: Areal) -> tuple:
+    """A scan without single heights that stand far off the median of 5 x 5 around them, and how many there were.
+
+    A spike is twelve heights at most, all of which stand off all of its neighbours; more are a feature of the surface.
+    """
+    from scipy.ndimage import median_filter
+
+    missing = scan.missing
+    off = np.abs(scan.z - median_filter(filled(scan.z, missing), 5))
+    scale = 1.4826 * float(np.nanmedian(off))
+    spikes = np.zeros(off.shape, bool)
+    for least in SPIKE if scale > 0 else ():  # a steep place would join a spike to its neighbours at the lowest
+        with np.errstate(invalid="ignore"):
+            spikes |= _apart(scan.z, off > least * scale, least * scale)
+    if not spikes.any():
+        return scan, 0
+    z = np.where(spikes, np.nan, scan.z)
+    note = (f"{scan.source}: {spikes.sum()} of {(~missing).sum()} heights are spikes or dropouts and are left out; "
+            "--keep-spikes keeps them")
+    return replace(scan, z=frozen_array(z), notes=(*scan.notes, note)), int(spikes.sum())
+
+
+def _apart(z, far, least: float) -> np.ndarray:
+    """Which far heights belong to a small group that stands off all of its neighbours, as no slope does."""
+    from scipy.ndimage import find_objects, label
+
+    names, _ = label(far, np.ones((3, 3)))
+    out, sizes = np.zeros(far.shape, bool), np.bincount(names.ravel())
+    for name, place in enumerate(find_objects(names), 1):
+        if sizes[name] > WIDEST:
+            continue
+        wide = tuple(slice(max(one.start - 1, 0), one.stop + 1) for one in place)
+        own = names[wide] == name
+        rim, top = z[wide][~own & np.isfinite(z[wide])], z[wide][own]
+        if rim.size and (top.min() > rim.max() + least / 2 or top.max() < rim.min() - least / 2):
+            out[wide] |= own
+    return out
+
+
+def headline(one: Change) -> str:
+    """What two scans prove about material, in a few words."""
+    if one.volumes is None:
+        return ELSEWHERE
+    worn, grown = (one.volumes.values[name] for name in ("worn_volume", "grown_volume"))
+    if grown.low > 0 and grown.value > 2 * worn.value:
+        return GREW
+    return WORN if worn.low > 0 else NONE
+
+
+def sentences(one: Change) -> list:
+    """What two scans prove about material, in sentences."""
+    if one.volumes is None:
+        return [f"Worn volume: not available; {one.why}."]
+    out, values = _ways(one), one.volumes.values
+    worn, grown = values["worn_volume"], values["grown_volume"]
+    if worn.low > 0:
+        out.append(f"Worn: {_volume(worn)} over {100 * values['worn_share'].value:.3g} % of the region that both scans "
+                   f"show, {_length(values['worn_depth_mean'])} in the mean over that region, "
+                   f"{_length(values['worn_depth_max'])} at the deepest place.")
+    else:
+        out.append("Worn volume: none shown. Even wear of any depth, and a wedge that the mounting turned back, would "
+                   "look the same; only an unworn part beside the rubbed one, in both scans, would settle it.")
+    if grown.low > 0:
+        out.append(f"{_volume(grown)} stand above the scan before: pile-up or deposits"
+                   + (", or the two files are in the wrong order." if headline(one) == GREW else "."))
+    share = 100 * float(one.found.used.sum()) / max(float(np.isfinite(one.found.depth).sum()), 1.0)
+    out.append(f"Depths count from the {share:.0f} % of the heights that agree up to a plane within "
+               f"{say(REACH * one.found.noise, 3)}; what they lost evenly or as one wedge would come on top.")
+    if one.found.other is not None:
+        out.append("Another part of the scans may be the unworn one as well: both are planes that meet in an edge; the "
+                   "intervals hold what either gives.")
+    return out
+
+
+def _ways(one: Change) -> list:
+    out, guess = [], one.found.guess
+    if guess.mirrored:
+        out.append(f"The scan after is mirrored: its {guess.mirrored} counts from the other end.")
+    if abs(abs(one.registration["rotation"].value) - np.pi) < 0.2:
+        out.append("The scan after is turned half round.")
+    if guess.turned:
+        out.append("The heights of both scans count opposite ways: those of one were turned over, so that more wears "
+                   "than grows; tell which file counts into the material.")
+    return out
+
+
+def over(one: Change) -> str:
+    """What was mirrored or turned over, for the headline."""
+    guess = one.found.guess if one.found is not None else None
+    words = [] if guess is None else ["mirrored"] * bool(guess.mirrored) + ["turned over"] * guess.turned
+    return f"one scan is {' and '.join(words)} against the other" if words else ""
+
+
+def _volume(one: Quantity) -> str:
+    """A volume as words: um^3, or mm^3 from a thousandth of one on."""
+    scale, unit = (1e9, "mm^3") if max(one.high, 0.0) >= 1e-12 else (1e18, "um^3")
+    return f"{one.value * scale:.{DIGITS}g} {unit} ({one.low * scale:.{DIGITS}g} to {one.high * scale:.{DIGITS}g})"
+
+
+def _length(one: Quantity) -> str:
+    return f"{say(one.value)} ({say(one.low)} to {say(one.high)})"

@@ -1,0 +1,183 @@
+"""Volumes, share and depths of what wore off and of what grew, from a map of depths.
+
+A height counts as worn where the mean of the depths around it stands above its scatter over the unworn heights, for
+squares of 1 to 32 heights: deep and narrow wear shows in the small ones, shallow and wide wear in the large ones.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..quantity import SIDE, Quantity, around, refused
+from .registration import Laid
+
+SQUARES = 1, 3, 5, 9, 17, 33  # heights along a side
+CLEAR = 5.0  # scatters above which a mean depth is worn: one of 3 million by chance
+ALONE = 1.6  # times as far must a single height lie, as noise is larger beside holes
+SHARE = 0.3  # of the mean depth of a square that the smaller ones inside it have, at least
+EDGE = 0.25  # of the height at its border, how well the volume of a worn part is known
+UNDER = 0.7  # of the slow errors of the scans beside a worn part, what they are in its mean
+TOGETHER = 3.0  # the noise of a volume over that of independent heights
+FEW = 0.25  # of a square, at least, is known
+PARTS = 4  # along a side, of which each is left out once to tell what the plane is worth
+WORN = {"worn_volume": "volume that went, over the region that both scans show",
+        "grown_volume": "volume that stands above the scan before: pile-up, deposits",
+        "worn_share": "share of the common region that wore",
+        "worn_depth_mean": "worn volume over the common region",
+        "worn_depth_max": "largest worn depth, of the mean of neighbouring heights"}
+
+
+class Volumes(NamedTuple):
+    """What `measured` found: values by the names of `WORN`; worn and grown (m, n): which heights; filled (m, n) [m]:
+    the depths, missing ones from their neighbours, NaN beyond the common region."""
+
+    values: dict
+    worn: np.ndarray
+    grown: np.ndarray
+    filled: np.ndarray
+
+
+def nothing(reason: str) -> dict:
+    """Values that are not known, and why."""
+    units = {"worn_volume": "m3", "grown_volume": "m3", "worn_share": "1"}
+    return {name: refused(units.get(name, "m"), text, reason) for name, text in WORN.items()}
+
+
+def measured(found: Laid, x, y) -> Volumes:
+    """Measures of a map of depths at x (n,) and y (m,) [m].
+
+    Volumes are sums over the worn heights. Their standard deviation is that of the plane, told by leaving out each of
+    16 parts of the map once (jackknife), and of the noise; what the heights that do not count as worn hold, above
+    zero, widens the interval. Where another part may be the unworn one, the interval reaches to what that gives.
+    """
+    first = _measured(found, x, y)
+    if found.other is None:
+        return first
+    second = _measured(found.other, x, y)
+    both = {name: one._replace(low=min(one.low, second.values[name].low), high=max(one.high, second.values[name].high))
+            for name, one in first.values.items()}
+    return first._replace(values=both)
+
+
+def _measured(found: Laid, x, y) -> Volumes:
+    from scipy.ndimage import binary_erosion
+
+    depth, cell = _filled(found), _cells(x, y)
+    inside = np.isfinite(depth)
+    heights, area, values = np.where(inside, depth, 0.0), float(cell[inside].sum()), {}
+    worn, grown = (_beyond(sign * depth, found) & inside for sign in (1.0, -1.0))
+    grown &= ~worn
+    bent = _bent(found, worn | grown)
+    for name, mask, sign in (("worn_volume", worn, 1.0), ("grown_volume", grown, -1.0)):
+        volume = float((sign * cell * heights)[mask].sum())
+        noise = found.noise * float(np.sqrt((cell[mask]**2).sum())) * TOGETHER
+        edge = EDGE * float((cell * np.abs(heights))[mask & ~binary_erosion(mask)].sum())
+        slow = UNDER * bent * float(cell[mask].sum())
+        reach = SIDE * float(np.hypot(np.hypot(_of_plane(found, mask, cell, x, y), slow), noise)) + edge
+        left = max(sign * float((cell * heights)[inside & ~worn & ~grown].sum()), 0.0)
+        values[name] = Quantity(max(volume, 0.0), max(volume - reach, 0.0), max(volume + reach + left, 0.0), "m3",
+                                WORN[name])
+    share = [float(cell[_beyond(depth, found, *rule) & inside].sum()) / area
+             for rule in ((CLEAR, 0.0), (2 * CLEAR, 0.0), (CLEAR, 2.0), (CLEAR / 1.8, 2.0))]
+    values["worn_share"] = Quantity((share[0] + share[2]) / 2, min(share), max(share), "1", WORN["worn_share"])
+    mean = (one / area for one in values["worn_volume"][:3])
+    values["worn_depth_mean"] = Quantity(*mean, "m", WORN["worn_depth_mean"])
+    values["worn_depth_max"] = _largest(found, worn)
+    return Volumes(values, worn, grown, depth)
+
+
+def _cells(x, y) -> np.ndarray:
+    """Area [m2] that each place of a raster stands for (m, n)."""
+    return np.gradient(y)[:, None] * np.gradient(x)[None, :]
+
+
+def _filled(found: Laid) -> np.ndarray:
+    """Depths, those missing inside the common region from the nearest one."""
+    from scipy.ndimage import distance_transform_edt
+
+    place = distance_transform_edt(~np.isfinite(found.depth), return_distances=False, return_indices=True)
+    return np.where(found.region, found.depth[tuple(place)], np.nan)
+
+
+def _means(depth, side: int, even: bool = True) -> np.ndarray:
+    """Mean of the known depths in the square around each place, NaN where few are known.
+
+    even: times the root of the share that is known, so that its noise is the same everywhere.
+    """
+    from scipy.ndimage import uniform_filter
+
+    if side == 1:
+        return depth
+    known = np.isfinite(depth)
+    weight = np.maximum(uniform_filter(known.astype(float), side, mode="constant"), 1e-9)
+    mean = uniform_filter(np.where(known, depth, 0.0), side, mode="constant") / weight
+    return np.where(weight >= FEW, mean * (np.sqrt(weight) if even else 1.0), np.nan)
+
+
+def _scatter(means, used, side: int) -> float:
+    """Standard deviation of the means of squares that are unworn for the most part."""
+    from scipy.ndimage import uniform_filter
+
+    quiet = (uniform_filter(used.astype(float), side) > 0.5) if side > 1 else used
+    here = means[quiet & np.isfinite(means)]
+    if here.size < 50:
+        return np.inf
+    return 1.4826 * float(np.median(np.abs(here)))
+
+
+def _beyond(depth, found: Laid, clear: float = CLEAR, less: float = 2.0) -> np.ndarray:
+    """Which heights are deep: by the mean of a square around them, of which the smaller squares inside have their
+    share, but for `less` of their scatter; beside a groove they have not."""
+    out, seen = np.zeros(depth.shape, bool), []
+    for side in SQUARES:
+        means = _means(depth, side)
+        scatter = max(_scatter(means, found.used, side), found.noise / side)
+        with np.errstate(invalid="ignore"):
+            deep = means > (ALONE if side == 1 else 1.0) * clear * scatter
+            for inner, noise in seen:
+                deep &= ~(inner < SHARE * means - less * noise)
+        out |= deep
+        seen.append((means, scatter))
+    return out
+
+
+def _bent(found: Laid, changed) -> float:
+    """Standard deviation [m] of slow errors of the scans, from the wide means that lie above the scan before
+    and do not count as changed."""
+    means = _means(found.depth, SQUARES[-1], False)
+    with np.errstate(invalid="ignore"):
+        above = -means[(means < 0) & ~changed]
+    return float(np.quantile(above, 0.8)) / 1.2816 if above.size > 50 else found.noise
+
+
+def _of_plane(found: Laid, mask, cell, x, y) -> float:
+    """Standard deviation of the volume under a mask [m3] that the plane leaves open."""
+    flat = (np.ones(mask.shape), np.broadcast_to(x - x.mean(), mask.shape),
+            np.broadcast_to((y - y.mean())[:, None], mask.shape))
+    pull = np.array([float((cell * one)[mask].sum()) for one in flat])
+    rows, columns = (np.minimum(np.arange(n) * PARTS // n, PARTS - 1) for n in mask.shape)
+    part, used = rows[:, None] * PARTS + columns[None, :], found.used & np.isfinite(found.depth)
+    normal, right = np.zeros((PARTS**2, 3, 3)), np.zeros((PARTS**2, 3))
+    for k in range(PARTS**2):
+        on = used & (part == k)
+        base = np.column_stack([one[on] for one in flat])
+        normal[k], right[k] = base.T @ base, base.T @ found.depth[on]
+    have = np.flatnonzero(normal[:, 0, 0] > 0)
+    moves = np.array([pull @ np.linalg.lstsq(normal.sum(axis=0) - normal[k], right.sum(axis=0) - right[k],
+                                             rcond=1e-12)[0] for k in have])
+    return float(np.sqrt((have.size - 1) * moves.var())) if have.size else 0.0
+
+
+def _largest(found: Laid, worn) -> Quantity:
+    """Largest median depth of 3 x 3 heights, less what the noise of as many alike depths adds."""
+    from scipy.ndimage import median_filter
+
+    text, known = WORN["worn_depth_max"], np.isfinite(found.depth)
+    if not (worn & known).any():
+        return Quantity(0.0, 0.0, SIDE * 2 * found.noise, "m", text)
+    middle = np.where(worn & known, median_filter(np.where(known, found.depth, 0.0), 3), -np.inf)
+    scatter, top = 0.5 * found.noise, float(middle.max())  # of a median of nine
+    excess = scatter * np.sqrt(2 * np.log(max(float((middle > top - 3 * scatter).sum()) / 5, 1.0)))
+    mid = around(top - excess, float(np.hypot(scatter, excess / 2)), "m", text, 0.0)
+    finest = float(found.depth[worn & known].max())
+    return mid._replace(high=max(mid.high, finest + scatter))

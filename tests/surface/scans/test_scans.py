@@ -1,0 +1,159 @@
+"""Two areal scans before and after: place, volumes and depths of known pairs, and what is said where none is known."""
+
+import json
+
+import numpy as np
+import pytest
+from known_scans import make
+
+from patchfem.__main__ import main
+from patchfem.surface.areal import Areal, filled
+from patchfem.surface.scans import change
+from patchfem.surface.scans.search import rotation, variant
+
+STEP, COUNT = 1e-6, 200
+SIDE = STEP * (COUNT - 1)
+
+
+def waves(x, y, seed=0):
+    """Heights [m] of a smooth surface at any place."""
+    draw = np.random.default_rng(seed)
+    length, way, phase = np.exp(draw.uniform(np.log(10e-6), np.log(120e-6), 250)), *draw.uniform(0, 2 * np.pi, (2, 250))
+    size = length**0.8 * 0.5e-6 / np.sqrt((length**1.6).sum() / 2)
+    return sum(a * np.cos(2 * np.pi / l * (x * np.cos(w) + y * np.sin(w)) + p)
+               for a, l, w, p in zip(size, length, way, phase))
+
+
+def scans(wear, angle=0.03, shift=(12e-6, -18e-6), noise=2e-9, holes=0.03, seed=0):
+    """Scans before and after of a surface; wear(x, y, z): depth [m] at places of the scan before."""
+    axis, draw = STEP * np.arange(COUNT), np.random.default_rng(seed)
+    x, y = np.meshgrid(axis, axis)
+    away = np.stack([x - SIDE / 2 - shift[0], y - SIDE / 2 - shift[1]])
+    at = np.tensordot(rotation(-angle), away, 1) + SIDE / 2
+    z = waves(*at, seed)
+    out = []
+    for heights in (waves(x, y, seed), z - wear(*at, z) + 1e-3 * x - 2e-3 * y):
+        heights = heights + noise * draw.normal(size=heights.shape)
+        out.append(Areal(axis, axis, np.where(draw.random(heights.shape) < holes, np.nan, heights), "a scan"))
+    return out
+
+
+def groove(x, y, z):
+    return 0.6e-6 * np.clip(1 - ((x - SIDE / 2) / 30e-6)**2, 0.0, None)
+
+
+def common(angle, shift, worn):
+    """Integral of a worn depth over the region that both scans show, on a grid ten times finer."""
+    fine = (np.arange(10 * COUNT - 10) + 0.5) * STEP / 10
+    x, y = np.meshgrid(fine, fine)
+    at = np.tensordot(rotation(angle), np.stack([x, y]) - SIDE / 2, 1) + SIDE / 2 + np.reshape(shift, (2, 1, 1))
+    inside = ((at >= 0) & (at <= SIDE)).all(axis=0)
+    return float(worn(x, y, 0.0)[inside].sum()) * (STEP / 10)**2
+
+
+@pytest.fixture(scope="module")
+def grooved():
+    return scans(groove)
+
+
+def test_exact_a_groove_between_unworn_parts_has_its_volume_and_its_place(grooved):
+    found = change.changed(*grooved)
+    truth, volume = common(0.03, (12e-6, -18e-6), groove), found.values["worn_volume"]
+    assert volume.value == pytest.approx(truth, rel=5e-3) and volume.low <= truth <= volume.high
+    assert found.values["worn_depth_max"].value == pytest.approx(0.6e-6, rel=0.01)
+    place = {name: one.value for name, one in found.registration.items()}
+    assert place["rotation"] == pytest.approx(0.03, abs=5e-5)
+    assert (place["shift_x"], place["shift_y"]) == pytest.approx((12e-6, -18e-6), abs=0.02e-6)
+    assert found.volumes.values["grown_volume"].value < 1e-3 * truth
+    assert change.headline(found) == change.WORN
+
+
+@pytest.mark.parametrize("mirrored, turned", [("x", False), ("y", True)])
+def test_exact_a_scan_that_is_mirrored_or_turned_over_has_the_same_volume(grooved, mirrored, turned):
+    plain, other = change.changed(*grooved), change.changed(grooved[0], variant(grooved[1], mirrored, turned))
+    assert (other.found.guess.mirrored, other.found.guess.turned) == (mirrored, turned)
+    assert other.values["worn_volume"].value == pytest.approx(plain.values["worn_volume"].value, rel=1e-6)
+    assert mirrored in change.sentences(other)[0] and ("turned over" in change.over(other)) == turned
+
+
+def test_exact_a_scan_that_is_turned_half_round_is_found(grooved):
+    scan = grooved[1]
+    half = Areal(scan.x, scan.y, scan.z[::-1, ::-1], scan.source)
+    found = change.changed(grooved[0], half)
+    assert abs(abs(found.registration["rotation"].value) - np.pi) < 0.04 and not found.found.guess.mirrored
+    assert found.values["worn_volume"].value == pytest.approx(change.changed(*grooved).values["worn_volume"].value,
+                                                              rel=1e-6)
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.5e-6])
+def test_always_even_wear_and_none_are_told_alike_and_have_no_depth(depth):
+    found = change.changed(*scans(lambda x, y, z: depth + 0 * x))
+    assert change.headline(found) == change.NONE
+    assert all(one.value is None and "even wear" in one.reason for one in found.values.values())
+
+
+def test_always_files_in_the_wrong_order_are_named(grooved):
+    found = change.changed(*grooved[::-1])
+    assert change.headline(found) == change.GREW and found.values["grown_volume"].low > 0
+
+
+def test_always_two_places_have_no_depth(grooved):
+    found = change.changed(grooved[0], scans(groove, seed=5)[1])
+    assert change.headline(found) == change.ELSEWHERE and found.values["worn_volume"].value is None
+    assert found.registration["shift_x"].reason
+
+
+def test_always_either_side_of_an_edge_may_be_the_unworn_one():
+    """A wedge that begins in the middle: both halves are planes."""
+    def wedge(x, y, z):
+        return 0.8e-6 * np.clip((x - 0.55 * SIDE) / SIDE, 0.0, None)
+    found = change.changed(*scans(wedge))
+    truth, volume = common(0.03, (12e-6, -18e-6), wedge), found.values["worn_volume"]
+    assert volume.low <= truth <= volume.high and found.found.other is not None
+    assert any("edge" in text for text in change.sentences(found))
+
+
+def test_exact_single_holes_are_bridged_to_the_fourth_order():
+    """On a cubic the bi-Laplacian is zero: a hole has its height but for round-off."""
+    x, y = np.meshgrid(np.linspace(-1, 1, 31), np.linspace(-1, 1, 21))
+    z = x**3 - 2 * x * y**2 + x * y + 0.3 * y**3
+    lost = np.zeros(z.shape, bool)
+    lost[5::7, 4::6] = True
+    assert np.abs(filled(np.where(lost, np.nan, z), lost) - z)[:19].max() < 1e-7
+
+
+def test_always_spikes_are_left_out_and_pits_are_not(grooved):
+    scan, z = grooved[0], grooved[0].z.copy()
+    z[50:52, 60:62] += 9e-6
+    z[100, 100] -= 5e-6
+    x, y = np.meshgrid(np.arange(COUNT), np.arange(COUNT))
+    z -= 2e-6 * (np.hypot(x - 150, y - 150) < 4)
+    kept, count = change.without_spikes(Areal(scan.x, scan.y, z, "a scan"))
+    assert np.isnan(kept.z[50:52, 60:62]).all() and np.isnan(kept.z[100, 100])
+    assert np.isfinite(kept.z[150, 150]) == np.isfinite(scan.z[150, 150]) and count <= 8
+
+
+@pytest.mark.share(0, 1)
+@pytest.mark.parametrize("seed", [1, 6, 4, 8, 13, 19, 22, 26])
+def test_always_a_pair_made_by_an_independent_program_has_its_volume(seed):
+    kind, *sides, truth = make(seed)
+    found = change.changed(*(Areal(*map(np.asarray, one), "a scan") for one in sides))
+    name = "grown_volume" if kind == "deposits" else "worn_volume"
+    assert found.values[name].value == pytest.approx(truth[name], rel=0.05)
+
+
+def test_always_the_verb_tells_volumes_and_draws_maps(grooved, tmp_path, capsys):
+    paths = []
+    for name, scan in zip(("before", "after"), grooved):
+        x, y = np.meshgrid(scan.x, scan.y)
+        paths.append(tmp_path / f"{name}.npy")
+        np.save(paths[-1], np.column_stack([x.ravel(), y.ravel(), scan.z.ravel()]))
+    with pytest.raises(SystemExit) as ended:
+        main(["compare", *map(str, paths), "--units", "m,m", "--json", "-o", str(tmp_path / "out")])
+    assert ended.value.code == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["verdict"].startswith("worn") and data["worn_volume"]["unit"] == "m3"
+    assert {"shift_x", "shift_y", "rotation", "mirrored", "turned"} <= set(data["registration"])
+    assert data["removed"] == {"before": 0, "after": 0} and data["hidden_wear"]["value"] is None
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "laid on it" in page and "Sections through" in page
