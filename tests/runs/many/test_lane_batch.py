@@ -88,7 +88,7 @@ def lumped_answers(cases, finer: int = 0):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_always_97_of_100_cases_lie_within_both_bars(law):
-    held(law, 1, 150)
+    held(law, 1, 80 if law == "tanh" else 150)  # single runs beside it take seconds
 
 
 @pytest.mark.slow
