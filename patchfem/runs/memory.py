@@ -38,7 +38,7 @@ NONE = EngineCode(0.0, 0.0)
 STEPS, SHEARED = EngineCode(58e6, 0.15, 3.5), EngineCode(58e6, 0.15, 7.0)  # a march; one with shear modes of a patch
 LINEAR = EngineCode(58e6, 0.0)  # nothing of it is compiled
 FOLLOWED = EngineCode(58e6, 0.15, 2.0)  # a slide, or a method of few kernels
-SMOOTH, PIECES, BALANCE = EngineCode(74e6, 0.15, 9.0), EngineCode(82e6, 0.15, 20.0), EngineCode(1e8, 0.3, 3.0)
+SMOOTH, PIECES, BALANCE = EngineCode(74e6, 0.15, 9.0), EngineCode(82e6, 0.15, 12.0), EngineCode(1e8, 0.3, 3.0)
 CODES = {"static": NONE, "bench, closed form": NONE, "bench, law step by step": NONE, "bench, two directions": NONE,
          **dict.fromkeys(("bench, parallel elements", "bench, recursion", "duhamel", "newmark", "euler"), FOLLOWED),
          "smooth": SMOOTH, "exact": PIECES, "piecewise": PIECES, "harmonic": BALANCE}
