@@ -178,6 +178,8 @@ def too_wide(models, found: Answers) -> np.ndarray:
     for name, values in found.values.items():
         if name in RING:  # the fit of a single run knows it no better
             continue
+        if name.endswith("_steady") and models[0].friction.law == "tanh":  # an extrapolation errs alike at finer steps
+            continue
         out |= found.errors[name] > tolerance * np.abs(values) + found.floors[name]
     return out
 
