@@ -26,7 +26,7 @@ H, EXPONENT, SHARE, HALF = A11, A12, A21, A22  # of the numbers of a case: step,
 # of points behind
 (SIDE, M, FROM, HELD, SLIP_FROM, ENERGY_FROM, NEXT, STIFF, STIFF_0, STIFF_1, STIFF_2, STIFF_3, GONE, AT_TURN, EVER,
  VIRGIN, ALL, DROPPED, BEHIND) = range(OWN, OWN + 19)
-STACK, EACH, DEPTH = OWN + 19, 4, 24  # those points: slide, friction, irreversible slide and energy of each
+STACK, EACH, DEPTH = OWN + 19, 4, 64  # those points: slide, friction, irreversible slide and energy of each
 OWN_STATE = 19 + EACH * DEPTH
 LEAST = 1e-30  # of w
 MOST = 8  # events of a step
