@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from patchfem.compiled import Entry, Kernels, load, machine
+from patchfem.compiled import Entry, Kernels, inner, load, machine
 
 
 class Inner(NamedTuple):
@@ -127,6 +127,29 @@ def test_exact_the_same_bits_from_the_file(weighing):
     other = outer._replace(count=2, inner=Inner(-outer.inner.places, 1.5))  # other words, not those of the first call
     assert code(words_of(-1, other, 2.0, mine)) == made(-1, other, 2.0, np.zeros(5)) == (1, (mine[1], 7))
     assert mine[1] == pytest.approx(weighed(-1, other, 2.0, out)[1][0], rel=1e-13)
+
+
+def test_exact_tuples_are_taken_by_their_address(weighing, tmp_path):
+    """Numbers, arrays of each layout and a tuple inside are read where they lie, those of each call; a function inside
+    is given the address as well."""
+    _, (first, outer, step, _), answer, _, made = weighing
+    within = inner.njit(error_model="numpy", _nrt=False)(weighed)
+
+    @inner.njit(error_model="numpy", _nrt=False)
+    def called(first, outer, step, out):
+        return within(first, outer, step, out)
+
+    for function in (within, called):
+        code = machine.make(tmp_path / "a.code", function, (first, outer, step, np.zeros(5)), inner.optimised)
+        mine = np.zeros(5)
+        assert code(words_of(first, outer, step, mine)) == (8, (mine[-1], 7))
+        assert mine[-1] == pytest.approx(answer[1][0], rel=1e-14)
+        other = outer._replace(first=2 * outer.first, count=2, inner=Inner(-outer.inner.places, 1.5))
+        theirs = np.zeros(5)
+        assert code(words_of(-1, other, 2.0, mine))[0] == made(-1, other, 2.0, theirs)[0] == 1
+        assert mine[:2] == pytest.approx(theirs[:2], rel=1e-14)
+    [taken] = within.overloads.values()  # for `called`
+    assert taken.signature.args[1].whole.fields == Outer._fields
 
 
 @pytest.mark.parametrize("damage", [

@@ -59,7 +59,7 @@ def sources():
     """Hash, as an object, of every *kernels.py of the package, of the tuples that they take and how they are
     compiled."""
     digest = hashlib.sha256()
-    for source in (HERE / "compiled" / "inner.py", *sorted(HERE.rglob("*kernels.py")),
+    for source in (*(HERE / "compiled" / name for name in ("inner.py", "held.py")), *sorted(HERE.rglob("*kernels.py")),
                    *(HERE / "dynamics" / name for name in TUPLES)):
         digest.update(str(source.relative_to(HERE)).encode() + b"\0" + source.read_bytes())
     return digest

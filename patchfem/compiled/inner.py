@@ -10,13 +10,15 @@ from functools import wraps
 from types import SimpleNamespace
 
 import numba
-from numba.core import types
+from numba.core import typed_passes, types, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.compiler_machinery import PassManager
 from numba.core.options import DefaultOptions
 from numba.core.registry import CPUDispatcher
 from numba.core.types.functions import BaseFunction
 
+from .held import held
 from .kept import kept_on_disk
 
 NO_C, NO_PYTHON = ({flag: True} if hasattr(DefaultOptions, flag) else {}
@@ -25,6 +27,13 @@ NO_C, NO_PYTHON = ({flag: True} if hasattr(DefaultOptions, flag) else {}
 LEAN = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 # of functions that compiled code alone calls: their wrappers for Python take most of the time of compiling them
 INNER = LEAN | NO_C | NO_PYTHON
+# of numba's passes those that our texts need: no closure, generator, `with`, list, raise or expression of arrays is in
+# them, and what numba would look for in vain took a seventh of the time of compiling a loop
+PASSES = [getattr(home, name, None) for home, names in (
+    (untyped_passes, ("TranslateByteCode", "FixupArgs", "IRProcessing", "RewriteSemanticConstants", "DeadBranchPrune",
+                      "GenericRewrites", "ReconstructSSA")),
+    (typed_passes, ("NopythonTypeInference", "PreLowerStripPhis", "IRLegalization", "NativeLowering",
+                    "NoPythonBackend"))) for name in names]
 HOOKS = ("_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals", "get_pointer_to_function")
 
 
@@ -104,7 +113,7 @@ def optimised(function, arguments: tuple) -> tuple:
     if not all(hasattr(JITCodeLibrary, name) for name in HOOKS):
         raise NotImplementedError
     bare = CPUDispatcher(function.py_func, function.locals, function.targetoptions | NO_C | NO_PYTHON, Whole)
-    kinds = tuple(bare.typeof_pyval(one) for one in arguments)
+    kinds = tuple(held(bare.typeof_pyval(one)) for one in arguments)
     bare.compile(kinds)
     return bare.targetctx, bare.overloads[kinds]
 
@@ -116,7 +125,13 @@ class Inside(Compiler):
 
     def define_pipelines(self):
         self.state.library = self.part(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
-        return super().define_pipelines()
+        if not all(PASSES):
+            return super().define_pipelines()
+        passes = PassManager("nopython")
+        for one in PASSES:
+            passes.add_pass(one, one.__name__)
+        passes.finalize()
+        return [passes]
 
 
 class Whole(Inside):
@@ -129,6 +144,14 @@ class Part(JITCodeLibrary):
     """Code of a function that is not optimised yet and has no address."""
 
     codegen = SimpleNamespace(set_env=lambda name, environment: None)  # there is no machine code that could look it up
+
+    def _optimize_functions(self, module):
+        """The passes of a function alone, of those that have a body."""
+        module.data_layout = self._codegen._data_layout
+        for one in module.functions:
+            if not one.is_declaration:
+                passes, builder = self._codegen._function_pass_manager()
+                passes.run(one, builder)
 
     def _optimize_final_module(self):
         pass
@@ -145,4 +168,7 @@ class Part(JITCodeLibrary):
 class Optimised(Part):
     """Code of a function and of all that it calls, optimised, without an address."""
 
-    _optimize_final_module = JITCodeLibrary._optimize_final_module
+    def _optimize_final_module(self):
+        """All passes of LLVM, without the cheap ones that numba has before them for its counting of references."""
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)

@@ -217,6 +217,8 @@ def _code(target, made, name: str, results: int) -> tuple:
     """
     from llvmlite import binding, ir
 
+    from .held import Held, words
+
     whole = made.library._get_module_for_linking().clone()
     inner, word = target.call_conv.get_function_type(made.signature.return_type, made.signature.args), ir.IntType(64)
     module = ir.Module()
@@ -224,11 +226,18 @@ def _code(target, made, name: str, results: int) -> tuple:
     called = ir.Function(module, inner, made.fndesc.llvm_func_name)
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [word.as_pointer()]), name)
     build = ir.IRBuilder(entry.append_basic_block())
-    row, given = entry.args[0], []
-    for at, kind in enumerate(inner.args[2:], 1 + results):
-        if not isinstance(kind, (ir.PointerType, ir.DoubleType)) and kind != word:
-            raise Unfit
-        given.append(build.load(build.bitcast(build.gep(row, [word(at)]), kind.as_pointer())))
+    row, given, at, flat = entry.args[0], [], 1 + results, iter(inner.args[2:])
+    for taken in made.signature.args:
+        count = words(taken)
+        if isinstance(taken, Held):
+            given.append(build.bitcast(build.gep(row, [word(at)]), next(flat)))
+        else:
+            for k in range(count):
+                kind = next(flat)
+                if not isinstance(kind, (ir.PointerType, ir.DoubleType)) and kind != word:
+                    raise Unfit
+                given.append(build.load(build.bitcast(build.gep(row, [word(at + k)]), kind.as_pointer())))
+        at += count
     answer = build.bitcast(build.gep(row, [word(1)]), inner.args[0])
     fault = build.bitcast(build.alloca(ir.IntType(8).as_pointer()), inner.args[1])
     build.store(build.sext(build.call(called, [answer, fault, *given]), word), row)

@@ -49,7 +49,7 @@ def moved(poly, top, u):
     return out * u
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def crossing(poly, top, room, limit, spare):
     """u in (0, limit] at which a slide of speed series poly, monotone there, has moved by `room` the way it goes; NONE
     if it does not. room > 0 [m], signed; spare: room for a polynomial."""
@@ -101,7 +101,7 @@ def rest(face, head, poly, top, room):
     return first_root(spare, order, top - 1, room.hulls) if order < top else NONE
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def next_event(top, plant, table, memory, clock, room):
     """(u, what, face, sign) of the first event of a piece; u = 1 and NOTHING where none ends it.
 
