@@ -10,21 +10,22 @@ SIGNS = np.array([[1.0], [-1.0]])  # of the root of a square
 MOST_TURNS = 100  # samples of a cycle that are kept outside the last ones
 
 
-def thinned(rows, run) -> np.ndarray:
-    """Numbers of the samples of a cycle worth keeping: its first, every reversal of the output and of a slide, every
-    stop and release (slip speed below or above 1e-2 of its peak in the cycle)."""
-    n, output = run.modes.omega.size, run.modes.output
-    speeds, slips = run.watched(rows)
-    speeds = np.concatenate([speeds.T, (rows[:, n:2 * n] @ output)[None]])
-    low = 1e-13 * max(speeds.max(), -speeds.min())
+def thinned(rows, run) -> list:
+    """Numbers of the samples worth keeping of each cycle, rows (c, k, width): its first, every reversal of the output
+    and of a slide, every stop and release (slip speed below or above 1e-2 of its peak in the cycle)."""
+    n, output, (count, size), flat = run.modes.omega.size, run.modes.output, rows.shape[:2], rows.reshape(
+        -1, rows.shape[2])
+    speeds, slips = run.watched(flat)
+    speeds = np.concatenate([speeds.T, (flat[:, n:2 * n] @ output)[None]]).reshape(-1, count, size)
+    low = 1e-13 * np.maximum(speeds.max(axis=(0, 2)), -speeds.min(axis=(0, 2)))[:, None]
     way = (speeds > low).view(np.int8) - (speeds < -low).view(np.int8)
-    moved = np.abs(slips.T[:, 1:] - slips.T[:, :-1])
-    low = 1e-13 * np.abs(rows[:, :n] @ output).max()
-    slipping = moved > np.maximum(STICK * moved.max(axis=1), low)[:, None]
-    kept = (way[:, 1:] != way[:, :-1]).any(axis=0)
-    kept[1:] |= (slipping[:, 1:] != slipping[:, :-1]).any(axis=0)
-    kept[0] = True
-    return np.flatnonzero(kept)[:MOST_TURNS]
+    moved = np.abs(np.diff(slips.T.reshape(-1, count, size), axis=2))
+    low = 1e-13 * np.abs((flat[:, :n] @ output).reshape(count, size)).max(axis=1)[:, None]
+    slipping = moved > np.maximum(STICK * moved.max(axis=2, keepdims=True), low)
+    kept = (way[:, :, 1:] != way[:, :, :-1]).any(axis=0)
+    kept[:, 1:] |= (slipping[:, :, 1:] != slipping[:, :, :-1]).any(axis=0)
+    kept[:, 0] = True
+    return [np.flatnonzero(one)[:MOST_TURNS] for one in kept]
 
 
 def extremes_of(rows, modes, dt) -> list:

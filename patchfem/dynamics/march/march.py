@@ -123,16 +123,18 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
         run = fresh(modes, drive, model, steps_per_cycle, travel, start)  # it ends before: once more, cycle by cycle
         samples.again = True
     extremes, phasors = samples.extremes, samples.phasors
-    room, whole = samples.room, whole or bool(asked)
+    room, whole, picked = samples.room, whole or bool(asked), {}
     # a fraction of a cycle comes first, the window is whole
     size = (total - run.done) % steps_per_cycle or steps_per_cycle
     while run.done < total and run.outcome is None:
         stop = min((mark for mark in asked if mark > run.done), default=total)
         for first, rows, works in run.cycles(size, stop, frames if stop == total else 0, snapshots):
+            picks = thinned(rows, run) if whole and room > 0 and rows.shape[1] > 1 else [None] * len(works)
             for k, work in enumerate(works):
                 if whole and len(last) == last.maxlen and room > 0:
-                    room -= _shelved(samples, run, last[0])
+                    room -= _shelved(samples, run, last[0], picked.pop(last[0][0], None))
                 last.append((first + k * steps_per_cycle, rows[k], work))
+                picked[last[-1][0]] = picks[k]
             if whole:
                 extremes += extremes_of(rows, modes, run.prop.dt)
                 phasors += phasors_of(rows, modes, first, steps_per_cycle)
@@ -158,10 +160,11 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
                        snapshots, end.work, run.done / steps_per_cycle, run.message, tuple(found))
 
 
-def _shelved(samples: Samples, run, cycle) -> int:
-    """Keep what is worth it of a cycle (first step, rows, work) that is none of the last ones; how many samples."""
+def _shelved(samples: Samples, run, cycle, pick=None) -> int:
+    """Keep what is worth it of a cycle (first step, rows, work) that is none of the last ones; how many samples. pick:
+    their numbers where they are known."""
     first, rows, _ = cycle
-    pick = thinned(rows, run)
+    pick = thinned(rows[None], run)[0] if pick is None else pick
     samples.early(rows[pick], first + pick)
     return len(pick)
 
@@ -178,7 +181,7 @@ def _left_out(samples: Samples, run, count: int) -> int:
     samples.last.clear()
     samples.extremes += [samples.extremes[-1]] * count
     samples.phasors += [samples.phasors[-1]] * count
-    pick, begin = thinned(rows, run), 2 * run.modes.omega.size + 6
+    pick, begin = thinned(rows[None], run)[0], 2 * run.modes.omega.size + 6
     shown = np.arange(1, 1 + min(count, -(-max(0, samples.room) // len(pick))))[:, None]
     sums = slice(begin, begin + 3)  # friction work, and what is dissipated and created, since the start
     later = np.tile(rows[pick], (len(shown), 1))

@@ -1,7 +1,7 @@
 """Patches with bonds behind shear, of a study of many: each runs by itself, a few points in place of all its nodes.
 
-Nobody sees the fields of such a run. What the points leave out of the backbone is a thousandth of the tolerance
-(`rig.interface.FEWER`), far below the bars.
+Nobody sees the fields of such a run. What its points and modes each leave out of the backbone is a thousandth of the
+tolerance (`rig.interface.FEWER`), far below the bars, so no further run tells the error of the modes.
 """
 
 from collections.abc import Hashable, Sequence

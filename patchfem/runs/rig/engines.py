@@ -204,11 +204,10 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     if coarse is not None and (varies or model.soft):
         fixed = few if shape is None else replace(few, shear_modes=shape.size)  # one change at a time
         out.append(coarser_space(Variant(fixed, coarse), quarter))
-    climbs = model.grooves is not None
-    if shape is not None and (varies or climbs or (coarse is not None and has(model.friction.law, "bonds"))):
-        # of as few modes as a motion without fields has, twice as many say more than half of them
-        other = 2 * shape.size if model.patch is not None and model.patch.gathers else max(1, shape.size // 2)
-        out.append(coarser_space(Variant(replace(few, shear_modes=other), patch), quarter, "modes"))
+    climbs, gathers = model.grooves is not None, model.patch is not None and model.patch.gathers
+    pointed = coarse is not None and not gathers  # few points state themselves what their modes leave out
+    if shape is not None and (varies or climbs or (pointed and has(model.friction.law, "bonds"))):
+        out.append(coarser_space(Variant(replace(few, shear_modes=max(1, shape.size // 2)), patch), quarter, "modes"))
     return [*out, *_summed(model, few, patch, solution)]
 
 
