@@ -5,7 +5,7 @@ of kernels that it imports are plain as well.
 """
 
 import builtins
-from functools import cache
+from functools import partial
 from importlib.util import resolve_name
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -22,24 +22,35 @@ def _untouched(function=None, **options):
 INNER = SimpleNamespace(njit=_untouched, LEAN={}, INNER={})  # in place of the module `inner`
 
 
-@cache
+PLAIN = {}  # plain modules by name
+
+
 def plain(name: str) -> ModuleType:
     """The module of kernels of this full name, such as "patchfem.dynamics.modal_kernels", uncompiled."""
-    path = ROOT.joinpath(*name.split(".")).with_suffix(".py")
-    module = ModuleType(name)
-    module.__file__, module.__package__ = str(path), name.rpartition(".")[0]
-    module.__builtins__ = vars(builtins) | {"__import__": _bring}
-    exec(compile(path.read_text("utf-8"), str(path), "exec"), vars(module))
-    return module
+    return retold(name, INNER, PLAIN)
 
 
-def _bring(name: str, names=None, locals=None, parts=(), level: int = 0):
-    """What an import of a plain module gives: plain kernels, else what Python's own import does."""
+def retold(name: str, inner, known: dict[str, ModuleType]) -> ModuleType:
+    """The module of kernels of this full name with another compiler, `inner`, in place of the module `inner`.
+
+    known: modules told to it before, by name, to which this one and those that it imports are added.
+    """
+    if name not in known:
+        path = ROOT.joinpath(*name.split(".")).with_suffix(".py")
+        module = known[name] = ModuleType(name)
+        module.__file__, module.__package__ = str(path), name.rpartition(".")[0]
+        module.__builtins__ = vars(builtins) | {"__import__": partial(_bring, inner, known)}
+        exec(compile(path.read_text("utf-8"), str(path), "exec"), vars(module))
+    return known[name]
+
+
+def _bring(inner, known: dict, name: str, names=None, locals=None, parts=(), level: int = 0):
+    """What an import of such a module gives: kernels told alike, else what Python's own import does."""
     full = resolve_name("." * level + name, names["__package__"]) if level else name
     if full == f"{PACKAGE}.compiled.inner":
-        return INNER
+        return inner
     if full.startswith(PACKAGE) and full.endswith("kernels"):
-        return plain(full)
+        return retold(full, inner, known)
     if parts and all(part.endswith("kernels") for part in parts):
-        return SimpleNamespace(**{part: plain(f"{full}.{part}") for part in parts})
+        return SimpleNamespace(**{part: retold(f"{full}.{part}", inner, known) for part in parts})
     return builtins.__import__(name, names, locals, parts, level)

@@ -1,5 +1,6 @@
 """Cases of one mode, one interface and a sine as numbers, and their march in lanes."""
 
+from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
@@ -51,8 +52,11 @@ class Marched(NamedTuple):
     step: float
 
 
-def kernels(law: str):
-    """The loop of a law, "rigid", "yielding", "creeping" or "masing"."""
+def kernels(law: str, device: str = "cpu"):
+    """The loop of a law, "rigid", "yielding", "creeping" or "masing", of a device: the one place that decides what
+    compiles it and where its arrays are, "cpu" or "cuda"."""
+    if device == "cuda":
+        return import_module(f"patchfem.{HERE}.cuda_kernels").kernels(law)  # it brings numba
     loop = f"{HERE}.loop_kernels"
     return load(loop) if law == "rigid" else instance(loop, {"law": f"{HERE}.{law}_kernels"})
 
@@ -152,9 +156,12 @@ def accelerations(law: str, cases: Cases, motion, cycles: int, steps: int) -> np
     return out
 
 
-def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> Marched:
-    """March cases over `cycles` by so many steps each; the last `window` of them are read, fewer of what repeats."""
-    loop, n = kernels(law), len(cases.damp)
+def march(law: str, cases: Cases, cycles: int, window: int, steps: int, device: str = "cpu") -> Marched:
+    """March cases over `cycles` by so many steps each; the last `window` of them are read, fewer of what repeats.
+
+    device: as of `kernels`.
+    """
+    loop, n = kernels(law, device), len(cases.damp)
     numbers, table, order = numbers_of(law, cases, steps), table_of(steps), np.arange(n)
     motion, history = begun_at(law, cases), np.zeros((n, cycles, 4))
     start, ended, shown = motion.copy(), np.zeros(n, np.int64), np.zeros((n, at.SHOWN))

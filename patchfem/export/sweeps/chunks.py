@@ -161,6 +161,8 @@ class Chunks:
         else:
             gone = []
         gone += [path for place, path in enumerate(self.files) if place not in used]
+        known = np.sort(self.names) if gone and not others else self.names[:0]
         for path in gone:
-            if others or np.isin(names_in(path), self.names).all():
+            names = names_in(path)
+            if others or (known[np.searchsorted(known, names).clip(max=known.size - 1)] == names).all():
                 path.unlink(missing_ok=True)
