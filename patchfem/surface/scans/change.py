@@ -16,6 +16,7 @@ ROTATION = "of the scan after against the scan before, anticlockwise"
 ALIKE = 0.95  # correlation of the unworn heights of both scans, from which on they show the same place
 LIKELY = 0.98  # the same where the search is no clearer than chance, as on a lay that repeats itself
 SPIKE, WIDEST = (10.0, 40.0, 160.0), 12  # scatters off the medians of 5 x 5 heights; heights of a spike at most
+SPECK = 12.0, 48.0, 192.0  # noises that a speck of the depths jumps by
 DIGITS = 4
 WORN, NONE = "worn", "no wear shown"
 GREW = "material grew, or the files are in the wrong order"
@@ -28,8 +29,8 @@ class Change:
     """What `changed` found.
 
     before, after: the scans without spikes; found, volumes: None where they show no common place, for the reason why;
-    removed: heights left out of each as spikes; turned_first: whether the scan before was turned over instead of the
-    scan after.
+    removed: heights left out of each as spikes, specks of the depths counted with the scan after; turned_first: whether
+    the scan before was turned over instead of the scan after.
     """
 
     before: Areal
@@ -67,15 +68,30 @@ def changed(before: Areal, after: Areal, keep_spikes: bool = False) -> Change:
         found = laid(before, after)
     except PatchfemError as error:
         return Change(before, after, None, None, str(error), removed, registration=_place(None, str(error)))
+    found, specks = without_specks(found)
     if why := _elsewhere(found):
         return Change(before, after, None, None, why, removed, registration=_place(None, why))
     volumes, first = measured(found, before.x, before.y), False
     if found.guess.turned and volumes.values["grown_volume"].value > volumes.values["worn_volume"].value:
         before, first = variant(before, "", True), True
-        found = laid(before, variant(after, "", True))
+        found, specks = without_specks(laid(before, variant(after, "", True)))
         volumes = measured(found, before.x, before.y)
         found = replace(found, guess=found.guess._replace(turned=True))
-    return Change(before, after, found, volumes, "", removed, first, _place(found, ""))
+    return Change(before, after, found, volumes, "", (removed[0], removed[1] + specks), first, _place(found, ""))
+
+
+def without_specks(found: Laid) -> tuple:
+    """A registration without the few depths side by side that jump out of their neighbours, as dust, dropouts and what
+    is left of a spike do and worn tops do not, and how many there were."""
+    specks = np.zeros(found.depth.shape, bool)
+    for least in SPECK:
+        with np.errstate(invalid="ignore"):
+            specks |= _apart(found.depth, np.abs(found.depth) > least * found.noise, least * found.noise)
+    if not specks.any():
+        return found, 0
+    other = None if found.other is None else without_specks(found.other)[0]
+    return replace(found, depth=np.where(specks, np.nan, found.depth), used=found.used & ~specks, other=other), \
+        int(specks.sum())
 
 
 def _elsewhere(found: Laid) -> str:

@@ -16,6 +16,7 @@ CLEAR = 5.0  # scatters above which a mean depth is worn: one of 3 million by ch
 ALONE = 1.6  # times as far must a single height lie, as noise is larger beside holes
 SHARE = 0.3  # of the mean depth of a square that the smaller ones inside it have, at least
 EDGE = 0.25  # of the height at its border, how well the volume of a worn part is known
+LEAK = 0.005  # of what wore, how well what grew is known, and the other way round: a shift makes both
 UNDER = 0.7  # of the slow errors of the scans beside a worn part, what they are in its mean
 TOGETHER = 3.0  # the noise of a volume over that of independent heights
 FEW = 0.25  # of a square, at least, is known
@@ -68,12 +69,13 @@ def _measured(found: Laid, x, y) -> Volumes:
     worn, grown = (_beyond(sign * depth, found) & inside for sign in (1.0, -1.0))
     grown &= ~worn
     bent = _bent(found, worn | grown)
-    for name, mask, sign in (("worn_volume", worn, 1.0), ("grown_volume", grown, -1.0)):
+    for name, mask, sign, beside in (("worn_volume", worn, 1.0, grown), ("grown_volume", grown, -1.0, worn)):
         volume = float((sign * cell * heights)[mask].sum())
         noise = found.noise * float(np.sqrt((cell[mask]**2).sum())) * TOGETHER
         edge = EDGE * float((cell * np.abs(heights))[mask & ~binary_erosion(mask)].sum())
         slow = UNDER * bent * float(cell[mask].sum())
         reach = SIDE * float(np.hypot(np.hypot(_of_plane(found, mask, cell, x, y), slow), noise)) + edge
+        reach += LEAK * float((cell * np.abs(heights))[beside].sum())
         left = max(sign * float((cell * heights)[inside & ~worn & ~grown].sum()), 0.0)
         values[name] = Quantity(max(volume, 0.0), max(volume - reach, 0.0), max(volume + reach + left, 0.0), "m3",
                                 WORN[name])
