@@ -9,6 +9,8 @@ from ..compiled.inner import INNER, LEAN, njit
 
 FAST = {"reassoc", "contract", "arcp"}
 SET_VALUED = False  # whether a law holds without a stretch
+# of a law in lanes: whether its slope has a kink at no stretch; whether its stretches spread about their mean
+BENDS = SPREADS = False
 
 
 @njit(error_model="numpy", **LEAN)
@@ -41,4 +43,11 @@ def longest(num, turn):
     return inf
 
 
-__all__ = ["FAST", "INNER", "LEAN", "SET_VALUED", "closed", "gives", "knee", "longest", "middle"]
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def spreading(k, z, square, v, way):
+    """The `spreading` of laws of one stretch: 0, as the square of its mean is the mean of its square."""
+    return 0.0
+
+
+__all__ = ["BENDS", "FAST", "INNER", "LEAN", "SET_VALUED", "SPREADS", "closed", "gives", "knee", "longest", "middle",
+           "spreading"]

@@ -27,6 +27,11 @@ Its irreversible part of q turns where q does or the force passes zero. A law th
 SET_VALUED true: gives(num, turn) -> direction in which it lets go, 0 where it holds, longest(num, turn) -> longest step
 [s]; of turn it takes besides what `dynamics.smooth.arrays` lists, and its last two states are what is left of its hold
 and of its load [N], by their rates alone. Those of `flags_kernels` belong to laws that hold nothing.
+
+A law of one stretch z may march in lanes (`dynamics.lanes`): flowing(k, z, v, way) -> (force, dz/dq in the direction
+`way`, slopes of the force over z and v) is all of it without an array or a branch, so that cases stand side by side; k
+are its numbers, in the UNITS. BENDS says that dz/dq has a kink at z = 0, SPREADS that its
+bonds have a mean square of the stretches of their own, whose rate is spreading(k, z, square, v, way).
 """
 
 from typing import NamedTuple

@@ -4,8 +4,8 @@ In: `run.Cases`, numbers of the equation. Out: what every cycle and the last one
 a cycle in all; a march by half the steps tells the error. `loop_kernels` is the text of the loop, of one case in a lane
 as of many; its law is a part of it: `rigid_kernels` (Coulomb), `yielding_kernels` (elastic-plastic), of which a step
 without a stop, a yield or a release in it is exact and one with it finds its place to the fourth order,
-`creeping_kernels` (tanh) and `masing_kernels` (Iwan's sliders, without cells), of which every step is of that order.
-Read `loop_kernels` first, then `run`, which decides where the loop is compiled (`cuda_kernels`: for a graphics
-processor); `reading` gives the numbers of a run from event to event (`events`), whose
-measures are taken off them.
+`flowing_kernels` (laws of one stretch, from their own kernels: tanh, Bouc-Wen, LuGre, bonds) and `masing_kernels`
+(Iwan's sliders, without cells), of which every step is of that order. Read `loop_kernels` first, then `run`, which
+decides where the loop is compiled (`cuda_kernels`: for a graphics processor); `reading` gives the numbers of a run from
+event to event (`events`), whose measures are taken off them.
 """

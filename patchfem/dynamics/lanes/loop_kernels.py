@@ -147,13 +147,13 @@ def look(room, i, s0, c0, s1, c1, h):
     x1, v1, way1, place1, u, xe, ve, pe, turn, _ = done
     out, base = room[OUT * LANES + i], room[BASE * LANES + i]
     damp, push, square = room[D * LANES + i], room[P * LANES + i], room[W * LANES + i]
-    f0, f1 = law.felt(x, way, place, s0, room, i), law.felt(x1, way1, place1, s1, room, i)
+    f0, f1 = law.felt(x, v, way, place, s0, room, i), law.felt(x1, v1, way1, place1, s1, room, i)
     a0, a1 = push * s0 - damp * v - square * x - f0, push * s1 - damp * v1 - square * x1 - f1
     # the acceleration on both sides of an event, and at its vertices between it and the ends
     t = u * h
     se = s0 * (1 - t * t / 2 + t**4 / 24) + c0 * t * (1 - t * t / 6 + t**4 / 120)
     ce = c0 * (1 - t * t / 2 + t**4 / 24) - s0 * t * (1 - t * t / 6 + t**4 / 120)
-    before, after = law.felt(xe, way, pe, se, room, i), law.felt(xe, way1, pe, se, room, i)
+    before, after = law.felt(xe, ve, way, pe, se, room, i), law.felt(xe, ve, way1, pe, se, room, i)
     rest = push * se - damp * ve - square * xe
     ae, af = rest - before, rest - after
     moves, moves1 = 0.0 if law.RESTS and way == 0.0 else out, 0.0 if law.RESTS and way1 == 0.0 else out
@@ -168,24 +168,32 @@ def look(room, i, s0, c0, s1, c1, h):
                        (h - t) * (moves1 * (push * c1 - damp * a1 - square * v1) + base * c1) - moves1 * r1))
     room[ACCELERATION * LANES + i] = max(room[ACCELERATION * LANES + i], best)
     # sticks and releases
-    stuck = (u if way == 0.0 else 0.0) + (1 - u if way1 == 0.0 else 0.0)
-    room[STUCK * LANES + i] += h * stuck
-    run = room[STICK * LANES + i] + h * (u if way == 0.0 else 0.0)
+    stick, slips, furthest = law.held((x, v, a0, place), (xe, ve, ae, pe), way, room, i, t)
+    stick1, slips1, furthest1 = law.held((xe, ve, af, pe), (x1, v1, a1, place1), way1, room, i, h - t)
+    stuck = u * stick, (1 - u) * stick1
+    room[STUCK * LANES + i] += h * (stuck[0] + stuck[1])
+    run = room[STICK * LANES + i] + h * stuck[0]
     longest = max(room[LONGEST * LANES + i], run)
     room[LONGEST * LANES + i] = longest
-    run = run if way == 0.0 and (u >= 1.0 or (law.TURNS_HELD and way1 == 0.0)) else 0.0
-    room[STICK * LANES + i] = run + h * (1 - u if way1 == 0.0 else 0.0)
-    begins = 1.0 if way == 0.0 and way1 != 0.0 else 0.0
+    run = run if stick > 0.0 and (u >= 1.0 or (law.TURNS_HELD and way1 == 0.0)) else 0.0
+    room[STICK * LANES + i] = run + h * stuck[1]
+    lets_go = way == 0.0 and way1 != 0.0
+    start = t if lets_go else t * slips if slips <= 1.0 else t + (h - t) * slips1
+    begins = 1.0 if lets_go or slips <= 1.0 or slips1 <= 1.0 else 0.0
+    sb = s0 * (1 - start * start / 2 + start**4 / 24) + c0 * start * (1 - start * start / 6 + start**4 / 120)
+    cb = c0 * (1 - start * start / 2 + start**4 / 24) - s0 * start * (1 - start * start / 6 + start**4 / 120)
     room[STARTS * LANES + i] += begins
-    room[START_COS * LANES + i] += begins * (1 - 2 * se * se)
-    room[START_SIN * LANES + i] += begins * 2 * se * ce
+    room[START_COS * LANES + i] += begins * (1 - 2 * sb * sb)
+    room[START_SIN * LANES + i] += begins * 2 * sb * cb
     # the loop
-    fold_t = law.felt(turn, way, place, se, room, i)
+    pull = law.at_turn(turn, way, place, pe, room, i)
     peak = max(highest(f0, before, r0, re), highest(after, f1, rf, r1))
-    room[FORCE * LANES + i] = max(room[FORCE * LANES + i], peak if turn == x1 else max(peak, abs(fold_t)))
+    room[FORCE * LANES + i] = max(room[FORCE * LANES + i], peak if turn == x1 else max(peak, abs(pull)))
     slipped, slipped1 = law.slid(xe, pe, room, i), law.slid(x1, place1, room, i)
-    room[SLIP_HIGH * LANES + i] = max(room[SLIP_HIGH * LANES + i], max(slipped, slipped1))
-    room[SLIP_LOW * LANES + i] = min(room[SLIP_LOW * LANES + i], min(slipped, slipped1))
+    most, least = max(max(slipped, slipped1), max(furthest, furthest1)), \
+        min(min(slipped, slipped1), min(furthest, furthest1))
+    room[SLIP_HIGH * LANES + i] = max(room[SLIP_HIGH * LANES + i], most)
+    room[SLIP_LOW * LANES + i] = min(room[SLIP_LOW * LANES + i], least)
     one, two = 0.5 * (f0 + before) * (xe - x), 0.5 * (after + f1) * (x1 - xe)
     room[TURNED * LANES + i] += one + two
     room[PASSED * LANES + i] += abs(one) + abs(two)
@@ -195,7 +203,6 @@ def look(room, i, s0, c0, s1, c1, h):
     room[S3 * LANES + i] += x1 * s1 * (3 - 4 * s1 * s1)
     room[MEAN * LANES + i] += x1
     room[PULL * LANES + i] += f1
-    pull = law.at_turn(turn, way, place, room, i)
     turned = v != 0.0 and v * v1 <= 0.0
     higher, lower = max(x1, turn) > high, min(x1, turn) < low
     room[PULL_HIGH * LANES + i] = (pull if turned else nan) if higher else room[PULL_HIGH * LANES + i]
@@ -212,6 +219,7 @@ def fetch(case, i, cases, motion, room):
     room[CASE * LANES + i], room[CYCLE * LANES + i] = case, 0.0
     room[WAS_X * LANES + i], room[WAS_V * LANES + i] = room[X * LANES + i], room[V * LANES + i]
     room[WAS_PLACE * LANES + i] = room[PLACE * LANES + i]
+    law.begin(room, i)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)

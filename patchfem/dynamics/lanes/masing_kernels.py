@@ -14,11 +14,14 @@ import numpy as np
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
-from .names_kernels import A11, A12, A21, A22, GK, LANES, LENGTH, OWN, PLACE, WAY, D, K, P, V, W, X
+from .names_kernels import FIRST_OF_LAW, GK, LANES, LENGTH, OWN, PLACE, WAY, D, H, K, P, V, W, X
+from .rigid_kernels import begin
+
+__all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "held", "path", "rise", "slid"]
 
 RESTS = False  # it never holds
 TURNS_HELD = True  # an event may leave a stick as it is
-H, EXPONENT, SHARE, HALF = A11, A12, A21, A22  # of the numbers of a case: step, chi + 1, q, w from which half slips
+EXPONENT, SHARE, HALF = range(FIRST_OF_LAW, FIRST_OF_LAW + 3)  # numbers: chi + 1, q, w from which half slips
 # of its own state: sign of the motion; m; slide, friction, irreversible slide and energy at the last turn; slide at
 # which something happens next; stiffness now, and in the step: at its begin, before and after its event, at its end;
 # path of slip in the step; friction at the last turn that was; whether it ever slipped, whether the first loading is
@@ -94,7 +97,7 @@ def energy(x, place, room, i):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def felt(x, way, place, sine, room, i):
+def felt(x, v, way, place, sine, room, i):
     """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
     return place
 
@@ -106,9 +109,16 @@ def rise(v, a, way, place, room, i, when):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def at_turn(x, way, place, room, i):
+def at_turn(x, way, place, turned, room, i):
     """Friction at the last turn of the slide."""
     return room[AT_TURN * LANES + i]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def held(begin, end, way, room, i, h):
+    """(1 where less than half of the friction slips; 2, as a slip begins with an event; irreversible part of the slide
+    at the end of a part of a step)."""
+    return 1.0 if way == 0.0 else 0.0, 2.0, slid(end[0], end[3], room, i)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)

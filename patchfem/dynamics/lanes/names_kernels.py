@@ -18,6 +18,9 @@ NUMBER = STATE
 (A11, A12, A21, A22, RX, RV, SX, SV, CX, CV, B11, B12, B21, B22, QX, QV, TX, TV, UX, UV, D, W, P, GK, GS, K, LENGTH,
  OUT, BASE) = range(NUMBER, NUMBER + 29)
 NUMBERS = 29
+# of a law that needs none of the first of these, in their place: the step, half of one over the cosine of half of it,
+# its numbers
+H, MIDDLE, FIRST_OF_LAW, OF_LAW = A11, A12, A21, 6
 
 # what the last cycles show
 SHOW = NUMBER + NUMBERS

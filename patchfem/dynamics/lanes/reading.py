@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from ...compiled import load
 from ..events import names_kernels as of
 from ..events.reading import Reading
 from . import names_kernels as at
-from .run import HERE, Cases, Marched
+from .run import Cases, Marched, flows, own_of, own_state
 
 
 def books(law: str, cases: Cases, found: Marched, energy) -> dict:
@@ -20,9 +19,8 @@ def books(law: str, cases: Cases, found: Marched, energy) -> dict:
     # the sums are those of the trapezoidal rule; its ends by Euler and Maclaurin
     viscous = h * sums[at.LOST] + h / 2 * (v0**2 - v1**2) + h * h / 6 * (gains[0] - gains[1])
     reach = np.abs(found.history[:, :, :2]).max(axis=(1, 2))
-    lost, elastic = cases.slip * sums[at.PATH], _elastic(law, cases, e) - _elastic(law, cases, first)
-    if law == "creeping":
-        lost = lost + _edges(cases, first, e, h)
+    elastic = _elastic(law, cases, e) - _elastic(law, cases, first)
+    lost = sums[at.PATH] - elastic if flows(law) else cases.slip * sums[at.PATH]
     out = {"work_in": cases.push * (h * sums[at.IN] + h * h / 12 * (v0 - v1)), "viscous": cases.damp * viscous,
            "power": np.abs(cases.push) * h * sums[at.POWER], "friction": lost + elastic, "lost": lost,
            "stored": 0.5 * (v1**2 - v0**2 + cases.square * (x1**2 - x0**2)),
@@ -33,33 +31,26 @@ def books(law: str, cases: Cases, found: Marched, energy) -> dict:
 def _held(law: str, cases: Cases, motion) -> np.ndarray:
     """Friction where the drive passes 0."""
     x, place, way = (motion[:, k] for k in (at.X, at.PLACE, at.WAY))
-    if law in ("creeping", "masing"):
+    if law == "masing":
         return place
+    if flows(law):
+        return own_of(law, motion, "FELT")
     return np.where(way != 0, way * cases.slip, -cases.square * x if law == "rigid" else cases.spring * (x - place))
-
-
-def _edges(cases: Cases, b, e, h: float) -> np.ndarray:
-    """What the trapezoidal rule on the power of the rate law has at both ends of it, by Euler and Maclaurin."""
-    power, gain = [], []
-    for motion in (b, e):
-        x, v, f = (motion[:, k] for k in (at.X, at.V, at.PLACE))
-        slope = cases.slip / cases.length * (1 - (f / cases.slip)**2)
-        power.append(f * v)
-        gain.append((f + slope * v) * (-cases.damp * v - cases.square * x - f))
-    return h / 2 * (power[0] - power[1]) + h * h / 12 * (gain[0] - gain[1])
 
 
 def _elastic(law: str, cases: Cases, motion) -> np.ndarray:
     """Energy in the contact."""
-    return _of_sliders(cases, motion) if law == "masing" else \
-        0.5 * cases.spring * (motion[:, at.X] - motion[:, at.PLACE])**2
+    if law == "masing":
+        return _of_sliders(cases, motion)
+    square = own_of(law, motion, "SQUARE") if flows(law) else (motion[:, at.X] - motion[:, at.PLACE])**2
+    return 0.5 * cases.spring * square
 
 
 def _of_sliders(cases: Cases, motion) -> np.ndarray:
     """Energy in the sliders of Masing's rule, as `masing_kernels.energy` has it."""
-    own = load(f"{HERE}.masing_kernels")
+    own = own_state("masing")
     side, m, begun, held, _, energy = (motion[:, k - at.OWN + at.STATE] for k in range(own.SIDE, own.ENERGY_FROM + 1))
-    e, far, force = cases.shape[:, 0], side * (motion[:, at.X] - begun) / m, side * (motion[:, at.PLACE] - held) / m
+    e, far, force = cases.law[:, 0], side * (motion[:, at.X] - begun) / m, side * (motion[:, at.PLACE] - held) / m
     w, whole = np.minimum(far / cases.length, 1.0), cases.spring * cases.length**2
     missing = w - force / (cases.spring * cases.length)
     work = whole * w * (w / 2 - missing / (e + 2)) + cases.slip * (far - w * cases.length)
@@ -87,8 +78,9 @@ def reading_of(law: str, cases: Cases, found: Marched, energy, omega, outward) -
                        ("PASSED", energy), ("STUCK", 1 / omega), ("FIRST", 1 / omega), ("LAST", 1 / omega),
                        ("F_FIRST", energy / omega), ("F_LAST", energy / omega)):
         face[:, getattr(of, name)] = unit * shown[name]
-    edges = _edges(cases, b, e, found.step) if law == "creeping" else _elastic(law, cases, e) - _elastic(law, cases, b)
-    face[:, of.WORK] = energy * (cases.slip * (e[:, at.PATH] - b[:, at.PATH]) + edges)
+    path = e[:, at.PATH] - b[:, at.PATH]  # friction work of a law of a stretch
+    face[:, of.WORK] = energy * (path if flows(law) else cases.slip * path + _elastic(law, cases, e)
+                                 - _elastic(law, cases, b))
     face[:, [of.Q_COS, of.Q_SIN]] = np.array(slide).T / omega[:, None]
     face[:, [of.F_COS, of.F_SIN]] = np.array(pull).T * (energy / omega)[:, None]
     face[:, of.BEGIN], face[:, of.END] = b[:, at.X], e[:, at.X]

@@ -27,7 +27,7 @@ def root(y0, y1, m0, m1, least):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def felt(x, way, place, sine, room, i):
+def felt(x, v, way, place, sine, room, i):
     """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
     held, most = room[P * LANES + i] * sine - room[W * LANES + i] * x, room[GS * LANES + i]
     return min(max(held, -most), most) if way == 0.0 else way * room[GK * LANES + i]
@@ -52,9 +52,21 @@ def path(place, pe, place1, v1, room, i):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def at_turn(x, way, place, room, i):
+def at_turn(x, way, place, turned, room, i):
     """Friction at a turn of the slide, the mean of what it is before and after it."""
     return 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def held(begin, end, way, room, i, h):
+    """(share of a part of a step in which the contact sticks; share inside it at which it begins to slip, 2: nowhere;
+    irreversible part of the slide where that turns inside it, that of its end without)."""
+    return 1.0 if way == 0.0 else 0.0, 2.0, slid(end[0], end[3], room, i)
+
+
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def begin(room, i):
+    """Set what a law has of its own state by the common one when a lane takes a case: nothing."""
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)

@@ -17,9 +17,10 @@ class Cases(NamedTuple):
     """n cases of x'' + D x' + W x = P sin - f in the angle of their drive, x the slide [m].
 
     damp, square, push (n,): D, W, P; slip, stick (n,): f in a slip and the most of a stick; spring (n,): slope of f in
-    a stick, 0 of a rigid contact, length (n,) [m] over which it yields, or v_0 of the rate law; out, base (n,) [m s-2]:
-    acceleration of the output over x'' and of the base over the sine; x, v (n,): start; shape (n, m): what else a law
-    asks for, of Masing's chi + 1, q and the share of `length` at which half of the friction slips.
+    a stick, 0 of a rigid contact, length (n,) [m] over which it yields; out, base (n,) [m s-2]: acceleration of the
+    output over x'' and of the base over the sine; x, v (n,): start; law (n, k): what else a law asks for, of a law of a
+    stretch as its `flowing` takes it, of Masing's chi + 1, q and the share of `length` at which half of the friction
+    slips.
     """
 
     damp: np.ndarray
@@ -33,7 +34,7 @@ class Cases(NamedTuple):
     base: np.ndarray
     x: np.ndarray
     v: np.ndarray
-    shape: np.ndarray
+    law: np.ndarray
 
 
 class Marched(NamedTuple):
@@ -52,13 +53,35 @@ class Marched(NamedTuple):
     step: float
 
 
+def flows(law: str) -> bool:
+    """Whether a law is one of a stretch, named as its kernels are: "friction.laws.tanh_kernels"."""
+    return "." in law
+
+
 def kernels(law: str, device: str = "cpu"):
-    """The loop of a law, "rigid", "yielding", "creeping" or "masing", of a device: the one place that decides what
-    compiles it and where its arrays are, "cpu" or "cuda"."""
+    """The loop of a law, "rigid", "yielding", "masing" or one of a stretch, of a device: the one place that decides
+    what compiles it and where its arrays are, "cpu" or "cuda"."""
     if device == "cuda":
         return import_module(f"patchfem.{HERE}.cuda_kernels").kernels(law)  # it brings numba
     loop = f"{HERE}.loop_kernels"
+    if flows(law):
+        return instance(loop, {"law": instance(f"{HERE}.flowing_kernels", {"friction": law})})
     return load(loop) if law == "rigid" else instance(loop, {"law": f"{HERE}.{law}_kernels"})
+
+
+def own_state(law: str):
+    """The kernels that name what a law has of its own in the state of a case; None where it has nothing."""
+    if law in ("rigid", "yielding"):
+        return None
+    return load(f"{HERE}.{'flowing' if flows(law) else law}_kernels")
+
+
+def scales(law: str, force, omega) -> np.ndarray:
+    """(n, k) what turns the numbers of a law of a stretch into those of cases; force (n,) [m/N]: of a case over that in
+    N; omega (n,) [rad/s]."""
+    one = np.ones(np.shape(omega))
+    units = {"1": one, "m": one, "m/s": one / omega, "N": force, "N/m": force, "N_s/m": force * omega}
+    return np.stack([units[unit] for unit in load(law).UNITS.split()], axis=-1)
 
 
 def after(damp, square, h: float, begin: tuple, forces: tuple) -> tuple:
@@ -78,6 +101,13 @@ def after(damp, square, h: float, begin: tuple, forces: tuple) -> tuple:
 def numbers_of(law: str, cases: Cases, steps: int) -> np.ndarray:
     """(n, NUMBERS) of cases that march by so many steps a cycle."""
     found, h = np.zeros((len(cases.damp), at.NUMBERS)), 2 * np.pi / steps
+    found[:, at.D - at.NUMBER:] = np.array(cases[:9]).T
+    if own_state(law):
+        found[:, at.H - at.NUMBER], found[:, at.MIDDLE - at.NUMBER] = h, 0.5 / np.cos(h / 2)
+        first = at.FIRST_OF_LAW - at.NUMBER
+        found[:, first:first + at.OF_LAW] = 1.0
+        found[:, first:first + cases.law.shape[1]] = cases.law
+        return found
     sine, cosine = ([float(np.round(wave(k * np.pi / 2))) for k in range(TERMS)] for wave in (np.sin, np.cos))
     for stiff, first in ((0.0, at.A11), (cases.spring, at.B11)):
         parts = [after(cases.damp, cases.square + stiff, h, begin, forces) for begin, forces in (
@@ -85,11 +115,6 @@ def numbers_of(law: str, cases: Cases, steps: int) -> np.ndarray:
         (xx, vx), (xv, vv), force, *drive = parts
         drive = [cases.push * one for pair in drive for one in pair]
         found[:, first - at.NUMBER:first - at.NUMBER + 10] = np.array([xx, xv, vx, vv, *force, *drive]).T
-    found[:, at.D - at.NUMBER:] = np.array(cases[:9]).T
-    if law == "creeping":
-        found[:, at.A11 - at.NUMBER], found[:, at.A12 - at.NUMBER] = h, 0.5 / np.cos(h / 2)
-    if law == "masing":
-        found[:, at.A11 - at.NUMBER], found[:, at.A12 - at.NUMBER:at.A12 - at.NUMBER + 3] = h, cases.shape
     return found
 
 
@@ -103,16 +128,16 @@ def table_of(steps: int) -> np.ndarray:
 
 def begun_at(law: str, cases: Cases) -> np.ndarray:
     """(n, STATE and more) motion of cases at their start."""
-    own = load(f"{HERE}.masing_kernels") if law == "masing" else None
+    own = own_state(law)
     motion = np.zeros((len(cases.damp), at.STATE + (own.OWN_STATE if own else 0)))
     motion[:, at.X], motion[:, at.V], motion[:, at.PLACE] = cases.x, cases.v, cases.x
     motion[:, at.WAY] = np.sign(cases.v) * (cases.spring == 0)
-    if law == "creeping":
-        motion[:, at.WAY], motion[:, at.PLACE] = 1.0, cases.slip * np.tanh(cases.v / cases.length)
-    if own:
+    if flows(law):
+        motion[:, at.WAY], motion[:, at.PLACE] = np.where(cases.v == 0, np.sign(cases.push), np.sign(cases.v)), 0.0
+    if law == "masing":
         way = np.sign(np.select([cases.v != 0, cases.x != 0], [cases.v, -cases.x], cases.push))
         way[way == 0] = 1.0
-        first, half = way * cases.length, cases.shape[:, 2]
+        first, half = way * cases.length, cases.law[:, 2]
         for place, value in ((own.SIDE, way), (own.M, 1.0), (own.VIRGIN, 1.0), (own.FROM, cases.x),
                              (own.STIFF, cases.spring), (own.NEXT, cases.x + first * half)):
             motion[:, place - at.OWN + at.STATE] = value
@@ -121,9 +146,9 @@ def begun_at(law: str, cases: Cases) -> np.ndarray:
     return motion
 
 
-def of_sliders(motion, name: str) -> np.ndarray:
-    """(n,) a number of the state of sliders by its name."""
-    return motion[:, at.STATE + getattr(load(f"{HERE}.masing_kernels"), name) - at.OWN]
+def own_of(law: str, motion, name: str) -> np.ndarray:
+    """(n,) a number of the own state of a law by its name."""
+    return motion[:, at.STATE + getattr(own_state(law), name) - at.OWN]
 
 
 def march_on(law: str, cases: Cases, motion, cycles: int, steps: int) -> np.ndarray:

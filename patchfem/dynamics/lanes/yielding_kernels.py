@@ -40,16 +40,16 @@ from .names_kernels import (
     W,
     X,
 )
-from .rigid_kernels import path, slid
+from .rigid_kernels import begin, held, path, slid
 
-__all__ = ["RESTS", "advance", "ahead", "at_turn", "felt", "path", "rise", "slid"]
+__all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "held", "path", "rise", "slid"]
 
 RESTS = False  # a stick moves its spring
 TURNS_HELD = False
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def felt(x, way, place, sine, room, i):
+def felt(x, v, way, place, sine, room, i):
     """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
     return room[K * LANES + i] * (x - place) if way == 0.0 else way * room[GK * LANES + i]
 
@@ -61,9 +61,9 @@ def rise(v, a, way, place, room, i, when):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def at_turn(x, way, place, room, i):
+def at_turn(x, way, place, turned, room, i):
     """Friction at a turn of the slide."""
-    return felt(x, way, place, 0.0, room, i)
+    return felt(x, 0.0, way, place, 0.0, room, i)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -113,8 +113,8 @@ def advance(room, i, s0, c0, s1, c1, h):
     damp, square, push = room[D * LANES + i], room[W * LANES + i], room[P * LANES + i]
     spring, length = room[K * LANES + i], room[LENGTH * LANES + i]
     xs, vs = linear(room, i, s0, c0)
-    a0 = push * s0 - damp * v - square * x - felt(x, way, place, s0, room, i)
-    a1 = push * s1 - damp * vs - square * xs - felt(xs, way, place, s1, room, i)
+    a0 = push * s0 - damp * v - square * x - felt(x, v, way, place, s0, room, i)
+    a1 = push * s1 - damp * vs - square * xs - felt(xs, vs, way, place, s1, room, i)
     # the speed as a cubic over the step, the slide as its integral
     m0, m1 = h * a0, h * a1
     c2, c3 = 3 * (vs - v) - 2 * m0 - m1, m0 + m1 - 2 * (vs - v)

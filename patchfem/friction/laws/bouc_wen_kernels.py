@@ -10,10 +10,12 @@ from math import exp, expm1, inf, log, log1p, nan
 import numpy as np
 
 from ...compiled.inner import njit
-from ..flags_kernels import LEAN, SET_VALUED, closed, gives, knee, longest, middle
+from ..flags_kernels import FAST, LEAN, SET_VALUED, SPREADS, closed, gives, knee, longest, middle, spreading
 
-__all__ = ["SET_VALUED", "begin", "closed", "commit", "finish", "flow", "gives", "knee", "longest", "mean", "middle",
-           "pull", "rate", "shown", "state"]
+__all__ = ["BENDS", "SET_VALUED", "SPREADS", "begin", "closed", "commit", "finish", "flow", "flowing", "gives", "knee",
+           "longest", "mean", "middle", "pull", "rate", "shown", "spreading", "state"]
+
+UNITS, BENDS = "N m 1 1", True  # of the numbers k of the law in lanes; as of `flags_kernels`
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 PIECE = 0.25  # longest piece of a Gauss rule, in -y or w
@@ -126,10 +128,18 @@ def along(y, x, n, s):
     return -expm1(-w), area + (scaled(rest, way, x) if way > 0 else x * y)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, **LEAN)
 def slope(y, n, s):
     """dy/dx at y [1]: 1 - y^n above zero, 1 - (1 - 2 s) |y|^n below."""
-    return 1 - max(y, 0.0)**n if y >= 0 else 1 - (1 - 2 * s) * (-y)**n
+    return 1 - (1.0 if y >= 0 else 1 - 2 * s) * abs(y)**n
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def flowing(k, z, v, way):
+    """(force [N] at a stretch z = eps times the z of the law [m], slope of the stretch over the slide in the direction
+    `way`, slopes of the force over stretch [N/m] and speed, 0); k: limit [N], eps [m], n, s."""
+    stiffness = k[0] / k[1]
+    return stiffness * z, slope(way * z / k[1], k[2], k[3]), stiffness, 0.0
 
 
 @njit(error_model="numpy", **LEAN)

@@ -8,23 +8,40 @@ from math import exp, inf, nan
 
 from ...compiled.inner import njit
 from ..bonds.point_kernels import shape
-from ..flags_kernels import LEAN, SET_VALUED, closed, gives, longest, middle
+from ..flags_kernels import BENDS, FAST, LEAN, SET_VALUED, SPREADS, closed, gives, longest, middle, spreading
 
-__all__ = ["SET_VALUED", "begin", "closed", "commit", "finish", "flow", "gives", "knee", "longest", "mean", "middle",
-           "pull", "rate", "shown", "state"]
+__all__ = ["BENDS", "SET_VALUED", "SPREADS", "begin", "closed", "commit", "finish", "flow", "flowing", "gives", "knee",
+           "longest", "mean", "middle", "pull", "rate", "shown", "spreading", "state"]
 
+UNITS = "N/m N N m/s N_s/m N_s/m"  # of the numbers k of the law in lanes
 
 FADED = 6.0  # times v_s: beyond it the limit is the kinetic one to the last digit, e^-36
 TRACE = 1e-9  # least limit over the static one: z relaxes over limit/stiffness, which must not be 0
 
 
-@njit(error_model="numpy", **LEAN)
-def reach(num, e, speed):
-    """(length g/stiffness [m] over which z relaxes, its slope over the speed [s]) at a speed >= 0 [m/s]; where no
-    friction is left at speed, a trace of the length at rest."""
-    ratio = speed / num[e, 4]
-    more = (num[e, 3] - num[e, 2]) * exp(-ratio * ratio)
-    return max(num[e, 2] + more, TRACE * num[e, 3]) / num[e, 1], -2 * ratio / num[e, 4] * more / num[e, 1]
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def numbers(num, e):
+    """Numbers of a contact as `flowing` takes them."""
+    return num[e, 1], num[e, 2], num[e, 3], num[e, 4], num[e, 5], num[e, 6]
+
+
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def reach(k, v):
+    """(length g/stiffness [m] over which z relaxes, its slope over v [s]) at a speed v [m/s]; where no friction is left
+    at speed, a trace of the length at rest; k: numbers of the law."""
+    ratio = v / k[3]
+    more = (k[2] - k[1]) * exp(-ratio * ratio)
+    return max(k[1] + more, TRACE * k[2]) / k[0], -2 * ratio / k[3] * more / k[0]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def flowing(k, z, v, way):
+    """(force [N] at a stretch z [m] and a speed v [m/s], slope of the stretch over the slide in the direction `way`,
+    slopes of the force over stretch [N/m] and speed [N s/m])."""
+    length, bend = reach(k, v)
+    gain = 1 - way * z / length
+    return k[0] * z + (k[4] * gain + k[5]) * v, gain, k[0] - k[4] * way * v / length, \
+        k[4] * (gain + way * z * v * bend / (length * length)) + k[5]
 
 
 @njit(error_model="numpy", **LEAN)
@@ -34,7 +51,7 @@ def relaxed(num, e, z, dq, dt):
     way, path = (1.0 if dq > 0 else -1.0), abs(dq)
     length, bend = max(num[e, 2], TRACE * num[e, 3]) / num[e, 1], 0.0
     if dt > 0:
-        length, bend = reach(num, e, path / dt)
+        length, bend = reach(numbers(num, e), path / dt)
         bend /= dt
     x = path / length
     f1, f2, kept = shape(x)
@@ -76,12 +93,8 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
 @njit(error_model="numpy", **LEAN)
 def pull(num, e, z, v):
     """(force [N] at a stretch z [m] and a speed v [m/s], its slopes over z [N/m] and v [N s/m])."""
-    way, speed = (1.0 if v > 0 else -1.0), abs(v)
-    length, bend = reach(num, e, speed)
-    rate = v - speed * z / length
-    force = num[e, 1] * z + num[e, 5] * rate + num[e, 6] * v
-    by_speed = 1 - way * z * (1 - speed * bend / length) / length
-    return force, num[e, 1] - num[e, 5] * speed / length, num[e, 5] * by_speed + num[e, 6]
+    force, _, by_stretch, by_speed = flowing(numbers(num, e), z, v, 1.0 if v > 0 else -1.0)
+    return force, by_stretch, by_speed
 
 
 @njit(error_model="numpy", **LEAN)
@@ -114,8 +127,9 @@ def begin(num, mem, way, y):
 @njit(error_model="numpy", **LEAN)
 def rate(num, mem, turn, dq, v, y, out):
     """Force [N] at the speed v [m/s] in the direction turn[0]; writes z' [m/s] into out."""
-    out[0] = v - turn[0] * v * y[0] / reach(num, 0, turn[0] * v)[0]
-    return num[0, 1] * y[0] + num[0, 5] * out[0] + num[0, 6] * v
+    force, gain, _, _ = flowing(numbers(num, 0), y[0], v, turn[0])
+    out[0] = gain * v
+    return force
 
 
 @njit(error_model="numpy", **LEAN)

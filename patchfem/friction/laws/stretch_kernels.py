@@ -11,13 +11,14 @@ from math import exp, expm1, inf, nan
 
 from ...compiled.inner import njit
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
-from ..flags_kernels import LEAN, SET_VALUED, closed, gives, longest
+from ..flags_kernels import BENDS, FAST, LEAN, SET_VALUED, closed, gives, longest
 
-__all__ = ["SET_VALUED", "begin", "closed", "commit", "finish", "flow", "gives", "knee", "longest", "mean", "middle",
-           "pull", "rate", "shown", "state"]
+__all__ = ["BENDS", "SET_VALUED", "begin", "closed", "commit", "finish", "flow", "flowing", "gives", "knee", "longest",
+           "mean", "middle", "pull", "rate", "shown", "spreading", "state"]
 
 GROWTH, WEIGHT = 2, 8  # of num: where the growth and the weights begin
 FREE = 7  # of num: share of the bond length that stretches without damage
+UNITS, SPREADS = "N/m m", True  # of the numbers k of the law in lanes; as of `flags_kernels`
 
 
 @njit(error_model="numpy", **LEAN)
@@ -68,6 +69,19 @@ def flow(num, e, z, dq, dt):
     kept = exp(-abs(dq) / length)
     # no difference of lengths: stretches far below them are as exact
     return z * kept - end * expm1(-abs(dq) / length), kept, (1 - z / end) * kept, 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def flowing(k, z, v, way):
+    """(force [N] of full-grown bonds of a constant length stretched by z [m], slope of the stretch over the slide in
+    the direction `way`, slopes of the force over stretch [N/m] and speed, 0); k: mu_s N/eps [N/m] and eps [m]."""
+    return k[0] * z, 1 - way * z / k[1], k[0], 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def spreading(k, z, square, v, way):
+    """Rate of the mean square of the stretches of these bonds [m2/s] at a speed v [m/s]."""
+    return (2 * z - way * square / k[1]) * v
 
 
 @njit(error_model="numpy", **LEAN)

@@ -1,15 +1,55 @@
 """Compiled rate law of eq. 2.4. Twin: `tanh.Rate`.
 
-num: limit [N], v_0 [m/s]; no memory.
+num: limit [N], v_0 [m/s]; no memory. `flowing` is the law as lanes of many cases take it (`dynamics.lanes`), k:
+limit and v_0.
 """
 
 from math import inf, nan, tanh
 
 from ...compiled.inner import njit
-from ..flags_kernels import LEAN, SET_VALUED, closed, gives, knee, longest, middle
+from ..flags_kernels import (
+    BENDS,
+    FAST,
+    LEAN,
+    SET_VALUED,
+    SPREADS,
+    closed,
+    gives,
+    knee,
+    longest,
+    middle,
+    spreading,
+)
 
-__all__ = ["SET_VALUED", "at_end", "begin", "closed", "commit", "finish", "gives", "knee", "longest", "mean",
-           "middle", "rate", "shown", "state"]
+__all__ = ["BENDS", "SET_VALUED", "SPREADS", "at_end", "begin", "closed", "commit", "finish", "flowing", "gives",
+           "knee", "longest", "mean", "middle", "rate", "shown", "spreading", "state"]
+
+UNITS = "N m/s"  # of the numbers k of the law in lanes
+MOST = 18.0  # argument from which tanh is 1 to the last bit
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def hyperbolic(y):
+    """tanh(y) to 2e-13, by exp(-2 |y|) as the 64th power of seven terms of its series; no branch, so that a compiler
+    takes several lanes at once."""
+    size = min(abs(y), MOST)
+    z = size * (-2.0 / 64)
+    e = 1 + z * (1 + z * (1 / 2 + z * (1 / 6 + z * (1 / 24 + z * (1 / 120 + z * (1 / 720 + z / 5040))))))
+    e = e * e
+    e = e * e
+    e = e * e
+    e = e * e
+    e = e * e
+    e = e * e
+    part = (1 - e) / (1 + e)
+    return part if y > 0.0 else -part
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def flowing(k, z, v, way):
+    """(force, slope 0 of a stretch, that there is not, over the slide, slopes of the force over stretch and speed)."""
+    part = hyperbolic(v / k[1])
+    return k[0] * part, 0.0, 0.0, k[0] / k[1] * (1 - part) * (1 + part)
 
 
 @njit(error_model="numpy", **LEAN)

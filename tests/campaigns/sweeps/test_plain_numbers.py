@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scene_texts import COULOMB, DRIVE, MODE, POINT, SECOND
+from scene_texts import COULOMB, DRIVE, MODE, POINT, SECOND, friction_of
 
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.core import PatchfemError
@@ -75,7 +75,7 @@ def test_exact_models_made_from_the_first_are_those_built_from_text(name):
 
 ONE = POINT + "{}" + MODE + DRIVE
 LUMPED = {"coulomb": ONE.format(COULOMB), "elastic-plastic": ONE.format(PLASTIC),
-          "tanh": ONE.format('[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n'),
+          **{law: ONE.format(friction_of(law)) for law in ("tanh", "nonlocal", "bouc-wen", "lugre")},
           "start": ONE.format(COULOMB) + '[structure.start]\nvelocity = ["0.1 m/s"]\n'}
 
 
@@ -91,11 +91,13 @@ def test_exact_columns_of_models_are_the_numbers_of_each(name):
     r, asked = np.random.default_rng(len(name)), Asked(Path("a.toml"), LUMPED[name])
     for _ in range(20):
         keys = list(r.choice([key for key in KEYS if ".1." not in key], r.integers(1, 5), replace=False))
-        keys = [key for key in keys if name == "elastic-plastic" or not key.endswith("bond_length")] or KEYS[:1]
+        bonds = name in ("elastic-plastic", "nonlocal")
+        keys = [key for key in keys if bonds or not key.endswith("bond_length")] or KEYS[:1]
         values = 10.0 ** r.uniform(-3, -0.4, (7, len(keys)))
         alike = asked.alike(keys, values, partial(written, keys, values), np.arange(7))
         single = list(alike)
-        for row in (lanes._row, lanes._rate):
+        smooth = name in ("tanh", "nonlocal", "bouc-wen", "lugre")
+        for row in (lanes._row, lanes._rate, *([lanes.of_law] if smooth else [])):
             np.testing.assert_array_equal(columns_of(alike, row), columns_of(single, row))
         for mine, theirs in zip(columns.sizes_of(alike), columns.sizes_of(single)):
             np.testing.assert_array_equal(mine, theirs)

@@ -13,7 +13,8 @@ from patchfem.dynamics.lanes import names_kernels as at
 from patchfem.dynamics.lanes import reading, run
 from patchfem.friction.laws.iwan import largest
 
-LAWS = "rigid", "yielding", "creeping", "masing"
+FLOWS = tuple(f"friction.laws.{law}_kernels" for law in ("tanh", "stretch", "bouc_wen", "lugre"))
+LAWS = "rigid", "yielding", "masing", *FLOWS
 
 
 def cases(law: str, count: int, seed: int = 1) -> run.Cases:
@@ -22,22 +23,28 @@ def cases(law: str, count: int, seed: int = 1) -> run.Cases:
     square, one = r.uniform(0.3, 3, count)**2, np.ones(count)
     slip = 10 ** r.uniform(-1.5, -0.1, count)
     spring = r.uniform(0.5, 5, count) if law in ("yielding", "masing") else 0 * one
-    length, shape = slip / np.where(spring > 0, spring, 1) * (spring > 0), np.zeros((count, 0))
-    if law == "creeping":
-        length = slip * r.uniform(0.3, 2, count)
+    length, numbers = slip / np.where(spring > 0, spring, 1) * (spring > 0), np.zeros((count, 0))
     if law == "masing":
         chi, beta = r.uniform(-0.9, 0, count), r.choice([0, 0.3, 3], count)
         length = largest(slip, spring, chi, beta)
         slips = (chi + 1) / ((chi + 2) * (1 + beta) - 1)
-        shape = np.stack([chi + 1, 1 / (1 + beta), np.minimum(1, (0.5 / slips)**(1 / (chi + 2)))], axis=1)
-    return run.Cases(2 * np.sqrt(square) * 10 ** r.uniform(-3, -0.5, count), square, one, slip,
+        numbers = np.stack([chi + 1, 1 / (1 + beta), np.minimum(1, (0.5 / slips)**(1 / (chi + 2)))], axis=1)
+    if law in FLOWS:
+        speed, length = slip * r.uniform(0.3, 2, count), (0 if "tanh" in law else 1) * r.uniform(0.6, 2, count)
+        spring = np.divide(slip, length, out=0 * slip, where=length > 0)
+        numbers = np.array({"tanh": [slip, speed], "stretch": [spring, length],
+                            "bouc_wen": [slip, length, r.choice([1, 2, 1.5], count), r.uniform(0.5, 1, count)],
+                            "lugre": [spring, slip * r.uniform(0.6, 1, count), slip, speed,
+                                      *(r.uniform(0, 0.2, count) * slip / speed for _ in range(2))],
+                            }[law.split(".")[2].removesuffix("_kernels")]).T
+    return run.Cases(2 * np.sqrt(square) * 10 ** r.uniform(-1 if law in FLOWS else -3, -0.5, count), square, one, slip,
                      slip * (r.choice([1, 1.3], count) if law == "rigid" else 1), spring,
-                     length, -one, one, 0 * one, 0.1 * r.choice([0, 1], count), shape)
+                     length, -one, one, 0 * one, 0.1 * r.choice([0, 1], count), numbers)
 
 
 def test_exact_the_hyperbolic_tangent_of_lanes():
     """Its error is below 2e-13, as its text states."""
-    tangent = plain("patchfem.dynamics.lanes.creeping_kernels").hyperbolic
+    tangent = plain("patchfem.friction.laws.tanh_kernels").hyperbolic
     places = np.concatenate([np.linspace(-25, 25, 5001), [-1e-9, 0.0, 1e-9, 300.0]])
     np.testing.assert_allclose([tangent(y) for y in places], np.tanh(places), rtol=0, atol=2e-13)
 
@@ -95,7 +102,10 @@ def test_exact_lanes_are_the_text_as_python(law, monkeypatch):
     some = cases(law, 3)
     fast = run.march(law, some, 2, 1, 24)
     text = plain("patchfem.dynamics.lanes.loop_kernels")
-    monkeypatch.setattr(text, "law", plain(f"patchfem.dynamics.lanes.{law}_kernels"))
+    flowing = plain("patchfem.dynamics.lanes.flowing_kernels")
+    monkeypatch.setattr(text, "law", flowing if law in FLOWS else plain(f"patchfem.dynamics.lanes.{law}_kernels"))
+    if law in FLOWS:
+        monkeypatch.setattr(flowing, "friction", plain(f"patchfem.{law}"))
     monkeypatch.setattr(run, "kernels", lambda *_: text)
     with np.errstate(all="ignore"):
         slow = run.march(law, some, 2, 1, 24)
@@ -122,7 +132,7 @@ def test_order_of_events_is_above_three(law):
     reach = [np.ptp(run.march(law, some, 60, 6, steps).history[:, -6:, :2], axis=(1, 2)) / 2
              for steps in (48, 96, 768)]
     coarse, fine = (np.abs(one - reach[2]) / reach[2] for one in reach[:2])
-    assert np.quantile(fine, 0.9) < (1e-4 if law == "creeping" else 1e-5)
+    assert np.quantile(fine, 0.9) < (1e-4 if law in FLOWS else 1e-5)
     counts = coarse > 1e-9
     assert np.median(np.log2(coarse[counts] / np.maximum(fine[counts], 1e-14))) > 2.9
 

@@ -1,13 +1,16 @@
-"""The batch of lanes: lumped Coulomb, elastic-plastic, tanh and Iwan cases side by side, with bars from half the steps.
+"""The batch of lanes: lumped cases of one law side by side, with bars from half the steps.
 
-A tanh or Iwan case whose bars miss its tolerance marches by finer steps; an Iwan case that has not settled marches on.
-A case goes to the exact batch `lumped`, a tanh case to a run of its own, where a bar still misses its tolerance, where
-nothing slips (but of Iwan), rings are to be told (but of Iwan in a stick that lasts all the time) or a motion still has
-to settle. So does every case of a batch of which these contradict one of a few.
+A case of a law of a stretch (tanh, Bouc-Wen, LuGre, bonds of a constant length) marches by a quarter of the steps too,
+which shows how its errors fall. Such a case and one of Iwan march by finer steps where their bars miss the tolerance;
+an Iwan case that has not settled marches on. A case goes to the exact batch `lumped`, or under a law of a stretch to a
+run of its own, where a bar still misses its tolerance, where nothing slips (but of Iwan, and of a law of a stretch that
+has settled), rings are to be told (but of Iwan in a stick that lasts all the time) or a motion still has to settle. So
+does every case of a batch of which these contradict one of a few.
 """
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import pairwise
 from time import perf_counter
 from zlib import crc32
 
@@ -16,12 +19,13 @@ import numpy as np
 from ....dynamics.lanes import names_kernels as at
 from ....dynamics.lanes import reading
 from ....dynamics.lanes import run as march
+from ....effects import has, listed
 from ....friction.laws.iwan import largest as largest_slide
 from ....model.alike import Alike, columns_of, some
 from ....model.model import Model
 from ....response.errors import APART, GAPS, MAIN, ROUND
 from ....response.measures import energy_balance
-from ....response.ringing import ringing
+from ....response.ringing import FAINT, ringing
 from ....response.rows import TABLE, first_harmonic
 from ....response.settling import steady_amplitudes, windows_of
 from ....scene.rules.draft import pinned
@@ -37,22 +41,24 @@ from .pieces import LONGEST, SHORTEST
 LEAST = 64  # cases of a study that lanes serve
 TIGHTEST = 1e-4  # tolerance that lanes serve
 TOGETHER = 4096  # cases of one compiled call
-KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "tanh": "creeping",
-         "iwan": "masing"}  # law -> that of `dynamics.lanes`
-SMOOTH = 128, 256, 512, 1024, 2048  # steps of a cycle under the rate law, whose own rate is 1 a step then
-FINER = 4  # times as many steps has a case under the rate law whose bars miss its tolerance
+# law -> that of `dynamics.lanes`
+KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "iwan": "masing", "tanh": "friction.laws.tanh_kernels",
+         "bouc-wen": "friction.laws.bouc_wen_kernels", "lugre": "friction.laws.lugre_kernels",
+         "nonlocal": "friction.laws.stretch_kernels"}
+SMOOTH, CALM = (128, 256, 512, 1024, 2048), 0.5  # steps of a cycle under a law of a stretch, its rate in a step then
+FINER = 4  # times as many steps has a case of Iwan or of a law of a stretch whose bars miss its tolerance
 RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
 # of the change at half the steps, of that of the main measures, and of the measure itself, as both marches can miss an
 # event alike: 2 of 4077 random cases had an error beyond
 OF_CHANGE, OF_TYPICAL, OF_SIZE = 2.0, 1.0, 2e-5
-OF_DRIFT = 1e-6  # of the amplitude in its place, of the drift behind sliders: their march misses no event
+OF_MIDDLE = 1e-6  # of the amplitude, by which its middle errs behind sliders or a stretch, of which no event is missed
+ORDERLY, SHOWN = 6.0, 0.25  # a change at half the steps that falls by this shows a high order, and is so much of itself
 MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; change over a tenth of these that is left
 # times twice as many cells as a run by itself has in a check of Iwan, and of its bars by half of them: with 48 cells 1
 # of 10 has an error beyond both, up to 5 times as large
 FINER_CELLS, SHORT = 4, 5.0
 RING = "ring_frequency", "ring_damping"
 DROPPED = 1e-2  # share of a loop by which another may be larger that is forgotten for want of room
-WIDER = 2.0  # times these are the bars of tanh cases: 493 of 500 had no error beyond half of them
 CHECKED, FEWEST = 200, 2  # one of so many cases is held against the exact engine, so many of a batch at least
 RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a ring is looked for
 
@@ -70,26 +76,62 @@ def no_lanes(model: Model) -> str:
         return "its cycles are too few or too many, or nothing rubs"
     if model.friction.law not in KINDS:
         return "its law does not march in lanes"
+    if why := _manifold(model.friction):
+        return why
     if model.accuracy.method != "auto" or pinned(model.accuracy) or model.accuracy.tolerance < TIGHTEST:
         return "it asks for another method, or for more than lanes state"
     return ""
 
 
+def _manifold(friction) -> str:
+    """Why a law of a stretch has more than that to follow; "" where it has not."""
+    grows = has(friction.law, "bonds") and (listed(friction) or friction.slip_growth is not None)
+    return "its bonds grow, or have more than one stretch" if grows else ""
+
+
+def _creates(model: Model):
+    """Whether a law of a stretch may create energy, or its bonds have more than one stretch."""
+    f = model.friction
+    if has(f.law, "bonds"):
+        return np.not_equal(f.breakaway or 0.0, 0.0) | np.not_equal(f.initial_bonds, 1.0)
+    if f.law == "lugre":  # the power of its damping is below zero from there on
+        return np.greater(f.micro_damping * model.rig.speed, 4 * of_law(model)[1])
+    return np.less(f.shape, 0.5) if f.law == "bouc-wen" else False
+
+
+def of_law(model: Model) -> tuple:
+    """Numbers of a law of a stretch, as its `flowing` takes them, and the length [m] over which it gives way, 0 for
+    none."""
+    f, load, limit = model.friction, model.point.load, model.limits(model.point.load)[0]
+    if f.law == "tanh":
+        return limit, f.reference_speed, 0.0
+    if has(f.law, "bonds"):
+        return limit / f.bond_length, f.bond_length, f.bond_length
+    if f.law == "bouc-wen":
+        return limit, limit / f.stiffness, f.exponent, f.shape, limit / f.stiffness
+    kinetic = f.static if f.kinetic is None else f.kinetic
+    return f.stiffness, kinetic * load, limit, f.stribeck_speed, f.micro_damping, f.viscous, limit / f.stiffness
+
+
 def steps_of(models: Sequence[Model]) -> np.ndarray:
     """Steps per cycle (n,) of models of one law, 0 where they would be too many."""
     rate, = columns_of(models, _rate)
-    ends = [(steps / (2 * np.pi), steps) for steps in SMOOTH] if models[0].friction.law == "tanh" else RATES
+    smooth = march.flows(KINDS[models[0].friction.law])
+    ends = [(CALM * steps / (2 * np.pi), steps) for steps in SMOOTH] if smooth else RATES
     return np.append([steps for _, steps in ends], 0)[np.searchsorted([end for end, _ in ends], rate)]
 
 
 def _rate(model: Model) -> tuple:
-    """Fastest rate of a model over that of its drive."""
-    modes, omega = model.rig.modes, model.rig.drive.omega
+    """Fastest rate of a model over that of its drive; infinite where lanes do not follow it."""
+    modes, omega, damper = model.rig.modes, model.rig.drive.omega, model.rig.modes.dampers[0, 0]
+    scale = modes.slide[0]**2 / modes.mass
+    stiff = _contact(model)[0] * scale
+    if not march.flows(KINDS[model.friction.law]):
+        return (np.sqrt(modes.omega[0]**2 + stiff) + damper) / omega,
+    rate = damper
     if model.friction.law == "tanh":
-        rate = model.limits(model.point.load)[0] / model.friction.reference_speed * modes.slide[0]**2 / modes.mass
-        return np.maximum(rate + modes.dampers[0, 0], modes.omega[0]) / omega,
-    stiff = _contact(model)[0] * modes.slide[0]**2 / modes.mass
-    return (np.sqrt(modes.omega[0]**2 + stiff) + modes.dampers[0, 0]) / omega,
+        rate = model.limits(model.point.load)[0] / model.friction.reference_speed * scale + damper
+    return np.where(_creates(model), np.inf, np.maximum(rate, np.sqrt(modes.omega[0]**2 + stiff)) / omega),
 
 
 def _contact(model: Model) -> tuple:
@@ -100,9 +142,10 @@ def _contact(model: Model) -> tuple:
         slips = share * (chi + 1) / (chi + 2 - share)  # of the friction, before the last slider does
         half = np.minimum(1.0, (0.5 / slips)**(1 / (chi + 2)))
         return friction.stiffness, largest_slide(static, friction.stiffness, chi, friction.beta), chi + 1, share, half
-    if friction.law == "elastic-plastic":
-        return static / friction.bond_length, friction.bond_length
-    return 0.0, friction.reference_speed / model.rig.drive.omega if friction.law == "tanh" else 0.0
+    if march.flows(KINDS[friction.law]):
+        *numbers, length = of_law(model)
+        return 0.0 if friction.law == "tanh" else static / length, length, *numbers
+    return (static / friction.bond_length, friction.bond_length) if friction.law == "elastic-plastic" else (0.0, 0.0)
 
 
 def group(model: Model) -> tuple:
@@ -130,11 +173,11 @@ def _solved(models: Sequence[Model], say, steps: int = 0) -> Answers:
     begin, (cycles, law, least) = perf_counter(), group(models[0])
     steps = max(steps, least)
     window = min(10, cycles // 10)
-    runs, exact, marks = runs_of(models, cycles, window, steps)
+    runs, exact, lost, marks = runs_of(models, cycles, window, steps)
     found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window})
     # elastic-plastic motions that have not settled have a steady estimate by the map of their yields
     unsettled = found.outcome == "grows" if law != "elastic-plastic" else found.outcome != "steady"
-    wide = too_wide(models, found)
+    wide = too_wide(models, found) | lost
     exact |= alone | wide | unsettled
     chosen = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
     found.numerics.update(dict.fromkeys(range(len(models)), chosen))
@@ -147,7 +190,7 @@ def _solved(models: Sequence[Model], say, steps: int = 0) -> Answers:
     if wrong := contradicted(found, ones, looked, SHORT if law == "iwan" else 1.0):
         exact[:] = True
         note = f"lanes said {wrong} otherwise than the exact engine in a check of {len(looked)} cases, so all are exact"
-    finer = (wide | alone) & (law in ("tanh", "iwan") and not wrong and FINER * steps <= SMOOTH[-1])
+    finer = (wide | alone) & ((law == "iwan" or march.flows(KINDS[law])) and not wrong and FINER * steps <= SMOOTH[-1])
     exact &= ~finer
     if cases := np.flatnonzero(finer).tolist():
         lumped.take_out(found, cases)
@@ -178,8 +221,8 @@ def too_wide(models, found: Answers) -> np.ndarray:
     for name, values in found.values.items():
         if name in RING:  # the fit of a single run knows it no better
             continue
-        if name.endswith("_steady") and models[0].friction.law == "tanh":  # an extrapolation errs alike at finer steps
-            continue
+        if name.endswith("_steady") and march.flows(KINDS[models[0].friction.law]):
+            continue  # an extrapolation errs alike at finer steps
         out |= found.errors[name] > tolerance * np.abs(values) + found.floors[name]
     return out
 
@@ -210,42 +253,56 @@ def contradicted(found: Answers, ones: Answers | None, looked: list, times: floa
 
 
 def runs_of(models, cycles: int, window: int, steps: int) -> tuple:
-    """(Runs of models of a group, (n,) which must be run otherwise, (n, k) numbers that tell each from any other)."""
+    """(Runs of models of a group, (n,) which must be run otherwise, (n,) which need finer steps at least, (n, k)
+    numbers that tell each from any other)."""
     law = KINDS[models[0].friction.law]
     cases, c = cases_of(models)
-    fine, coarse = (_measured(law, cases, c, march.march(law, cases, cycles, window, count))
-                    for count in (steps, steps // 2))
-    values, book, found, extremes, rise = fine
-    changes = {name: np.abs(value - coarse[0][name]) for name, value in values.items()}
-    changes["slip_start_phase"] = np.minimum(changes["slip_start_phase"], np.pi - changes["slip_start_phase"])
+    fine, *coarser = (_measured(law, cases, c, march.march(law, cases, cycles, window, steps // share))
+                      for share in ((1, 2, 4) if march.flows(law) else (1, 2)))
+    (values, book, found, extremes, rise), coarse = fine, coarser[0]
+    errors = bars(values, changed(values, [one[0] for one in coarser]), law)
     slips = found.shown[:, at.SLIP_HIGH - at.SHOW] - found.shown[:, at.SLIP_LOW - at.SHOW]
     stuck = slips / 2 <= np.maximum(c["held"], ROUND * np.abs(found.history[:, :, :2]).max(axis=(1, 2)))
     exact = np.any([np.isnan(values[name]) != np.isnan(coarse[0][name]) for name in values], axis=0)
-    exact |= stuck & (law != "masing")
-    if law in ("yielding", "masing"):
-        own = np.sqrt(np.maximum(cases.square + cases.spring - cases.damp**2 / 4, 0.0))
-        rings = found.shown[:, at.LONGEST - at.SHOW] * own >= RINGS
-        rings &= (law == "yielding") | (found.ended >= cycles - window)
-        exact |= rings & (law == "yielding")
+    rings = may_ring(cases, found) & (law != "rigid")
     steady, none = None, {name: np.full(len(models), np.nan) for name in RING}
-    if law == "masing":
-        rings &= march.of_sliders(found.motion, "EVER") > 0
+    if march.flows(law):
+        stuck &= cases.spring > 0
+        exact |= stays(cases, found) & (stuck | rings)
+    elif law == "masing":
+        rings &= (found.ended >= cycles - window) & (march.own_of(law, found.motion, "EVER") > 0)
         held = rings & (found.shown[:, at.STUCK - at.SHOW] > 2 * np.pi * (window - 1e-6))
         exact |= rings & ~held
         none, told = _rings(law, cases, c, found, np.flatnonzero(held), steps)
-        exact |= march.of_sliders(found.motion, "DROPPED") > DROPPED
-        steady, lost = _settled(law, cases, found, steps, windows_of(extremes, window)[0], ~stuck)
-        steady, exact = tuple(np.abs(c["ratio"]) * one for one in steady), exact | lost
+        errors |= told
+        exact |= march.own_of(law, found.motion, "DROPPED") > DROPPED
+        steady, open_ones = _settled(law, cases, found, steps, windows_of(extremes, window)[0], ~stuck)
+        steady, exact = tuple(np.abs(c["ratio"]) * one for one in steady), exact | open_ones
+    else:
+        exact, stuck = exact | stuck | rings, stuck & False
     phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
-    errors = {name: (WIDER if law == "creeping" else 1.0) * one
-              for name, one in bars(values, changes, law).items()}
-    errors |= told if law == "masing" else {}
-    nowhere = np.zeros(len(models), bool)  # what is lost goes elsewhere, and what sticks but for sliders
+    nowhere = np.zeros(len(models), bool)  # what is lost goes elsewhere
     tolerance, = columns_of(models, lambda model: (model.accuracy.tolerance,))
-    runs = Runs(cycles, window, values | none, book, extremes, phasors[:, ends], stuck & (law == "masing"), nowhere,
-                errors, 1e-9, np.inf, stuck & (rise > tolerance * values["friction_force_peak"]), steady, again=False)
-    return runs, exact, np.column_stack(cases)
+    runs = Runs(cycles, window, values | none, book, extremes, phasors[:, ends], stuck, nowhere, errors, 1e-9, np.inf,
+                stuck & (rise > tolerance * values["friction_force_peak"]), steady, again=False)
+    lost = ~np.isfinite(found.motion[:, at.X] + coarser[-1][2].motion[:, at.X])
+    return runs, exact, lost, np.column_stack(cases)
+
+
+def may_ring(cases, found) -> np.ndarray:
+    """(n,) whether a stick of the last cycles is long enough that what rings in it could be told."""
+    own = np.sqrt(np.maximum(cases.square + cases.spring - cases.damp**2 / 4, 0.0))
+    return found.shown[:, at.LONGEST - at.SHOW] * own >= RINGS
+
+
+def stays(cases, found) -> np.ndarray:
+    """(n,) whether a start or a ring may be left at the end: cycles change by what it decays in one, by its damper at
+    least."""
+    last = found.history[:, -2:, :2]
+    change = np.abs(last[:, 1] - last[:, 0]).max(axis=1) / np.maximum(-np.expm1(-np.pi * cases.damp), 1e-300)
+    gain = np.abs(cases.out) * (cases.square + cases.spring) * change
+    return gain > FAINT / 3 * found.shown[:, at.ACCELERATION - at.SHOW]
 
 
 def _rings(law: str, cases, c: dict, found, held, steps: int) -> tuple:
@@ -293,11 +350,12 @@ def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
 def cases_of(models) -> tuple:
     """(Cases of models, what else is told of them by name, (n,) each: SI)."""
     own, damping, slide, share, output, mass, drive, w, moving, static, kinetic, z, v, stiffness, load, size, spring, \
-        length, *shape = columns_of(models, _row)
-    scale = slide**2 / (mass * w**2)
+        length, *numbers = columns_of(models, _row)
+    law, scale, numbers = KINDS[models[0].friction.law], slide**2 / (mass * w**2), np.array(numbers).T
+    numbers = numbers * march.scales(law, scale, w) if march.flows(law) else numbers.reshape(len(w), -1)
     cases = march.Cases(damping / w, (own / w)**2, -slide * share * drive / w**2, scale * kinetic, scale * static,
                         scale * spring, length, output / slide * w**2, drive * moving, slide * z, slide * v / w,
-                        np.array(shape).T.reshape(len(w), -1))
+                        numbers)
     return cases, {"omega": w, "energy": mass * (w / slide)**2, "ratio": output / slide,
                    "held": 1e-3 * np.divide(static, spring, out=0 * w, where=spring > 0), "stiffness": stiffness,
                    "load": load, "size": size}
@@ -328,14 +386,35 @@ def _measured(law: str, cases, c: dict, found) -> tuple:
     return values, book, found, extremes, seen.rise
 
 
+def changed(values: dict, coarser: list) -> dict:
+    """Changes by name, (n,) each, of values at half the steps; where a quarter of them, the last of `coarser`, shows
+    that they fall with the step as those of a high order do, a share of them."""
+    changes = []
+    for fine, coarse in pairwise([values, *coarser]):
+        changes.append({name: np.abs(fine[name] - coarse[name]) for name in values})
+        changes[-1]["slip_start_phase"] = np.minimum(changes[-1]["slip_start_phase"],
+                                                     np.pi - changes[-1]["slip_start_phase"])
+    if len(changes) == 1:
+        return changes[0]
+    last, before = changes
+    with np.errstate(all="ignore"):
+        falls = np.array([before[name] >= ORDERLY * last[name] for name in MAIN]).sum(axis=0) > len(MAIN) / 2
+        return {name: np.where(falls & (before[name] >= ORDERLY * last[name]) & np.isfinite(before[name]),
+                               np.fmax(SHOWN * last[name], SHOWN**2 * before[name]), last[name]) for name in values}
+
+
 def bars(values: dict, changes: dict, law: str = "") -> dict:
     """Errors by name, (n,) each, of values whose changes at half the steps are known: the change, and a share of the
-    median relative change of the main measures, as one change can be small by chance, and OF_SIZE of the value."""
+    median relative change of the main measures, as one change can be small by chance, and OF_SIZE of the value.
+
+    law: as of `dynamics.lanes`; one of sliders or of a stretch misses no event, and no limit holds its force.
+    """
     with np.errstate(all="ignore"):
-        shares = [np.where(changes[name] > 0, changes[name] / np.abs(values[name]), np.nan) for name in MAIN
-                  if name in values]
-        typical = np.nan_to_num(np.nanmedian(shares, axis=0))
-    out = {}
+        shares = np.array([np.where(changes[name] > 0, changes[name] / np.abs(values[name]), np.nan) for name in MAIN
+                           if name in values])
+        shares[:, np.isnan(shares).all(axis=0)] = 0.0
+        typical = np.nanmedian(shares, axis=0)
+    out, smooth = {}, law == "masing" or march.flows(law)
     for name, change in changes.items():
         size = first_harmonic(values) if name == "equivalent_stiffness" else 1.0 if TABLE[name].term is not None \
             and name not in GAPS and name != "drift_per_cycle" else np.abs(values[name])
@@ -343,8 +422,8 @@ def bars(values: dict, changes: dict, law: str = "") -> dict:
             size = np.maximum(size, 1e-3)
         if name == "drift_per_cycle":
             size = np.abs(values[MAIN[0]])
-        least = OF_DRIFT if law == "masing" and name == "drift_per_cycle" else OF_SIZE
-        known = name in ("normal_load", *GAPS) or (name == APART[0] and law != "masing")
+        least = OF_MIDDLE if smooth and name == "drift_per_cycle" else OF_SIZE
+        known = name in ("normal_load", *GAPS) or (name == APART[0] and not smooth)
         chance = 0.0 if known else (OF_TYPICAL * typical + least) * size
         out[name] = np.maximum(OF_CHANGE * np.nan_to_num(change), chance)
     return out
