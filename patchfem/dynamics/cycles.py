@@ -7,6 +7,7 @@ import numpy as np
 from ..core import STICK
 
 SIGNS = np.array([[1.0], [-1.0]])  # of the root of a square
+REST = 1e-12  # of the square of the largest rate of a cycle, the size of a product of two rates that is round-off
 MOST_TURNS = 100  # samples of a cycle that are kept outside the last ones
 
 
@@ -59,7 +60,8 @@ def hermite_extremes(y, v, dt) -> tuple:
     [s]."""
     before, y, v = y.shape[:-1], y.reshape(-1, y.shape[-1]), v.reshape(-1, y.shape[-1])
     low, high = y.min(axis=1), y.max(axis=1)
-    row, at = np.nonzero(v[:, :-1] * v[:, 1:] < 0)
+    # a rate that is zero but for round-off, as at a stop, turns nothing: the cubic would swing beyond it
+    row, at = np.nonzero(v[:, :-1] * v[:, 1:] < -REST * (v**2).max(axis=1, keepdims=True))
     if at.size:
         a, b, p, q = y[row, at], y[row, at + 1], v[row, at] * dt, v[row, at + 1] * dt
         # derivative 3 s^2 A + 2 s B + p of a + p s + B s^2 + A s^3

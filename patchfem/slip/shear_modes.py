@@ -298,7 +298,10 @@ def _backbone(limit, shape, values, length, slides) -> np.ndarray:
         decay = np.exp(np.minimum(-xi / length, 700.0))
         missing = b[going] / values - (limit * (1 - decay)) @ shape
         tangent = np.diag(1 / values) + shape.T @ ((limit * decay / length)[:, :, None] * shape)
-        step = np.linalg.solve(tangent, missing[:, :, None])[:, :, 0]
+        try:
+            step = np.linalg.solve(tangent, missing[:, :, None])[:, :, 0]
+        except np.linalg.LinAlgError:  # a law too steep for numbers
+            return np.full(slides.size, np.nan)
         change = step @ shape.T  # of xi
         part = np.where(change < 0, (xi + BACK * length) / np.where(change < 0, -change, 1.0), 1.0).min(axis=1)
         part = np.where((part > 0) & (part < 1), part, 1.0)

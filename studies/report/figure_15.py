@@ -1,6 +1,6 @@
 """Does a released block come to rest as eq. 3.11 and Fig. 15 say, at pi N0/w0, about 11 units of time?
 
-In part: with N0 rounded up 3.11 is exact, to 4e-16 of x0, and 11 is N0 = 7 with w0 = 2 (10.996) or N0 = 5 with w0 =
+In part: with N0 rounded up 3.11 is exact, to 3e-16 of x0, and 11 is N0 = 7 with w0 = 2 (10.996) or N0 = 5 with w0 =
 1.414 (11.107); as printed N0 = 3.5 gives 10.996 with w0 = 1 and k x0/F = 8, when the block still moves: it rests at
 12.566.
 

@@ -84,14 +84,15 @@ def _runner(model):
 
 def warm_up(modes: ModalBasis, drive: BaseSine, model: ContactModel, say=None) -> None:
     """Load the compiled loop of a model, or compile it, by a march of no steps; say: told before it compiles."""
-    kind = _runner(model), model.kind, model.laws, model.loading, modes.damping is None
-    if kind not in _WARM:
-        run = _runner(model)(modes, drive, model, 4, np.inf, load_kernels(say))
+    runner = _runner(model)
+    kind = (model.kind, model.laws, model.loading, modes.damping is None) if runner is Run else None
+    if kind is None or kind not in _WARM:
+        run = runner(modes, drive, model, 4, np.inf, load_kernels(say))
         run.cycle(0, 0, [])
         _WARM.add(kind)
 
 
-_WARM = set()  # what has been marched: its code is there
+_WARM = set()  # kinds of patches that have marched: their code is there
 
 
 def fresh(modes: ModalBasis, drive, model, steps_per_cycle: int, travel: float = np.inf, start=None):
