@@ -12,13 +12,13 @@ from ...core import say
 from ...disk.whole import write_text
 from ...scales import LADDERS, plain, step_of
 from ...surface.areal import level_plane
-from ...surface.compare.carried import NO_LIMIT, hidden_wear
+from ...surface.compare.carried import NO_LIMIT
 from ...surface.compare.compare import Comparison
 from ...surface.profile import Profile, even, level
 from ...surface.quantity import LEVEL, Quantity
 from ...surface.roughness.parameters import Heights, abbott
 from ...surface.roughness.spectrum import BAND
-from ...surface.scans.change import Change
+from ...surface.scans.change import Change, hidden
 from ..pages.document import Section, document, figure, table, warned
 from ..pages.words import pair
 from . import pictures
@@ -125,7 +125,7 @@ def _of_scans(one: Change) -> dict:
     guess = None if one.found is None else one.found.guess
     flags = {"mirrored": bool(guess and guess.mirrored), "turned": bool(guess and guess.turned)}
     return {"registration": {**{name: _plain(each) for name, each in one.registration.items()}, **flags},
-            "hidden_wear": _plain(hidden_wear(None, None)),
+            "hidden_wear": _plain(hidden(one)),
             "removed": dict(zip(("before", "after"), one.removed))}
 
 
@@ -174,7 +174,9 @@ def page(parts: list, found: tuple, pressing: Pressed | None = None) -> str:
     for number, one in enumerate(parts):
         body = [*(figure(f"{number}{place}", *each) for place, each in enumerate(figures(one))), _table(one),
                 f"<p class=soft>{escape(NOTE)}</p>"]
-        sections.append(Section(f"changes{number}", f"What changed{one.direction and f' along {one.direction}'}",
+        title = "What changed place by place, and the waves" if one.change is not None else \
+            "Waves" if one.direction and parts[0].change is not None else "What changed"
+        sections.append(Section(f"changes{number}", f"{title}{one.direction and f' along {one.direction}'}",
                                 "\n".join(body)))
     if pressing is not None:
         sections.append(Section("pressed", f"{pressing.title}, pressed with each surface", _pressing(pressing)))
@@ -220,9 +222,9 @@ def _maps(one: Change) -> list:
     x, y, depth = one.before.x, one.before.y, one.volumes.filled
     first = level_plane(one.before).z
     worn = one.volumes.values["worn_volume"]
-    out = [(pictures.maps(x, y, (first, first - depth, depth)), "Left and middle: the scan before and, laid on it, the "
-            "scan after, about the plane of the scan before. Right: depth of the scan after below the scan before; "
-            "white: no height in one of them.",
+    out = [(pictures.maps(x, y, (first, first - depth, depth)), "Left and middle: the scan before and, laid on it, "
+            "the scan after, about the plane of the scan before; white: no height. Right: depth of the scan after "
+            "below the scan before, missing ones from their neighbours; white: beyond the scan after.",
             f"Maps of both scans and of the worn depth: worn volume {' '.join(shown(worn)[::2])}")]
     row, column = (int(one) for one in np.unravel_index(np.nanargmax(_wide(depth)), depth.shape))
     lines = [(x, first[row], (first - depth)[row], f"along x, at y = {say(float(y[row]), 3)}"),

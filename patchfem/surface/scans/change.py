@@ -21,6 +21,7 @@ DIGITS = 4
 WORN, NONE = "worn", "no wear shown"
 GREW = "material grew, or the files are in the wrong order"
 ELSEWHERE = "not comparable place by place"
+HIDDEN = "mean depth that even wear or a wedge may hide"
 UNSURE = "the scans agree up to a plane: even wear and a wedge would look the same"
 
 
@@ -29,8 +30,8 @@ class Change:
     """What `changed` found.
 
     before, after: the scans without spikes; found, volumes: None where they show no common place, for the reason why;
-    removed: heights left out of each as spikes, specks of the depths counted with the scan after; turned_first: whether
-    the scan before was turned over instead of the scan after.
+    removed: heights left out of each as spikes, specks of the depths counted with the scan after; registration: shift
+    and rotation by name.
     """
 
     before: Areal
@@ -39,7 +40,6 @@ class Change:
     volumes: Volumes | None
     why: str = ""
     removed: tuple = (0, 0)
-    turned_first: bool = False
     registration: dict = field(default_factory=dict)
 
     @property
@@ -65,19 +65,26 @@ def changed(before: Areal, after: Areal, keep_spikes: bool = False) -> Change:
         (before, one), (after, two) = without_spikes(before), without_spikes(after)
         removed = one, two
     try:
-        found = laid(before, after)
+        found, volumes, specks = _laid(before, after, keep_spikes)
     except PatchfemError as error:
-        return Change(before, after, None, None, str(error), removed, registration=_place(None, str(error)))
-    found, specks = without_specks(found)
-    if why := _elsewhere(found):
-        return Change(before, after, None, None, why, removed, registration=_place(None, why))
-    volumes, first = measured(found, before.x, before.y), False
+        return Change(before, after, None, None, str(error), removed, _place(None, str(error)))
     if found.guess.turned and volumes.values["grown_volume"].value > volumes.values["worn_volume"].value:
-        before, first = variant(before, "", True), True
-        found, specks = without_specks(laid(before, variant(after, "", True)))
-        volumes = measured(found, before.x, before.y)
-        found = replace(found, guess=found.guess._replace(turned=True))
-    return Change(before, after, found, volumes, "", (removed[0], removed[1] + specks), first, _place(found, ""))
+        before, guess = variant(before, "", True), found.guess  # it counts into the material instead
+        found, volumes, specks = _laid(before, variant(after, "", True), keep_spikes)
+        found = replace(found, guess=guess)
+    return Change(before, after, found, volumes, "", (removed[0], removed[1] + specks), _place(found, ""))
+
+
+def _laid(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
+    """(registration, volumes, number of specks left out); PatchfemError with the reason where no place is common."""
+    found = laid(before, after)
+    least = ALIKE if found.guess.clear > CLEAR else LIKELY
+    if found.like <= least:
+        raise PatchfemError("the scans show no common place: the heights that agree up to a plane have a correlation "
+                            f"of {found.like:.3f}, and only above {least:g} it is no chance; scan the same place, with "
+                            "unworn parts beside the rubbed one")
+    found, specks = (found, 0) if keep_spikes else without_specks(found)
+    return found, measured(found, before.x, before.y), specks
 
 
 def without_specks(found: Laid) -> tuple:
@@ -94,14 +101,6 @@ def without_specks(found: Laid) -> tuple:
         int(specks.sum())
 
 
-def _elsewhere(found: Laid) -> str:
-    """Why two scans show no common place, "" where they do."""
-    if found.like > (ALIKE if found.guess.clear > CLEAR else LIKELY):
-        return ""
-    return (f"the scans show no common place: the heights that agree up to a plane have a correlation of "
-            f"{found.like:.2f} only, {ALIKE:g} is wanted")
-
-
 def _place(found: Laid | None, why: str) -> dict:
     """Shift and rotation as quantities by name."""
     texts = {"shift_x": ("m", SHIFT.format("x")), "shift_y": ("m", SHIFT.format("y")), "rotation": ("rad", ROTATION)}
@@ -109,7 +108,8 @@ def _place(found: Laid | None, why: str) -> dict:
         return {name: refused(*one, why) for name, one in texts.items()}
     angle = float((found.angle + np.pi) % (2 * np.pi) - np.pi)
     values = dict(zip(texts, (*found.shift, angle)))
-    errors = dict(zip(texts, (*found.errors[1:], found.errors[0])))
+    deviations = np.sqrt(np.diag(found.covariance))
+    errors = dict(zip(texts, (*deviations[1:3], deviations[0])))
     return {name: Quantity(float(values[name]), float(values[name] - SIDE * errors[name]),
                            float(values[name] + SIDE * errors[name]), *texts[name]) for name in texts}
 
@@ -151,6 +151,14 @@ def _apart(z, far, least: float) -> np.ndarray:
         if rim.size and (top.min() > rim.max() + least / 2 or top.max() < rim.min() - least / 2):
             out[wide] |= own
     return out
+
+
+def hidden(one: Change) -> Quantity:
+    """Why no number tells what even wear or a wedge may hide."""
+    if one.volumes is None:
+        return refused("m", HIDDEN, one.why)
+    carried = one.volumes.values["worn_volume"].low > 0
+    return refused("m", HIDDEN, "unworn parts carry the registration" if carried else UNSURE)
 
 
 def headline(one: Change) -> str:

@@ -31,19 +31,18 @@ PARTS = 4  # along a side, of which each is left out once to tell how well a fit
 class Laid:
     """How a second scan lies on a first one.
 
-    guess: the search; angle [rad], shift (2,) [m] as there; errors (3,): standard deviations of these; depth (m, n)
-    [m]: of the second scan below the first at the places of the first, less the plane, NaN where one is missing; plane:
-    the level [m] and the slopes along x and y about the middle of the first; noise [m] of a depth; used (m, n): the
-    unworn heights; like: correlation of both scans there; other: the registration on another plane, where a second part
-    of the scans may be the unworn one.
+    guess: the search; angle [rad], shift (2,) [m] as there; depth (m, n) [m]: of the second scan below the first at the
+    places of the first, less the plane, NaN where one is missing; covariance (6, 6): of angle, shift, and level [m] and
+    slopes along x and y of the plane about the middle of the first; noise [m] of a depth; used (m, n): the unworn
+    heights; region (m, n): what lies in both scans, missing heights too; like: correlation of the unworn heights of
+    both; other: the registration on another plane, where a second part of the scans may be the unworn one.
     """
 
     guess: Guess
     angle: float
     shift: np.ndarray
-    errors: np.ndarray
     depth: np.ndarray
-    plane: np.ndarray
+    covariance: np.ndarray
     noise: float
     used: np.ndarray
     region: np.ndarray
@@ -78,7 +77,7 @@ def _settled(fit, guess: Guess, state, plane) -> Laid:
     """The registration that starts from one plane."""
     state, numbers, noise, covariance = fit.settled(state, np.array(plane[:3]), plane.noise)
     depth = fit.map(state, numbers)
-    return Laid(guess, float(state[0]), state[1:], np.sqrt(np.diag(covariance)[:3]), depth, numbers, noise,
+    return Laid(guess, float(state[0]), state[1:], depth, covariance, noise,
                 _unworn(depth, noise), fit.region(state), fit.like(state, numbers, noise))
 
 
@@ -155,8 +154,10 @@ def rest_at(z, at, spline, known, grid, angle: float, steps: tuple) -> tuple:
 
     inside = _inside(known, grid)
     grid, at = grid[:, inside], at[inside]
-    read = lambda move: map_coordinates(spline, grid + np.array(move)[:, None], order=3, prefilter=False,  # noqa: E731
-                                        mode="mirror")
+
+    def read(move):
+        return map_coordinates(spline, grid + np.array(move)[:, None], order=3, prefilter=False, mode="mirror")
+
     along = (read((0, 0.5)) - read((0, -0.5))) / steps[0]
     across = (read((0.5, 0)) - read((-0.5, 0))) / steps[1]
     turned = at @ rotation(angle + np.pi / 2).T  # d(R p)/d(angle)
@@ -254,7 +255,7 @@ class _Fit:
         return (len(moves) - 1) * np.cov(moves.T, bias=True) / np.outer(scale, scale)
 
     def like(self, state, plane, noise: float) -> float:
-        """Correlation of the unworn heights of both scans, each about its mean in a block without long waves."""
+        """Correlation of the unworn heights of both scans, those of the first about their own plane."""
         z, at = self.some
         grid = np.nan_to_num(self.grid(at, state), posinf=1e9)
         there = _inside(self.known, grid)

@@ -11,9 +11,10 @@ SIZE = 224  # pixels along the longer side of the images of the search
 ANGLES = np.radians(np.arange(-6.0, 6.01, 0.5))  # rotations that are tried; a pixel at the edge of an image
 OVERLAP = 0.35  # of the smaller scan, at least, lies on the other one
 WAVES = 0.1  # of the shorter side: standard deviation of the Gauss filter whose mean is taken off the heights
-CLEAR = 7.0  # scatters of the likeness at other shifts: chance brings 5 in a hundred thousand shifts
+CLEAR = 7.0  # scatters above the likeness at other shifts; the largest of 100 000 normal numbers lies 4.4 off
 SURE = 12.0  # beyond which no other variant is tried
 TRIED, EACH = 8, 3  # places that are looked at closely, of one variant at most
+APART = 0.02  # rad from which on two rotations at one shift are two places
 NEAR = 4  # pixels around the likest shift that belong to it
 
 
@@ -22,8 +23,8 @@ class Guess(NamedTuple):
 
     angle [rad], shift (2,) [m]: a place of the first scan, turned by the angle about its middle and moved by the shift,
     is where it stands in the second, whose x or y is mirrored before ("" for neither) and whose heights are turned
-    over, where it says so; likeness: correlation of the valleys there; second: the largest one at other shifts; clear:
-    how many scatters of the likeness at all shifts it lies above their mean.
+    over, where it says so; likeness: correlation of the valleys there; clear: how many scatters of the likeness at
+    other shifts it lies above their mean.
     """
 
     angle: float
@@ -31,7 +32,6 @@ class Guess(NamedTuple):
     mirrored: str
     turned: bool
     likeness: float
-    second: float
     clear: float
 
 
@@ -149,28 +149,28 @@ class _Search:
         return np.where(enough, product / np.sqrt(np.where(enough, square, 1.0)), -1.0)
 
     def best(self, moved: tuple, half: float, step: float) -> list:
-        """(angle, shift [m], likeness, second, clear) of the likest places of an image, turned half round or not."""
+        """(angle, shift [m], likeness, clear) of the likest places of an image, turned half round or not."""
         from scipy.ndimage import rotate
 
-        found = []
+        found, like = [], None
         for angle in ANGLES:
             z, known = (np.rot90(one, 2) for one in moved) if half else moved
             # the image in the axes of the fixed one: rows count along y, so a positive angle turns them back
             z, known = (rotate(one.astype(float), np.degrees(angle), reshape=False, order=1) for one in (z, known))
             known = known > 0.5
-            like = self.likeness(np.where(known, z, 0.0), known)
-            at = np.unravel_index(np.argmax(like), like.shape)
-            found.append((float(like[at]), angle, at, like if not found or like[at] > max(found)[0] else None))
-        top = [found.pop(max(range(len(found)), key=lambda k: found[k][0]))]
-        while found and len(top) < EACH:
-            one = found.pop(max(range(len(found)), key=lambda k: found[k][0]))
-            if all(abs(one[1] - other[1]) > 0.02 or max(np.subtract(one[2], other[2])) > NEAR for other in top):
-                top.append(one)
-        _, _, at, like = top[0]
+            here = self.likeness(np.where(known, z, 0.0), known)
+            at = np.unravel_index(np.argmax(here), here.shape)
+            if like is None or here[at] > max(found)[0]:
+                like, top = here, at
+            found.append((float(here[at]), angle, at))
+        kept = []
+        for one in sorted(found, reverse=True):
+            if len(kept) < EACH and all(abs(one[1] - other[1]) > APART or
+                                        np.abs(np.subtract(one[2], other[2])).max() > NEAR for other in kept):
+                kept.append(one)
         rows, columns = np.indices(like.shape)
-        beside = (np.maximum(abs(rows - at[0]), abs(columns - at[1])) > NEAR) & (like > -1.0)
+        beside = (np.maximum(abs(rows - top[0]), abs(columns - top[1])) > NEAR) & (like > -1.0)
         z = np.arctanh(np.clip(like[beside], -0.999999, 0.999999))
-        mean, scatter, second = z.mean(), max(float(z.std()), 1e-9), float(like[beside].max(initial=-1.0))
-        shapes = np.subtract(moved[0].shape, self.z.shape) / 2
+        mean, scatter, shapes = z.mean(), max(float(z.std()), 1e-9), np.subtract(moved[0].shape, self.z.shape) / 2
         return [(angle + half, step * np.array([self.places[1][at[1]] - shapes[1], self.places[0][at[0]] - shapes[0]]),
-                 one, second, float((np.arctanh(min(one, 0.999999)) - mean) / scatter)) for one, angle, at, _ in top]
+                 one, float((np.arctanh(min(one, 0.999999)) - mean) / scatter)) for one, angle, at in kept]

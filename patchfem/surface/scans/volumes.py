@@ -20,12 +20,11 @@ LEAK = 0.005  # of what wore, how well what grew is known, and the other way rou
 UNDER = 0.7  # of the slow errors of the scans beside a worn part, what they are in its mean
 TOGETHER = 3.0  # the noise of a volume over that of independent heights
 FEW = 0.25  # of a square, at least, is known
-PARTS = 4  # along a side, of which each is left out once to tell what the plane is worth
 WORN = {"worn_volume": "volume that went, over the region that both scans show",
         "grown_volume": "volume that stands above the scan before: pile-up, deposits",
         "worn_share": "share of the common region that wore",
         "worn_depth_mean": "worn volume over the common region",
-        "worn_depth_max": "largest worn depth, of the mean of neighbouring heights"}
+        "worn_depth_max": "largest worn depth, of the median of 3 x 3 heights"}
 
 
 class Volumes(NamedTuple):
@@ -47,8 +46,8 @@ def nothing(reason: str) -> dict:
 def measured(found: Laid, x, y) -> Volumes:
     """Measures of a map of depths at x (n,) and y (m,) [m].
 
-    Volumes are sums over the worn heights. Their standard deviation is that of the plane, told by leaving out each of
-    16 parts of the map once (jackknife), and of the noise; what the heights that do not count as worn hold, above
+    Volumes are sums over the worn heights. Their standard deviation is that of the plane (`Laid.covariance`), of slow
+    errors of the scans and of the noise; what the heights that do not count as worn hold, above
     zero, widens the interval. Where another part may be the unworn one, the interval reaches to what that gives.
     """
     first = _measured(found, x, y)
@@ -154,20 +153,10 @@ def _bent(found: Laid, changed) -> float:
 
 def _of_plane(found: Laid, mask, cell, x, y) -> float:
     """Standard deviation of the volume under a mask [m3] that the plane leaves open."""
-    flat = (np.ones(mask.shape), np.broadcast_to(x - x.mean(), mask.shape),
-            np.broadcast_to((y - y.mean())[:, None], mask.shape))
-    pull = np.array([float((cell * one)[mask].sum()) for one in flat])
-    rows, columns = (np.minimum(np.arange(n) * PARTS // n, PARTS - 1) for n in mask.shape)
-    part, used = rows[:, None] * PARTS + columns[None, :], found.used & np.isfinite(found.depth)
-    normal, right = np.zeros((PARTS**2, 3, 3)), np.zeros((PARTS**2, 3))
-    for k in range(PARTS**2):
-        on = used & (part == k)
-        base = np.column_stack([one[on] for one in flat])
-        normal[k], right[k] = base.T @ base, base.T @ found.depth[on]
-    have = np.flatnonzero(normal[:, 0, 0] > 0)
-    moves = np.array([pull @ np.linalg.lstsq(normal.sum(axis=0) - normal[k], right.sum(axis=0) - right[k],
-                                             rcond=1e-12)[0] for k in have])
-    return float(np.sqrt((have.size - 1) * moves.var())) if have.size else 0.0
+    x, y = x - (x[0] + x[-1]) / 2, y - (y[0] + y[-1]) / 2
+    weight = np.where(mask, cell, 0.0)
+    pull = np.array([weight.sum(), weight.sum(axis=0) @ x, weight.sum(axis=1) @ y])
+    return float(np.sqrt(pull @ found.covariance[3:, 3:] @ pull))
 
 
 def _largest(found: Laid, worn) -> Quantity:

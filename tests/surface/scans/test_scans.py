@@ -1,6 +1,7 @@
 """Two areal scans before and after: place, volumes and depths of known pairs, and what is said where none is known."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -137,6 +138,22 @@ def test_always_spikes_are_left_out_and_pits_are_not(grooved):
     assert np.isfinite(kept.z[110, 110]) == np.isfinite(scan.z[110, 110]) and count <= 8
 
 
+def test_always_kept_spikes_count_and_the_others_do_not(grooved, worn):
+    scan, z = grooved[1], grooved[1].z.copy()
+    z[120:122, 20:22] += 4e-6
+    grown = [change.changed(grooved[0], replace(scan, z=z), keep).volumes.values["grown_volume"].value
+             for keep in (False, True)]
+    assert grown[0] < 0.1 * grown[1] and grown[1] == pytest.approx(4 * STEP**2 * 4e-6, rel=0.3)
+
+
+@pytest.mark.parametrize("clear, least", [(3.0, change.LIKELY), (30.0, change.ALIKE)])
+def test_always_a_refused_place_names_the_likeness_that_it_wants(grooved, worn, monkeypatch, clear, least):
+    found = replace(worn.found, like=least - 0.004, guess=worn.found.guess._replace(clear=clear))
+    monkeypatch.setattr(change, "laid", lambda before, after: found)
+    why = change.changed(*grooved).why
+    assert f"of {least - 0.004:.3f}, and only above {least:g} " in why
+
+
 @pytest.mark.share(1)
 @pytest.mark.parametrize("seed", [1, 6, 4, 8, 13, 19, 22, 26])
 def test_always_a_pair_made_by_an_independent_program_has_its_volume(seed):
@@ -158,6 +175,6 @@ def test_always_the_verb_tells_volumes_and_draws_maps(grooved, tmp_path, capsys)
     data = json.loads(capsys.readouterr().out)
     assert data["verdict"].startswith("worn") and data["worn_volume"]["unit"] == "m3"
     assert {"shift_x", "shift_y", "rotation", "mirrored", "turned"} <= set(data["registration"])
-    assert data["removed"] == {"before": 0, "after": 0} and data["hidden_wear"]["value"] is None
+    assert data["removed"] == {"before": 0, "after": 0} and data["hidden_wear"]["reason"].startswith("unworn parts")
     page = (tmp_path / "out" / "report.html").read_text()
     assert "laid on it" in page and "Sections through" in page
