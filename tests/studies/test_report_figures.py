@@ -128,6 +128,13 @@ def test_figures_30_and_31_a_share_of_the_traces(tmp_path):
     (sets, row), = one.main((2,), 4, None).values()
     inside(one.ANSWER, f"{row.after[0]:.2f} along x and {row.after[1]:.2f} along y")
     assert one.held(sets, row) >= 7 and not any(part.reference for each in sets for part in each.parts)
+    printed = np.divide(*one.PRINTED[::-1])
+    inside(" ".join(one.__doc__.split()), f"is {printed[0]:.2f} and {printed[1]:.2f}, if each figure")
+    for way in (0, 1):
+        before, after = one.totals(sets, way)
+        new = [each.traces[way][0] for each in sets]  # Pt: from highest to lowest about the line of least squares
+        total = [np.ptp(trace.z - np.polyval(np.polyfit(trace.x, trace.z, 1), trace.x)) for trace in new]
+        assert (after < before).all() and before == pytest.approx(total)
     files = [str(path) for path in one.write(one.middle(sets), tmp_path)]
     found = json.loads(cli("compare", *files, "-o", tmp_path / "out", "--json").out)["directions"]
     for way, part in zip("xy", one.middle(sets).parts):
@@ -146,6 +153,13 @@ def test_figures_30_and_31_counts_of_all_sets(tmp_path):
            f"in {one.held(*six)} and {one.held(*twelve)} of 40 cases")
     new, old = (1e6 * one.heights(six[0], when) for when in (0, 1))
     inside(flat, f"{new.min():.0f} to {new.max():.0f} um before and {old.min():.0f} to {old.max():.0f} um after")
+    (x_before, x_after), (y_before, y_after) = (one.totals(six[0], way) for way in (0, 1))
+    both = [1e6 * np.concatenate(pair) for pair in ((x_before, y_before), (x_after, y_after))]
+    inside(flat, f"have {both[0].min():.0f} to {both[0].max():.0f} um before and {both[1].min():.0f} to "
+           f"{both[1].max():.0f} um after", f"is {one.spread(x_after / x_before, 2)} along x and "
+           f"{one.spread(y_after / y_before, 2)} along y")
+    late = [np.divide(*one.totals(twelve[0], way)[::-1]) for way in (0, 1)]
+    inside(flat, f"At 12.8 um they are {one.spread(late[0], 2)} and {one.spread(late[1], 2)}")
     inside((tmp_path / "x.svg").read_text(), "along x, 95 % of one set", "Fig. 31, after, along y: waves")
 
 
