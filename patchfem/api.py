@@ -26,6 +26,7 @@ from .export import summary as summaries
 from .export.drawing import swept
 from .export.pages import lead, released, words
 from .export.surfaces import compare as compared_data
+from .export.surfaces import pairs as pairs_data
 from .export.sweeps import folder, page, tables
 from .export.sweeps import run as sweep_run
 from .model.model import Model
@@ -40,7 +41,7 @@ from .scene.changed import Base
 from .scene.scene import Scene, SceneError, loads, text_of, with_files
 from .scene.scene import load as load_file
 from .scene.sets import assignments, texts
-from .surface.compare import compare as comparison
+from .surface.compare import pairs as pairs_tables
 from .surface.compare import verdict
 
 if TYPE_CHECKING:
@@ -197,22 +198,25 @@ def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[
     return many.answers(meshes.meshed([build(one) for one in models]), say=_on_stderr if say is None else say)
 
 
-def compare(before: str | Path, after: str | Path, /, *other: str | Path, direction: str = "",
-            units: tuple[str, str] | None = None, shift: float | None = None,
-            keep_spikes: bool = False) -> dict[str, Any]:
+def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | None = None, shift: float | None = None,
+            keep_spikes: bool = False, pairs: str | Path | None = None) -> dict[str, Any]:
     """Compare a measured surface before with the same surface after: the dict that compare.json holds, in SI.
 
-    before, after: files of two traces or two areal scans; other: the pair of traces of the other direction. direction:
+    files: before and after, two traces or two areal scans; then the pair of traces of the other direction. direction:
     "x" or "y", along which the first two run. units: of x and of z for files that name none, as ("mm", "um").
     shift [m]: of two traces whose places are known, 0.0 where both start at one mark. keep_spikes: spikes, dropouts and
     dust stay in. In the dict `verdict` and `sentences` are words; `shift`, `worn_depth_mean`, `amplitude_ratio` and so
     on have `value`, `low`, `high`, `unit`, and a `reason` where the value is None. Two scans have `worn_volume`,
-    `grown_volume`, `worn_share` and the `registration` by x, y and rotation. PatchfemError for files that do not fit
-    together.
+    `grown_volume`, `worn_share` and the `registration` by x, y and rotation. pairs: in place of files a table of
+    them with the columns before and after: `pairs` then has the dict of each pair, `means` mean, interval and scatter
+    over them; a pair that fails has its reason as `message`. PatchfemError for files that do not fit together.
     """
-    parts = comparison.compared_files((before, after, *other), direction, units, shift, keep_spikes)
-    directions = comparison.directions_of(parts)
-    return compared_data.data_of(parts, verdict.verdicts(parts, directions), directions)
+    how = {"units": units, "shift": shift, "keep_spikes": keep_spikes}
+    if pairs is None:
+        return compared_data.data_of(*verdict.judged(files, direction, **how))
+    if files:
+        raise PatchfemError("compare: files or a table of pairs are wanted, not both")
+    return pairs_data.data_of(pairs_data.answers(pairs_tables.read_pairs(pairs), direction, **how))
 
 
 def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:

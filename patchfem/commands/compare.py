@@ -9,11 +9,14 @@ from cyclopts import Parameter
 from ..campaigns import compare as pressing
 from ..export import results, summary
 from ..export.surfaces import compare as paper
+from ..export.surfaces import pairs as pairs_paper
 from ..surface import profile
-from ..surface.compare import compare as comparison
+from ..surface.compare import pairs as tables
 from ..surface.compare import verdict
 from .shared import (
+    Ended,
     Json,
+    NotReached,
     Out,
     Quiet,
     Refused,
@@ -24,14 +27,18 @@ from .shared import (
     note,
     pair,
     placed,
+    progress_bar,
     quantity,
     say,
     scene_of,
     word,
 )
+from .streams import plain
 
 
-def compare(before: Path, after: Path, /, *other: Path,
+def compare(before: Path | None = None, after: Path | None = None, /, *other: Path,
+            pairs: Annotated[Path | None, Parameter(help="in place of files a table of them, a pair in each line, such "
+                             "as pairs.csv with the columns before and after")] = None,
             direction: word("x or y, along which the traces run; an areal scan has both") = "",
             units: Units = "",
             shift: word("known shift: what stands at x before stands at x + shift after, such as \"0 mm\" for traces "
@@ -41,16 +48,24 @@ def compare(before: Path, after: Path, /, *other: Path,
                                                     "surface, such as rig.toml")] = None,
             set_: Sets = (), out: Out = None, json_: Json = False, quiet: Quiet = False):
     """Compare the surface in BEFORE with that in AFTER: registration, worn depth, ratios, a verdict, a page; of areal
-    scans the worn volume and maps; two more files are the pair of the other direction, of traces.
+    scans the worn volume and maps; two more files are the pair of the other direction, of traces. A table of many
+    pairs has mean, scatter and interval over them.
 
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """
     if direction not in ("", "x", "y"):
         raise Refused(f"compare --direction {direction}: x or y is wanted")
-    known = quantity(shift, "length", "compare --shift")
-    parts = comparison.compared_files((before, after, *other), direction, pair(units), known, keep_spikes)
-    directions = comparison.directions_of(parts)
-    found = verdict.verdicts(parts, directions)
+    how = {"units": pair(units), "shift": quantity(shift, "length", "compare --shift"), "keep_spikes": keep_spikes}
+    files = [one for one in (before, after, *other) if one is not None]
+    if pairs is not None:
+        if files or scene is not None:
+            raise Refused(f"compare --pairs {pairs}: the table alone is wanted, without "
+                          f"{'other files' if files else '--scene'}")
+        _table(pairs, direction, how, placed(out, pairs.stem), json_, quiet)
+        return
+    if len(files) < 2:
+        raise Refused("compare: BEFORE and AFTER are wanted, or --pairs with a table of them")
+    parts, found, directions = verdict.judged(tuple(files), direction, **how)
     target = placed(out, f"{before.stem}-{after.stem}")
     with results.Folder(target) as folder:
         pressing = _pressed(scene, set_, parts[0], folder.path, quiet) if scene is not None else None
@@ -64,6 +79,29 @@ def compare(before: Path, after: Path, /, *other: Path,
     else:
         print("\n".join(paper.lines_of(parts, found, pressing)))
         print(f"results: {target}")
+
+
+def _table(path: Path, direction: str, how: dict, target: Path, json_: bool, quiet: bool) -> None:
+    """All pairs of a table; exit code 3 where some fail, 2 where all of them do."""
+    asked = tables.read_pairs(path)
+    with results.Folder(target) as folder:
+        with progress_bar(quiet) as done:
+            rows = pairs_paper.answers(asked, direction, done, **how)
+        data = pairs_paper.data_of(rows)
+        summary.write_json(data, folder.path / "pairs.json")
+        pairs_paper.write_csv(rows, folder.path / "pairs.csv")
+        pairs_paper.write_page(folder.path / "report.html", rows, path.name)
+    for text in data["notes"]:
+        note(text)
+    print(json.dumps(rows, ensure_ascii=False, allow_nan=False) if json_ else
+          "\n".join([*pairs_paper.lines_of(rows), f"results: {target}"]))
+    failed = [row for row in rows if row["outcome"] == "failed"]
+    for row in failed:
+        say(plain(f"{path}:{row['line']}: {row['message']}"))
+    if len(failed) == len(rows):
+        raise Ended(2)
+    if failed:
+        raise NotReached
 
 
 def _pressed(scene: Path, sets, part, target: Path, quiet: bool):

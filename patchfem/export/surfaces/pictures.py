@@ -191,6 +191,25 @@ def both_statistics(curves: tuple, spectra: tuple, band: tuple) -> str:
                        axis("density", "um$^3$", True), marks)])
 
 
+def each_and_mean(panels: list) -> str:
+    """Numbers of pairs with their intervals, and their mean; panels: (title, [(line of the pair, quantity)], mean)
+    each."""
+    made = []
+    for title, each, mean in panels:
+        known = [(k, one) for k, one in each if one.value is not None]
+        ends = [end for _, one in known for end in (one.low, one.high) if end is not None]
+        unit, scale = axis_unit(ends, mean.unit) if mean.unit != "1" else ("", 1.0)
+        wide = np.array([each[0][0] - 0.5, each[-1][0] + 0.5])
+        marks = [mark("band", "soft", "mean", x=wide, low=np.full(2, mean.low * scale),
+                      high=np.full(2, mean.high * scale)), line(wide, np.full(2, mean.value * scale), "soft")]
+        marks += [line([k, k], [one.low * scale, one.high * scale], "accent", width=1.0) for k, one in known
+                  if one.high is not None]
+        marks.append(mark("dots", "accent", "each pair", x=np.array([k for k, _ in known], float),
+                          y=np.array([one.value * scale for _, one in known]), size=4.0))
+        made.append(chart(title, axis("line of the table") | {"range": wide}, axis("", unit), marks))
+    return draw(made, height=2.7)
+
+
 def pressures(sides: list) -> str:
     """The normal stress of the patch with each surface; sides: (x (n,) [m], stress (n,) [Pa], name)."""
     along, mm = axis_unit(sides[0][0], "m")

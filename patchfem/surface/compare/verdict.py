@@ -8,11 +8,19 @@ from ..profile import Profile
 from ..quantity import SIDE, Quantity
 from ..scans import change as scans
 from .carried import may_hide, told
-from .compare import Comparison, identical
+from .compare import Comparison, compared_files, directions_of, identical
 
 EXCHANGED, ELSEWHERE = scans.GREW, scans.ELSEWHERE
 DEPOSITED = 0.05  # of the worn area, what may stand above without a word
 NEAR = 1e-6  # a ratio that close to one is one but for round-off
+
+
+def judged(paths: tuple, direction: str = "", units: tuple | None = None, shift: float | None = None,
+           keep_spikes: bool = False) -> tuple:
+    """(parts, verdict, directions) of the files before and after: `compared_files`, `verdicts`, `directions_of`."""
+    parts = compared_files(paths, direction, units, shift, keep_spikes)
+    directions = directions_of(parts)
+    return parts, verdicts(parts, directions), directions
 
 
 def verdicts(parts: list, directions: list = ()) -> tuple:

@@ -1,0 +1,113 @@
+"""patchfem compare --pairs: each pair as compare gives it alone, means over them, failures, refusals."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from command_line import cli
+from pairs import UM, track
+from scipy.stats import t
+
+import patchfem as pf
+from patchfem.surface.compare.pairs import mean_of, read_pairs
+
+COUNT = 1201
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    """A table of three pairs with a track, the last of which has no file after."""
+    place = tmp_path_factory.mktemp("pairs")
+    for k in range(2):
+        made = track("band", 7100 + k, COUNT)
+        for name, one in (("before", made.before), ("after", made.after)):
+            (place / f"{name}{k}.csv").write_text("x [um],z [um]\n" + "".join(
+                f"{x / UM:.3f},{z / UM:.4f}\n" for x, z in zip(one.x, one.z)))
+    path = place / "pairs.csv"
+    path.write_text("specimen,before,after,direction\nA,before0.csv,after0.csv,y\n\nB,before1.csv,after1.csv,y\n"
+                    "C,before0.csv,nowhere.csv,\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def answered(table, tmp_path_factory):
+    out = tmp_path_factory.mktemp("answered") / "out"
+    return cli("compare", "--pairs", table, "-o", out, "--json"), out
+
+
+def test_exact_each_pair_is_what_compare_gives_alone(table, answered):
+    answer, out = answered
+    rows = json.loads(answer.out)
+    assert answer.code == 3 and [row["line"] for row in rows] == [2, 4, 5]
+    alone = pf.compare(table.parent / "before1.csv", table.parent / "after1.csv", direction="y")
+    own = {"line": 4, "before": "before1.csv", "after": "after1.csv", "labels": {"specimen": "B"}, "outcome": "done",
+           "message": ""}
+    assert rows[1] == json.loads(json.dumps(alone)) | own
+    assert rows[2]["outcome"] == "failed" and "nowhere.csv: there is no such file" in rows[2]["message"]
+    assert f"{table}:5: " in answer.err and "<b>3 pairs, 2 with wear shown, 1 failed.</b>" in \
+        (out / "report.html").read_text()
+
+
+def test_exact_the_mean_over_the_pairs_and_the_table(table, answered):
+    out = answered[1]
+    lines = list(csv.DictReader((out / "pairs.csv").read_text().splitlines()))
+    values = np.array([float(one["worn_depth_mean [m]"]) for one in lines[:2]])
+    assert lines[2]["worn_depth_mean [m]"] == "" and [one["specimen"] for one in lines] == ["A", "B", "C"]
+    said = json.loads((out / "pairs.json").read_text())
+    assert len(said["means"]) == 1
+    found = said["means"][0]["worn_depth_mean"]
+    side = t.ppf(0.975, 1) * values.std(ddof=1) / np.sqrt(2)
+    assert found["value"] == pytest.approx(values.mean()) and found["scatter"] == pytest.approx(values.std(ddof=1))
+    assert (found["low"], found["high"]) == pytest.approx((max(values.mean() - side, 0.0), values.mean() + side))
+    assert json.loads(json.dumps(pf.compare(pairs=table))) == said
+
+
+def test_always_the_interval_of_a_mean_holds_the_truth_in_95_of_100():
+    """Pairs that scatter, and pairs whose own errors are all there is: 400 means of four each."""
+    random = np.random.default_rng(11)
+    for scatter, own in ((3.0, 0.3), (0.0, 1.0)):
+        held = []
+        for _ in range(400):
+            values = 50 + random.normal(0, np.hypot(scatter, own), 4)
+            one = mean_of([{"value": v, "low": v - 1.96 * own, "high": v + 1.96 * own, "unit": "m"} for v in values])
+            held.append(one.mean.low <= 50 <= one.mean.high)
+        assert np.mean(held) > 0.92
+
+
+@pytest.mark.parametrize("text, says", [
+    ("before,then\na.csv,b.csv\n", ":1: a header like `before,after` is wanted, not 'before,then' (no column after)"),
+    ("before,after\n\n", ": no pair below its header"),
+    ("before,after\na.csv\n", ":2: two cells are wanted, before and after, not 'a.csv'"),
+    ("before,after\na.csv,\n", ":2: after: the name of a file is wanted"),
+    ("before,after,direction\na.csv,b.csv,z\n", ":2: direction: x, y or nothing is wanted, not 'z'"),
+    ("before,after\na.csv,b.csv\na.csv,b.csv\n", ":3: the pair of line 2 again"),
+    ("", ":1: a header like `before,after` is wanted"),
+])
+def test_refuses_a_table_that_is_none(tmp_path, text, says):
+    path = tmp_path / "pairs.csv"
+    path.write_text(text)
+    answer = cli("compare", "--pairs", path, "-o", tmp_path / "out")
+    assert answer.code == 2 and f"{path}{says}" in answer.err and not (tmp_path / "out").exists()
+    with pytest.raises(pf.PatchfemError):
+        read_pairs(path)
+
+
+@pytest.mark.parametrize("words, code, says", [
+    (("--pairs", "nowhere.csv"), 4, "nowhere.csv: no such table"),
+    (("a.csv", "b.csv", "--pairs", "pairs.csv"), 2, "the table alone is wanted, without other files"),
+    (("a.csv",), 2, "compare: BEFORE and AFTER are wanted, or --pairs"),
+    (("--pairs", "pairs.csv", "--scene", "rig.toml"), 2, "the table alone is wanted, without --scene"),
+])
+def test_refuses_with_the_exit_code_of_the_contract(tmp_path, monkeypatch, words, code, says):
+    monkeypatch.chdir(tmp_path)
+    answer = cli("compare", *words)
+    assert answer.code == code and says in answer.err and answer.out == ""
+
+
+def test_refuses_a_table_of_which_no_pair_can_be_compared(tmp_path):
+    (tmp_path / "pairs.csv").write_text("before,after\na.csv,b.csv\n")
+    answer = cli("compare", "--pairs", tmp_path / "pairs.csv", "-o", tmp_path / "out")
+    assert answer.code == 2 and (tmp_path / "out" / "pairs.csv").is_file()
+    with pytest.raises(pf.PatchfemError, match="not both"):
+        pf.compare("a.csv", "b.csv", pairs=tmp_path / "pairs.csv")
