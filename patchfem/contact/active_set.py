@@ -292,7 +292,7 @@ def polished(operator, ask, active, found: Found) -> Found:
     return finer if flaw(finer) < flaw(found) else found
 
 
-def rest(x, gap, load: float, moment: float, spring: float = 0.0) -> float:
+def rest(x, gap, load: float, moment: float, spring: float) -> float:
     """Rotation theta [rad] at which a rigid piece comes to rest on the gap (m,) under load and moment.
 
     It lies on the edge of the lower convex hull of the gap below the load line; against a spring [N m/rad] it may lie

@@ -12,7 +12,7 @@ from scipy.optimize import brentq, nnls
 from patchfem.contact.active_set import Ask, Operator
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.gradients import descend, gradients
-from patchfem.contact.unilateral import SOLVED, press, solve_forces
+from patchfem.contact.unilateral import SOLVED, press, press_by, solve_forces
 from patchfem.core import Compliance, Interface, Outcome, PatchfemError
 from patchfem.mesh.tensor import graded_grid
 
@@ -251,6 +251,22 @@ def test_exact_zero_load_touches_and_carries_nothing(moment):
     assert not state.sigma_n.any() and (state.load, state.moment) == (0, 0)
     assert state.approach == 3e-6
     assert state.gap.min() == 0 and np.abs(state.gap - (gap - 3e-6)).max() <= 1e-20
+
+
+def test_exact_one_node_under_the_load_line_takes_the_middle_of_the_rotations_that_open_the_others():
+    pair = coated_pair(100)
+    x = pair.interface.x
+    state = press(pair, 1e-3 * np.abs(x - x[30]) + 5e-3 * x, 1e-6, 1e-6 * x[30])  # V about a slope of 5e-3
+    assert np.flatnonzero(state.sigma_n).tolist() == [30]
+    assert state.rotation == pytest.approx(-5e-3, rel=1e-6)
+
+
+def test_exact_an_approach_is_counted_from_a_gap_that_lies_below_zero():
+    pair = coated_pair(100)
+    gap = crown(pair.interface.x, 1.0)
+    above, below = press_by(pair, gap, 2e-6), press_by(pair, gap - 8e-6, 2e-6 - 8e-6)
+    assert below.load == pytest.approx(above.load, rel=1e-9)
+    assert below.sigma_n == pytest.approx(above.sigma_n, rel=1e-6, abs=1e-9 * above.sigma_n.max())
 
 
 # contact fraction, dT/d(slide) [N/m], greatest pressure [Pa] and approach [m] of the coated pair at 200 cells, from
