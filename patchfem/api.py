@@ -27,6 +27,7 @@ from .export.drawing import swept
 from .export.pages import lead, released, words
 from .export.surfaces import compare as compared_data
 from .export.surfaces import pairs as pairs_data
+from .export.surfaces import worn
 from .export.sweeps import folder, page, tables
 from .export.sweeps import run as sweep_run
 from .model.model import Model
@@ -209,9 +210,16 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
     on have `value`, `low`, `high`, `unit`, and a `reason` where the value is None. Two scans have `worn_volume`,
     `grown_volume`, `worn_share` and the `registration` by x, y and rotation. pairs: in place of files a table of
     them with the columns before and after: `pairs` then has the dict of each pair, `means` mean, interval and scatter
-    over them; a pair that fails has its reason as `message`. PatchfemError for files that do not fit together.
+    over them; a pair that fails has its reason as `message`. Two results folders, the second of a run with [wear]: what
+    wore off between them, over the whole patch, with the measures of both under `runs`. PatchfemError for files that
+    do not fit together.
     """
     how = {"units": units, "shift": shift, "keep_spikes": keep_spikes}
+    if pairs is None and len(files) > 1 and any(Path(one).is_dir() for one in files):
+        if len(files) > 2 or direction or units is not None or shift is not None or keep_spikes:
+            raise PatchfemError("compare: two results folders stand alone, without other files and settings of traces")
+        lost = worn.lost(*map(Path, files))
+        return worn.data_of(lost, worn.verdict(lost))
     if pairs is None:
         return compared_data.data_of(*verdict.judged(files, direction, **how))
     if files:

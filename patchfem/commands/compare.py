@@ -10,6 +10,7 @@ from ..campaigns import compare as pressing
 from ..export import results, summary
 from ..export.surfaces import compare as paper
 from ..export.surfaces import pairs as pairs_paper
+from ..export.surfaces import worn
 from ..surface import profile
 from ..surface.compare import pairs as tables
 from ..surface.compare import verdict
@@ -49,7 +50,7 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
             set_: Sets = (), out: Out = None, json_: Json = False, quiet: Quiet = False):
     """Compare the surface in BEFORE with that in AFTER: registration, worn depth, ratios, a verdict, a page; of areal
     scans the worn volume and maps; two more files are the pair of the other direction, of traces. A table of many
-    pairs has mean, scatter and interval over them.
+    pairs has mean, scatter and interval over them; two results folders, the second of a run with [wear], what wore off.
 
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """
@@ -65,6 +66,10 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
         return
     if len(files) < 2:
         raise Refused("compare: BEFORE and AFTER are wanted, or --pairs with a table of them")
+    if before.is_dir() or after.is_dir():
+        _no_traces({"a third file": other, "--direction": direction, "--units": units, "--shift": shift,
+                    "--keep-spikes": keep_spikes, "--scene": scene, "--set": set_})
+        return _runs(before, after, out, json_)
     parts, found, directions = verdict.judged(tuple(files), direction, **how)
     target = placed(out, f"{before.stem}-{after.stem}")
     with results.Folder(target) as folder:
@@ -102,6 +107,27 @@ def _table(path: Path, direction: str, how: dict, target: Path, json_: bool, qui
         raise Ended(2)
     if failed:
         raise NotReached
+
+
+def _no_traces(asked: dict):
+    """Refuse what belongs to files of traces, beside a results folder."""
+    for name, value in asked.items():
+        if value:
+            raise Refused(f"compare: {name} belongs to measured surfaces, not to results folders")
+
+
+def _runs(before: Path, after: Path, out, json_: bool):
+    """What wore off between the runs in two results folders."""
+    lost = worn.lost(before, after)
+    found = worn.verdict(lost)
+    data, target = worn.data_of(lost, found), placed(out, f"{before.resolve().name}-{after.resolve().name}")
+    with results.Folder(target) as folder:
+        summary.write_json(data, folder.path / "compare.json")
+        worn.write_page(folder.path / "report.html", lost, found)
+    for text in data["notes"]:
+        note(text)
+    print(json.dumps(data, ensure_ascii=False, allow_nan=False) if json_ else
+          "\n".join([*worn.lines_of(lost, found), f"results: {target}"]))
 
 
 def _pressed(scene: Path, sets, part, target: Path, quiet: bool):

@@ -24,6 +24,8 @@ def contents(result: Result) -> netcdf.Contents:
     rig = result.plan.model.rig
     names = list(rig.names) if found and rig is not None else []
     data = netcdf.of_run(found, modal, fields, x, weight, strips, levels, names)
+    if patch is not None:
+        data = netcdf.with_surfaces(data, patch.gap)
     if "events" in extra:
         e = extra["events"]
         data = netcdf.with_events(data, e.time, e.interface, e.kind, e.slide, e.count, MEANINGS, e.source)

@@ -42,6 +42,7 @@ LONG = {
     "slip": ("m", "irreversible local slip"),
     "worn_depth": ("m", "worn depth, both pieces together"),
     "weight": ("m2", "nodal area of all pairs"),
+    "unloaded_gap": ("m", "gap of the unloaded surfaces, wear included"),
 }
 
 BETWEEN = {"relative_displacement": "displacement of the first mass of an interface relative to the second",
@@ -174,6 +175,11 @@ def with_curve(data: Contents, curve: dict) -> Contents:
         out["curve_fold"] = ("fold", np.asarray(curve["folds"], float),
                              {"units": unit, "long_name": f"{over} at which the curve turns back"})
     return data.also(out)
+
+
+def with_surfaces(data: Contents, gap) -> Contents:
+    """The contents with the gap (m,) [m] of the unloaded surfaces, wear included."""
+    return data.also({"unloaded_gap": ("x", np.asarray(gap), _attributes("unloaded_gap"))})
 
 
 def with_wear(data: Contents, history: dict, units: dict) -> Contents:

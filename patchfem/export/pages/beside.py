@@ -96,7 +96,7 @@ def measured(name: str, values: dict, like: FinishedRun) -> FinishedRun:
 def _lag(one: FinishedRun, like: FinishedRun) -> float:
     """Time [s] that a measurement is shifted by: its end to that of the run, then on to the same phase."""
     shift = like.arrays["time"][0][-1] - one.arrays["time"][0][-1] if "time" in like.arrays else 0.0
-    period = _period(like)
+    period = period_of(like)
     both = next((key for key in IN_PHASE if key in one.arrays and key in like.arrays), None)
     if period is None or both is None or like.summary["kind"] == "bench":
         return shift
@@ -177,7 +177,7 @@ def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list)
                       for colour, (name, a, b) in zip(COLOURS * len(lines), lines)]}
 
 
-def _period(run: FinishedRun) -> float | None:
+def period_of(run: FinishedRun) -> float | None:
     """Period [s] of the sine that drives a run; None where none does."""
     written = NUMBER.match(str(run.resolved.get("drive", {}).get("frequency", "")))
     return 1 / float(written[1]) if written and float(written[1]) > 0 else None
@@ -185,7 +185,7 @@ def _period(run: FinishedRun) -> float | None:
 
 def _late(run: FinishedRun) -> np.ndarray:
     """Which samples lie in the last CYCLES cycles of a sine, or in the last tenth of a run without one."""
-    time, period = run.arrays["time"][0], _period(run)
+    time, period = run.arrays["time"][0], period_of(run)
     span = CYCLES * period if period else np.ptp(time) / 10
     if run.summary["kind"] == "bench":
         span = np.ptp(time)

@@ -97,14 +97,14 @@ def data_of(parts: list, found: tuple, directions: list, pressing: Pressed | Non
     """The answer as plain data in SI; the first direction stands at the top."""
     def part(one: Comparison) -> dict:
         return {"before": one.before.source, "after": one.after.source, "direction": one.direction or None,
-                "reference": one.reference or None, **{name: _plain(each) for name, each in one.values.items()},
+                "reference": one.reference or None, **{name: plain_of(each) for name, each in one.values.items()},
                 **_of_traces(one)}
 
     out = {"patchfem": __version__, "verdict": found[0], "sentences": found[1], "confidence": LEVEL,
            "band": list(BAND), **part(parts[0]), "notes": [text for one in parts for text in one.notes]}
     if len(parts) > 1:
         out["directions"] = {one.direction: part(one) for one in parts}
-        out["anisotropy"] = {when: {"amplitude_ratio": _plain(amplitude), "slope_ratio": _plain(slope)}
+        out["anisotropy"] = {when: {"amplitude_ratio": plain_of(amplitude), "slope_ratio": plain_of(slope)}
                              for when, amplitude, slope in directions}
     if pressing is not None:
         out["pressed"] = pressed_data(pressing)
@@ -115,8 +115,8 @@ def _of_traces(one: Comparison) -> dict:
     """What traces alone have: how they were laid on each other, the longest track, the heights left out."""
     if not isinstance(one.before, Profile):
         return {} if one.change is None else _of_scans(one.change)
-    sizes = {name: _plain(each) for name, each in one.tracks.sizes.items()}
-    return {"registration": {"shift": _plain(one.shift), "mirrored": one.mirrored, "turned": one.turned},
+    sizes = {name: plain_of(each) for name, each in one.tracks.sizes.items()}
+    return {"registration": {"shift": plain_of(one.shift), "mirrored": one.mirrored, "turned": one.turned},
             "track": sizes or None, "removed": dict(zip(("before", "after"), one.removed))}
 
 
@@ -124,12 +124,12 @@ def _of_scans(one: Change) -> dict:
     """How scans were laid on each other, and the heights left out."""
     guess = None if one.found is None else one.found.guess
     flags = {"mirrored": bool(guess and guess.mirrored), "turned": bool(guess and guess.turned)}
-    return {"registration": {**{name: _plain(each) for name, each in one.registration.items()}, **flags},
-            "hidden_wear": _plain(hidden(one)),
+    return {"registration": {**{name: plain_of(each) for name, each in one.registration.items()}, **flags},
+            "hidden_wear": plain_of(hidden(one)),
             "removed": dict(zip(("before", "after"), one.removed))}
 
 
-def _plain(one: Quantity) -> dict:
+def plain_of(one: Quantity) -> dict:
     out = {"value": one.value, "low": one.low, "high": one.high, "unit": one.unit}
     return {**out, "reason": one.reason} if one.value is None else out
 

@@ -112,8 +112,9 @@ def _coarser(found, motion: dict) -> float:
 
 def volume_of_point(model, result, estimate: bool = True) -> dict:
     """worn_volume of one point under [normal]: coefficient times load times slip path, over all cycles of wear."""
-    value = model.wear.coefficient * model.point.load * of_point(model, result.window) * model.wear.cycles
-    error = (slip_miss(result.measures) + 1e-12) * value if estimate else None
+    path, miss = of_point(model, result.window, {name: m.value for name, m in result.measures.items()})
+    value = model.wear.coefficient * model.point.load * path * model.wear.cycles
+    error = (miss + slip_miss(result.measures) + 1e-12) * value if estimate else None
     return {"worn_volume": Measure(value, TABLE["worn_volume"].unit, error, TABLE["worn_volume"].floor)}
 
 

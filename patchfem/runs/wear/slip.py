@@ -23,8 +23,8 @@ class Rubbed(NamedTuple):
     """What one cycle of a motion does to the interface.
 
     path (m,) [m]: slip path of each node, or with form 'energy' its friction work per area over its pressure, along the
-    flanks of grooves where there are any; miss: its relative error by the frames it is read from; values: measures of
-    the motion; outcome: why no cycle repeats, else None.
+    flanks of grooves where there are any; miss: its relative error by the frames it is read from, and by what the
+    cycles of the window still differ; values: measures of the motion; outcome: why no cycle repeats, else None.
     """
 
     path: np.ndarray
@@ -34,11 +34,11 @@ class Rubbed(NamedTuple):
 
 
 def frames_for(tolerance: float) -> int:
-    """Frames of a cycle from which its slip path has an error of a tenth of the tolerance.
+    """Frames of a cycle from which its slip path has an error of a hundredth of the tolerance.
 
     A reversal between two of k frames of a sine hides up to (pi/k)^2/2 of the amplitude.
     """
-    return int(np.clip(2 * ceil(np.pi / sqrt(0.8 * tolerance)), LEAST_FRAMES, MOST_FRAMES))
+    return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), LEAST_FRAMES, MOST_FRAMES))
 
 
 def even(model, per_point: bool = False) -> bool:
@@ -79,6 +79,8 @@ def _rig(model, patch, frames: int) -> Rubbed:
     amplitude = Measure(found.values["relative_displacement_amplitude"], "m", 0.0)
     wanted = {"relative_displacement_amplitude": amplitude}
     settled, _ = settle(found, wanted, model.accuracy.tolerance, model.rig.drive)
+    last = _last_cycle(model, found.window, patch.pressure.load)
+    beat = _beat(found.values, last[1])
     outcome = outcome_on_piece(settled if settled in UNBOUNDED else None, model.patch, patch, found.response.slide)
     if shaped:
         fields = fields_of(model, numerics, patch, found)
@@ -88,21 +90,32 @@ def _rig(model, patch, frames: int) -> Rubbed:
             lifted = np.interp(time, window.time, window.extra.get("normal_load", np.full(
                 window.time.size, patch.pressure.load)))
             local, tau = slip_path_of(model, patch, slide, lifted, local, tau)
-        return _read(model, patch, local, tau, True, found.values, outcome)
-    load = patch.pressure.load
-    return _alike(model, patch, _last_cycle(model, found.window, load), load, found.values, outcome)
+        out = _read(model, patch, local, tau, True, found.values, outcome)
+    else:
+        out = _alike(model, patch, last, patch.pressure.load, found.values, outcome)
+    return out._replace(miss=out.miss + beat)
 
 
-def of_point(model, window) -> float:
-    """Slip path [m] of one cycle of one point under [normal], from the last cycles of its run.
+def _beat(values: dict, slip) -> float:
+    """By how much the slip of the last cycle (k,) [m] differs from the amplitude of the whole window, relative: what a
+    mode that still beats leaves open."""
+    own, whole = float(np.ptp(slip)) / 2, values.get("slip_amplitude")
+    return abs(whole / own - 1) if whole is not None and own > 0 else 0.0
 
-    It is weighted with the load where that changes. window: histories of a bench or a rig.
+
+def of_point(model, window, values: dict) -> tuple:
+    """(slip path [m] of one cycle of one point under [normal], its relative error by what the cycles still differ).
+
+    It is weighted with the load where that changes. window: histories of a bench or a rig; values: measures by name.
     """
+    beat = 0.0
     if model.rig is not None:
         last = _last_cycle(model, window, model.point.load)
+        beat = _beat(values, last[1])
     else:
         last = [part[window.first:] for part in (window.slide, window.slip, window.force, window.load)]
-    return float(_alike(model, None, last, last[-1][0], {}, None).path[0])
+    found = _alike(model, None, last, last[-1][0], {}, None)
+    return float(found.path[0]), found.miss + beat
 
 
 def _last_cycle(model, window, load: float) -> list:
@@ -159,12 +172,19 @@ def slip_path_of(model, patch, slide, vertical, local, tau) -> tuple:
 
 def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> Rubbed:
     """The path of every node from frames (f, m) of local slip [m] and shear stress [Pa], over grooves those of
-    `slip_path_of`; closed: the last frame is followed by the first."""
+    `slip_path_of`; closed: the last frame is followed by the first.
+
+    A reversal between two frames hides f(d) of the path, d <= 1/2 of their distance. Every third frame hides f(d),
+    f(1 - d) or f(1 + d), from the first, the second or the third: in the mean so much more that 3/2 of it hold f(d)
+    wherever d lies, of a corner f = c d as of a smooth turn f = c d^2.
+    """
     path = _path(model, patch, local, tau, closed)
-    coarse = _path(model, patch, local[::2], tau[::2], closed)
-    total = path @ patch.pressure.sigma_n
-    miss = abs(total - coarse @ patch.pressure.sigma_n) / 3 / total if total > 0 else 0.0
-    return Rubbed(path, float(miss), values, outcome)
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    ends = [] if closed else [0, len(local) - 1]
+    thirds = [np.unique([*ends, *range(first, len(local), 3)]).astype(int) for first in range(3)]
+    lost = [abs(float((path - _path(model, patch, local[at], tau[at], closed)) @ force)) for at in thirds]
+    total = float(path @ force)
+    return Rubbed(path, 1.5 * float(np.mean(lost)) / total if total > 0 else 0.0, values, outcome)
 
 
 def _path(model, patch, local, tau, closed: bool) -> np.ndarray:

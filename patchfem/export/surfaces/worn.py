@@ -1,0 +1,387 @@
+"""Two results folders of one patch, new and worn or worn and worn on: what wore off between them, with its errors."""
+
+from html import escape
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ... import __version__
+from ...core import Missing, PatchfemError, frozen_array, say
+from ...disk.whole import write_text
+from ...scales import axis_unit
+from ...surface.compare import ratios
+from ...surface.compare.compare import AMPLITUDE, SLOPE
+from ...surface.profile import Profile, level
+from ...surface.quantity import LEVEL, Quantity, refused
+from ..drawing.charts import axis, chart, line, loop, mark
+from ..drawing.pictures import draw
+from ..pages import beside
+from ..pages.document import Section, document, figure, table, warned
+from ..pages.sweep import label
+from ..pages.words import pair
+from ..readback import numeric, readable, variables, wanted
+from .compare import WORDS, plain_of, shown
+from .pictures import SIDES, pressures
+
+LOADING = ("load", "approach", "holder", "shear", "element_size", "load_line", "plane")  # of [contact]; no surface
+BESIDE = ("pressure_peak", "contact_fraction", "normal_stiffness", "tangential_stiffness", "approach", "rotation",
+          "groove_amplitude", "slip_amplitude", "relative_displacement_amplitude", "loop_area", "friction_force_peak")
+NEEDED = {"x": 1, "weight": 1, "unloaded_gap": 1, "normal_stress": 2}  # variables of a patch, their dimensions
+SAME = 1e-2  # of the largest difference of a gap, by which the gaps of one patch on two meshes may differ
+FLOOR = 5  # parts of a track, the deepest of which is its floor
+FLAT = 1e-12  # m, below which a new surface has no waves
+TEXTS = {"worn_volume": ("m3", "material lost over the whole patch, both pieces together"),
+         "worn_depth_max": ("m", "largest worn depth"), "worn_depth_mean": ("m", "worn volume over the area"),
+         "worn_area": ("m2", "worn volume over the width"),
+         "worn_share": ("1", "share of the patch that lost more than the error of the depth"),
+         "hidden_wear": ("m", "mean of the highest straight line of wear that no worn depth lies below: even wear and "
+                              "a wedge, which a trace alone could not show")}
+
+
+class Worn(NamedTuple):
+    """A run as its folder holds it.
+
+    run: `beside.FinishedRun`; path: as it was named; x (m,) [m], area (m,) [m2] and gap (m,) [m] of the unloaded
+    surfaces, wear included; depth (m,) [m] worn so far; pressure (m,) [Pa]; slide [m] and force [N] (k,) of the last
+    cycle, or None; cycles of wear; wears: whether it has [wear].
+    """
+
+    run: beside.FinishedRun
+    path: str
+    x: np.ndarray
+    area: np.ndarray
+    gap: np.ndarray
+    depth: np.ndarray
+    pressure: np.ndarray
+    loop: tuple | None
+    cycles: float
+    wears: bool
+
+    def measure(self, name: str) -> dict | None:
+        """A measure with a value, None where the run has none."""
+        one = self.run.summary["measures"].get(name)
+        return one if one is not None and one["value"] is not None else None
+
+
+class Lost(NamedTuple):
+    """What wore off between two runs: x (m,) [m], the gaps (m,) [m] of the surfaces before and after, depth (m,) [m]
+    between them; values: `Quantity` by name; track: those of the worn part; notes: sentences."""
+
+    before: Worn
+    after: Worn
+    gaps: tuple
+    depth: np.ndarray
+    values: dict
+    track: dict
+    notes: list
+
+
+def lost(before: Path, after: Path) -> Lost:
+    """What wore off between the runs in two results folders, over the whole patch.
+
+    The later run has [wear]; the earlier one may be new. PatchfemError that names the folder where one is no run of a
+    patch, and where the two are not states of one patch in this order.
+    """
+    for path, other in ((before, after), (after, before)):
+        if not path.exists():
+            raise Missing(f"{path}: there is no such folder")
+        if not path.is_dir():
+            raise PatchfemError(f"{path}: a file, while {other} is a folder: two files of surfaces or two results "
+                                "folders are wanted")
+    first, second = read(before), read(after)
+    if not second.wears:
+        raise PatchfemError(f"{after}: a run without [wear], which wore nothing; the worn one comes second")
+    _one_patch(first, second)
+    return _between(first, second)
+
+
+def read(path: Path) -> Worn:
+    """The run of a patch in a results folder; PatchfemError that names it where there is none."""
+    run = beside.read(path)
+    if "contact" not in run.resolved:
+        raise PatchfemError(f"{path}: a run without [contact] has no surfaces to compare")
+    file = path / "result.nc"
+    if not file.is_file():
+        raise PatchfemError(f"{path}: no results folder of a run: it has no result.nc")
+    names = {*NEEDED, "worn_depth", "time", "slide", "relative_displacement", "friction_force", "wear_cycle"}
+    held = {name: one.values for name, one in variables(file, names)[1].items()}
+    with readable(file, "results of a patch"):
+        for name, dimensions in NEEDED.items():
+            wanted(name in held, f"no {name} in it; run the scene again")
+            wanted(numeric(held[name]) and held[name].ndim == dimensions and np.isfinite(held[name]).all(),
+                   f"{name} is no field along the patch")
+        size = held["x"].size
+        wanted(size > 1 and all(held[name].shape[-1] == size for name in (*NEEDED, "worn_depth") if name in held),
+               "its fields are of unlike length")
+        wanted((np.diff(held["x"]) > 0).all() and held["weight"].sum() > 0, "x is no row of places")
+    depth = held["worn_depth"][-1] if "worn_depth" in held else np.zeros(size)
+    cycles = float(held["wear_cycle"][-1]) if "wear_cycle" in held else 0.0
+    return Worn(run, str(path), held["x"], held["weight"], held["unloaded_gap"], depth,
+                held["normal_stress"][-1], _last_loop(run, held), cycles, "wear" in run.resolved)
+
+
+def _last_loop(run, held: dict) -> tuple | None:
+    """Slide [m] and friction force [N] (k,) of the last cycle, of the whole run where no sine drives it."""
+    slide = held.get("slide", held.get("relative_displacement"))
+    if slide is None or "friction_force" not in held or held["friction_force"].ndim != 1:
+        return None
+    time, period = held["time"], beside.period_of(run)
+    late = time >= (time[-1] - period * (1 + 1e-9) if period else time[0])
+    return slide[late], held["friction_force"][late]
+
+
+def _one_patch(first: Worn, second: Worn) -> None:
+    """PatchfemError unless the runs are two states of one patch, the less worn one first."""
+    tables = [{key: one for key, one in each.run.resolved["contact"].items() if key not in LOADING}
+              for each in (first, second)]
+    unlike = [key for key in {**tables[0], **tables[1]} if tables[0].get(key) != tables[1].get(key)]
+    if unlike:
+        raise PatchfemError(f"{first.path} and {second.path}: two patches, not one before and after: "
+                            f"{', '.join(f'contact.{key}' for key in unlike)} differ")
+    news = [_at(second.x, each.x, each.gap - each.depth) for each in (first, second)]
+    off = float(np.abs(news[0] - news[1]).max())
+    if off > SAME * float(np.ptp(news[1])) + FLAT:
+        raise PatchfemError(f"{first.path} and {second.path}: two patches, not one before and after: their new "
+                            f"surfaces differ by {say(off, 3)}")
+    volumes = [0.0 if (one := each.measure("worn_volume")) is None else one["value"] for each in (first, second)]
+    if volumes[1] < volumes[0]:
+        raise PatchfemError(f"{first.path} is worn more than {second.path}: the less worn one comes first")
+
+
+def _at(x, own, values) -> np.ndarray:
+    return np.interp(x, own, values)
+
+
+def _between(first: Worn, second: Worn) -> Lost:
+    x, depth = second.x, second.depth - _at(second.x, first.x, first.depth)
+    gaps = second.gap - depth, second.gap
+    length, area = float(np.ptp(x)), float(second.area.sum())
+    volume, volume_error = _less(first, second, "worn_volume")
+    _, deep_error = _less(first, second, "worn_depth_max")
+    deep_error = None if deep_error is None else deep_error + _between_nodes(first, x)
+    off = deep_error or 0.0
+    share = float(second.area[depth > max(off, 1e-3 * depth.max())].sum()) / area if depth.max() > 0 else 0.0
+    line_under = hidden_line(x, depth)
+    found = {"worn_volume": (volume, volume_error), "worn_depth_max": (float(depth.max()), deep_error),
+             "worn_depth_mean": (volume / area, volume_error and volume_error / area),
+             "worn_area": (volume / area * length, volume_error and volume_error / area * length),
+             "hidden_wear": (max(float(np.mean(line_under)), 0.0), deep_error)}
+    values = {name: _with(value, error, *TEXTS[name]) for name, (value, error) in found.items()}
+    values["worn_share"] = Quantity(share, share, share, *TEXTS["worn_share"])
+    values |= _waves(x, gaps)
+    notes = [f"{name}: {text}" for name, one in (("before", first), ("after", second))
+             for text in one.run.summary.get("warnings", ())]
+    if float(depth.min()) < -off:
+        notes.append(f"at x = {say(float(x[np.argmin(depth)]), 3)} the later run is worn less by "
+                     f"{say(-float(depth.min()), 3)}: it does not go on from the earlier one")
+    return Lost(first, second, gaps, depth, values, _track(x, depth, off, length * volume / area), notes)
+
+
+def _between_nodes(first: Worn, x) -> float:
+    """Error [m] of the depth before at places x (m,) [m] between its own nodes: a quarter of what half of these
+    change."""
+    if np.array_equal(first.x, x) or not first.depth.any():
+        return 0.0
+    every = np.unique([*range(0, first.x.size, 2), first.x.size - 1])
+    return float(np.abs(first.depth - _at(first.x, first.x[every], first.depth[every])).max()) / 4
+
+
+def _less(first: Worn, second: Worn, name: str) -> tuple:
+    """(a measure of the later run less that of the earlier, the sum of their errors or None)."""
+    parts = [one for each in (first, second) if (one := each.measure(name)) is not None]
+    errors = [one["error"] for one in parts]
+    value = parts[-1]["value"] - (parts[0]["value"] if len(parts) > 1 else 0.0)
+    return value, None if None in errors else float(sum(errors))
+
+
+def _with(value: float, error: float | None, unit: str, text: str) -> Quantity:
+    if error is None:
+        return Quantity(value, value, None, unit, text, "no error is estimated")
+    return Quantity(value, max(value - error, 0.0), value + error, unit, text)
+
+
+def hidden_line(x, depth) -> tuple:
+    """Depths [m] at both ends, neither below zero, of the straight line of the highest mean that no depth (m,) [m] at
+    x (m,) [m] lies below: an edge of the lower convex hull, or a line from zero at one end. An unworn stretch leaves
+    none: from there a trace shows all."""
+    x, depth = np.asarray(x, float), np.asarray(depth, float)
+    hull = []
+    for point in zip(x, depth):
+        while len(hull) > 1 and _right(hull[-2], hull[-1], point) <= 0:
+            hull.pop()
+        hull.append(point)
+    at = next(k for k in range(1, len(hull)) if hull[k][0] >= (x[0] + x[-1]) / 2)
+    (a, low), (b, high) = hull[at - 1], hull[at]
+    slope = (high - low) / (b - a)
+    edge = float(low + slope * (x[0] - a)), float(low + slope * (x[-1] - a))
+    if min(edge) >= 0:
+        return edge
+    along = (x - x[0]) / (x[-1] - x[0])
+    left, right = (max(float((depth[part] / share[part]).min()), 0.0) for part, share in
+                   ((along < 1, 1 - along), (along > 0, along)))
+    return (left, 0.0) if left >= right else (0.0, right)
+
+
+def _right(one, two, three) -> float:
+    return (two[0] - one[0]) * (three[1] - one[1]) - (two[1] - one[1]) * (three[0] - one[0])
+
+
+def _waves(x, gaps: tuple) -> dict:
+    """Ratios of amplitude and slope of the surfaces, after over before, None where the nodes do not show the waves."""
+    pairs = (("amplitude", AMPLITUDE), ("slope", SLOPE))
+    sides = [Profile(frozen_array(x), frozen_array(gap), "the patch") for gap in gaps]
+    why = "the new surfaces are flat" if level(sides[0]).z.std() < FLAT else ""
+    if not why:
+        try:
+            step = float(np.diff(x).min())
+            sizes = [ratios.size_of(one, step) for one in sides]
+        except PatchfemError as error:
+            why = str(error)
+    if why:
+        return {f"{part}_ratio": refused("1", text, why) for part, text in pairs}
+    heights = [ratios.at_step(one, step) for one in sides]
+    alike = ratios.likeness(heights[0][0], heights[1][0], heights[0][1])
+    return {f"{part}_ratio": ratios.ratio(part, text, sizes[1], sizes[0], one)
+            for (part, text), one in zip(pairs, alike)}
+
+
+def _track(x, depth, off: float, area: float) -> dict:
+    """Ends, depths and areas of the part that wore by more than its error `off` [m]; area: lost over the width."""
+    deep = np.flatnonzero(depth > max(off, 1e-3 * float(depth.max())))
+    if not deep.size or depth.max() <= 0:
+        return {}
+    a, b = (max(int(deep[0]) - 1, 0), min(int(deep[-1]) + 1, x.size - 1))
+    cells = [float(x[min(k + 1, x.size - 1)] - x[max(k - 1, 0)]) / 2 for k in (a, b)]
+    ends = [Quantity(float(x[k]), float(x[k]) - cell, float(x[k]) + cell, "m", text)
+            for k, cell, text in zip((a, b), cells, ("where the worn part begins", "where the worn part ends"))]
+    width = float(x[b] - x[a])
+    even = np.interp(np.linspace(x[a], x[b], 100 * FLOOR), x, depth)
+    floor = float(np.convolve(even, np.full(100, 0.01), "valid").max())
+    return {"from": ends[0], "to": ends[1],
+            "depth_mean": _with(area / width, off + area / width * sum(cells) / width, "m", "lost area over its width"),
+            "depth_floor": _with(floor, off, "m", "mean over the deepest fifth of its width"),
+            "area_net": _with(area, off * width, "m2", "lost area less pile-up, of which wear makes none"),
+            "area_gross": _with(area, off * width, "m2", "lost area"),
+            "pile_up": Quantity(0.0, 0.0, 0.0, "m2", "wear takes material and piles none up")}
+
+
+def verdict(one: Lost) -> tuple:
+    """(headline, sentences)."""
+    mean, hidden = (one.values[name] for name in ("worn_depth_mean", "hidden_wear"))
+    if not mean.value > 0:
+        return "nothing was worn between the two runs", []
+    ends = hidden_line(one.after.x, one.depth)
+    head = f"worn by {say(mean.value, 3)} in the mean over the patch"
+    if hidden.value > 0.01 * mean.value:
+        kind = "a wedge" if abs(ends[1] - ends[0]) > 0.2 * abs(ends[1] + ends[0]) else "even wear"
+        head += f", of which {say(hidden.value, 3)} is {kind}, which a trace alone could not show"
+    place, track, volume = one.after.x[int(np.argmax(one.depth))], one.track, one.values["worn_volume"]
+    told = [f"Worn volume {' '.join(shown(volume)[::2])}; {say(float(one.depth.max()), 3)} at the deepest place, "
+            f"x = {say(float(place), 3)}; both pieces together; {one.after.cycles:.6g} cycles of wear"
+            f"{f', {one.before.cycles:.6g} before' if one.before.cycles else ''}."]
+    if track and one.values["worn_share"].value < 0.999:
+        told.append(f"Worn from x = {say(track['from'].value, 3)} to {say(track['to'].value, 3)}, "
+                    f"{say(track['depth_mean'].value, 3)} deep in the mean there.")
+    for name in ("contact_fraction", "pressure_peak", "loop_area"):
+        sides = [each.measure(name) for each in (one.before, one.after)]
+        if None not in sides:
+            first, second = (pair(name, side) for side in sides)
+            told.append(f"{label(name)}: {first} before, {second} after.")
+    return head, told
+
+
+def data_of(one: Lost, found: tuple) -> dict:
+    """The answer as plain data in SI, by the names that traces have."""
+    zero = Quantity(0.0, 0.0, 0.0, "m", "the places of one patch are known")
+    return {"patchfem": __version__, "verdict": found[0], "sentences": found[1], "confidence": LEVEL,
+            "before": one.before.path, "after": one.after.path, "direction": "x", "reference": "run",
+            "shift": plain_of(zero), **{name: plain_of(each) for name, each in one.values.items()},
+            "registration": {"shift": plain_of(zero), "mirrored": False, "turned": False},
+            "track": {name: plain_of(each) for name, each in one.track.items()} or None,
+            "removed": {"before": 0, "after": 0},
+            "runs": {when: {"outcome": each.run.summary["outcome"], "cycles": each.cycles,
+                            "measures": {name: {key: m[key] for key in ("value", "error", "unit")}
+                                         for name in BESIDE if (m := each.measure(name)) is not None}}
+                     for when, each in (("before", one.before), ("after", one.after))},
+            "notes": one.notes}
+
+
+def lines_of(one: Lost, found: tuple) -> list:
+    """The answer as lines."""
+    out = [found[0], *(f"  {text}" for text in found[1]), "", f"{one.before.path} -> {one.after.path}",
+           f"  {'':<38} {'value':>10}  {'95 %':<22} unit"]
+    for name, each in _rows(one):
+        value, interval, unit = _texts(each)
+        out.append(f"  {name:<38} {value:>10}  {interval:<22} {unit:<5}".rstrip())
+    out += ["", f"  {'':<38} {'before':>24} {'after':>24}"]
+    return out + [f"  {name:<38} {first:>24} {second:>24}" for name, first, second in _beside(one)]
+
+
+def _rows(one: Lost) -> list:
+    """(words, Quantity) of the table."""
+    track = {f"track_{name.removesuffix('_mean')}": each for name, each in one.track.items()}
+    words = WORDS | {"track_from": "worn part from", "track_to": "worn part to", "track_depth": "worn part, mean",
+                     "track_depth_floor": "worn part, floor",
+                     "hidden_wear": "even wear and wedge, mean", "worn_share": "worn share of the patch"}
+    return [(words[name], each) for name, each in (one.values | {
+        name: track[name] for name in ("track_from", "track_to", "track_depth", "track_depth_floor")
+        if name in track}).items()]
+
+
+def _texts(each: Quantity) -> tuple:
+    value, interval, unit = shown(each)
+    return value, interval if each.value is not None and each.high is not None else "", unit
+
+
+def _beside(one: Lost) -> list:
+    """(words, before, after) of the measures of both runs."""
+    rows = [(name, [each.measure(name) for each in (one.before, one.after)]) for name in BESIDE]
+    return [(label(name), *("-" if m is None else pair(name, m) for m in sides)) for name, sides in rows if any(sides)]
+
+
+def write_page(path: Path, one: Lost, found: tuple) -> None:
+    """Write the page, the verdict first, nothing fetched."""
+    names = [Path(each.path).resolve().name for each in (one.before, one.after)]
+    lead = (f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict>"
+            f"<b>{escape(found[0][0].upper() + found[0][1:])}.</b>"
+            + "".join(f"<p>{escape(text)}</p>" for text in found[1]) + "</div>" + warned(one.notes))
+    rows = [[escape(name), *map(escape, _texts(each)),
+             f"<td class=soft>{escape(each.text + (f': {each.reason}' if each.reason else ''))}</td>"]
+            for name, each in _rows(one)]
+    body = [figure(number, *each) for number, each in enumerate(_figures(one))]
+    body.append(table(("quantity", ">value", ">interval", "unit", "meaning"), rows))
+    body.append("<p class=soft>Interval: the numerical errors of the runs, which hold in 19 of 20 scenes.</p>")
+    runs = [figure("p", pressures([(each.x, each.pressure, name) for each, (_, name) in
+                                   zip((one.before, one.after), SIDES)]), "Normal stress of the pressed patch.",
+                   "Pressure along the patch before and after")]
+    if one.before.loop is not None and one.after.loop is not None:
+        made = [part for each, (_, name) in zip((one.before, one.after), SIDES)
+                for part in loop(*each.loop, f"Friction loop {name}")]
+        runs.append(figure("l", draw(made, height=2.9), "Friction force over the slide in the last cycle.",
+                           "Friction loops before and after"))
+    runs.append(table(("measure", ">before", ">after"), [[escape(text) for text in row] for row in _beside(one)]))
+    sections = [Section("changes", "What wore off", "\n".join(body)),
+                Section("runs", "Pressure, contact and loop", "\n".join(runs))]
+    write_text(path, document(f"{names[0]} and {names[1]}: before and after", lead, sections, paper=True))
+
+
+def _figures(one: Lost) -> list:
+    """Pictures (svg, caption, alternative text): the surfaces with the wear on, and the worn depth."""
+    x, under = one.after.x, hidden_line(one.after.x, one.depth)
+    (along, mm), (up, um) = axis_unit(x, "m"), axis_unit(np.concatenate(one.gaps), "m")
+    place = axis("x", along) | {"range": [x[0] * mm, x[-1] * mm]}
+    marks = [line(x * mm, gap * um, colour, name) for gap, (colour, name) in zip(one.gaps, SIDES)]
+    marks.append(mark("band", "warm", "worn off", x=x * mm, low=one.gaps[0] * um, high=one.gaps[1] * um))
+    deep, scale = axis_unit(one.depth, "m")
+    depths = [line(x * mm, one.depth * scale, "warm", "worn depth"),
+              line(x[[0, -1]] * mm, np.array(under) * scale, "#4d4d4d", "even wear and wedge", width=0.9,
+                   dash="dashed")]
+    ends = [*under, 0.0, float(one.depth.max()), float(one.depth.min())]
+    down = axis("worn depth", deep) | {"range": [(max(ends) + 0.05 * np.ptp(ends)) * scale,
+                                                 (min(ends) - 0.05 * np.ptp(ends)) * scale]}
+    return [(draw([chart("", place, axis("gap of the unloaded surfaces", up), marks)], height=2.9),
+             "Gap between the unloaded surfaces, with the wear on.", "Gap of the surfaces before and after"),
+            (draw([chart("", place, down, depths)], height=2.5), "Depth that both pieces lost together between the two "
+             "runs; dashed: the straight line that a trace alone could not show.",
+             f"Worn depth: mean {say(one.values['worn_depth_mean'].value, 3)}")]

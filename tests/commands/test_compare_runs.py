@@ -1,0 +1,125 @@
+"""patchfem compare of two results folders: what wore off between them, by the names that traces have, refusals."""
+
+import json
+
+import numpy as np
+import pytest
+from command_line import cli
+from scene_texts import COULOMB, POINT
+from test_compare_verb import NAMES
+
+import patchfem as pf
+from patchfem.export.surfaces import worn
+from patchfem.export.surfaces.worn import hidden_line
+
+TILTED = """
+[contact]
+length = "12.7 mm"
+width = "10 mm"
+height = "6.35 mm"
+load = "100 N"
+element_size = "0.2 mm"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.tilt]
+angle = "0.1 mrad"
+"""
+SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
+WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\njumps = 8\ncycles = '
+PER_CYCLE = 1e-14 * 100.0 * 40e-6  # m^3: coefficient, load, path
+MANY = 4e6
+SCENES = {"new": TILTED + COULOMB + SINE, "pressed": TILTED, "half": TILTED + COULOMB + SINE + WEAR + "1e5\n",
+          "worn": TILTED + COULOMB + SINE + WEAR + f"{MANY:g}\n", "point": POINT + COULOMB + SINE + WEAR + "1e5\n",
+          "other": TILTED.replace("0.1 mrad", "0.2 mrad") + COULOMB + SINE + WEAR + "1e5\n"}
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Results folders of SCENES by name."""
+    place = tmp_path_factory.mktemp("runs")
+    for name, text in SCENES.items():
+        pf.run(pf.load(text)).save(place / name)
+    return place
+
+
+@pytest.mark.parametrize("before", ["new", "pressed", "half"])
+def test_exact_volume_mean_and_area_are_those_of_the_whole_patch(runs, before):
+    found = pf.compare(runs / before, runs / "worn")
+    volume = PER_CYCLE * (MANY - (1e5 if before == "half" else 0.0))
+    for name, truth in (("worn_volume", volume), ("worn_depth_mean", volume / 12.7e-3 / 10e-3),
+                        ("worn_area", volume / 10e-3)):
+        one = found[name]
+        assert one["value"] == pytest.approx(truth, rel=1e-11) and one["low"] <= truth <= one["high"]
+    assert set(NAMES) | {"hidden_wear", "worn_share", "track", "registration", "removed"} <= set(found)
+    track, deepest = found["track"], found["worn_depth_max"]["value"]
+    width = track["to"]["value"] - track["from"]["value"]
+    assert track["depth_mean"]["value"] == pytest.approx(track["area_gross"]["value"] / width, rel=1e-12)
+    assert track["depth_mean"]["value"] < track["depth_floor"]["value"] < deepest
+    measures = [found["runs"][when]["measures"] for when in ("before", "after")]
+    assert measures[0]["pressure_peak"]["value"] > 2 * measures[1]["pressure_peak"]["value"]
+    assert ("loop_area" in measures[0]) == (before != "pressed")
+
+
+def test_exact_a_wedge_is_told_apart_from_what_a_trace_shows(runs):
+    """Between two states in full contact all points wear nearly alike; from the new one on, a stretch is unworn."""
+    found = pf.compare(runs / "new", runs / "worn")
+    mean, hidden = found["worn_depth_mean"]["value"], found["hidden_wear"]["value"]
+    assert 0.8 * mean < hidden < mean and "a trace alone could not show" in found["verdict"]
+    found = pf.compare(runs / "new", runs / "half")
+    assert found["hidden_wear"]["value"] == 0 and "trace" not in found["verdict"]
+
+
+def test_exact_hidden_wear_is_the_highest_line_below_the_depth():
+    """Against the best of many lines."""
+    x, rng = np.linspace(-1, 2, 41), np.random.default_rng(3)
+    for k in range(12):
+        depth = rng.uniform(0, 1, x.size) + rng.uniform(-0.2, 2) * (x + 1)
+        depth = np.maximum(depth, 0.0) * (x < 1.5 if k % 4 == 0 else 1)
+        ends = hidden_line(x, depth)
+        line = np.interp(x, x[[0, -1]], ends)
+        assert min(ends) >= 0 and (line <= depth + 1e-12).all()
+        low, high = np.meshgrid(*[np.linspace(0, one, 100) for one in (depth[0], depth[-1])])
+        share = (x - x[0]) / (x[-1] - x[0])
+        under = ((low[..., None] * (1 - share) + high[..., None] * share) <= depth).all(axis=-1)
+        best = float(((low + high) / 2)[under].max())
+        assert best <= sum(ends) / 2 + 1e-12 and sum(ends) / 2 - best < 0.04 * max(depth[0], depth[-1]) + 1e-12
+    assert hidden_line(x, 3.0 + x) == pytest.approx((2.0, 5.0), rel=1e-12)
+    assert hidden_line(x, np.maximum(x, 0.0)) == (0.0, 0.0)
+
+
+def test_exact_the_verb_says_what_python_says_and_writes_a_page(runs, tmp_path):
+    answer = cli("compare", runs / "half", runs / "worn", "--json", "-o", tmp_path / "out")
+    assert answer.code == 0, answer.err
+    found = json.loads(answer.out)
+    assert found == pf.compare(runs / "half", runs / "worn") == json.loads((tmp_path / "out/compare.json").read_text())
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert found["verdict"][1:] in page and "Friction loop before" in page and "<script" not in page
+    lost = worn.lost(runs / "half", runs / "worn")
+    table = "\n".join(worn.lines_of(lost, worn.verdict(lost)))
+    assert found["verdict"] in table and "worn volume" in table and "pressure peak" in table
+
+
+@pytest.mark.parametrize("names, told", [
+    (("worn", "half"), "half: the less worn one comes first"),
+    (("half", "new"), "new: a run without [wear], which wore nothing; the worn one comes second"),
+    (("other", "worn"), "worn: two patches, not one before and after: contact.tilt differ"),
+    (("new", "point"), "point: a run without [contact] has no surfaces to compare"),
+    (("new", "nowhere"), "nowhere: there is no such folder"), (("empty", "worn"), "empty: no results folder"),
+    (("file.csv", "worn"), "file.csv: a file, while")])
+def test_refuses_bad_folders_by_name(runs, tmp_path, names, told):
+    (runs / "empty").mkdir(exist_ok=True)
+    (runs / "file.csv").write_text("x [um],z [um]\n0,0\n1,1\n")
+    answer = cli("compare", *(runs / name for name in names), "-o", tmp_path / "out")
+    assert answer.code == (4 if "nowhere" in names else 2) and told in answer.err and "Traceback" not in answer.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_refuses_what_belongs_to_traces_and_damaged_results(runs, tmp_path):
+    for words in (("--shift", "1 mm"), ("--direction", "x"), ("--keep-spikes",), ("--units", "um,um")):
+        answer = cli("compare", runs / "new", runs / "worn", *words, "-o", tmp_path / "out")
+        assert answer.code == 2 and f"{words[0]} belongs to measured surfaces" in answer.err
+    (tmp_path / "bad").mkdir()
+    for name in ("summary.json", "scene.resolved.toml", "result.nc"):
+        (tmp_path / "bad" / name).write_bytes((runs / "worn" / name).read_bytes())
+    (tmp_path / "bad" / "result.nc").write_bytes(b"no netCDF")
+    answer = cli("compare", runs / "new", tmp_path / "bad", "-o", tmp_path / "out")
+    assert answer.code == 2 and "bad/result.nc: cannot be read" in answer.err and "Traceback" not in answer.err
