@@ -37,7 +37,7 @@ Sets = texts('a key of the scene with another value, such as "contact.load=30 lb
 Json = flag("the answer as one JSON object on stdout", "--json")
 Out = out_in("folder of the results, such as out/mine")
 Quiet = flag("nothing but faults", "-q", "--quiet")
-Units = word('units of x and z where the files name none, such as "mm,um"')
+Units = word('units of x and z where a text names none or wrong ones, such as "mm,um"')
 NoPage = flag("leave out report.html", "--no-page")
 
 

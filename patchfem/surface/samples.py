@@ -7,13 +7,16 @@ from .profile import Profile
 
 LONGEST = 10.0  # [m] beyond which a unit must be wrong
 SHORTEST = 1e-9  # [m]
+ATOM = 1e-10  # [m], the width of one: heights that span less were not measured
+TRIMMED = 10, 100  # heights from which on, and of how many, the highest and the lowest may stand out
+METRES, GIVEN = "the file gives both in metres", "taken in the units that were given for it"  # who says the units
 
 
-def checked(path, x, z, at, factors: tuple, stated: bool = False) -> Profile:
+def checked(path, x, z, at, factors: tuple, stated: str = "") -> Profile:
     """Turn samples of a file into a trace in order of growing x, one height per place; the notes tell what that took.
 
     x, z: (n,) in the units of the file, with their factors to metres; at: (n,) their lines, None where the file has
-    none; stated: the format itself says metres. PatchfemError names line and value.
+    none; stated: who says the units, METRES or GIVEN. PatchfemError names line and value.
     """
     bounded(path, (x, z), ("x", "z"), at, factors)
     if x[-1] < x[0]:
@@ -96,19 +99,28 @@ def _single(path, x, z, at, factor: float) -> tuple:
     return np.bincount(group, x) / np.bincount(group), mean, (note,)
 
 
-def plausible(path, x, z, stated: bool = False) -> tuple:
+def plausible(path, x, z, stated: str = "") -> tuple:
     """Refuse heights z [m] without two numbers and, where no unit is `stated`, too high for their length x [m].
 
-    Where metres are stated, a note tells of heights that are too high.
+    Notes tell of heights that are too high where their units are stated, of a few that stand out so far, and of heights
+    that span less than an atom.
     """
-    if np.isfinite(z).sum() < 2:
-        raise PatchfemError(f"{path}: {np.isfinite(z).sum()} heights; a trace wants two at least")
-    length, span = float(x[-1] - x[0]), float(np.nanmax(z) - np.nanmin(z))
+    there = np.sort(z[np.isfinite(z)], axis=None)
+    if there.size < 2:
+        raise PatchfemError(f"{path}: {there.size} heights; a trace wants two at least")
+    length, span = float(x[-1] - x[0]), float(there[-1] - there[0])
     if length < SHORTEST:
         raise PatchfemError(f"{path}: the profile is {say(length, 3)} long; is the unit of x right?")
+    if 0 < span < ATOM:
+        return (f"{path}: heights span {say(span)}, less than an atom is wide; is their unit right?",)
     if span <= length:
         return ()
     steep = f"{path}: heights span {say(span)} over a length of {say(length)}"
+    few = max(1, there.size // TRIMMED[1]) if there.size >= TRIMMED[0] else 0
+    most = float(there[-1 - few] - there[few])
+    if most <= length:
+        return (f"{steep}, without the {few} highest and the {few} lowest of {there.size} {say(most)}: spikes?",)
     if not stated:
-        raise PatchfemError(f"{steep}; is the unit of z right? a missing height is written nan")
-    return (f"{steep}: the file gives both in metres",)
+        raise PatchfemError(f"{steep}; is the unit of z right? a missing height is written nan; --units overrules the "
+                            "units of a header")
+    return (f"{steep}: {stated}",)

@@ -13,10 +13,10 @@ from ...core import PatchfemError
 from ...inputs.matlab import variables
 from ..areal import Areal
 from ..profile import Profile
-from ..samples import checked
+from ..samples import GIVEN, checked
 from .raster import areal, raster
 from .raw import POINTS, Raw, shown
-from .text import UNITS
+from .units import GIVE, LISTED, factor_of
 
 _HEADER = 10_000  # bytes of the header of an .npy
 _HEADERS = {(1, 0): npy_format.read_array_header_1_0, (2, 0): npy_format.read_array_header_2_0}
@@ -57,12 +57,12 @@ def mat(raw: Raw, units: tuple | None) -> Profile | Areal:
 def lengths(raw: Raw, units: tuple | None) -> tuple:
     """Factors to metres of x (and y) and of z from the names of their units; PatchfemError where they are not given."""
     if units is None:
-        raise PatchfemError(f"{raw.path}: the file names no units, and units are never guessed; give those of x and z, "
-                            'such as units=("mm", "um"), or write it as text with the header `x [um],z [um]`')
+        raise PatchfemError(f"{raw.path}: the file names no units, and units are never guessed; {GIVE}, or write it as "
+                            "text with the header `x [um],z [um]`")
     for unit in units:
-        if unit not in UNITS:
-            raise PatchfemError(f"{raw.path}: unknown unit '{shown(str(unit))}'; use one of {', '.join(UNITS)}")
-    return UNITS[units[0]], UNITS[units[1]]
+        if factor_of(unit) is None:
+            raise PatchfemError(f"{raw.path}: unknown unit '{shown(str(unit))}'; use one of {LISTED}")
+    return factor_of(units[0]), factor_of(units[1])
 
 
 def _table(path, table, factors: tuple) -> Profile | Areal:
@@ -70,8 +70,8 @@ def _table(path, table, factors: tuple) -> Profile | Areal:
     if len(columns[0]) < 2:
         raise PatchfemError(f"{path}: {len(columns[0])} rows; a trace wants two at least")
     if len(columns) == 2:
-        return checked(path, *columns, None, factors)
-    return raster(path, *columns, None, (factors[0], *factors))
+        return checked(path, *columns, None, factors, GIVEN)
+    return raster(path, columns, None, (factors[0], *factors), GIVEN)
 
 
 def _named(path, places: list, z, factors: tuple) -> Profile | Areal:
@@ -81,7 +81,7 @@ def _named(path, places: list, z, factors: tuple) -> Profile | Areal:
     if all(one.size == z.size for one in flat):
         columns = [*flat, z.ravel()]
     elif len(flat) == 2 and z.shape == (flat[1].size, flat[0].size):
-        return areal(path, flat[0] * factors[0], flat[1] * factors[0], z * factors[1])
+        return areal(path, flat[0] * factors[0], flat[1] * factors[0], z * factors[1], GIVEN)
     else:
         shapes = ", ".join(str(one.shape) for one in (*places, z))
         raise PatchfemError(f"{path}: x, y and z of shapes {shapes} do not fit; z wants a row for each y and a column "

@@ -37,10 +37,10 @@ def dektak(raw: Raw) -> Profile:
     body = text[header.end() + 1:]
     if body.count(",,\n") == body.count("\n"):
         body = body.replace(",,\n", "\n")  # empty columns behind
-    (x, z), at = values(path, body, number, (0, 1), ",")
+    found, at = values(path, body, number, {"x": 0, "z": 1}, ",", 2)
     settings, results = _rows(text[:header.start()])
-    x, notes = _stepped(path, x, _length(settings.get("Length", "")), factors[0])
-    found = checked(path, x, z, at, tuple(factors))
+    x, notes = _stepped(path, found["x"], _length(settings.get("Length", "")), factors[0])
+    found = checked(path, x, found["z"], at, tuple(factors))
     tip = re.search(r"Radius:\s*(.*)", settings.get("Stylus", ""))
     return replace(found, notes=notes + found.notes, tip_radius=_length(tip[1]) if tip else None,
                    printed={name: one for name, one in map(_printed, results) if one is not None})

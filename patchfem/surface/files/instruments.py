@@ -14,7 +14,7 @@ import numpy as np
 from ...core import Missing, PatchfemError
 from ..areal import Areal
 from ..profile import Profile
-from ..samples import checked
+from ..samples import GIVEN, checked
 from .arrays import lengths
 from .raster import areal
 from .raw import BROKEN, POINTS, Raw, reason, shown
@@ -38,10 +38,11 @@ def instrument(raw: Raw, units: tuple | None) -> Profile | Areal:
     if not found["unit"]:
         along, up = lengths(raw, units)
         arrays = [*(one * along for one in arrays[:-1]), arrays[-1] * up]
+    stated = "the file tells both units" if found["unit"] else GIVEN
     note = f"{raw.path}: read as {shown(found['format'])} by SurfaceTopography {shown(found['version'])}"
     if len(arrays) == 3:
-        return areal(raw.path, *arrays, found["unit"], (note,))
-    trace = checked(raw.path, *arrays, None, (1.0, 1.0), found["unit"])
+        return areal(raw.path, *arrays, stated, (note,))
+    trace = checked(raw.path, *arrays, None, (1.0, 1.0), stated)
     return replace(trace, notes=(note, *trace.notes))
 
 

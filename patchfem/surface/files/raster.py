@@ -11,15 +11,15 @@ from .raw import POINTS
 SPARSE = 4  # cells of the raster for each point: what is emptier is a cloud of points
 
 
-def raster(path, x, y, z, at, factors: tuple | None) -> Profile | Areal:
+def raster(path, columns: list, at, factors: tuple, stated: str = "") -> Profile | Areal:
     """Points of a scan along rows or columns as an areal scan; those of one row or column as a trace.
 
-    x, y, z: (k,) in the units of the file, with their factors to metres, None where the format itself says metres; at:
-    (k,) their lines, None where there are none. Cells without a point are missing. PatchfemError for points that lie on
-    no raster or twice at one place.
+    columns: x, y, z (k,) in the units of the file, with their factors to metres; at: (k,) their lines, None where there
+    are none; stated: as for `areal`. Cells without a point are missing. PatchfemError for points that lie on no raster
+    or twice at one place.
     """
-    stated, factors = factors is None, factors or (1.0, 1.0, 1.0)
-    bounded(path, (x, y, z), ("x", "y", "z"), at, factors)
+    x, y, z = columns
+    bounded(path, columns, ("x", "y", "z"), at, factors)
     (xs, column), (ys, row) = _axis(x), _axis(y)
     if ys.size == 1 or xs.size == 1:
         return checked(path, y if xs.size == 1 else x, z, at, (factors[xs.size == 1], factors[2]), stated)
@@ -38,11 +38,11 @@ def raster(path, x, y, z, at, factors: tuple | None) -> Profile | Areal:
     return areal(path, xs * factors[0], ys * factors[1], heights.reshape(ys.size, xs.size) * factors[2], stated)
 
 
-def areal(path, x, y, z, stated: bool = False, notes: tuple = ()) -> Profile | Areal:
+def areal(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal:
     """Heights z (m, n) [m] at x (n,) [m] and y (m,) [m], rising or falling, as an areal scan; a trace where m is 1.
 
-    stated: the format itself says metres, so that steep heights are told and not refused. PatchfemError for axes that
-    turn back and, where not stated, heights that only a wrong unit explains.
+    stated: who says the units, METRES or GIVEN of `samples`, so that steep heights are told and not refused.
+    PatchfemError for axes that turn back and, where not stated, heights that only a wrong unit explains.
     """
     if len(y) == 1:
         found = checked(path, x, z[0], None, (1.0, 1.0), stated)

@@ -1,5 +1,6 @@
 """Any file of a measured surface as a trace or an areal scan; the format is known by its content, then its suffix."""
 
+from dataclasses import replace
 from importlib.util import find_spec
 
 from ...core import PatchfemError
@@ -11,23 +12,32 @@ from .instruments import instrument
 from .raw import PLAIN, Raw, fetch
 from .sdf import sdf
 from .text import columns
+from .units import ASIDE
 from .x3p import x3p
 
-KINDS = {"npy": npy, "mat": mat, "sdf": lambda raw, units: sdf(raw), "x3p": lambda raw, units: x3p(raw),
-         "binary": instrument}
+KINDS = {"npy": npy, "mat": mat, "binary": instrument}
+TOLD = {"sdf": sdf, "x3p": x3p, "dektak": dektak}  # formats that tell their units
+WYKO = b"Wyko ASCII"  # first words of heights in wavelengths, which SurfaceTopography reads
 
 
 def read_surface(path, units: tuple | None = None) -> Profile | Areal:
     """Read the surface in a file: a trace as `Profile`, an areal scan as `Areal`, heights and places in metres.
 
-    units: names of the units of x (and y) and of z, such as ("mm", "um"), for a file that names none; a header of text
-    that names others is refused. Heights keep the sign of the file. PatchfemError names file and line of a fault,
-    Missing what is not there.
+    units: names of the units of x (and y) and of z, such as ("mm", "um"): they complete a file that names none, and
+    overrule a header of text, with a note; a format that tells its units keeps them, with a note. Heights keep the sign
+    of the file. PatchfemError names file and line of a fault, Missing what is not there.
     """
     if units is not None and (isinstance(units, str) or len(tuple(units)) != 2):
         raise PatchfemError(f'{path}: units are two, of x and of z, such as ("mm", "um"), not {units!r}')
     raw = fetch(path)
-    return _text(raw, units) if raw.kind == "text" else KINDS[raw.kind](raw, units)
+    begins = raw.data[:80].replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \r\n\t") if raw.kind == "text" else b""
+    kind = "dektak" if begins.startswith(MARK) else raw.kind
+    if kind in TOLD:
+        found = TOLD[kind](raw)
+        return found if units is None else replace(found, notes=(*found.notes, f"{path}: {ASIDE}"))
+    if begins.startswith(WYKO):
+        return instrument(raw, units)
+    return _text(raw, units) if kind == "text" else KINDS[kind](raw, units)
 
 
 def read_profile(path, units: tuple | None = None) -> Profile:
@@ -40,8 +50,6 @@ def read_profile(path, units: tuple | None = None) -> Profile:
 
 
 def _text(raw: Raw, units: tuple | None) -> Profile | Areal:
-    if raw.data[:80].replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \r\n\t").startswith(MARK):
-        return dektak(raw)
     try:
         return columns(raw, units)
     except PatchfemError:

@@ -12,6 +12,7 @@ from ...core import PatchfemError
 from ...inputs.cells import NUMBER
 from ..areal import Areal
 from ..profile import Profile
+from ..samples import METRES
 from .raster import areal
 from .raw import POINTS, Raw, shown
 
@@ -31,7 +32,7 @@ def sdf(raw: Raw) -> Profile | Areal:
     notes = ()
     if header.get("CheckType"):
         notes = (f"{raw.path}: its checksum of kind {header['CheckType']:g} is not verified",)
-    return areal(raw.path, np.arange(count) * header["Xscale"], np.arange(rows) * header["Yscale"], z, True, notes)
+    return areal(raw.path, np.arange(count) * header["Xscale"], np.arange(rows) * header["Yscale"], z, METRES, notes)
 
 
 def _checked(raw: Raw, header: dict) -> dict:

@@ -1,14 +1,16 @@
 """Columns of a text file whose header names the units: `x [um],z [um]` is a trace, `x [um],y [um],z [um]` a raster.
 
-The columns stand in any order; `x (um)`, `x_um` and `x/um` mean the same. They stand apart by commas, semicolons, tabs,
-bars or blanks. The decimal sign is a point, or a comma where columns do not stand apart by commas or cells are quoted.
-Lines that start with #, % or // are comments, and the header itself may be one. A height that is empty, `nan` or `***`
-is missing. UTF-8 with or without its mark, UTF-16 with it, else Latin-1.
+The columns stand in any order; `x (um)`, `x_um`, `x/um` and `x in um` mean the same, and names and units may stand in a
+line each. Columns stand apart by commas, semicolons, tabs, bars or blanks. The decimal sign is a point, or a comma
+where columns do not stand apart by commas or cells are quoted. Lines that start with #, % or // are comments, and the
+header itself may be one. A height that is empty, `nan` or `***` is missing.
+UTF-8 with or without its mark, UTF-16 with it, else Latin-1.
 """
 
 import io
 import re
 from array import array
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,45 +18,54 @@ from ...core import PatchfemError
 from ...inputs.cells import NUMBER
 from ..areal import Areal
 from ..profile import Profile
-from ..samples import checked
+from ..samples import GIVEN, checked
+from .head import COMMA, COMMENT, EXAMPLE, LOST, SIGNS, WIDEST, Head, head_of, is_number, role_of, trimmed
+from .matrix import is_matrix, matrix
 from .raster import raster
 from .raw import Raw, shown
+from .units import GIVE, LISTED, factor_of
 
-UNITS = {"m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9,
-         "in": 0.0254, "ft": 0.3048, "mil": 25.4e-6}
-WIDEST = 1000  # characters of a line
-EXAMPLE = "write the header as `x [um],z [um]`"
-_SIGNS = (";", ",", "\t", "|")
-_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
-_LOST = re.compile(r"(?:[+-]?nan|\*+)?", re.IGNORECASE)
-_COLUMN = re.compile(r"(\w+?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|[_/]\s*(\w+))")
-_CELL = re.compile(r"[^\s\[\](]+\s*(?:\[[^\]]*\]|\([^)]*\))|\S+")
 _QUOTED = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
 _WIDE = re.compile(rf"\n[^\n]{{{WIDEST + 1}}}")
-_COMMENT = ("#", "%", "//")
+_COUNTS = {1: "one", 2: "two", 3: "three", 4: "four"}
 
 
 def columns(raw: Raw, given: tuple | None = None) -> Profile | Areal:
-    """The trace or areal scan in a text file of two or three columns, in the order of growing x.
+    """The trace or areal scan in a text file of two or three columns, in the order of growing x; of a matrix the scan.
 
-    given: units of x (and y) and of z where the file names none. Samples at one x become their mean, x that only its
-    printed digits keep from even spacing is evened, both with a note; an x that turns back is refused. A million
-    samples: 0.3 s. PatchfemError names the line.
+    given: units of x (and y) and of z; they complete what the file does not tell, and overrule with a note what it
+    does. Samples at one x become their mean, x that only its printed digits keep from even spacing is evened, both with
+    a note; an x that turns back is refused. A million samples: 0.3 s. PatchfemError names the line.
     """
     path, text = raw.path, text_of(raw)
-    header, number, body = _header(path, text)
-    names, cells, delimiter = _names(header, False)
-    if all(_is_number(cell, delimiter) for cell in cells):
-        if given is None:
-            raise PatchfemError(f"{path}:{number}: no header, and units are never guessed; {EXAMPLE} above the first "
-                                "sample")
-        names = {2: ["x", "z"], 3: ["x", "y", "z"]}.get(len(cells), cells)
-        cells, body, number = names, f"{header}\n{body}", number - 1
-    order, factors = _columns(f"{path}:{max(number, 1)}", cells, given, header)
-    found, at = values(path, body, number, order, delimiter)
-    if len(order) == 2:
-        return checked(path, *found, at, factors)
-    return raster(path, *found, at, factors)
+    for unit in given or ():
+        if factor_of(unit) is None:
+            raise PatchfemError(f"{path}: unknown unit '{shown(unit)}'; use one of {LISTED}")
+    head = head_of(path, text)
+    facts = {} if head.named else head.facts()
+    at, names, units = _above(head)
+    if not head.named and is_matrix(len(head.row), names, facts):
+        return matrix(path, head, facts, given, text[head.start:])
+    if len(head.named or head.row) < 2:
+        raise PatchfemError(f"{path}:{head.number + 1}: one column, '{shown(head.row[0])}', where x and z are wanted; "
+                            f"{EXAMPLE}")
+    if not (names or given or units or "lateral" in facts):
+        raise PatchfemError(f"{path}:{at}: no header, and units are never guessed; {EXAMPLE} above the first sample, "
+                            f"or {GIVE}")
+    place, notes = _roles(f"{path}:{at}", names or list("xz" if len(head.row) == 2 else "xyz"), given is not None)
+    found, lines = values(path, text[head.start:], head.number, place, head.delimiter, len(names or head.row))
+    if "valid" in place:
+        found["z"] = np.where(found.pop("valid") == 0, np.nan, found["z"])
+    if list(place) == ["x", "y", "z"] and not {"x", "y"} <= {role_of(cell)[0] for cell in names} and _counted(found):
+        place, found = {"x": place["y"], "z": place["z"]}, {"x": found["y"], "z": found["z"]}
+        notes += (f"{path}: the first column counts the samples; x and z are taken from the others",)
+    factors, more = _factors(f"{path}:{at}", place, (names, units), facts, given)
+    said = GIVEN if given else ""
+    if "y" not in place:
+        trace = checked(path, found["x"], found["z"], lines, factors, said)
+    else:
+        trace = raster(path, [found[name] for name in "xyz"], lines, factors, said)
+    return replace(trace, notes=(*notes, *more, *trace.notes))
 
 
 def text_of(raw: Raw) -> str:
@@ -79,118 +90,93 @@ def _encoding(raw: Raw) -> str:
     return "utf-8-sig"
 
 
-def _header(path, text: str) -> tuple:
-    """First line that is no comment, or a comment that is columns with units; its line number; the text after it."""
-    start = number = 0
-    while start < len(text):
-        stop = text.find("\n", start)
-        stop = len(text) if stop < 0 else stop
-        line, number = text[start:stop].strip(), number + 1
-        start = stop + 1
-        comment = line.startswith(_COMMENT)
-        if len(line) > WIDEST and not comment:
-            raise PatchfemError(f"{path}:{number}: a line of {len(line)} characters; two columns are wanted, {EXAMPLE}")
-        if comment:
-            line = line[:WIDEST].lstrip("#%/").strip()
-            names, cells, delimiter = _names(line, True)
-            if names:
-                return (delimiter or " ").join(cells), number, text[start:]
-        elif line:
-            return line, number, text[start:]
-    raise PatchfemError(f"{path}: no data, only comments")
+def _above(head: Head) -> tuple:
+    """Line of the head that names the columns, for messages; their names; their units from a line of their own."""
+    if head.named:
+        return head.number, head.named, []
+    (number, names), units = head.beside(len(head.row))
+    return number or head.number + 1, names, units
 
 
-def _names(line: str, comment: bool) -> tuple:
-    """Names of the columns where every cell is one with a unit, else []; the cells of a line; the delimiter.
-
-    The last column of a comment may go on with other words, which are left out.
-    """
-    cells, delimiter = _split(line)
-    found = [_COLUMN.fullmatch(cell) for cell in cells]
-    if comment and len(cells) > 1 and None in found:
-        last = found.index(None)
-        more = _COLUMN.match(cells[last])
-        if more and cells[last][more.end():][:1].isspace():
-            found, cells = [*found[:last], more], [*cells[:last], more[0]]
-    good = 1 < len(found) < 4 and None not in found
-    return ([one[1] for one in found] if good else []), cells, delimiter
-
-
-def _split(text: str) -> tuple:
-    """Cells of a line without the empty ones at the end, and the delimiter between them, None for blanks."""
-    for delimiter in (*_SIGNS, None):  # numbers with a decimal comma stand apart by something else
-        cells = _trimmed(text.split(delimiter))
-        if 1 < len(cells) < 4 and all(_is_number(cell, delimiter) for cell in cells):
-            return cells, delimiter
-    delimiter = next((sign for sign in _SIGNS if sign in text), None)
-    return _trimmed(text.split(delimiter) if delimiter else _CELL.findall(text)), delimiter
-
-
-def _trimmed(cells: list) -> list:
-    cells = [cell.strip() for cell in cells]
-    while cells and not cells[-1]:
-        cells.pop()
-    return cells
-
-
-def _is_number(cell: str, delimiter) -> bool:
-    number = NUMBER.fullmatch(cell) or _LOST.fullmatch(cell)
-    return bool(number or (delimiter != "," and _COMMA.fullmatch(cell)))
-
-
-def _columns(at: str, cells: list, given: tuple | None, header: str) -> tuple:
-    """Meaning of the header: places of x, (y,) z; factors of x, (y,) z."""
-    if len(cells) < 2:
-        raise PatchfemError(f"{at}: one column, '{shown(header)}', where x and z are wanted; {EXAMPLE}")
-    if len(cells) > 3:
-        raise PatchfemError(f"{at}: {len(cells)} columns where x and z, or x, y and z, are wanted; keep one trace of "
-                            f"two columns and {EXAMPLE}")
-    found, known = {}, ("x", "z") if len(cells) == 2 else ("x", "y", "z")
-    for place, cell in enumerate(cells):
-        name, factor = _column(at, cell, known, given)
-        if name in found:
-            raise PatchfemError(f"{at}: two columns are named {name}; {EXAMPLE}")
-        found[name] = place, factor
-    return tuple(zip(*(found[name] for name in known)))
-
-
-def _column(at: str, cell: str, known: tuple, given: tuple | None) -> tuple:
-    """(name, factor) of a column; its own unit counts, and one given for it must be the same."""
-    match = _COLUMN.fullmatch(cell)
-    if match is None and (given is None or cell.lower() not in known):
-        raise PatchfemError(f"{at}: column '{shown(cell)}' has no unit, and units are never guessed; {EXAMPLE}")
-    name = (match[1] if match else cell).lower()
-    if name not in known:
+def _roles(at: str, cells: list, given: bool) -> tuple:
+    """What named columns are -> their places, in the order x, (y,) z, (valid); notes. given: units were given, so that
+    columns of unknown names count by their place."""
+    roles = {k: role_of(cell)[0] for k, cell in enumerate(cells)}
+    valid = {role: k for k, role in roles.items() if role == "valid"}
+    data = {k: role for k, role in roles.items() if role not in ("valid", "index")}
+    if not 1 < len(data) < 4:
+        what = f"{len(cells)} columns" if len(data) == len(cells) else f"{', '.join(map(shown, cells))}"
+        raise PatchfemError(f"{at}: {what} where x and z, or x, y and z, are wanted; keep one trace of two columns and "
+                            f"{EXAMPLE}")
+    known, notes = ("x", "z") if len(data) == 2 else ("x", "y", "z"), ()
+    if sorted(data.values()) == ["x", "y"]:
+        data = {k: "z" if role == "y" else role for k, role in data.items()}  # heights over x
+    strange = next((cells[k] for k, role in data.items() if role not in known), None)
+    if strange is not None and not given:
         listed = " and ".join(filter(None, (", ".join(known[:-1]), known[-1])))
-        raise PatchfemError(f"{at}: column '{shown(match[1])}' is not known, {listed} are wanted; {EXAMPLE}")
-    asked = None if given is None else given[name == "z"]
-    unit = next((part for part in match.groups()[1:] if part is not None), "").strip() if match else asked
-    factor = UNITS.get(unit.replace("µ", "u").replace("μ", "u"))
-    if factor is None:
-        raise PatchfemError(f"{at}: unknown unit '{shown(unit)}' of {name}; use one of {', '.join(UNITS)}")
-    if asked is not None and UNITS.get(asked) != factor:
-        raise PatchfemError(f"{at}: the header gives {name} in {shown(unit)}, but {shown(asked)} was given for it; "
-                            "leave the units out, the header names them")
-    return name, factor
+        raise PatchfemError(f"{at}: column '{shown(strange.partition('[')[0].strip())}' is not known, {listed} are "
+                            f"wanted; {EXAMPLE}")
+    if strange is not None:
+        names = ", ".join(f"'{shown(cells[k])}'" for k in data)
+        data = dict(zip(data, known))
+        notes = (f"{at}: columns {names} are taken as {', '.join(known)} in this order",)
+    if len(set(data.values())) < len(data):
+        twice = next(role for role in known if list(data.values()).count(role) > 1)
+        raise PatchfemError(f"{at}: two columns are named {twice}; {EXAMPLE}")
+    place = {role: k for k, role in data.items()}
+    return {role: place[role] for role in known} | valid, notes
 
 
-def values(path, body: str, number: int, order: tuple, delimiter) -> tuple:
-    """Columns x, (y,) z in the file's units, z NaN where missing, and the line of each row."""
-    first = next((line for line in _lines(body) if line.strip() and not line.lstrip().startswith(_COMMENT)), "")
-    delimiter = _delimiter(first, delimiter, len(order))
+def _factors(at: str, place: dict, cells: tuple, facts: dict, given: tuple | None) -> tuple:
+    """Factors to metres of x, (y,) z; notes where a unit that was given overrules that of the file.
+
+    cells: names and units of the columns, [] where no line has them; facts: what the head tells beside.
+    """
+    names, units = cells
+    factors, notes = [], ()
+    for name, k in place.items():
+        if name == "valid":
+            continue
+        told = role_of(names[k])[1] if names else None
+        told = units[k] if told is None and units else told
+        if told is None:
+            told = facts.get("value" if name == "z" else "lateral", (None, None))[1]
+        unit = given[name == "z"] if given else told
+        if unit is None:
+            raise PatchfemError(f"{at}: column '{shown(names[k] if names else name)}' has no unit, and units are never "
+                                f"guessed; {EXAMPLE}, or {GIVE}")
+        if factor_of(unit) is None:
+            raise PatchfemError(f"{at}: unknown unit '{shown(unit)}' of {name}; use one of {LISTED}")
+        if told is not None and factor_of(told) != factor_of(unit):
+            notes += (f"{at}: the header gives {name} in {shown(told)}; {unit} is taken, as the units given say",)
+        factors.append(factor_of(unit))
+    return tuple(factors), notes
+
+
+def _counted(found: dict) -> bool:
+    """Whether x is 0, 1, 2, ... or 1, 2, 3, ... and y grows or falls from row to row, as on no raster."""
+    x, steps = found["x"], np.diff(found["y"])
+    return bool(x.size > 2 and x[0] in (0, 1) and (np.diff(x) == 1).all() and ((steps > 0).all() or (steps < 0).all()))
+
+
+def values(path, body: str, number: int, place: dict, delimiter, width: int) -> tuple:
+    """Columns by what they are, x, (y,) z, at their places among `width`, in the file's units, NaN where a height is
+    missing; the line of each row. number: lines above the body."""
+    first = next((line for line in _lines(body) if line.strip() and not line.lstrip().startswith(COMMENT)), "")
+    delimiter = _delimiter(first, delimiter, width)
     comma = delimiter != "," and "," in body
     if comma:
-        comma = any("," in line for line in _lines(body) if not line.lstrip().startswith(_COMMENT))
+        comma = any("," in line for line in _lines(body) if not line.lstrip().startswith(COMMENT))
     table, at = (None, None) if comma and "." in body else _quick(body.replace(",", ".") if comma else body, delimiter)
-    if table is not None and table.shape[1] == len(order):
-        return [table[:, place] for place in order], at + number + 1
+    if table is not None and table.shape[1] == width:
+        return {name: table[:, k] for name, k in place.items()}, at + number + 1
     rows, at = array("d"), array("q")
     for count, line in enumerate(_lines(body), number + 1):
-        row = _row(f"{path}:{count}", line, order, delimiter, comma)
+        row = _row(f"{path}:{count}", line, (place, width), delimiter, comma)
         if row is not None:
             rows.extend(row)
             at.append(count)
-    return list(np.array(rows).reshape(-1, len(order)).T), np.array(at)
+    return dict(zip(place, np.array(rows).reshape(-1, len(place)).T)), np.array(at)
 
 
 def _lines(body: str):
@@ -204,10 +190,10 @@ def _lines(body: str):
 
 def _delimiter(line: str, ours, count: int):
     """The delimiter that makes `count` numbers of a line; that of the header, `ours`, is tried first."""
-    for sign in (ours, *_SIGNS, None) if len(line) <= WIDEST else ():
+    for sign in (ours, *SIGNS, None) if len(line) <= WIDEST else ():
         cells = [cell.strip() for cell in line.split(sign)]
-        trimmed = _trimmed(cells)
-        if len(trimmed) <= count <= len(cells) and all(_is_number(cell, sign) for cell in trimmed):
+        full = trimmed(cells)
+        if len(full) <= count <= len(cells) and all(is_number(cell, sign) for cell in full):
             return sign
     return ours
 
@@ -230,31 +216,33 @@ def _quick(body: str, delimiter) -> tuple:
     return (table, at) if good else (None, None)
 
 
-def _row(at: str, line: str, order: tuple, delimiter, comma: bool) -> list | None:
-    """Numbers x, (y,) z of a line; None for a comment or a blank line."""
-    if not line.strip(" \t,;|") or line.lstrip().startswith(_COMMENT):
+def _row(at: str, line: str, columns: tuple, delimiter, comma: bool) -> list | None:
+    """Numbers of a line for the columns wanted, (their places, how many there are); None for a comment or a blank
+    line."""
+    place, width = columns
+    if not line.strip(" \t,;|") or line.lstrip().startswith(COMMENT):
         return None
-    words = {2: "two", 3: "three"}[len(order)]
+    words = _COUNTS[width]
     if len(line) > WIDEST:
         raise PatchfemError(f"{at}: a line of {len(line)} characters; {words} numbers are wanted")
     cells = [cell.strip() for cell in line.split(delimiter)]
-    while len(cells) > len(order) and not cells[-1]:
+    while len(cells) > width and not cells[-1]:
         cells.pop()
-    if delimiter == "," and len(cells) == 2 * len(order):
+    if delimiter == "," and len(cells) == 2 * width:
         raise PatchfemError(f"{at}: '{shown(line)}': {words} numbers are wanted; with a decimal comma the columns "
                             "stand apart by semicolons or tabs")
-    if len(cells) != len(order):
+    if len(cells) != width:
         raise PatchfemError(f"{at}: '{shown(line)}': {words} numbers are wanted; write nan for a missing height")
     if comma and "." in line:
         raise PatchfemError(f"{at}: '{shown(line)}': the decimal sign is a comma elsewhere in the file and a point "
                             "here; write it in one way")
     if comma:
-        cells = [cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in cells]
-    return [_value(at, name, cells[place]) for name, place in zip("xz" if len(order) == 2 else "xyz", order)]
+        cells = [cell.replace(",", ".") if COMMA.fullmatch(cell) else cell for cell in cells]
+    return [_value(at, name, cells[k]) for name, k in place.items()]
 
 
 def _value(at: str, name: str, cell: str) -> float:
-    if name == "z" and _LOST.fullmatch(cell):
+    if name == "z" and LOST.fullmatch(cell):
         return np.nan
     if NUMBER.fullmatch(cell) or re.fullmatch(r"[+-]?(?:nan|inf)", cell, re.IGNORECASE):
         return float(cell)

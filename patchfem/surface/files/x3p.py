@@ -16,6 +16,7 @@ import numpy as np
 from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
+from ..samples import METRES
 from .raster import areal, raster
 from .raw import POINTS, Raw, member, opened, reason, shown
 
@@ -58,7 +59,7 @@ def _surface(path, columns: list, axes: list, shape: tuple, listed: bool, notes:
         for name, axis, n in zip(_AXES, axes, (count, rows)):
             if n > 1 and not axis[2] > 0:
                 raise PatchfemError(f"{path}: Increment of {name} is {axis[2]:g}; a length > 0 m is wanted")
-        return areal(path, *places, columns[-1].reshape(rows, count), True, notes)
+        return areal(path, *places, columns[-1].reshape(rows, count), METRES, notes)
     number = np.arange(rows * count)
     places, own = [], iter(columns)
     for axis, index in zip(axes[:2], (number % count, number // count)):
@@ -66,7 +67,7 @@ def _surface(path, columns: list, axes: list, shape: tuple, listed: bool, notes:
     there = np.isfinite(places[0]) & np.isfinite(places[1])
     if there.sum() < 2:
         raise PatchfemError(f"{path}: {there.sum()} points with a place; a trace wants two at least")
-    return raster(path, *(one[there] for one in (*places, columns[-1])), None, None)
+    return raster(path, [one[there] for one in (*places, columns[-1])], None, (1.0, 1.0, 1.0), METRES)
 
 
 def _axis(path, root: Element, name: str) -> tuple:

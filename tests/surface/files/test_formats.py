@@ -244,14 +244,14 @@ def test_refuses_points_that_are_no_scan(tmp_path, content, said):
         read(tmp_path, content.encode(), "scan.txt")
 
 
-def test_refuses_units_that_are_absent_unknown_or_contradict_the_header(tmp_path):
+def test_refuses_units_that_are_absent_or_unknown(tmp_path):
     for data, name in ((write.npy(TRACE), "a.npy"), (write.mat(points=POINTS), "a.mat")):
-        with pytest.raises(PatchfemError, match=r'names no units.*units=\("mm", "um"\), or write it as text'):
+        with pytest.raises(PatchfemError, match=r'names no units.*units=\("mm", "um"\)\), or write it as text'):
             read(tmp_path, data, name)
         with pytest.raises(PatchfemError, match="unknown unit 'furlong'; use one of m, km"):
             read(tmp_path, data, name, ("um", "furlong"))
-    with pytest.raises(PatchfemError, match="the header gives z in um, but mm was given for it"):
-        read(tmp_path, b"x [um],z [um]\n0,1\n5,2\n", "a.csv", ("um", "mm"))
+    with pytest.raises(PatchfemError, match="unknown unit 'furlong'; use one of m, km"):
+        read(tmp_path, b"x,z\n0,1\n5,2\n", "a.csv", ("um", "furlong"))
     with pytest.raises(PatchfemError, match=r'units are two, of x and of z, such as \("mm", "um"\), not'):
         read(tmp_path, b"x [um],z [um]\n0,1\n5,2\n", "a.csv", "um")
 

@@ -33,6 +33,10 @@ SEEDS = {
     "text": ("a.csv", f"# tip 2 um\nx [um],z [um]\n{ROWS}".encode(), bytes),
     "decimal comma": ("a.csv", f"x_um;z_um\n{ROWS}".replace(",", ";").replace(".", ",").encode(), bytes),
     "raster": ("a.txt", f"x [um],y [um],z [um]\n{LINES}".encode(), bytes),
+    "matrix": ("a.txt", ("# Width: 3,0 µm\n# Height: 3,0 µm\n# Value units: um\n" + "\n".join("\t".join(
+        f"{float(z) * 1e6!r}".replace(".", ",") for z in row) for row in Z)).encode(), bytes),
+    "names and units": ("a.txt", ("Nr.;Position;Höhe\n;mm;µm\n" + "".join(
+        f"{k};{row.replace(',', ';')}\n" for k, row in enumerate(ROWS.split()))).encode(), bytes),
     "utf-16": ("a.txt", f"x [um],y [um],z [um]\n{LINES}".encode("utf-16"), bytes),
     "gzip": ("a.csv.gz", gzip.compress(f"x [um],y [um],z [um]\n{LINES}".encode(), mtime=0), bytes),
     "dektak": ("a.csv", write.dektak(np.sin(np.arange(60.0)), 9.375), bytes),

@@ -19,7 +19,7 @@ from patchfem.core import Missing, PatchfemError
 from patchfem.scene.keys.quantities import KINDS
 from patchfem.surface.files import raw
 from patchfem.surface.files.read import read_profile
-from patchfem.surface.files.text import UNITS
+from patchfem.surface.files.units import UNITS
 
 
 def read(tmp_path, content, name="before.csv"):
@@ -110,16 +110,18 @@ def test_exact_rounded_x_is_evened(tmp_path, step):
         assert profile.notes == ()
 
 
+GIVE = 'or name the units of x and z, --units "mm,um" (in Python units=("mm", "um"))'
 REFUSED = {
     "": "{path}: the profile is empty",
     "\ufeff \n\n": "{path}: the profile is empty",
     "# only words\n% more\n": "{path}: no data, only comments",
     "0,1\n1,2\n": "{path}:1: no header, and units are never guessed; write the header as `x [um],z [um]` above the "
-                  "first sample",
-    "x,z\n0,1\n": "{path}:1: column 'x' has no unit, and units are never guessed; write the header as `x [um],z [um]`",
+                  f"first sample, {GIVE}",
+    "x,z\n0,1\n": "{path}:1: column 'x' has no unit, and units are never guessed; write the header as `x [um],z [um]`, "
+                   f"{GIVE}",
     "\nx [um],z []\n0,1\n": "{path}:2: unknown unit '' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
     "x [um],z [furlong]\n0,1\n": "{path}:1: unknown unit 'furlong' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
-    "x [um]\n0\n": "{path}:1: one column, 'x [um]', where x and z are wanted; write the header as `x [um],z [um]`",
+    "x [um]\n0\n": "{path}:2: one column, '0', where x and z are wanted; write the header as `x [um],z [um]`",
     "x [um],y [um],z [um],w [um]\n0,0,1,1\n": "{path}:1: 4 columns where x and z, or x, y and z, are wanted; keep one "
                                                "trace of two columns and write the header as `x [um],z [um]`",
     "x [um],x [um]\n0,1\n": "{path}:1: two columns are named x; write the header as `x [um],z [um]`",
@@ -147,7 +149,7 @@ REFUSED = {
     "x [m],z [um]\n0,1\n12700,2\n": "{path}:3: x is 1.27e+04 m; is its unit right? a missing height is written nan",
     "x [mm],z [mm]\n0,1\n1,2\n2,99999\n": "{path}:4: z is 100 m; is its unit right? a missing height is written nan",
     "x [um],z [mm]\n0,1\n5,2\n10,1\n": "{path}: heights span 1 mm over a length of 10 um; is the unit of z right? a "
-                                       "missing height is written nan",
+                                       "missing height is written nan; --units overrules the units of a header",
     "x [nm],z [nm]\n0,0\n0.1,0\n": "{path}: the profile is 0.1 nm long; is the unit of x right?",
     "x [um],z [um]\n0,1\n1,2\n3,1\n2,2\n4,1\n": "{path}:5: x turns back, 3 um and then 2 um; a trace runs one way: "
                                                   "keep one trace per file",

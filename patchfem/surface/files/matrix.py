@@ -1,0 +1,140 @@
+"""A matrix of heights in text, a row of the scan in each line, whose size and units stand in the lines above it."""
+
+import io
+
+import numpy as np
+
+from ...core import PatchfemError
+from ..areal import Areal
+from ..profile import Profile
+from ..samples import GIVEN, checked
+from .head import COMMA, COMMENT, VOID, Head, is_number, named, trimmed
+from .raster import areal
+from .raw import shown
+from .units import GIVE, factor_of
+
+SIZE = "`# Width: 1.2 mm` and `# Height: 0.8 mm`"
+ABOVE = f"write {SIZE}, those of the scan, and `# Value units: um` above its rows"
+
+
+def is_matrix(count: int, names: list, facts: dict) -> bool:
+    """Whether rows of `count` numbers are a matrix and no columns x, (y,) z."""
+    sized = "width" in facts and ("height" in facts or count == 1)
+    return not named(names) and (count > 3 or sized or facts.get("columns", (0,))[0] == count)
+
+
+def matrix(path, head: Head, facts: dict, given: tuple | None, body: str) -> Profile | Areal:
+    """The scan in a matrix of heights; a trace where it is one row or one column.
+
+    The step is that of a pixel: Width over the number of columns. facts: what the head tells; given: units of x, y and
+    of z, which complete and overrule it. PatchfemError for a matrix of unknown size or unit, or of uneven rows.
+    """
+    table = _table(path, head, body)
+    if table.shape[1] == 1 and "height" not in facts:
+        table = table.T  # one height a line
+    for name, axis, count in (("rows", "rows", table.shape[0]), ("columns", "numbers a row", table.shape[1])):
+        stated = facts.get(name, (None,))[0]
+        if stated is not None and stated != count:
+            raise PatchfemError(f"{path}: {count} {axis} where its head says {stated:g}; the file is cut off or was "
+                                "put together: export the scan anew")
+    steps, notes = [], ()
+    for axis, count in zip(("x", "y"), table.shape[::-1]):
+        if axis == "y" and count == 1:
+            continue
+        step, more = _step(path, axis, count, facts, given)
+        steps.append(step)
+        notes += more
+    up, more = _height(path, facts, given)
+    table, said, notes = table * up, GIVEN if given else "", (*notes, *more)
+    if len(steps) == 1:
+        trace = checked(path, np.arange(table.shape[1]) * steps[0], table[0], None, (1.0, 1.0), said)
+        return Profile(trace.x, trace.z, trace.source, (*notes, *trace.notes))
+    axes = [np.arange(count) * step for count, step in zip(table.shape[::-1], steps)]
+    return areal(path, *axes, table, said, notes)
+
+
+def _height(path, facts: dict, given: tuple | None) -> tuple:
+    """Factor of the heights to metres; notes."""
+    told = next((facts[name][1] for name in ("value", "factor") if facts.get(name, ("", ""))[1]), None)
+    scale = facts.get("factor", (None,))[0]
+    if facts.get("scaled", ("", ""))[1].lower() == "yes":
+        scale = facts.get("scale", (None,))[0]
+    if told is None and facts.get("bit2nm", (None,))[0]:
+        told, scale = "nm", facts["bit2nm"][0]
+    scale = 1.0 if scale is None else scale
+    if not 0 < abs(scale) < np.inf:
+        raise PatchfemError(f"{path}: a factor of the heights of {scale:g}; export the scan anew")
+    if told is not None and factor_of(told) is None and given is None:
+        raise PatchfemError(f"{path}: its values are in '{shown(told)}', which is no length; export the channel of the "
+                            f"heights, or {GIVE}")
+    if told is None and given is None:
+        raise PatchfemError(f"{path}: a matrix of heights whose unit is not told; write `# Value units: um` above its "
+                            f"rows, or {GIVE}")
+    unit, notes = _overruled(path, "the heights", told, given and given[1])
+    return scale * factor_of(unit), notes
+
+
+def _step(path, axis: str, count: int, facts: dict, given: tuple | None) -> tuple:
+    """Step along x or y [m]; notes."""
+    size, step = ("width", "step_x") if axis == "x" else ("height", "step_y")
+    if axis == "y" and step not in facts and size not in facts:
+        step = "step_x"  # square pixels by a size of one number
+    number, unit = facts.get(step, facts.get(size, (None, "")))
+    if number is None or not 0 < number < np.inf:
+        raise PatchfemError(f"{path}: rows of more than three numbers, or those of a map, are a matrix of heights, and "
+                            f"its {'width' if axis == 'x' else 'height'} is not told; {ABOVE}")
+    unit = unit or next((facts[name][1] for name in ("unit_y", "lateral") if axis == "y" or name == "lateral"
+                         if name in facts), None)
+    if not unit and "bit2nm" in facts:
+        unit = "nm"  # SPIP writes places in nanometres
+    if given is None and factor_of(unit or "") is None:
+        raise PatchfemError(f"{path}: the unit of its width and height, '{shown(unit or '')}', is not known; write "
+                            f"{SIZE}, or {GIVE}")
+    unit, notes = _overruled(path, f"places along {axis}", unit or None, given and given[0])
+    return number * factor_of(unit) / (1 if step in facts else count), notes
+
+
+def _overruled(path, what: str, told: str | None, asked: str | None) -> tuple:
+    """The unit that counts, and a note where the one given overrules the one of the file."""
+    if asked is None or told is None or factor_of(asked) == factor_of(told):
+        return asked or told, ()
+    return asked, (f"{path}: its head gives {what} in {shown(told)}; {asked} is taken, as the units given say",)
+
+
+def _table(path, head: Head, body: str) -> np.ndarray:
+    """Rows of numbers (m, n), NaN where a height is missing."""
+    comma = head.delimiter != "," and "," in body
+    plain = body.replace(",", ".") if comma else body
+    if plain.isascii() and "_" not in plain and not (comma and "." in body):
+        try:
+            table = np.loadtxt(io.BytesIO(plain.encode()), delimiter=head.delimiter, comments=None, ndmin=2)
+            if not np.isinf(table).any():
+                return table
+        except ValueError:
+            pass  # the line at fault is found below
+    rows = []
+    for number, line in enumerate(body.split("\n"), head.number + 1):
+        if row := _row(f"{path}:{number}", line, head.delimiter, len(head.row)):
+            rows.append(row)
+    return np.array(rows, float)
+
+
+def _row(at: str, line: str, delimiter: str | None, count: int) -> list:
+    """Heights of a line, [] of a blank one."""
+    line = line.strip("\r\n \t" if delimiter is None else "\r\n ")
+    if not line.strip():
+        return []
+    if line.startswith(COMMENT):
+        if ":" in line or "=" in line:
+            raise PatchfemError(f"{at}: '{shown(line)}' begins another scan or ends this one; keep one scan in a file")
+        return []
+    cells = [cell.strip() for cell in line.split(delimiter)]
+    cells = cells if len(cells) == count else trimmed(cells)
+    if len(cells) != count:
+        raise PatchfemError(f"{at}: {len(cells)} numbers where the first row of the matrix has {count}; write nan for "
+                            "a missing height, and one row of the scan in a line")
+    bad = next((cell for cell in cells if not is_number(cell, delimiter)), None)
+    if bad is not None:
+        raise PatchfemError(f"{at}: '{shown(bad)}' is not a height; a missing one is empty, nan, bad or ***")
+    return [np.nan if VOID.fullmatch(cell) else float(cell.replace(",", ".") if COMMA.fullmatch(cell) else cell)
+            for cell in cells]

@@ -1,0 +1,19 @@
+"""Names of units of length as files, instruments and users write them."""
+
+UNITS = {"m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9,
+         "in": 0.0254, "ft": 0.3048, "mil": 25.4e-6}
+_WORDS = {"pm": 1e-12, "å": 1e-10, "angstrom": 1e-10, "ångström": 1e-10, "mils": 25.4e-6, "inch": 0.0254,
+          "inches": 0.0254, "micron": 1e-6, "microns": 1e-6, "mikron": 1e-6}
+_WORDS |= {f"{prefix}{end}": factor for prefix, factor in (
+    ("", 1.0), ("milli", 1e-3), ("micro", 1e-6), ("mikro", 1e-6), ("nano", 1e-9))
+    for end in ("meter", "meters", "metre", "metres")}
+LISTED = ", ".join(UNITS)
+GIVE = 'name the units of x and z, --units "mm,um" (in Python units=("mm", "um"))'
+
+ASIDE = "the file itself tells its units; those that were given are left aside"
+
+
+def factor_of(word: str) -> float | None:
+    """Factor to metres of a unit as it is written, such as um, µm, [mm] or Mikrometer; None for any other word."""
+    word = word.strip().strip("[]()").strip().replace("µ", "u").replace("μ", "u")
+    return UNITS.get(word) or _WORDS.get(word.lower())

@@ -1,0 +1,220 @@
+"""Texts as programs write them: matrices under a head, columns with names and units in lines of their own.
+
+The layouts are those of the ASCII exports of Gwyddion, SPIP, Attocube, Nova and HFM files; every refusal that names a
+remedy is read once the remedy is done.
+"""
+
+import numpy as np
+import pytest
+
+from patchfem.core import PatchfemError
+from patchfem.surface.areal import Areal
+from patchfem.surface.files.read import read_surface
+from patchfem.surface.profile import Profile
+
+Z = np.arange(1.0, 13.0).reshape(3, 4)
+ROWS = "1 2 3 4\n5 6 7 8\n9 10 11 12\n"
+LONG = np.random.default_rng(3).normal(size=(30, 300))
+
+
+def read(tmp_path, text, units=None, name="scan.txt", encoding="utf-8"):
+    (tmp_path / name).write_text(text, encoding=encoding)
+    return read_surface(tmp_path / name, units)
+
+
+def is_scan(found, steps, z) -> None:
+    assert isinstance(found, Areal) and found.z == pytest.approx(z, rel=1e-14, nan_ok=True)
+    assert found.x == pytest.approx(np.arange(z.shape[1]) * steps[0], rel=1e-14)
+    assert found.y == pytest.approx(np.arange(z.shape[0]) * steps[1], rel=1e-14)
+
+
+GWYDDION = {"english": ("Channel:", "Width:", "Height:", "Value units:"),
+            "german": ("Kanal:", "Breite:", "Höhe:", "Einheiten:")}
+
+
+@pytest.mark.parametrize("words", GWYDDION.values(), ids=GWYDDION)
+@pytest.mark.parametrize("rows, encoding", [(ROWS, "utf-8"), (ROWS.replace(" ", "\t"), "utf-16"),
+                                            (ROWS.replace(" ", "\t").replace("\n", "\t\n"), "latin-1")])
+def test_exact_gwyddion_text_in_two_languages(tmp_path, words, rows, encoding):
+    text = f"# {words[0]} Topo\n# {words[1]} 4.000 µm\n# {words[2]} 6.000 µm\n# {words[3]} nm\n{rows}"
+    found = read(tmp_path, text, encoding=encoding)
+    is_scan(found, (1e-6, 2e-6), Z * 1e-9)
+    assert found.notes == ()
+    comma = text.replace("4.000", "4,000").replace("6.000", "6,000").replace("5", "5,5").replace(" 6", "  6")
+    if "\t" in rows:
+        is_scan(read(tmp_path, comma, encoding=encoding), (1e-6, 2e-6), np.where(Z == 5, 5.5, Z) * 1e-9)
+
+
+def test_exact_a_matrix_of_long_rows_with_missing_heights(tmp_path):
+    """Rows of more than a thousand characters, missing heights as nan, Bad, stars and nothing."""
+    z = np.where(np.arange(LONG.size).reshape(LONG.shape) % 97 == 5, np.nan, LONG)
+    head = "# Width: 300 µm\n# Height: 60 µm\n# Value units: um\n"
+    rows = ["\t".join(repr(float(one)) for one in row) for row in z]
+    for lost in ("nan", "Bad", "***", ""):
+        text = head + "\n".join(rows).replace("nan", lost) + "\n"
+        is_scan(read(tmp_path, text), (1e-6, 2e-6), z * 1e-6)
+    is_scan(read(tmp_path, head + "\n".join(rows).replace("\t", ";").replace(".", ",")), (1e-6, 2e-6), z * 1e-6)
+
+
+HEADS = {
+    "spip": ("# File Format = ASCII\n# Created by SPIP 6.3.2.0 2014-12-12 11:16\n# x-pixels = 4\n# y-pixels = 3\n"
+             "# x-length = 2000\n# y-length = 1500\n# x-offset = 0\n# y-offset = 0\n# Bit2nm = 0.5\n# Start of Data:\n",
+             (500e-9, 500e-9), 0.5e-9),
+    "attocube": ("# Daisy frame view snapshot\n# 2009-07-14T10:12:34\n# x-pixels: 4\n# y-pixels: 3\n# x-length: 8\n"
+                 "# y-length: 6\n# x-unit: um\n# y-unit: um\n# z-unit: nm\n# scanspeed: 2\n# Start of Data:\n",
+                 (2e-6, 2e-6), 1e-9),
+    "nova": ("File Format = ASCII\nCreated by Nova\nNX = 4\nNY = 3\nScale X = 0.5\nScale Y = 0.25\nUnit X = um\n"
+             "Unit Data = nm\nScale Data = 1\nDataScaleNeeded = no\nStart of Data :\n", (0.5e-6, 0.25e-6), 1e-9),
+    "nova with a scale": ("NX = 4\nNY = 3\nScale X = 0.5\nScale Y = 0.25\nUnit X = um\nUnit Data = nm\n"
+                          "Scale Data = 2\nDataScaleNeeded = yes\nStart of Data :\n", (0.5e-6, 0.25e-6), 2e-9),
+    "pixel size": ("# h = 3, w = 4\n# pixel size = 0.5 um\n# height conversion factor (-> m) = 1e-8\n",
+                   (0.5e-6, 0.5e-6), 1e-8),
+    "sizes of SurfaceTopography": ("# Width: 4.0 um\n# Height: 3.0 um\n# Value units: nm\n", (1e-6, 1e-6), 1e-9),
+    "spaces of a table": ("X step\t: 0,5 µm\nY step\t: 0,25 µm\nZ unit\t: nm\n", (0.5e-6, 0.25e-6), 1e-9),
+    "german steps": ("X-Schrittweite: 0,5 µm\nY-Schrittweite: 0,25 µm\nZ-Einheit: nm\n", (0.5e-6, 0.25e-6), 1e-9),
+}
+
+
+@pytest.mark.parametrize("head, steps, unit", HEADS.values(), ids=HEADS)
+def test_exact_heads_of_other_programs(tmp_path, head, steps, unit):
+    is_scan(read(tmp_path, head + ROWS), steps, Z * unit)
+
+
+def test_exact_a_line_scan_is_one_height_a_line_or_one_row(tmp_path):
+    for rows in ("1\n2\n5\n3\n", "1 2 5 3\n"):
+        found = read(tmp_path, f"# Width: 4.0 um\n# Value units: nm\n{rows}")
+        assert isinstance(found, Profile) and found.x == pytest.approx(np.arange(4) * 1e-6)
+        assert found.z == pytest.approx(np.array([1, 2, 5, 3]) * 1e-9)
+
+
+def test_exact_gwyddion_points_under_their_units(tmp_path):
+    rows = "".join(f"{0.5 * (i + 0.5)}\t{0.25 * (j + 0.5)}\t{Z[j, i]}\n" for j in range(3) for i in range(4))
+    found = read(tmp_path, f"# Channel: Height\n# Lateral units: µm\n# Value units: nm\n{rows}", name="scan.xyz")
+    assert found.z == pytest.approx(Z * 1e-9) and found.x == pytest.approx((np.arange(4) + 0.5) * 0.5e-6)
+    assert found.y == pytest.approx((np.arange(3) + 0.5) * 0.25e-6)
+
+
+X = np.array([0.0, 0.5, 1.0, 1.5, 3.0])
+H = np.array([0.25, -1.5, 0.75, 0.5, 0.0])
+PAIRS = "".join(f"{a}\t{b}\n" for a, b in zip(X, H))
+COUNTED = "".join(f"{k}\t{a}\t{b}\n" for k, (a, b) in enumerate(zip(X, H), 1))
+QUOTED = "".join(f'"{a}","{b}"\n'.replace(".", ",") for a, b in zip(X, H))
+TRACES = {
+    "x in um": (f"x in mm\tz in um\n{PAIRS}", None), "words and in": (f"Distance in mm\tHeight in µm\n{PAIRS}", None),
+    "blanks and in": (f"x in mm z in um\n{PAIRS}".replace("\t", " "), None),
+    "names and units in two lines": (f"Position\tHöhe\nmm\tµm\n{PAIRS}", None),
+    "units in brackets in a line": (f"X\tZ\n[mm]\t[um]\n{PAIRS}", None),
+    "a line of units alone": (f"mm\tMikrometer\n{PAIRS}", None),
+    "words before": (f"Surface of the pad\nOperator: A. B.\n2026-01-05\nDistance [mm]\tProfile [um]\n{PAIRS}", None),
+    "an index": (f"Index\tX [mm]\tZ [um]\n{COUNTED}", None),
+    "an index and units given": (COUNTED, ("mm", "um")),
+    "names without units, quoted": ('"Distance","Profile"\n' + QUOTED, ("mm", "um")),
+    "an index by name and no units": (f"Nr.\tWeg\tHöhe\n{COUNTED}", ("mm", "um")),
+    "one unit alone": (f"µm\n{PAIRS}", ("mm", "um")),
+    "x and y": (f"x [mm]\ty [um]\n{PAIRS}", None),
+    "only numbers": (PAIRS, ("mm", "µm")),
+}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+@pytest.mark.parametrize("text, units", TRACES.values(), ids=TRACES)
+def test_exact_traces_with_units_wherever_they_stand(tmp_path, text, units, encoding):
+    found = read(tmp_path, text, units, encoding=encoding)
+    assert isinstance(found, Profile) and found.x == pytest.approx(X * 1e-3, rel=1e-15)
+    assert found.z == pytest.approx(H * 1e-6, rel=1e-15)
+
+
+def test_exact_hfm_with_a_column_of_valid_points(tmp_path):
+    rows = "".join(f"{a};{b};{int(b != 0.75)}\n" for a, b in zip(X, H))
+    found = read(tmp_path, f"X;Y;valid\n[mm];[mm];[1/0]\n{rows}", name="a.hfm")
+    assert found.z == pytest.approx(np.where(H == 0.75, np.nan, H) * 1e-3, nan_ok=True)
+
+
+def test_exact_units_that_are_given_overrule_the_header_and_it_is_told(tmp_path):
+    found = read(tmp_path, f"x [um]\tz [um]\n{PAIRS}", ("mm", "um"))
+    assert found.x == pytest.approx(X * 1e-3) and found.z == pytest.approx(H * 1e-6)
+    path = tmp_path / "scan.txt"
+    assert found.notes == (f"{path}:1: the header gives x in um; mm is taken, as the units given say",)
+    scan = read(tmp_path, f"# Width: 4 um\n# Height: 3 um\n# Value units: V\n{ROWS}", ("mm", "um"))
+    is_scan(scan, (1e-3, 1e-3), Z * 1e-6)
+    assert scan.notes == (f"{path}: its head gives places along x in um; mm is taken, as the units given say",
+                          f"{path}: its head gives places along y in um; mm is taken, as the units given say",
+                          f"{path}: its head gives the heights in V; um is taken, as the units given say")
+    named = read(tmp_path, f"Kanal A\tKanal B\n{PAIRS}", ("mm", "um"))
+    assert named.notes == (f"{path}:1: columns 'Kanal A', 'Kanal B' are taken as x, z in this order",)
+    sdf = read(tmp_path, "aISO-1.0\nNumPoints = 3\nNumProfiles = 1\nXscale = 1e-6\nYscale = 1e-6\nZscale = 1e-9\n*\n"
+               "1 2 4\n*\n", ("mm", "um"))
+    assert sdf.notes == (f"{path}: the file itself tells its units; those that were given are left aside",)
+    assert sdf.x == pytest.approx(np.arange(3) * 1e-6)
+
+
+CURES = {  # what is refused, what is said, the same text after the remedy, the units given
+    "a bare matrix": (ROWS, "its width is not told; write `# Width: 1.2 mm` and `# Height: 0.8 mm`, those of the scan, "
+                      "and `# Value units: um` above its rows",
+                      "# Width: 1.2 mm\n# Height: 0.8 mm\n# Value units: um\n" + ROWS, None),
+    "no height": ("# Width: 4 um\n# Value units: um\n" + ROWS, "its height is not told; write",
+                  "# Width: 4 um\n# Height: 0.8 mm\n# Value units: um\n" + ROWS, None),
+    "no unit of the heights": ("# Width: 4 um\n# Height: 3 um\n" + ROWS, "whose unit is not told; write `# Value units",
+                               "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS, None),
+    "no unit, but given": ("# Width: 4\n# Height: 3\n" + ROWS, 'or name the units of x and z, --units "mm,um"',
+                           "# Width: 4\n# Height: 3\n" + ROWS, ("mm", "um")),
+    "a width without unit": ("# Width: 4\n# Height: 3\n# Value units: um\n" + ROWS, "the unit of its width and height, "
+                             "'', is not known; write", "# Width: 1.2 mm\n# Height: 0.8 mm\n# Value units: um\n" + ROWS,
+                             None),
+    "volts": ("# Width: 4 um\n# Height: 3 um\n# Value units: V\n" + ROWS, "in 'V', which is no length; export the",
+              "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS, None),
+    "a row cut off": ("# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS[:-6], ":6: 2 numbers where the first "
+                      "row of the matrix has 4; write nan for a missing height",
+                      "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS[:-6] + " nan nan\n", None),
+    "rows cut off": ("# w = 4, h = 4\n# pixel size = 1 um\n# Value units: nm\n" + ROWS, "3 rows where its head says 4",
+                     "# w = 4, h = 3\n# pixel size = 1 um\n# Value units: nm\n" + ROWS, None),
+    "a word": ("# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS.replace("7", "lost"), ":5: 'lost' is not a "
+               "height; a missing one is empty, nan, bad or",
+               "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS.replace("7", "nan"), None),
+    "two scans": ("# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS + "# Channel: Phase\n" + ROWS,
+                  ":7: '# Channel: Phase' begins another scan or ends this one; keep one scan in a file",
+                  "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS, None),
+    "names without units": (f"Distance\tProfile\n{PAIRS}", "column 'Distance' has no unit, and units are never guessed",
+                            f"Distance\tProfile\n{PAIRS}", ("um", "um")),
+    "one unit for two columns": (f"µm\n{PAIRS}", "no header, and units are never guessed",
+                                 f"µm\n{PAIRS}", ("um", "um")),
+    "one column": ("1\n2\n3\n", "one column, '1', where x and z are wanted; write the header as `x [um],z [um]`",
+                   "x [um],z [um]\n0,1\n1,2\n4,3\n", None),
+    "an index for x": (f"Index\tz [um]\n{PAIRS}", "Index, z [um] where x and z, or x, y and z, are wanted; keep one",
+                       f"x [um]\tz [um]\n{PAIRS}", None),
+    "an unknown name": (f"Kanal A [um]\tKanal B [um]\n{PAIRS}", "column 'Kanal A' is not known, x and z are wanted; "
+                        "write the header as", f"x [um]\tz [um]\n{PAIRS}", None),
+    "only words": ("Operator: me\nnothing\n", "no row of numbers in its first 2 lines; write the header as `x [um],z "
+                   "[um]` above rows of two numbers", f"x [um]\tz [um]\n{PAIRS}", None),
+    "too steep": (f"x [um]\tz [mm]\n{PAIRS}", "is the unit of z right? a missing height is written nan; --units "
+                  "overrules the units of a header", f"x [um]\tz [mm]\n{PAIRS}", ("um", "mm")),
+}
+
+
+@pytest.mark.parametrize("bad, said, good, units", CURES.values(), ids=CURES)
+def test_refuses_with_a_remedy_that_works(tmp_path, bad, said, good, units):
+    with pytest.raises(PatchfemError) as caught:
+        read(tmp_path, bad)
+    assert said in str(caught.value) and str(tmp_path / "scan.txt") in str(caught.value)
+    found = read(tmp_path, good, units)
+    assert np.isfinite(found.z).sum() >= 3
+
+
+def test_exact_a_spike_as_tall_as_the_scan_is_long_is_told_and_kept(tmp_path):
+    z = np.random.default_rng(1).normal(size=(20, 30)) * 1e-7
+    z[7, 9] = 4e-5
+    rows = "\n".join(" ".join(repr(float(one)) for one in row) for row in z)
+    found = read(tmp_path, f"# Width: 30 um\n# Height: 20 um\n# Value units: m\n{rows}")
+    assert found.z == pytest.approx(z, rel=1e-14)
+    assert len(found.notes) == 1 and "without the 6 highest and the 6 lowest of 600" in found.notes[0]
+    assert found.notes[0].endswith("nm: spikes?")
+    with pytest.raises(PatchfemError, match="is the unit of z right"):  # not one of them but all
+        read(tmp_path, "# Width: 30 um\n# Height: 20 um\n# Value units: m\n"
+             + "\n".join(" ".join(repr(float(one) * 1e3) for one in row) for row in z))
+
+
+def test_always_heights_below_an_atom_are_told(tmp_path):
+    found = read(tmp_path, "x [um],z [m]\n0,0\n1,1e-13\n2,0\n")
+    assert found.notes[0].endswith("less than an atom is wide; is their unit right?")
+    assert read(tmp_path, "x [um],z [nm]\n0,0\n1,0.2\n2,0\n").notes == ()
+    assert read(tmp_path, "x [um],z [nm]\n0,0\n1,0\n2,0\n").notes == ()
