@@ -22,7 +22,7 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))  # else an edited 
 
 # half of the tests, in folders whose runs compile; then those that compile nothing, then what meets compiled code again
 COMPILING = ("dynamics", "export", "model", "campaigns", "response", "runs", "commands", "friction")
-LATER = ("scene", "identify", "torture", "studies")
+LATER = ("structure", "wear", "scene", "identify", "torture", "studies")
 compiled.PATIENCE = -1.0  # a test runs what is compiled, also where nothing is kept and little would have to run
 
 if sys.dont_write_bytecode:  # hundreds of child processes would each compile all that they import

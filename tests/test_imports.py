@@ -74,7 +74,7 @@ def test_exact_a_rubbing_point_needs_no_other_rig():
     assert "pyuff" not in modules
 
 
-@pytest.mark.share(1, 2, 3)
+@pytest.mark.share(1, 3)
 @pytest.mark.parametrize("lines, module", [
     ('[structure.stiffening]\ncubic = "1e12 N/m^3"\n', "dynamics.march.joints"),
     ('[structure.bonded]\nstiffness = "1e6 N/m"\n', "structure.bonded"),

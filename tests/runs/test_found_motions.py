@@ -56,6 +56,7 @@ def once(name: str):
     return pf.run(load(FOUND / f"{name}.toml"))
 
 
+@pytest.mark.share(0, 1, *range(4, len(TRUE)))  # Bouc and Wen: a loop to compile for these alone
 @pytest.mark.parametrize(("name", "measure", "truth", "digit"), TRUE)
 def test_exact_the_bar_holds_an_independent_program(name, measure, truth, digit):
     found = once(name).measures[measure]
@@ -97,6 +98,7 @@ def test_always_what_slides_for_ever_under_a_step_has_no_bar():
     assert all(one.error is None for one in result.measures.values())
 
 
+@pytest.mark.slow  # by the loop of Bouc and Wen
 def test_always_a_ring_down_is_not_steady():
     """Three times as long it is 3.3 times smaller."""
     result = pf.run(load(FOUND / "step_decay_149.toml"))

@@ -342,6 +342,7 @@ cycles = 4
 STEADY = '%s"\nreference_speed = "20 mm/s'
 
 
+@pytest.mark.slow  # tanh under a load that changes: a loop to compile for this alone
 def test_exact_the_load_goes_through_zero_and_comes_back():
     """Heave under a strong drive: the block lifts off and lands on a linear skin, N = max(0, N0 - k A h); beside it the
     same equations by DOP853."""
@@ -365,6 +366,7 @@ def test_exact_the_load_goes_through_zero_and_comes_back():
     close(found, "relative_displacement_amplitude", np.ptp(y[:2].T @ [0.9, 1.0]) / 2, 1e-9)
 
 
+@pytest.mark.share(1, 2)  # Coulomb: a loop to compile for this alone
 @pytest.mark.parametrize("law", ["coulomb", 'elastic-plastic"\nbond_length = "1 um', 'nonlocal"\nbond_length = "1 um'])
 def test_always_lift_off_closes_its_energy(law):
     found = result_of(HEAVE % law, estimate=False)

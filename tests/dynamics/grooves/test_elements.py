@@ -110,6 +110,7 @@ def test_exact_a_slow_slide_by_the_numpy_law(name, swing):
     assert work - energies[:-1, 0].sum() == pytest.approx(energies[-1, 1] - energies[0, 1], rel=1e-9)
 
 
+@pytest.mark.slow  # a loop to compile for this alone
 def test_exact_a_slow_slide_by_the_equation_of_bouc_and_wen():
     """phi = f/R follows the law while R falls; while R grows, R phi stays but for the slide. R = N sqrt(1 + t^2)/(1 -
     phi t); scipy integrates phi over the slide."""
@@ -173,7 +174,7 @@ def test_exact_no_friction_to_speak_of_is_a_mass_in_a_valley():
     """A free motion about the bottom of a groove is that of the exact steps without friction."""
     start, still = Start(np.array([10e-6]), np.array([0.02])), BaseSine(0.0, DRIVE.omega)
     true = march(BASIS, still, model_of(GROOVES, LOAD, 0.0, 0.0, None, BASIS), 1, 100, start=start).response.slide
-    faint = BoucWen(1e-10, 2e-6).element(LOAD)
+    faint = parallel([1e-10 * LOAD / 2e-6], [2e-6])
     coarse, fine = (np.abs(march(BASIS, still, ElementsModel(GROOVES, LOAD, 1e-10, faint), 1, 100 * part, start=start)
                            .response.slide[::part] - true).max() for part in (4, 8))
     assert fine < 3e-4 * np.abs(true).max() and coarse > 3.8 * fine
@@ -201,6 +202,6 @@ def test_always_iwans_law_slips_at_its_limit():
 
 
 def test_always_a_lifted_mass_that_leaves_the_grooves_is_said():
-    one = ElementsModel(Grooves(80e-6, 7.5e-6, 0.0, 3.0), 20.0, MU, BoucWen(MU, 1e-6).element(20.0))
+    one = ElementsModel(Grooves(80e-6, 7.5e-6, 0.0, 3.0), 20.0, MU, parallel([MU * 20.0 / 1e-6], [1e-6]))
     done = march(BASIS, BaseSine(400.0, 2 * np.pi * 143), one, 5, 100)
     assert done.outcome is Outcome.LEAVES_GROOVES and "leaves the grooves" in done.message

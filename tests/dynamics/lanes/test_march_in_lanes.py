@@ -15,6 +15,7 @@ from patchfem.friction.laws.iwan import largest
 
 FLOWS = tuple(f"friction.laws.{law}_kernels" for law in ("tanh", "stretch", "bouc_wen", "lugre"))
 LAWS = "rigid", "yielding", "masing", *FLOWS
+ALWAYS = 0, 1, 2, 4  # each law is a loop to compile: one of those that flow
 
 
 def cases(law: str, count: int, seed: int = 1) -> run.Cases:
@@ -95,6 +96,7 @@ def test_exact_sliders_are_cells_side_by_side():
             law.look_ahead(place, room, 0)
 
 
+@pytest.mark.share(*ALWAYS)
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_lanes_are_the_text_as_python(law, monkeypatch):
     """The loop as numba compiles it and as Python runs it: the same motion and the same numbers to 1e-12 of their
@@ -113,6 +115,7 @@ def test_exact_lanes_are_the_text_as_python(law, monkeypatch):
         np.testing.assert_allclose(getattr(fast, name), getattr(slow, name), rtol=1e-10, atol=1e-12)
 
 
+@pytest.mark.share(*ALWAYS)
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_a_case_is_the_same_in_any_company(law):
     """To the last bit: in another lane, with other cases beside it, and after another case in its lane."""
@@ -124,6 +127,7 @@ def test_exact_a_case_is_the_same_in_any_company(law):
         np.testing.assert_array_equal(getattr(mixed, name), getattr(whole, name)[order])
 
 
+@pytest.mark.share(*ALWAYS)
 @pytest.mark.parametrize("law", LAWS)
 def test_order_of_events_is_above_three(law):
     """Between events a step is exact and an event is found to the fourth order, so the amplitudes of most cases
@@ -137,6 +141,7 @@ def test_order_of_events_is_above_three(law):
     assert np.median(np.log2(coarse[counts] / np.maximum(fine[counts], 1e-14))) > 2.9
 
 
+@pytest.mark.share(*ALWAYS)
 @pytest.mark.parametrize("law", LAWS)
 def test_always_energies_balance(law):
     """What the drive gives is what friction and damping take and what is left: to 1e-4 of it at 96 steps in 98 of 100

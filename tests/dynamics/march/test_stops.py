@@ -189,6 +189,7 @@ def by_events(drive, load, static, kinetic, at):
     return slides
 
 
+@pytest.mark.slow  # Coulomb under a load in time: a loop to compile
 def test_order_two_of_stops_under_a_load_in_time():
     """Kinetic friction at .4 of static on a load that swings by a half at another frequency, against events."""
     drive, errors = BaseSine(1.0, 0.6, False), []

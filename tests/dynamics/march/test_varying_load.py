@@ -17,6 +17,8 @@ from patchfem.friction.bonds.recursion import Recursion, pressed
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.model.structure import strip_rows
 
+POINTED = ["bonds", "growing", "plastic"]  # one loop; that of Coulomb and that of tanh are others to compile
+
 
 @pytest.mark.parametrize("row", [0, 1])
 def test_order_small_heave_and_pitch_swing_at_the_frequency_of_the_tangent(row):
@@ -29,7 +31,7 @@ def test_order_small_heave_and_pitch_swing_at_the_frequency_of_the_tangent(row):
     size = 1e-8 / part if row == 0 else 1e-8 / (part * sets.x[-1])
     errors = []
     for steps in (200, 400, 800):
-        done = varying_load.march(basis, BaseSine(0.0, 2000 * np.pi), sets, LAWS["coulomb"], 1, steps, 1,
+        done = varying_load.march(basis, BaseSine(0.0, 2000 * np.pi), sets, LAWS["plastic"], 1, steps, 1,
                             start=Start([size], [0.0]))
         response = done.response
         errors.append(np.abs(response.modal[:, 0] - size * np.cos(omega * response.time)).max() / size)
@@ -43,7 +45,7 @@ def test_order_small_heave_and_pitch_swing_at_the_frequency_of_the_tangent(row):
 def test_exact_energy_stays_while_the_block_bounces():
     """5000 steps of heave and pitch that leave the contact and land again: constant to 1e-12."""
     basis = modes([150.0, 400.0, 300.0], [0, 0, 0], [1.0, 0.2, 0.0], [20.0, 0.0, 250.0])
-    done = varying_load.march(basis, STILL, crowned(), LAWS["coulomb"], 10, 500, 10,
+    done = varying_load.march(basis, STILL, crowned(), LAWS["plastic"], 10, 500, 10,
                         start=Start([12e-7, 0, 9e-7], [0.0, 15e-3, 6e-3]))
     total, force = mechanical(done.response, basis), done.response.extra["normal_load"]
     assert np.ptp(total) <= 1e-12 * total[0] and done.outcome is None
@@ -82,6 +84,7 @@ def brute_block(basis, drive, stiff, mu, start, cycles, steps):
     return out
 
 
+@pytest.mark.slow  # a loop to compile
 def test_exact_coulomb_block_under_a_swinging_load():
     """A block that sticks and slips while its heave swings the load to zero, against small steps of another scheme."""
     sets = elastic()
@@ -100,6 +103,7 @@ def test_exact_coulomb_block_under_a_swinging_load():
     assert 0.02 < np.mean(np.diff(done.response.slide) == 0) < 0.9
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("name", ["tanh", "plastic"])
 def test_order_two_where_modes_carry_both(name):
     """Slide, heave and pitch in every mode, sets that change: the error falls by four when the step is halved."""
@@ -119,16 +123,18 @@ def test_order_the_accelerometer_feels_the_normal_forces():
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
     drive, errors = BaseSine(40.0, 2 * np.pi * 143), []
     for steps in (6400, 12800):
-        r = varying_load.march(basis, drive, crowned(), LAWS["tanh"], 1, steps, 1).response
+        r = varying_load.march(basis, drive, crowned(), LAWS["plastic"], 1, steps, 1).response
         slope = np.gradient(r.output_rate, r.time) + drive.values(r.time)
         errors.append(np.median(np.abs(r.acceleration - slope)[1:-1]) / np.abs(slope).max())
     assert errors[1] <= 1e-4 and errors[0] / errors[1] > 3
 
 
-def test_exact_no_friction_without_load():
+@pytest.mark.share(0)
+@pytest.mark.parametrize("laws", [POINTED, ["coulomb"]], ids=["points", "coulomb"])
+def test_exact_no_friction_without_load(laws):
     """Lift-off and return: nothing holds the slide in flight, the bonds are gone, and the load comes back."""
     basis = modes([100.0, 150.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.0, [1.0, 0.0])
-    for name in ("coulomb", "plastic", "bonds"):
+    for name in laws:
         done = varying_load.march(basis, BaseSine(30.0, 2 * np.pi * 143), crowned(), LAWS[name], 6, 400, 6,
                             start=Start([0, 5e-7], [0, 0.0]))
         r = done.response
@@ -137,11 +143,13 @@ def test_exact_no_friction_without_load():
         assert np.abs(r.force).max() > 0.1 * 0.3 * LOAD and np.count_nonzero(np.diff(apart.astype(int)) == -1) >= 3
 
 
-@given(st.sampled_from(sorted(LAWS)), st.integers(0, 10**6), st.sampled_from([60, 200]))
-def test_always_nothing_creates_energy(name, seed, steps):
+@pytest.mark.share(0)
+@pytest.mark.parametrize("laws", [POINTED, sorted(LAWS)], ids=["points", "all"])
+@given(st.data(), st.integers(0, 10**6), st.sampled_from([60, 200]))
+def test_always_nothing_creates_energy(laws, data, seed, steps):
     """Random modes that carry all three, random starts and drives, coarse steps, bouncing: the balance closes, friction
     and the changing load only lose, and no force exceeds mu N."""
-    rng = np.random.default_rng(seed)
+    rng, name = np.random.default_rng(seed), data.draw(st.sampled_from(laws))
     n = rng.integers(1, 5)
     basis = modes(rng.uniform(50, 900, n), rng.normal(size=n), rng.normal(size=n) * rng.choice([0, 0.3, 1.0]),
                   rng.normal(size=n) * rng.choice([0, 50.0, 300.0]), 0.01)

@@ -20,6 +20,7 @@ def law_of(name):
     return LAWS[name].element(60.0) if name != "bonds" else element(LAWS[name])
 
 
+@pytest.mark.share(0, 1)  # Bouc and Wen: a loop to compile for this alone
 @pytest.mark.parametrize("name", LAWS)
 def test_exact_cycles_that_are_left_out_are_as_the_last_one(name):
     left, whole = (Motion(MODES, SINE, law_of(name), 400, 1e-9) for _ in range(2))

@@ -135,6 +135,7 @@ def test_order_of_the_error_follows_the_tolerance():
     assert fine < 1e-8 and coarse < 1e-4 and fine < 0.02 * coarse
 
 
+@pytest.mark.share(0, 1)  # LuGre: a loop to compile for this alone
 @pytest.mark.parametrize("law", [SHORT, GROWING, LUGRE])
 def test_exact_energy_goes_into_motion_heat_and_stretch(law):
     book = simulate(ONE, SINE, element(law), 8, 1e-9, 2).ledger

@@ -49,9 +49,10 @@ def lumped_answers(cases, finer: int = 0):
     return found
 
 
+@pytest.mark.share(0, 1, 2, 4, 5)  # each other law is a loop in lanes and one of single runs to compile
 @pytest.mark.parametrize("law", LAWS)
 def test_always_97_of_100_cases_lie_within_both_bars(law):
-    held(law, 1, 150 if law in EXACT else 80)  # single runs beside it take seconds
+    held(law, 1, 150 if law in EXACT[:3] else 80)  # what stands beside Iwan or in single runs takes seconds
 
 
 @pytest.mark.slow
