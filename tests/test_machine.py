@@ -3,7 +3,10 @@
 import json
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from math import exp, tan
+from threading import Barrier
+from time import sleep
 from typing import NamedTuple
 
 import numpy as np
@@ -254,6 +257,32 @@ for law, more in (("coulomb", ""), ("elastic-plastic", 'bond_length = "2 um"'), 
     out.append([found.measures[name].value for name in ("slip_amplitude", "friction_work")])
 print(json.dumps([out, "numba" in sys.modules]))
 """
+
+
+def test_always_threads_that_call_first_at_once_bring_code_once(monkeypatch):
+    """Two that loaded the same function at once ended the process in 1 of 2 first sweeps of Iwan cases."""
+    entry, brought, at_once = kernels_of_its_own("dynamics.events.series_kernels").powers, [], Barrier(2)
+
+    def slow(path):
+        brought.append(path)
+        sleep(0.05)
+        return lambda words: 7.0
+
+    monkeypatch.setattr(machine, "found", slow)
+
+    def call(_):
+        at_once.wait()
+        return entry(1.5)
+
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(call, range(2))) == [7.0, 7.0]
+    assert len(brought) == 1
+
+
+def kernels_of_its_own(module: str) -> Kernels:
+    """The Kernels of a module of which nothing has been called yet."""
+    known = load(module)
+    return Kernels(known.__name__, known._text, known._bring)
 
 
 def test_exact_without_compiled_code_the_same_motions(monkeypatch):

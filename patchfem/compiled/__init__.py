@@ -33,6 +33,7 @@ from importlib.util import module_from_spec, spec_from_file_location, spec_from_
 from math import inf
 from operator import add, mul, neg, pos, sub, truediv
 from pathlib import Path
+from threading import RLock
 from time import monotonic, sleep
 
 import numpy as np
@@ -51,6 +52,7 @@ LEAST = 1 << 21  # bytes of the machine code of a run
 PATIENCE = 2.0  # CPU seconds of a function as Python in a process, from which on it is compiled: a tenth of that
 WAIT, LOOK = 300.0, 0.05  # s that a process waits at most for what another compiles: ten times the largest; how often
 UNKEPT = set()  # functions called here whose machine code cannot be kept: every process brings up numba for them
+LOADING = RLock()  # one thread at a time brings code: two that load the same function at once end the process
 _LISTENERS = []  # who is told when something is compiled
 ARITHMETIC = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv, ast.Pow: pow, ast.USub: neg, ast.UAdd: pos}
 
@@ -238,23 +240,31 @@ class Entry:
             return self.function()(*arguments)
         code = self.codes.get(kinds)
         if code is None:
-            path = _prepared() / "code" / f"{self.kept}{digest(','.join(kinds))}.code"
-            code = machine.found(path) or _generic(path)
-            if code is None and self.as_python <= PATIENCE:
-                with np.errstate(all="ignore"):
-                    return getattr(plain(self.home.__name__), self.name)(*arguments)
-            if code is None:
-                with spending():
-                    code = self._made(path, arguments)
-            if code is None:
-                with spending(), tidied_later():
-                    answer = self.function()(*arguments)
-                    if not machine.keep(path, self.function(), arguments):
-                        UNKEPT.add(self.kept[:-1])
-                self.codes[kinds] = False
-                return answer
-            self.codes[kinds] = code
+            with LOADING:
+                code = self.codes.get(kinds)  # another thread may have brought it meanwhile
+                if code is None:
+                    return self._first(kinds, words, arguments)
         return code(b"".join(words)) if code else self.function()(*arguments)
+
+    def _first(self, kinds: tuple, words: tuple, arguments: tuple):
+        """What the function returns at its first call with arguments of these kinds, for which its code is brought."""
+        path = _prepared() / "code" / f"{self.kept}{digest(','.join(kinds))}.code"
+        code = machine.found(path) or _generic(path)
+        if code is None and self.as_python <= PATIENCE:
+            with np.errstate(all="ignore"):
+                return getattr(plain(self.home.__name__), self.name)(*arguments)
+        if code is None:
+            with spending():
+                code = self._made(path, arguments)
+        if code is None:
+            with spending(), tidied_later():
+                answer = self.function()(*arguments)
+                if not machine.keep(path, self.function(), arguments):
+                    UNKEPT.add(self.kept[:-1])
+            self.codes[kinds] = False
+            return answer
+        self.codes[kinds] = code
+        return code(b"".join(words))
 
     def _made(self, path: Path, arguments: tuple):
         """Machine code made for arguments of these types, or by another process meanwhile; None where there is none."""
