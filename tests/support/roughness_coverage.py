@@ -1,0 +1,130 @@
+"""How many of the 90 % intervals of `profile` hold the mean of their surface, for surfaces that are not Gaussian too.
+
+    python tests/support/roughness_coverage.py --seeds 5000-5099 --kinds lognormal pitted
+
+Each seed makes one trace of 2 mm at 1 um of each kind, reads every parameter of its levelled trace and of its roughness
+at 0.25 mm with its interval, and asks whether the interval holds the mean over OTHERS traces of the same surface, whose
+seeds start at 900 000. Printed, of each parameter: the share of intervals that hold, and the share of traces that have
+an interval. Seeds below 5000 are for making the intervals, those from 5000 on are held out.
+"""
+
+import argparse
+import json
+from collections import defaultdict
+
+import numpy as np
+
+UM = 1e-6
+STEP, LENGTH, CUTOFF = UM, 2e-3, 250e-6
+OTHERS, FIRST = 400, 900_000
+
+
+def gaussian(rng, slope: float = 4.0, wave: float = 60e-6, size: int = 0) -> np.ndarray:
+    """Gaussian heights (n,) of unit deviation; the density is flat above `wave` and falls by -slope below it."""
+    size = size or round(LENGTH / STEP) + 1
+    period = 8 * size
+    frequency = np.arange(period // 2 + 1) / (period * STEP)
+    power = (1 + (frequency * wave) ** 2) ** (-slope / 2)
+    power[0] = 0.0
+    numbers = rng.standard_normal((2, frequency.size))
+    z = np.fft.irfft(np.sqrt(power) * (numbers[0] + 1j * numbers[1]), period)[:size]
+    return z / np.sqrt(power.sum() * 2) * period
+
+
+def pitted(rng) -> np.ndarray:
+    """A fine ground with round pits of 20 um and four deviations at random places, ten in a millimetre."""
+    z = 0.5 * gaussian(rng)
+    x = np.arange(z.size) * STEP
+    for at in rng.uniform(0, LENGTH, rng.poisson(10e3 * LENGTH)):
+        z -= rng.uniform(2, 4) * np.maximum(1 - ((x - at) / 10e-6) ** 2, 0.0)
+    return z
+
+
+def turned(rng) -> np.ndarray:
+    """Cusps of a turned piece, 100 um apart, with a ground of a tenth of their height."""
+    x = np.arange(round(LENGTH / STEP) + 1) * STEP
+    t = (x / 100e-6 + rng.uniform()) % 1 - 0.5
+    return 12 * t * t + 0.3 * gaussian(rng)
+
+
+KINDS = {
+    "gaussian": gaussian,
+    "steep": lambda rng: gaussian(rng, 6.0, 80e-6),
+    "exponential": lambda rng: gaussian(rng, 2.0, 60e-6),
+    "fractal": lambda rng: gaussian(rng, 2.6, 20 * LENGTH),
+    "two_scale": lambda rng: 0.9 * gaussian(rng, 4.0, 150e-6) + 0.4 * gaussian(rng, 4.0, 15e-6),
+    "truncated": lambda rng: np.minimum(gaussian(rng), 0.5),
+    "lognormal": lambda rng: np.exp(0.6 * gaussian(rng)),
+    "pitted": pitted,
+    "turned": turned,
+}
+
+
+def trace(kind: str, seed: int):
+    """One trace of a kind [Profile], heights of about a micrometre."""
+    from patchfem.surface.profile import Profile
+
+    z = UM * KINDS[kind](np.random.default_rng([seed, sorted(KINDS).index(kind)]))
+    return Profile(np.arange(z.size) * STEP, z, f"{kind}-{seed}")
+
+
+def means(kind: str) -> dict:
+    """Mean of every parameter over the others, by name: no interval is worked out."""
+    from patchfem.surface.profile import level
+    from patchfem.surface.roughness import rows
+    from patchfem.surface.roughness.filter import filtered
+    from patchfem.surface.roughness.parameters import Heights
+    from patchfem.surface.roughness.spectrum import BAND, amplitude_of, spectrum_of
+
+    found = defaultdict(list)
+    for seed in range(FIRST, FIRST + OTHERS):
+        one = level(trace(kind, seed))
+        heights = Heights(one.z, STEP)
+        rough = Heights(filtered(one, CUTOFF)[1].z, STEP, CUTOFF)
+        spectrum = spectrum_of(one.z, STEP)
+        for row, of in [*((row, heights) for row in rows.PRIMARY), *((row, rough) for row in rows.ROUGH)]:
+            if row.of is not None:
+                found[row.name].append(row.of(of))
+        found["band_amplitude"].append(amplitude_of(spectrum, *BAND))
+        found["dominant_wavelength"].append(spectrum.dominant)
+    return {name: float(np.mean([one for one in values if one is not None])) for name, values in found.items()
+            if any(one is not None for one in values)}
+
+
+def coverage(kind: str, seeds) -> dict:
+    """Name -> (share of the intervals that hold the mean, share of traces that have an interval)."""
+    from patchfem.surface.roughness.report import report_of
+
+    truth, held = means(kind), defaultdict(list)
+    for seed in seeds:
+        for one in report_of(trace(kind, seed), CUTOFF).values:
+            if one.name in truth and one.value is not None:
+                held[one.name].append(None if one.low is None else one.low <= truth[one.name] <= one.high)
+    return {name: (float(np.mean([one for one in values if one is not None] or [np.nan])),
+                   sum(one is not None for one in values) / len(values)) for name, values in held.items()}
+
+
+def main() -> None:
+    """Print a table for each kind, and write it where asked."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", default="1000-1019", help="first-last")
+    parser.add_argument("--kinds", nargs="*", default=list(KINDS), choices=list(KINDS))
+    parser.add_argument("-o", help="a JSON file for the shares")
+    asked = parser.parse_args()
+    first, last = map(int, asked.seeds.split("-"))
+    out = {kind: coverage(kind, range(first, last + 1)) for kind in asked.kinds}
+    print(f"{'':<22}" + "".join(f"{kind[:11]:>12}" for kind in out))
+    for name in next(iter(out.values())):
+        cells = [found.get(name, (np.nan, 0.0)) for found in out.values()]
+        print(f"{name:<22}" + "".join(f"{'none':>12}" if has == 0 else f"{share:>7.2f}/{has:.2f}"
+                                      for share, has in cells))
+    for kind, found in out.items():
+        shares = [share for share, has in found.values() if has > 0]
+        print(f"{kind}: mean {np.mean(shares):.3f}, worst {min(shares):.2f}")
+    if asked.o:
+        with open(asked.o, "w", encoding="utf-8") as file:
+            json.dump(out, file, indent=1)
+
+
+if __name__ == "__main__":
+    main()
