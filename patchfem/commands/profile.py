@@ -7,12 +7,17 @@ from .. import __version__
 from ..export import results, summary
 from ..export.surfaces import roughness
 from ..surface.files import read
+from ..surface.roughness import form as forms
 from ..surface.roughness import report as roughness_report
 from .shared import Json, Refused, Units, flag, note, out_in, pair, quantity, word
 
 
 def profile(file: Path, /, *more: Path,
-            cutoff: word('wavelength that splits roughness from waviness, such as "0.25 mm"') = "",
+            cutoff: word('wavelength that splits roughness from waviness (L-filter), such as "0.25 mm"') = "",
+            form: word("what is subtracted first: a degree from 1 (line or plane) to 9, or cylinder") = "1",
+            s_filter: word('wavelength below which waves are left out first, such as "2.5 um"') = "",
+            level: word('height over the mean line at which the material ratio is read, such as "0.5 um"') = "0 um",
+            ratios: word('material ratios whose heights are set side by side, such as "10,90" in percent') = "10,90",
             window: word('the part between two cursors, such as "468 um,733 um"') = "",
             tip: word('radius of the stylus, against which the valleys are checked, such as "12.5 um"') = "",
             units: Units = "",
@@ -23,10 +28,12 @@ def profile(file: Path, /, *more: Path,
     Example: patchfem profile trace.csv --cutoff "0.25 mm"
     """
     asked = {"window": _window(window) if window else None}
-    for name, text in (("cutoff", cutoff), ("tip", tip)):
+    for name, text in (("cutoff", cutoff), ("tip", tip), ("s-filter", s_filter)):
         asked[name] = quantity(text, "length", f"profile --{name}")
         if asked[name] is not None and asked[name] <= 0:
             raise Refused(f"profile --{name} {text}: a length above zero is wanted")
+    asked["settings"] = roughness_report.Settings(forms.form_of(form), asked.pop("s-filter"),
+                                                  quantity(level, "length", "profile --level"), _ratios(ratios))
     reports = [roughness_report.report_of(read.read_surface(path, pair(units)), **asked) for path in (file, *more)]
     for report in reports:
         if not json_:
@@ -42,6 +49,16 @@ def profile(file: Path, /, *more: Path,
         print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
     elif out is not None:
         print(f"results: {out}")
+
+
+def _ratios(text: str) -> tuple:
+    try:
+        first, second = (float(one.strip().removesuffix("%")) / 100 for one in text.split(","))
+    except ValueError:
+        first, second = 1.0, 0.0
+    if not 0 <= first < second <= 1:
+        raise Refused(f"profile --ratios '{text}': two growing shares in percent are wanted, such as '10,90'")
+    return first, second
 
 
 def _window(text: str) -> tuple:

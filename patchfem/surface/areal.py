@@ -73,21 +73,29 @@ def filled(z, missing) -> np.ndarray:
 
 
 def level_plane(scan: Areal) -> Areal:
-    """Level a scan: subtract the least-squares plane of its measured heights, which all count alike.
+    """Level a scan: subtract the least-squares plane of its measured heights, which all count alike (`level`)."""
+    return level(scan, 1)
 
-    PatchfemError where fewer than three heights are measured, or all of them in one line.
+
+def level(scan: Areal, degree: int) -> Areal:
+    """A scan less the least-squares polynomial in x and y of its measured heights, x^i y^j with i + j <= degree.
+
+    PatchfemError where the measured heights do not determine it, such as all of them in one line.
     """
-    there, (x, y) = ~scan.missing, (_reduced(axis) for axis in (scan.x, scan.y))
-    count, across, along = there.sum(), there.sum(0), there.sum(1)  # of all, of each column, of each row
-    normal = np.array([[count, across @ x, along @ y],
-                       [across @ x, across @ x**2, y @ (there @ x)],
-                       [along @ y, y @ (there @ x), along @ y**2]])
-    if count < 3 or np.linalg.matrix_rank(normal / count, tol=1e-12, hermitian=True) < 3:
-        raise PatchfemError(f"{scan.source}: {count} heights, all in one line; a plane wants three that are not")
+    there, count = ~scan.missing, int((~scan.missing).sum())
+    across, along = (np.polynomial.legendre.legvander(_reduced(axis), degree) for axis in (scan.x, scan.y))
+    terms = np.add.outer(np.arange(degree + 1), np.arange(degree + 1)) <= degree  # of y, of x
+    pairs = there.astype(float) @ (across[:, :, None] * across[:, None, :]).reshape(scan.x.size, -1)
+    normal = np.einsum("mik,mj,ml->jilk", pairs.reshape(-1, degree + 1, degree + 1), along, along, optimize=True)
+    normal = normal[terms][:, terms]
+    if count < len(normal) or np.linalg.matrix_rank(normal / count, tol=1e-12, hermitian=True) < len(normal):
+        raise PatchfemError(f"{scan.source}: {count} heights, all in one line; a plane wants three that are not"
+                            if degree == 1 else f"{scan.source}: {count} heights do not determine a polynomial of "
+                            f"degree {degree}; use a lower degree")
     mean = scan.z[there].mean()
-    off = np.where(there, scan.z - mean, 0.0)
-    level, slope, pitch = np.linalg.solve(normal, [off.sum(), off.sum(0) @ x, off.sum(1) @ y])
-    return replace(scan, z=frozen_array(scan.z - (mean + level + slope * x + (pitch * y)[:, None])))
+    found = np.zeros(terms.shape)
+    found[terms] = np.linalg.solve(normal, (along.T @ np.where(there, scan.z - mean, 0.0) @ across)[terms])
+    return replace(scan, z=frozen_array(scan.z - (mean + along @ found @ across.T)))
 
 
 def _reduced(axis) -> np.ndarray:

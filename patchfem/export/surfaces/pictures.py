@@ -93,7 +93,7 @@ def scan(x, y, z):
     mesh = left.pcolormesh(x[::step[1]] * mm, y[::step[0]] * mm, z[::step[0], ::step[1]] * um, cmap="viridis",
                            vmin=low, vmax=high, rasterized=True, shading="nearest")
     figure.colorbar(mesh, ax=left, label=f"height [{up}]", extend="both", fraction=0.05, pad=0.02)
-    left.set(xlabel=f"x [{along}]", ylabel=f"y [{along}]", aspect="equal", title="Heights about the plane")
+    left.set(xlabel=f"x [{along}]", ylabel=f"y [{along}]", aspect="equal", title="Heights")
     left.grid(False)
     right.hist(known, bins=120, color=BLUE, weights=np.full(known.size, 100 / known.size))
     right.set(xlabel=f"height [{up}]", ylabel="share of the points [%]", title="Distribution of the heights")

@@ -3,15 +3,18 @@
 from html import escape
 from pathlib import Path
 
+import numpy as np
+
 from ... import __version__
 from ...core import say
 from ...disk.whole import write_text
 from ...scales import LADDERS, plain, step_of
 from ...surface.quantity import Quantity
-from ...surface.roughness.report import RoughnessReport
+from ...surface.roughness.report import RoughnessReport, fitting_cutoff
 from ..pages.document import Section, document, figure, table, warned
 from . import pictures
 
+ALONG = ("PSm", "RSm", "dominant_wavelength", "Sal")  # lengths along the surface; all others are heights
 AREAL = ("Interval: 5 to 95 %, of the mean over all scans of this size on a surface with Gaussian heights and the "
          "spectrum of this scan, wider where the kurtosis is above 3. It does not know a surface that differs from "
          "place to place, nor waves longer than the scan.")
@@ -20,44 +23,82 @@ INTERVAL = ("Interval: 5 to 95 %, of the mean over all traces of this length on 
             "from place to place.")
 
 
-def shown(one: Quantity) -> tuple:
-    """Value, interval and unit as texts, in the unit that suits the value; no interval is an empty text."""
+def shown(one: Quantity, unit: tuple | None = None) -> tuple:
+    """Value, interval and unit as texts; no interval is an empty text.
+
+    unit: (name, scale) for a length, None for the one that suits the value. An angle is in degrees.
+    """
+    name, scale = ("", 1.0) if one.unit == "1" else ("deg", np.degrees(1.0)) if one.unit == "rad" else \
+        unit or step_of(LADDERS[one.unit], one.value or 0.0)
     if one.value is None:
-        return "-", "", "" if one.unit == "1" else one.unit
-    unit, scale = ("", 1.0) if one.unit == "1" else step_of(LADDERS[one.unit], one.value)
+        return "none", "", ""
     interval = "" if one.low is None else f"{plain(one.low * scale, 3)} .. {plain(one.high * scale, 3)}"
-    return plain(one.value * scale, 5), interval, unit
+    return plain(one.value * scale, 5), interval, name
+
+
+def units_of(report: RoughnessReport) -> dict:
+    """One unit (name, scale) for all heights of a report and one for all lengths along it, by parameter."""
+    root = report["Sq" if report.kind == "areal" else "Pq"].value
+    along = [one.value for one in report.values if one.name in ALONG and one.value is not None]
+    units = step_of(LADDERS["m"], max(along, default=1e-3)), step_of(LADDERS["m"], 3 * root)
+    return {one.name: units[one.name not in ALONG] for one in report.values}
 
 
 def heading(report: RoughnessReport) -> str:
     """What was measured and how it was treated, in one line."""
     shape = " x ".join(str(count) for count in report.shape)
     text = f"{shape} heights, {say(report.length)} long, every {say(report.step)}"
-    if report.kind == "areal":
-        return text + ", about the least-squares plane"
     if report.window is not None:
         text += f", window {say(report.window[0])} to {say(report.window[1])}"
-    text += ", about the least-squares line"
+    text += f", about the least-squares {report.form}"
+    short = report.settings.short
+    if report.kind == "areal":
+        return text + _areal_filters(short, report.cutoff, bool(np.isnan(report.scan.z).any()))
     if report.cutoff is None:
-        return text + "; no cut-off, so no roughness profile"
-    return (f"{text}; Gaussian filter at {say(report.cutoff)}, half of it trimmed at each end, no filter for short "
-            "waves")
+        fits = fitting_cutoff(report.length, report.step)
+        text += "; no cut-off, so no roughness profile" + (
+            f' (--cutoff "{say(fits)}" is the longest standard one with five sections here)' if fits else
+            ", and no standard cut-off has five sections here")
+        return text + (f"; S-filter at {say(short)}, half of it trimmed at each end" if short else "")
+    return (f"{text}; Gaussian filter at {say(report.cutoff)}, half of it trimmed at each end, "
+            + (f"S-filter at {say(short)}, the same" if short else "no filter for short waves"))
+
+
+def _areal_filters(short: float | None, cutoff: float | None, holes: bool) -> str:
+    """The filters of a scan in words, and the name of the surface behind them."""
+    parts = [f"{name}-filter at {say(one)}" for name, one in (("S", short), ("L", cutoff)) if one]
+    if not parts:
+        return "; no filter"
+    surface = " (the S-L surface)" if short and cutoff else " (the S-F surface)" if short else ""
+    return (f"; Gaussian {' and '.join(parts)}{surface}, half of {'each' if parts[1:] else 'it'} trimmed at each border"
+            + ("; beside a hole the weights on measured heights are scaled to a sum of one" if holes else ""))
 
 
 def lines_of(report: RoughnessReport, verbose: bool = False) -> list:
     """The report as lines: a table of value, interval and unit, with definitions where asked."""
     out = [f"{report.source}: {heading(report)}"]
-    out.append(f"  {'':<20} {'value':>10}  {'5 .. 95 %':<20} unit")
+    out.append(f"  {'':<20} {'value':>10}  {'90 %: from .. to':<20} unit")
+    units = units_of(report)
     for one in report.values:
-        value, interval, unit = shown(one)
-        tail = one.reason
+        value, interval, unit = shown(one, units[one.name])
+        tail = one.reason if one.value is None else ""
         out.append(f"  {one.name:<20} {value:>10}  {interval:<20} {unit:<4} {tail}".rstrip())
         if verbose:
             out.append(f"  {'':<20}   {one.text}")
+    out += [f"  no interval of {', '.join(names)}: {reason}" for reason, names in _untold(report).items()]
     for one in report.printed:
         out.append(f"  the instrument printed {_pair(one)}")
     if report.tip is not None:
         out.append(f"  {report.tip.sentence}")
+    return out
+
+
+def _untold(report: RoughnessReport) -> dict:
+    """The parameters without an interval, by the reason."""
+    out: dict = {}
+    for one in report.values:
+        if one.value is not None and one.low is None and one.reason:
+            out.setdefault(one.reason, []).append(one.name)
     return out
 
 
@@ -75,7 +116,8 @@ def data_of(report: RoughnessReport) -> dict:
             measures[one.name]["reason"] = one.reason
     out = {"file": report.source, "kind": report.kind, "length": report.length, "step": report.step,
            "shape": list(report.shape), "cutoff": report.cutoff,
-           "window": None if report.window is None else list(report.window), "measures": measures,
+           "window": None if report.window is None else list(report.window), "form": report.form,
+           "s_filter": report.settings.short, "confidence": 0.9, "measures": measures,
            "notes": list(report.notes)}
     if report.kind == "profile":
         out["band"] = list(report.band)
@@ -132,12 +174,12 @@ def figures(report: RoughnessReport) -> list:
     """Pictures [(svg, caption, alternative text)] of a report."""
     if report.kind == "areal":
         flat = report.scan
-        return [(pictures.scan(flat.x, flat.y, flat.z), "Heights about the least-squares plane and their distribution; "
-                 "colours end at all but the outermost 0.2 % of the points.",
+        return [(pictures.scan(flat.x, flat.y, flat.z), "Heights that the parameters are read from and their "
+                 "distribution; colours end at all but the outermost 0.2 % of the points.",
                  f"Map and histogram of the heights of {report.source}: {_said(report['Sq'])} root mean square")]
     lines = "the waviness on it" if report.waviness is not None else "no cut-off was given"
     height = report["Pt"]
-    out = [(pictures.trace(report.primary, report.waviness), f"Levelled trace; {lines}.",
+    out = [(pictures.trace(report.primary, report.waviness), f"Trace about the least-squares {report.form}; {lines}.",
             f"Heights of {report.source} along x: {_said(height)} from the deepest valley to the highest peak")]
     if report.roughness is not None:
         out.append((pictures.rough(report.roughness, (report.primary.x[0], report.primary.x[-1]), report.cutoff),
@@ -154,13 +196,15 @@ def figures(report: RoughnessReport) -> list:
 
 
 def _table(report: RoughnessReport) -> str:
-    rows = []
+    rows, units = [], units_of(report)
     for one in report.values:
-        value, interval, unit = shown(one)
+        value, interval, unit = shown(one, units[one.name])
         rows.append([escape(one.name), *([escape(value), escape(interval), escape(unit)] if one.value is not None else
                                          [f"<td colspan=3 class=soft>{escape(one.reason)}</td>"])])
-    return (f"<h3>Parameters</h3>{table(('parameter', '>value', '>5 .. 95 %', 'unit'), rows)}<p class=soft>"
-            f"{escape(AREAL if report.kind == 'areal' else INTERVAL)}</p>")
+    return (f"<h3>Parameters</h3>{table(('parameter', '>value', '>90 %: from .. to', 'unit'), rows)}<p class=soft>"
+            f"{escape(AREAL if report.kind == 'areal' else INTERVAL)}</p>"
+            + "".join(f"<p class=soft>No interval of {escape(', '.join(names))}: {escape(reason)}.</p>"
+                      for reason, names in _untold(report).items()))
 
 
 def _printed(report: RoughnessReport) -> str:

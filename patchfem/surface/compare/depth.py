@@ -193,7 +193,7 @@ def abbott_estimate(before: Profile, after: Profile) -> Quantity:
     tails = []
     for each, half in ((one, 0), (other, 1)):
         heights = Heights(each.z, each.length / (each.x.size - 1))
-        made = made_traces(spectrum, heights, True)[half::2]
+        made = made_traces(spectrum, heights, 1)[half::2]
         tails.append(np.array([np.quantile(m.z, share).mean() * np.sqrt(min(1.0, m.length / heights.length))
                                for m in made]))
     low, high = np.quantile(tails[1] - tails[0], ((1 - LEVEL) / 2, (1 + LEVEL) / 2))

@@ -78,7 +78,7 @@ def _made(spectrum, other: Profile, step: float) -> np.ndarray:
     """Traces (k, n) at the samples of `other` with the spectrum of the one before."""
     if not spectrum.density.any():
         return np.zeros((0, other.x.size))
-    made = made_traces(spectrum, Heights(other.z, step), False)
+    made = made_traces(spectrum, Heights(other.z, step), None)
     own = np.linspace(0, 1, other.x.size)
     return np.array([np.interp(own, np.linspace(0, 1, one.z.size), one.z) for one in made])
 

@@ -39,7 +39,7 @@ def size_of(trace: Profile, step: float, band: tuple = BAND) -> Size:
 def _size(z, step: float, band: tuple) -> Size:
     found = spectrum_of(z, step)
     heights = Heights(z, step)
-    inner = Intervals(heights, True, found, band)
+    inner = Intervals(heights, 1, found, band)
     freedom = (inner.freedom("band"), inner.freedom("slope")) if found.density.any() else (1.0, 1.0)
     return Size(amplitude_of(found, *band), float(np.sqrt(np.mean(np.diff(z) ** 2))) / step, freedom, found)
 

@@ -17,6 +17,7 @@ and Mr2 held the mean in 66 to 72 of 100 traces, those of Pku, Pk, Ppk and PMr2 
 The report says so where the skewness tells such a surface.
 """
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -37,9 +38,10 @@ PEAK = 1.3  # the peak of a spectrum scatters more than in traces made with this
 class Intervals:
     """Intervals of the parameters of one trace; its spectrum and the made traces are worked out when first wanted."""
 
-    def __init__(self, heights: Heights, levelled: bool, found: Spectrum | None = None, band: tuple = BAND):
-        """levelled: made traces are levelled like the trace, as the primary profile is; band: wavelengths [m]."""
-        self.heights, self.levelled, self.band = heights, levelled, band
+    def __init__(self, heights: Heights, degree: int | None, found: Spectrum | None = None, band: tuple = BAND):
+        """degree: of the polynomial that made traces are rid of, as the trace was, None: of none, as the roughness
+        profile; band: wavelengths [m]."""
+        self.heights, self.degree, self.band = heights, degree, band
         self.spectrum = spectrum_of(heights.z, heights.step) if found is None else found
         self._made = None
 
@@ -77,7 +79,7 @@ class Intervals:
 
     def _by_traces(self, row: Parameter, value: float) -> tuple:
         if self._made is None:
-            self._made = made_traces(self.spectrum, self.heights, self.levelled)
+            self._made = made_traces(self.spectrum, self.heights, self.degree)
         found = [row.of(one) for one in self._made]
         values = np.array([one for one in found if one is not None])
         if values.size < COUNT / 2:
@@ -96,7 +98,7 @@ class Intervals:
         return float(low), float(high)
 
 
-def made_traces(found: Spectrum, heights: Heights, levelled: bool, seed: int = 0) -> list:
+def made_traces(found: Spectrum, heights: Heights, degree: int | None, seed: int = 0) -> list:
     """COUNT traces with a spectrum, as Heights; same seed, same heights.
 
     They are as long as the trace where SAMPLES samples suffice, and stand on its step or a multiple of it that still
@@ -122,8 +124,7 @@ def made_traces(found: Spectrum, heights: Heights, levelled: bool, seed: int = 0
     deviation = np.sqrt(density / (period * step)) * period / 2
     numbers = np.random.default_rng(seed).standard_normal((2, COUNT, frequency.size))
     z = irfft(deviation * (numbers[0] + 1j * numbers[1]), period, axis=1)[:, :size]
-    if levelled:
-        t = np.linspace(-1, 1, size)
-        z = z - z.mean(axis=1, keepdims=True)
-        z = z - np.outer(z @ t / (t @ t), t)
-    return [Heights(row, step, heights.section) for row in z]
+    if degree is not None:
+        base = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, size), degree))[0]
+        z = z - (z @ base) @ base.T
+    return [replace(heights, z=row, step=step) for row in z]

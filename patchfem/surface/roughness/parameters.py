@@ -1,5 +1,6 @@
 """The even heights that all parameters of a trace are read from, with what several of them share: moments, the spacing
-of hills and dales (ISO 4287, ISO 21920-2), the Abbott curve and its core (ISO 13565-2, ISO 21920-2)."""
+of hills and dales (ISO 4287, ISO 21920-2), the Abbott curve, its core (ISO 13565-2, ISO 21920-2) and its volumes
+(ISO 25178-2)."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,11 +18,15 @@ class Heights:
     """Heights z (n,) [m] about their mean line, every `step` [m]: the primary or the roughness profile.
 
     section: length [m] over which a peak, a valley or a spacing is looked for, the cut-off; None: the whole trace.
+    level: height [m] above the mean line at which a material ratio is read; ratios: the two material ratios [1] whose
+    heights are set side by side.
     """
 
     z: np.ndarray
     step: float
     section: float | None = None
+    level: float = 0.0
+    ratios: tuple = (0.1, 0.9)
 
     @property
     def length(self) -> float:
@@ -92,6 +97,15 @@ def mean_spacing(heights: Heights) -> float | None:
     spans = [part[-1] - part[0] for part in (places[::2], places[1::2]) if part.size > 1]
     count = sum(part.size - 1 for part in (places[::2], places[1::2]) if part.size > 1)
     return float(sum(spans)) / count
+
+
+def mean_element(heights: Heights) -> float | None:
+    """Rc: mean height of the elements of `mean_spacing` from dale to hill [m], None where the trace holds none."""
+    places = crossings(heights)
+    if places.size < 3:
+        return None
+    parts = np.maximum.reduceat(np.abs(heights.z), np.floor(places / heights.step).astype(int) + 1)[:-1]
+    return float((parts[1:] + parts[:-1]).mean())
 
 
 def crossings(heights: Heights) -> np.ndarray:
@@ -165,6 +179,28 @@ def core(heights: Heights) -> Core | None:
     peaks = 2 * float((above - top).sum()) / n / first if first > 0 else 0.0
     valleys = 2 * float((bottom - below).sum()) / n / (1 - second) if second < 1 else 0.0
     return Core(-slope, peaks, valleys, first, second, top)
+
+
+def height_at(heights: Heights, ratio: float) -> float:
+    """Height [m] that this share [1] of the length lies above."""
+    return float(np.interp(ratio, _ratios(heights.z.size), heights.ordered))
+
+
+def material_ratio(heights: Heights) -> float:
+    """Rmr(c): share [1] of the length that lies above the height c, `level`."""
+    return _ratio_at(heights.ordered, heights.level)
+
+
+def ratio_heights(heights: Heights) -> float:
+    """Rdc: height [m] between two material ratios, `ratios`."""
+    first, second = (height_at(heights, one) for one in heights.ratios)
+    return first - second
+
+
+def volume(heights: Heights, ratio: float, material: bool) -> float:
+    """Volume of the material above, or of the void below, the height of a material ratio, per area [m3/m2]."""
+    off = heights.ordered - height_at(heights, ratio)
+    return float(np.maximum(off if material else -off, 0.0).mean())
 
 
 def _ratio_at(z, level: float) -> float:

@@ -6,12 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError, frozen_array, say
-from ..areal import Areal, level_plane
+from ..areal import Areal
 from ..profile import Profile, even, level, spikes
 from ..quantity import Quantity, refused
 from . import rows
-from .areal import areal_intervals, areal_parameters
-from .filter import filtered
+from .areal import Surface, lacking
+from .areal_intervals import areal_intervals
+from .filter import filtered, filtered_scan
+from .form import degree_of, without_form
 from .intervals import Intervals
 from .parameters import Heights, abbott
 from .spectrum import BAND, amplitude_of, refuse_band, spectrum_of
@@ -19,6 +21,8 @@ from .tip import Tip, tip_check
 
 FEWEST = 16  # samples of a trace with a report
 UNTOLD = "the trace does not tell its interval"
+CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)  # [m] of ISO 21920-3, and one more at each end
+SECTIONS = 6  # cut-offs in a trace: five that count and one that the filter takes
 ROUND = 1e-14  # of the largest height: what levelling leaves of a straight line
 PRINTED = {"Ra": "Pa", "Rq": "Pq", "Skew": "Psk", "RzDin": "RzDin", "MaxDev": "MaxDev", "ASH": "ASH",
            "Wa": "Pa", "Wq": "Pq", "WMaxDev": "MaxDev"}  # names of a Dektak, which filters nothing unless asked
@@ -33,15 +37,32 @@ class Reread(NamedTuple):
     unit: str
 
 
+class Settings(NamedTuple):
+    """What is taken off a surface before its parameters are read, and where two of them are read.
+
+    form: degree of a polynomial or "cylinder" (`without_form`); short [m]: nesting index of the S-filter, None for
+    none; level [m] and ratios [1] of the material ratio and of the height between two (`Heights`).
+    """
+
+    form: int | str = 1
+    short: float | None = None
+    level: float = 0.0
+    ratios: tuple = (0.1, 0.9)
+
+
+NOTHING = Settings()
+
+
 @dataclass(frozen=True, eq=False)
 class RoughnessReport:
     """What `report_of` found.
 
     values: tuple of Quantity, each with its name; length [m]; shape: samples, along y first; step [m] between samples;
-    cutoff, window [m] or None; band: wavelengths [m] of band_amplitude; notes: sentences about the file and what was
-    done to it; tip: the stylus against the valleys, or None; printed: tuple of Reread. Of traces only: primary, the
-    levelled trace; waviness, roughness, None without a cut-off; abbott: (ratio, height) of the roughness, of the
-    primary without one, and its core; spectrum of the primary. scan: the levelled areal scan.
+    form: the name of what was subtracted first; cutoff, window [m] or None; band: wavelengths [m] of band_amplitude;
+    notes: sentences about the file and what was done to it; tip: the stylus against the valleys, or None; printed:
+    tuple of Reread. Of traces only: primary, the trace without form; waviness, roughness, None without a cut-off;
+    abbott: (ratio, height) of the roughness, of the primary without one, and its core; spectrum of the primary. scan:
+    the areal scan that the parameters are read from.
     """
 
     source: str
@@ -51,6 +72,8 @@ class RoughnessReport:
     step: float
     values: tuple
     notes: tuple
+    form: str
+    settings: Settings
     cutoff: float | None = None
     window: tuple | None = None
     band: tuple = BAND
@@ -70,38 +93,47 @@ class RoughnessReport:
 
 
 def report_of(surface: Profile | Areal, cutoff: float | None = None, window: tuple | None = None,
-              tip: float | None = None, band: tuple = BAND) -> RoughnessReport:
+              tip: float | None = None, band: tuple = BAND, settings: Settings = NOTHING) -> RoughnessReport:
     """Parameters of a trace or of an areal scan with the intervals that one measurement of its size allows.
 
-    cutoff [m]: between waviness and roughness; without it there is the primary profile alone. window: (first, last)
-    [m] on the x axis of the file, as cursors (`windowed`). tip [m]: radius of the stylus, by default that of the file.
-    band [m]: wavelengths of band_amplitude. A trace of a million samples: 1.2 s. PatchfemError for fewer than 16
-    samples, a window beyond the trace, a cut-off that does not fit, or one for an areal scan.
+    cutoff [m]: between waviness and roughness, of a scan the nesting index of its L-filter; without it there is the
+    primary profile or the S-F surface alone. window: (first, last) [m] on the x axis of the file, as cursors
+    (`windowed`). tip [m]: radius of the stylus, by default that of the file. band [m]: wavelengths of band_amplitude.
+    A trace of a million samples: 1.2 s. PatchfemError for fewer than 16 samples, a window beyond the trace, a cut-off
+    that does not fit, or a window for an areal scan.
     """
     if isinstance(surface, Areal):
-        if cutoff is not None or window is not None:
-            raise PatchfemError(f"{surface.source}: an areal scan; a cut-off or a window is for one trace of it")
-        return _of_scan(surface)
+        if window is not None:
+            raise PatchfemError(f"{surface.source}: an areal scan; a window is for one trace of it")
+        return _of_scan(surface, cutoff, settings)
     cut = surface if window is None else windowed(surface, *window)
     trace = _enough(even(_enough(cut)))
-    primary, found = _primary(trace, band)
+    primary, form, found = _primary(trace, band, settings)
     heights, spectrum = found.heights, found.spectrum
     values = [_value(row, row.of(heights), found) for row in rows.PRIMARY]
     values += [_waves(row, trace.source, found) for row in rows.WAVES]
     waviness = roughness = rough = None
     if cutoff is not None:
         waviness, roughness = filtered(primary, cutoff)
-        rough = Heights(roughness.z, heights.step, cutoff)
-        inner = Intervals(rough, levelled=False)
+        rough = replace(heights, z=roughness.z, section=cutoff)
+        inner = Intervals(rough, None)
         values += [_value(row, row.of(rough), inner) for row in rows.ROUGH]
+        staged = replace(heights, z=filtered(primary, cutoff, stages=2)[1].z, section=cutoff)
+        values += [_value(row, row.of(staged), inner) for row in rows.TWO_STAGE]
     if window is not None:
         values += [_value(row, _ends(trace) if row.of is None else row.of(heights), found) for row in rows.WINDOW]
     shown, radius = rough or heights, surface.tip_radius if tip is None else tip
     stylus = None if radius is None else tip_check(heights, radius)
+    notes = trace.notes + _spiky(cut) + _skewed(trace.source, values)
     return RoughnessReport(
-        trace.source, "profile", trace.length, (trace.x.size,), heights.step, tuple(values),
-        trace.notes + _spiky(cut) + _skewed(trace.source, values), cutoff, window, band, stylus, reread(surface),
-        primary, waviness, roughness, abbott(shown), shown.core, spectrum)
+        trace.source, "profile", trace.length, (trace.x.size,), heights.step, tuple(values), notes, form, settings,
+        cutoff, window, band, stylus, reread(surface), primary, waviness, roughness, abbott(shown), shown.core,
+        spectrum)
+
+
+def fitting_cutoff(length: float, step: float) -> float | None:
+    """The longest standard cut-off [m] with five sections in a trace of this length [m] and step [m], or None."""
+    return max((one for one in CUTOFFS if SECTIONS * one <= length and one >= 4 * step), default=None)
 
 
 def windowed(profile: Profile, first: float, last: float) -> Profile:
@@ -122,17 +154,17 @@ def windowed(profile: Profile, first: float, last: float) -> Profile:
 def interval_of(name: str, profile: Profile, cutoff: float | None = None, band: tuple = BAND) -> Quantity:
     """One parameter of a trace with its interval; names as in `rows`, those of the roughness need a cut-off [m]."""
     row = rows.TABLE.get(name)
-    if row is None or row in rows.AREAL or row in rows.WINDOW:
+    if row is None or row in rows.AREAL or row in rows.WINDOW or row in rows.TWO_STAGE:
         known = ", ".join(each.name for each in (*rows.PRIMARY, *rows.WAVES, *rows.ROUGH))
         raise PatchfemError(f"'{name}' is no parameter of a trace; known are {known}")
     trace = _enough(even(_enough(profile)))
     if row not in rows.ROUGH:
-        found = _primary(trace, band)[1]
+        found = _primary(trace, band)[2]
         return _waves(row, trace.source, found) if row in rows.WAVES else _value(row, row.of(found.heights), found)
     if cutoff is None:
         raise PatchfemError(f"{profile.source}: {name} is of the roughness profile and wants a cut-off")
     heights = Heights(filtered(_primary(trace, band)[0], cutoff)[1].z, trace.length / (trace.x.size - 1), cutoff)
-    return _value(row, row.of(heights), Intervals(heights, levelled=False))
+    return _value(row, row.of(heights), Intervals(heights, None))
 
 
 def reread(profile: Profile) -> tuple:
@@ -164,12 +196,19 @@ def _enough(trace: Profile) -> Profile:
     return trace
 
 
-def _primary(trace: Profile, band: tuple) -> tuple:
-    flat = level(trace)
+def _primary(trace: Profile, band: tuple, settings: Settings = NOTHING) -> tuple:
+    """The trace without form and without the waves of the S-filter, the name of the form, and its `Intervals`.
+
+    A Gaussian filter keeps a polynomial one of its degree, so that the form may go first and again behind it.
+    """
+    flat, form = without_form(trace, settings.form)
+    if settings.short is not None:
+        flat = without_form(filtered(flat, settings.short)[0], settings.form)[0]
     if np.ptp(flat.z) <= ROUND * np.abs(trace.z).max():
         flat = replace(flat, z=frozen_array(np.zeros(flat.z.size)))
-    heights = Heights(flat.z, trace.length / (trace.x.size - 1))
-    return flat, Intervals(heights, True, spectrum_of(heights.z, heights.step), band)
+    heights = Heights(flat.z, trace.length / (trace.x.size - 1), None, settings.level, settings.ratios)
+    spectrum = spectrum_of(heights.z, heights.step)
+    return flat, form, Intervals(heights, degree_of(settings.form), spectrum, band)
 
 
 def _value(row, value, found: Intervals) -> Quantity:
@@ -182,7 +221,14 @@ def _value(row, value, found: Intervals) -> Quantity:
     elif row.kind == "wave" and low is not None and not (
             found.heights.step <= low <= value <= high <= found.heights.length):
         low, high, reason = None, None, UNTOLD
-    return Quantity(value, low, high, row.unit, row.text, reason, row.name)
+    if value is not None and low is None and not reason:
+        reason = "one trace does not tell its interval" if found.heights.power else ""
+    return Quantity(value, low, high, row.unit, _text(row, found.heights), reason, row.name)
+
+
+def _text(row, heights: Heights | Surface) -> str:
+    first, second = (f"{100 * one:g} %" for one in heights.ratios)
+    return row.text.format(level=say(heights.level), first=first, second=second)
 
 
 def _waves(row, source: str, found: Intervals) -> Quantity:
@@ -223,14 +269,25 @@ def _skewed(source: str, values: list) -> tuple:
     return tuple(out)
 
 
-def _of_scan(scan: Areal) -> RoughnessReport:
-    flat = level_plane(scan)
-    found = areal_parameters(flat.z)
+def _of_scan(scan: Areal, cutoff: float | None, settings: Settings) -> RoughnessReport:
+    flat, form = without_form(scan, settings.form)
+    if settings.short is not None:
+        flat = without_form(filtered_scan(flat, settings.short)[0], settings.form)[0]
+    if cutoff is not None:
+        flat = filtered_scan(flat, cutoff)[1]
+    if np.isnan(flat.z).all():
+        raise PatchfemError(f"{scan.source}: no measured height is left within half a cut-off of the borders")
+    if np.nanmax(flat.z) - np.nanmin(flat.z) <= ROUND * np.nanmax(np.abs(scan.z)):
+        flat = replace(flat, z=frozen_array(flat.z * 0.0))
+    steps = tuple(float(axis[-1] - axis[0]) / (axis.size - 1) for axis in (flat.y, flat.x))
+    surface = Surface(flat.z, steps, settings.level, settings.ratios)
+    found = {row.name: row.of(surface) for row in rows.AREAL}
     bounds = areal_intervals(flat.z, found)
-    values = tuple(Quantity(found[row.name], *bounds[row.name], row.unit, row.text,
-                            "" if found[row.name] is not None else "the scan is flat", row.name) for row in rows.AREAL)
-    lost = int(scan.missing.sum())
-    notes = scan.notes + ((f"{scan.source}: {lost} of {scan.z.size} heights are missing and do not count",) if lost
+    values = tuple(Quantity(found[row.name], *bounds[row.name], row.unit, _text(row, surface),
+                            lacking(surface, row.name, found[row.name], bounds[row.name][0]), row.name)
+                   for row in rows.AREAL)
+    lost = int(np.isnan(flat.z).sum())
+    notes = scan.notes + ((f"{scan.source}: {lost} of {flat.z.size} heights are missing and do not count",) if lost
                           else ())
-    return RoughnessReport(scan.source, "areal", float(scan.x[-1] - scan.x[0]), scan.z.shape,
-                           float(scan.x[-1] - scan.x[0]) / (scan.x.size - 1), values, notes, scan=flat)
+    return RoughnessReport(scan.source, "areal", float(scan.x[-1] - scan.x[0]), scan.z.shape, steps[1], values, notes,
+                           form, settings, cutoff, scan=flat)

@@ -1,4 +1,4 @@
-"""Parameters of a trace as rows of one table: a new parameter is a new row.
+"""Parameters of traces and scans as rows of one table: a new parameter is a new row.
 
 A row has a name, a unit, a definition in one sentence, its function and the kind of its interval. The same functions
 serve the primary profile, whose names begin with P, and the roughness profile, whose names begin with R.
@@ -10,16 +10,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .parameters import Heights, mean_spacing, moment, of_sections, peak_to_valley, root_mean_square
+from .areal import aspect, developed, direction, gradient, shortest
+from .parameters import (
+    Heights,
+    material_ratio,
+    mean_element,
+    mean_spacing,
+    moment,
+    of_sections,
+    peak_to_valley,
+    ratio_heights,
+    root_mean_square,
+    volume,
+)
 from .spectrum import spectrum_of
 
 
 class Parameter(NamedTuple):
-    """One parameter of a trace.
+    """One parameter of a trace or of a scan.
 
-    of: its function of `Heights`, None where it is not read off them alone; kind of its interval (`intervals`):
-    "power", "slope" and "band" by degrees of freedom of the spectrum, "ratio", "shift", "share", "wave" and "extreme"
-    by made traces of that spectrum, "" for none.
+    of: its function of `Heights`, or of a scan's `Surface`, None where it is not read off them alone; kind of its
+    interval (`intervals`): "power", "slope" and "band" by degrees of freedom of the spectrum, "ratio", "shift",
+    "share", "wave" and "extreme" by made traces of that spectrum, "" for none. {level}, {first} and {second} in the
+    text stand for what `Heights` has.
     """
 
     name: str
@@ -69,6 +82,11 @@ _BASE = (  # name without its letter
      _core("valleys"), "ratio"),
     ("Mr1", "1", "share of the length above the core", _core("first"), "share"),
     ("Mr2", "1", "share of the length above the bottom of the core", _core("second"), "share"),
+    ("c", "m", "mean height of a hill with its neighbouring dale, those that count for the spacing", mean_element,
+     "ratio"),
+    ("mr", "1", "material ratio: share of the length above the height {level} over the mean line", material_ratio,
+     "share"),
+    ("dc", "m", "height from the material ratio {second} up to the material ratio {first}", ratio_heights, "ratio"),
 )
 _WHOLE = {"p", "v"}  # of the primary profile: over the whole trace, so extremes
 PRIMARY = tuple(Parameter("P" + name, unit, text + ", of the levelled trace", of, "extreme" if name in _WHOLE else kind)
@@ -77,6 +95,9 @@ _MEAN = {"p", "v", "z"}
 ROUGH = tuple(Parameter(name if name.startswith("Mr") else "R" + name, unit,
                         text + (", mean over the sections of one cut-off" if name in _MEAN else "")
                         + ", of the roughness profile", of, kind) for name, unit, text, of, kind in _BASE)
+TWO_STAGE = tuple(Parameter(f"{row.name}_13565", row.unit, row.text.replace("roughness profile", "profile of the "
+                            "two-stage filter of ISO 13565-1, which cuts the valleys off before its second mean line"),
+                            row.of, "") for row in ROUGH if row.name in ("Rk", "Rpk", "Rvk", "Mr1", "Mr2"))
 WAVES = (
     Parameter("dominant_wavelength", "m", "wavelength at which an octave of frequencies holds most height, of the "
               "levelled trace", lambda heights: spectrum_of(heights.z, heights.step).dominant, "wave"),
@@ -91,12 +112,56 @@ WINDOW = (
     Parameter("ASH", "m", "average step height: height of the window's last sample over its first, before levelling",
               None, ""),
 )
+
+
+def _all(of: Callable, *more) -> Callable:
+    """A function of heights, read off all those of a scan."""
+    return lambda surface: of(surface.heights, *more)
+
+
 AREAL = (
-    Parameter("Sa", "m", "mean of the absolute heights about the least-squares plane", None, "power"),
-    Parameter("Sq", "m", "root mean square of the heights about the least-squares plane", None, "power"),
-    Parameter("Ssk", "1", "skewness: mean cube of the heights over Sq^3", None, "shift"),
-    Parameter("Sku", "1", "kurtosis: mean fourth power of the heights over Sq^4, 3 for a Gaussian surface", None,
-              "shift"),
-    Parameter("Sz", "m", "height from the lowest to the highest point", None, ""),
+    Parameter("Sa", "m", "mean of the absolute heights about the reference surface",
+              _all(lambda heights: float(np.abs(heights.z).mean())), "power"),
+    Parameter("Sq", "m", "root mean square of the heights about the reference surface", _all(root_mean_square),
+              "power"),
+    Parameter("Ssk", "1", "skewness: mean cube of the heights over Sq^3", _all(moment, 3), "shift"),
+    Parameter("Sku", "1", "kurtosis: mean fourth power of the heights over Sq^4, 3 for a Gaussian surface",
+              _all(moment, 4), "shift"),
+    Parameter("Sp", "m", "height of the highest point above the reference surface",
+              _all(lambda heights: float(heights.z.max())), ""),
+    Parameter("Sv", "m", "depth of the lowest point below the reference surface",
+              _all(lambda heights: float(-heights.z.min())), ""),
+    Parameter("Sz", "m", "height from the lowest to the highest point", _all(lambda heights: float(np.ptp(heights.z))),
+              ""),
+    Parameter("Sdq", "1", "root mean square gradient, of the slopes between neighbours along x and along y (two "
+              "points)", gradient, ""),
+    Parameter("Sdr", "1", "developed area over that of the plane, less one; each cell of four points is the mean of "
+              "its two pairs of triangles", developed, ""),
+    Parameter("Sal", "m", "autocorrelation length: shortest distance at which the autocorrelation falls to 0.2",
+              shortest, ""),
+    Parameter("Str", "1", "texture aspect ratio: Sal over the longest distance of the same kind, 1 for alike in every "
+              "direction", aspect, ""),
+    Parameter("Std", "rad", "texture direction: angle from x, anticlockwise, of the waves with the most power; the lay "
+              "runs at right angles to it", direction, ""),
+    Parameter("Sk", "m", "core height: fall of the least-squares line through the flattest 40 % of the Abbott curve, "
+              "over all of it", _all(_core("core")), ""),
+    Parameter("Spk", "m", "reduced peak height: a triangle over Smr1 with the volume of the peaks above the core",
+              _all(_core("peaks")), ""),
+    Parameter("Svk", "m", "reduced valley depth: a triangle over 1 - Smr2 with the volume of the valleys below the "
+              "core", _all(_core("valleys")), ""),
+    Parameter("Smr1", "1", "share of the area above the core", _all(_core("first")), ""),
+    Parameter("Smr2", "1", "share of the area above the bottom of the core", _all(_core("second")), ""),
+    Parameter("Vmp", "m", "volume of the peaks per area: material above the material ratio 10 %",
+              _all(volume, 0.1, True), ""),
+    Parameter("Vmc", "m", "volume of the core's material per area: between the material ratios 10 % and 80 %",
+              _all(lambda heights: volume(heights, 0.8, True) - volume(heights, 0.1, True)), ""),
+    Parameter("Vvc", "m", "volume of the core's void per area: between the material ratios 10 % and 80 %",
+              _all(lambda heights: volume(heights, 0.1, False) - volume(heights, 0.8, False)), ""),
+    Parameter("Vvv", "m", "volume of the valleys' void per area: below the material ratio 80 %",
+              _all(volume, 0.8, False), ""),
+    Parameter("Smr", "1", "material ratio: share of the area above the height {level} over the reference surface",
+              _all(material_ratio), ""),
+    Parameter("Sdc", "m", "height from the material ratio {second} up to the material ratio {first}",
+              _all(ratio_heights), ""),
 )
-TABLE = {row.name: row for row in (*PRIMARY, *ROUGH, *WAVES, *WINDOW, *AREAL)}
+TABLE = {row.name: row for row in (*PRIMARY, *ROUGH, *TWO_STAGE, *WAVES, *WINDOW, *AREAL)}

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from synthetic import sine
 
 from patchfem.core import PatchfemError
-from patchfem.surface.profile import Profile, even
+from patchfem.surface.profile import Profile, even, level
 from patchfem.surface.roughness.filter import ALPHA, filtered, mean_line
 from patchfem.surface.roughness.parameters import Heights, root_mean_square
 
@@ -112,3 +112,22 @@ def test_refuses_a_cutoff_that_does_not_fit(cutoff, says):
 def test_refuses_ends_that_are_not_known():
     with pytest.raises(PatchfemError, match="'padded' are not known; use trimmed or whole"):
         filtered(sine(np.arange(1000) * UM, UM, 80 * UM), 80 * UM, "padded")
+
+
+def test_exact_the_two_stage_filter_by_its_definition():
+    """Valleys below the first mean line are cut off before the second (ISO 13565-1): by sums over the weights."""
+    rng = np.random.default_rng(8)
+    x = np.arange(900) * 1e-6
+    z = rng.normal(size=x.size) * 1e-7 - 3e-6 * (np.abs((x * 1e6) % 120 - 60) < 5)
+    trace = level(Profile(x, z, "trace"))
+
+    def mean(values, at, cutoff=100.0):
+        weight = np.exp(-np.pi * ((np.arange(values.size) - at) / (ALPHA * cutoff)) ** 2)
+        return (weight * values).sum() / weight.sum()
+
+    first = np.array([mean(trace.z, at) for at in range(x.size)])
+    rough = filtered(trace, 100e-6, stages=2)[1]
+    for at in (50, 400, 849):
+        assert rough.z[at - 50] == pytest.approx(trace.z[at] - mean(np.maximum(trace.z, first), at), abs=1e-14)
+    plain = filtered(trace, 100e-6)[1]
+    assert rough.z.min() < plain.z.min()  # the mean line stays on the plateaus

@@ -41,7 +41,7 @@ def coverage(count: int, seed: int, names=None, others: int = 2000) -> dict:
         for heights, row, value in read(z, names):
             if value is None:
                 continue
-            one = made.setdefault(id(heights), Intervals(heights, levelled=heights.section is None))
+            one = made.setdefault(id(heights), Intervals(heights, 1 if heights.section is None else None))
             low, high = one.of(row, value)
             held[row.name].append(low <= truth[row.name] <= high)
     return {name: float(np.mean(values)) for name, values in held.items() if values}
@@ -76,7 +76,7 @@ def test_exact_degrees_of_freedom_of_white_noise():
     """n independent heights have n degrees of freedom, so Rq scatters by 1 / sqrt(2 n)."""
     n = 20_000
     heights = Heights(np.random.default_rng(0).normal(size=n), UM)
-    found = Intervals(heights, levelled=False)
+    found = Intervals(heights, None)
     assert found.freedom("power") == pytest.approx(n, rel=0.05)
     low, high = found.of(TABLE["Rq"], 1.0)
     assert high - low == pytest.approx(2 * 1.645 / np.sqrt(2 * n), rel=0.05)
@@ -85,7 +85,7 @@ def test_exact_degrees_of_freedom_of_white_noise():
 def test_exact_long_tails_make_the_interval_wider():
     """Laplace heights have a kurtosis of 6: the mean square scatters by sqrt(5 / 2) more."""
     rng = np.random.default_rng(0)
-    found = [Intervals(Heights(z, UM), False).freedom("power") for z in (rng.normal(size=50_000),
+    found = [Intervals(Heights(z, UM), None).freedom("power") for z in (rng.normal(size=50_000),
                                                                         rng.laplace(size=50_000))]
     assert found[0] / found[1] == pytest.approx(2.5, rel=0.1)
 
@@ -97,7 +97,7 @@ def test_always_a_longer_trace_tells_more():
         row, widths = TABLE[name], []
         for size in (16_000, 64_000):
             heights = Heights(z[:size], UM)
-            low, high = Intervals(heights, False).of(row, row.of(heights))
+            low, high = Intervals(heights, None).of(row, row.of(heights))
             widths.append(high - low)
         assert widths[0] / widths[1] == pytest.approx(2, rel=0.2), name
 
@@ -106,23 +106,23 @@ def test_exact_made_traces_have_the_spectrum_and_are_the_same_each_time():
     z = traces(1, 2e-3, UM, 6e-6, 9)[0]
     heights = Heights(z - z.mean(), UM)
     found = spectrum_of(heights.z, UM)
-    made = made_traces(found, heights, False)
+    made = made_traces(found, heights, None)
     assert len(made) == COUNT and made[0].z.size <= heights.z.size
     power = np.mean([root_mean_square(one) ** 2 for one in made])
     assert power == pytest.approx(found.density.sum() * found.step, rel=0.1)
-    assert np.array_equal(made[7].z, made_traces(found, heights, False)[7].z)
+    assert np.array_equal(made[7].z, made_traces(found, heights, None)[7].z)
 
 
 def test_exact_a_share_stays_a_share():
     z = traces(1, 0.3e-3, UM, 6e-6, 2)[0]
     heights = Heights(z - z.mean(), UM)
     for name in ("PMr1", "PMr2"):
-        low, high = Intervals(heights, True).of(TABLE[name], TABLE[name].of(heights))
+        low, high = Intervals(heights, 1).of(TABLE[name], TABLE[name].of(heights))
         assert 0 <= low <= high <= 1
 
 
 def test_exact_a_flat_trace_has_no_interval():
-    assert Intervals(Heights(np.zeros(100), UM), True).of(TABLE["Pa"], 0.0) == (None, None)
+    assert Intervals(Heights(np.zeros(100), UM), 1).of(TABLE["Pa"], 0.0) == (None, None)
 
 
 @pytest.mark.parametrize("radius", [5.0, 12.5, 40.0, 100.0])

@@ -10,7 +10,7 @@ from synthetic import sine
 from patchfem.core import PatchfemError
 from patchfem.surface.areal import Areal
 from patchfem.surface.profile import Printed, Profile
-from patchfem.surface.roughness.report import interval_of, report_of, windowed
+from patchfem.surface.roughness.report import NOTHING, fitting_cutoff, interval_of, report_of, windowed
 
 UM = 1e-6
 
@@ -34,7 +34,7 @@ def test_exact_a_sine_with_a_little_noise():
     assert report["band_amplitude"].value == pytest.approx(2 * UM, rel=0.01)
     assert report["dominant_wavelength"].value == pytest.approx(80 * UM, rel=0.01)
     assert [one.low <= one.value <= one.high for one in report.values if one.low is not None].count(False) == 0
-    assert len({one.name for one in report.values}) == len(report.values) == 31
+    assert len({one.name for one in report.values}) == len(report.values) == 42
 
 
 def test_exact_a_flat_trace_says_so():
@@ -118,7 +118,8 @@ def test_exact_areal_parameters_of_white_noise(lost):
     (made(), {"window": (20 * UM, 10 * UM)}, "a window from 20 um to 10 um; the trace runs from 0 um to 4 mm"),
     (made(), {"window": (20 * UM, 5e-3)}, "a window from 20 um to 5 mm"),
     (made(), {"cutoff": 5e-3}, "the trace is 4 mm long; half a cut-off of 5 mm goes off at each end"),
-    (scan(), {"cutoff": 1e-4}, "scan.txt: an areal scan; a cut-off or a window is for one trace of it"),
+    (scan(), {"window": (0.0, 1e-4)}, "scan.txt: an areal scan; a window is for one trace of it"),
+    (scan(), {"cutoff": 1e-4}, "scan.txt: the shorter side is 79 um long; half a cut-off of 100 um goes off"),
 ])
 def test_refuses(surface, more, says):
     with pytest.raises(PatchfemError, match=says):
@@ -138,3 +139,27 @@ def test_always_a_million_samples_take_two_seconds():
     begin = process_time()
     report_of(trace, 800 * UM)
     assert process_time() - begin < 2
+
+
+def test_exact_a_form_and_a_short_wave_of_a_trace():
+    """A parabola of 50 um and a wave of 5 um off a sine of 80 um: its amplitude is that of a Gaussian filter."""
+    x = np.arange(4001) * UM
+    z = 2 * UM * np.sin(2 * np.pi * x / 80e-6) + 50 * UM * (x / 2e-3 - 1) ** 2 + UM * np.sin(2 * np.pi * x / 5e-6)
+    trace = Profile(x, z, "bent.csv")
+    assert report_of(trace)["Pq"].value > 10 * UM
+    report = report_of(trace, settings=NOTHING._replace(form=2, short=20 * UM))
+    kept = 2 ** -((20 / 80) ** 2)
+    assert report["Pq"].value == pytest.approx(2 * UM / np.sqrt(2) * kept, rel=2e-3)
+    assert report.form == "polynomial of degree 2" and report.primary.x[0] == 10 * UM
+
+
+@pytest.mark.parametrize("length, fits", [(4e-3, 250 * UM), (1.5e-3, 250 * UM), (1.49e-3, 80 * UM), (60e-3, 8e-3),
+                                          (0.1e-3, None)])
+def test_exact_the_cutoff_that_fits(length, fits):
+    """Standard cut-offs; the trace holds five sections and two halves."""
+    assert fitting_cutoff(length, 0.5 * UM) == (None if fits is None else pytest.approx(fits))
+
+
+def test_always_no_value_or_interval_is_missing_without_a_reason():
+    report = report_of(made(), 250 * UM, (100 * UM, 3900 * UM))
+    assert all(one.reason for one in report.values if one.value is None or one.low is None)

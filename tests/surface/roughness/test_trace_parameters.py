@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from patchfem.surface.roughness.parameters import Heights, abbott, core, crossings, mean_spacing
-from patchfem.surface.roughness.rows import PRIMARY, ROUGH, TABLE
+from patchfem.surface.roughness.parameters import Heights, abbott, core, crossings, mean_element, mean_spacing
+from patchfem.surface.roughness.rows import AREAL, PRIMARY, ROUGH, TABLE, TWO_STAGE, WAVES, WINDOW
 
 UM = 1e-6
 
@@ -45,7 +45,7 @@ def test_always_heights_scale_and_numbers_do_not(seed, count, factor):
     z = np.random.default_rng(seed).normal(0, UM, count)
     one, other = Heights(z, UM), Heights(factor * z, UM)
     for row in PRIMARY:
-        grown = 1.0 if row.name in ("PSm", "PMr1", "PMr2", "Psk", "Pku") else factor
+        grown = 1.0 if row.name in ("PSm", "PMr1", "PMr2", "Pmr", "Psk", "Pku") else factor
         value = row.of(one)
         assert row.of(other) == (None if value is None else pytest.approx(grown * value, rel=1e-9)), row.name
 
@@ -111,10 +111,31 @@ def test_exact_abbott_curve_of_a_sine():
 def test_exact_a_flat_trace_has_no_shape():
     flat = Heights(np.zeros(100), UM, 20 * UM)
     without = [row.name for row in ROUGH if row.of(flat) is None]
-    assert without == ["Rsk", "Rku", "RSm", "Rk", "Rpk", "Rvk", "Mr1", "Mr2"]
+    assert without == ["Rsk", "Rku", "RSm", "Rk", "Rpk", "Rvk", "Mr1", "Mr2", "Rc"]
 
 
 def test_exact_every_row_has_a_name_of_its_own_and_a_definition():
     rows = [*PRIMARY, *ROUGH]
-    assert len(rows) + 10 == len(TABLE)
-    assert all(len(row.text.split()) > 4 and row.unit in ("m", "1") for row in TABLE.values())
+    assert len(rows) + len(TWO_STAGE) + len(AREAL) + len(WAVES) + len(WINDOW) == len(TABLE)
+    assert all(len(row.text.split()) > 4 and row.unit in ("m", "1", "rad") for row in TABLE.values())
+
+
+def test_exact_elements_material_ratio_and_two_heights_of_a_sine():
+    """Rc = 2 A; the share above A sin(phi) is 1/2 - phi / pi, so that A/2 has a third and 10 to 90 % lie
+    2 A sin(0.4 pi) apart."""
+    z = np.sin(2 * np.pi * (np.arange(10_007) + 0.5) / 1000.7)
+    assert TABLE["Rc"].of(Heights(z, 1.0)) == pytest.approx(2, rel=1e-4)
+    assert TABLE["Rmr"].of(Heights(z, 1.0)) == pytest.approx(1 / 2, abs=1e-3)
+    assert TABLE["Rmr"].of(Heights(z, 1.0, level=0.5)) == pytest.approx(1 / 3, abs=1e-3)
+    assert TABLE["Rdc"].of(Heights(z, 1.0)) == pytest.approx(2 * np.sin(0.4 * np.pi), rel=1e-3)
+    assert TABLE["Rdc"].of(Heights(z, 1.0, ratios=(0.0, 1.0))) == pytest.approx(2, rel=1e-3)
+    assert TABLE["Rmr"].of(Heights(z, 1.0, level=2.0)) == 0 and TABLE["Rmr"].of(Heights(z, 1.0, level=-2.0)) == 1
+
+
+def test_exact_elements_of_unlike_heights():
+    """Triangles of 1, 2, 3, 4 over dales of 1: from rise to rise 2 3 4 5, from fall to fall 3 4 5 (a dale of 1, then
+    the next hill): their mean over both kinds."""
+    hills = [1.0, 2.0, 3.0, 4.0]
+    z = np.concatenate([np.concatenate([h * np.array([0.5, 1, 0.5]), [-0.5, -1, -0.5]]) for h in hills])
+    z = np.concatenate([[-0.5, -1, -0.5], z])  # crossings: rise, fall, ... the last dale has no end
+    assert mean_element(Heights(z, 1.0)) == pytest.approx(np.mean([2, 3, 3, 4, 4, 5]), rel=1e-12)

@@ -1,0 +1,188 @@
+"""Parameters of scans (ISO 25178-2) and the areal filter: closed forms of ramps, sines and Gaussian surfaces; holes."""
+
+import numpy as np
+import pytest
+
+from patchfem.core import PatchfemError
+from patchfem.surface.areal import Areal
+from patchfem.surface.roughness.areal import (
+    Surface,
+    aspect,
+    autocorrelation,
+    developed,
+    direction,
+    gradient,
+    shortest,
+)
+from patchfem.surface.roughness.filter import ALPHA, filtered_scan, mean_line, mean_surface
+from patchfem.surface.roughness.report import NOTHING, report_of
+from patchfem.surface.roughness.rows import AREAL
+
+UM = 1e-6
+
+
+def scan(z, step=UM, down=UM) -> Areal:
+    return Areal(np.arange(z.shape[1]) * step, np.arange(z.shape[0]) * down, z, "scan")
+
+
+def plane_wave(m, n, wave, degrees, step=1.0) -> np.ndarray:
+    y, x = np.meshgrid(np.arange(m) * step, np.arange(n) * step, indexing="ij")
+    return np.sin(2 * np.pi * (x * np.cos(np.radians(degrees)) + y * np.sin(np.radians(degrees))) / wave + 0.3)
+
+
+def gaussian(m, n, across, along, degrees=0.0, seed=0) -> np.ndarray:
+    """Heights whose autocorrelation is exp(-(u/across)^2 - (v/along)^2), u and v turned by an angle; periodic."""
+    fy, fx = np.meshgrid(np.fft.fftfreq(m), np.fft.fftfreq(n), indexing="ij")
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    u, v = c * fx + s * fy, -s * fx + c * fy
+    power = np.exp(-(np.pi * u * across) ** 2 - (np.pi * v * along) ** 2)
+    noise = np.fft.fft2(np.random.default_rng(seed).standard_normal((m, n)))
+    z = np.fft.ifft2(np.sqrt(power) * noise).real
+    return z / z.std()
+
+
+def test_exact_a_ramp_before_it_is_levelled():
+    """Slopes a and b: gradient sqrt(a^2 + b^2), area sqrt(1 + a^2 + b^2), with and without holes."""
+    y, x = np.meshgrid(np.arange(20) * 2.0, np.arange(30) * 3.0, indexing="ij")
+    z = 0.4 * x - 0.7 * y
+    for holes in (False, True):
+        if holes:
+            z[np.random.default_rng(1).random(z.shape) < 0.2] = np.nan
+        surface = Surface(z, (2.0, 3.0))
+        assert gradient(surface) == pytest.approx(np.hypot(0.4, 0.7), rel=1e-12)
+        assert developed(surface) == pytest.approx(np.sqrt(1 + 0.4**2 + 0.7**2) - 1, rel=1e-12)
+
+
+def test_exact_a_sine_of_whole_periods():
+    """z = A cos(2 pi x / L): two-point slopes A sqrt(2) sin(pi h / L) / h; Sq, Sp, Sv, the Abbott curve of a sine."""
+    n, wave, high = 3997, 399.7, 3.0
+    z = np.tile(high * np.cos(2 * np.pi * (np.arange(n) + 0.5) / wave), (8, 1))
+    report = report_of(scan(z * UM))
+    assert report["Sq"].value == pytest.approx(high * UM / np.sqrt(2), rel=1e-9)
+    assert report["Ssk"].value == pytest.approx(0, abs=1e-9) and report["Sku"].value == pytest.approx(1.5, rel=1e-9)
+    surface = Surface(z, (1.0, 1.0))
+    rows = {row.name: row.of(surface) for row in AREAL}
+    slope = high * np.sqrt(2) * 2 * np.sin(np.pi / wave) / 2
+    assert rows["Sdq"] == pytest.approx(slope * np.sqrt((n - 0.5) / n), rel=3e-4)
+    assert rows["Sp"] == pytest.approx(high, rel=1e-4) and rows["Sv"] == pytest.approx(high, rel=1e-4)
+    every = Surface(high * np.sin(2 * np.pi * (np.arange(40_000) + 0.25) / 40_000).reshape(200, 200), (1.0, 1.0))
+    rows = {row.name: row.of(every) for row in AREAL if row.name[0] == "V" or row.name in ("Smr", "Sdc")}
+    # share above c = A sin(phi): 1/2 - phi / pi; volumes by integration of A cos over the phase
+    def height(p):
+        return high * np.sin(np.pi * (0.5 - p))
+
+    def material(p):
+        return high / np.pi * np.cos(np.pi * (0.5 - p)) - p * height(p)
+    assert rows["Vmp"] == pytest.approx(material(0.1), rel=1e-3)
+    assert rows["Vmc"] == pytest.approx(material(0.8) - material(0.1), rel=1e-3)
+    void = {p: material(p) + height(p) for p in (0.1, 0.8)}  # mean height zero: void = material - mean of (z - c)
+    assert rows["Vvv"] == pytest.approx(void[0.8], rel=1e-3)
+    assert rows["Vvc"] == pytest.approx(void[0.1] - void[0.8], rel=1e-3)
+    assert rows["Smr"] == pytest.approx(0.5, abs=1e-3)
+    assert rows["Sdc"] == pytest.approx(height(0.1) - height(0.9), rel=1e-3)
+
+
+def test_exact_the_flattest_two_fifths_of_a_straight_abbott_curve():
+    """Heights even between -1 and 1: the core is all of them, Sk = 2, no peaks and no valleys."""
+    z = np.random.default_rng(0).permutation(np.linspace(-1, 1, 10_000)).reshape(100, 100)
+    heights = Surface(z, (1.0, 1.0)).heights
+    assert heights.core.core == pytest.approx(2, rel=1e-3)
+    assert heights.core.peaks == pytest.approx(0, abs=1e-3) == heights.core.valleys
+
+
+def test_exact_the_autocorrelation_is_the_sum_over_measured_pairs():
+    z = np.random.default_rng(3).normal(size=(9, 12))
+    z[2, 3] = z[5, 7:9] = np.nan
+    found = autocorrelation(z)
+    assert found.shape == (9, 13) and found[4, 6] == pytest.approx(1)
+    for down, right in ((0, 1), (3, -4), (-4, 6), (2, 5)):
+        a = z[max(down, 0):9 + min(down, 0), max(right, 0):12 + min(right, 0)]
+        b = z[max(-down, 0):9 + min(-down, 0), max(-right, 0):12 + min(-right, 0)]
+        assert found[4 + down, 6 + right] == pytest.approx(np.nanmean(a * b) / np.nanmean(z * z), rel=1e-9)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 30.0, 117.0])
+def test_exact_grooves_have_a_length_and_a_direction_but_no_aspect(degrees):
+    """A sine of wavelength L falls to 0.2 at L arccos(0.2) / (2 pi), stays above along its crests, tells its angle."""
+    surface = Surface(plane_wave(300, 400, 25.0, degrees), (1.0, 1.0))
+    assert shortest(surface) == pytest.approx(25 * np.arccos(0.2) / (2 * np.pi), rel=0.01)
+    assert aspect(surface) is None
+    found = np.degrees(direction(surface))
+    assert abs((found - degrees + 90) % 180 - 90) < 0.3
+
+
+@pytest.mark.parametrize("degrees", [0.0, 40.0])
+def test_exact_a_gaussian_surface_of_two_lengths(degrees):
+    """Autocorrelation exp(-(u/a)^2 - (v/b)^2): Sal = a sqrt(ln 5), Str = a / b, waves across the longer one. A scan of
+    100 x 25 lengths tells them to a few percent."""
+    surface = Surface(gaussian(600, 600, 6.0, 18.0, degrees), (1.0, 1.0))
+    assert shortest(surface) == pytest.approx(6 * np.sqrt(np.log(5)), rel=0.05)
+    assert aspect(surface) == pytest.approx(1 / 3, rel=0.1)
+    assert abs((np.degrees(direction(surface)) - degrees + 90) % 180 - 90) < 5
+    z = surface.z.copy()
+    z[np.random.default_rng(5).random(z.shape) < 0.1] = np.nan
+    assert shortest(Surface(z, (1.0, 1.0))) == pytest.approx(shortest(surface), rel=0.01)
+
+
+def test_exact_steps_of_their_own_along_x_and_y():
+    """Every third row of a surface tells the same lengths."""
+    z = gaussian(900, 400, 12.0, 12.0, seed=2)
+    assert shortest(Surface(z[::3], (3.0, 1.0))) == pytest.approx(shortest(Surface(z, (1.0, 1.0))), rel=0.02)
+
+
+def test_always_what_has_no_value_says_why():
+    rng = np.random.default_rng(0)
+    for z, name, says in ((rng.normal(size=(60, 60)), "Sal", "within two steps"),
+                          (plane_wave(120, 120, 20.0, 0.0), "Str", "stays above 0.2 over 60 um, so Str is below 0.07"),
+                          (gaussian(200, 200, 5.0, 5.0), "Std", "no direction stands out: Str is 0."),
+                          (np.zeros((30, 30)), "Sk", "the scan is flat")):
+        found = report_of(scan(z * UM))[name]
+        assert found.value is None and says in found.reason
+    assert all(one.low is not None or one.reason for one in report_of(scan(rng.normal(size=(60, 60)) * UM)).values)
+
+
+def test_exact_the_areal_filter_is_that_of_traces_both_ways():
+    z = np.random.default_rng(4).normal(size=(80, 60))
+    rows = np.array([mean_line(row, 12.0) for row in z])
+    both = np.array([mean_line(column, 20.0) for column in rows.T]).T
+    assert mean_surface(z, (20.0, 12.0)) == pytest.approx(both, abs=1e-12)
+
+
+def test_exact_a_wave_through_the_areal_filter():
+    """What is left in the middle, exp(-pi (alpha cutoff / L)^2): half of a wave as long as the cut-off."""
+    for wave, degrees in ((40.0, 0.0), (40.0, 30.0), (25.0, 90.0)):
+        waves, rough = filtered_scan(scan(plane_wave(240, 240, wave, degrees)), 40 * UM)
+        assert waves.z.shape == (200, 200) and waves.x[0] == 20 * UM
+        kept = np.exp(-np.pi * (ALPHA * 40 / wave) ** 2)
+        inside = plane_wave(240, 240, wave, degrees)[60:-60, 60:-60]
+        assert waves.z[40:-40, 40:-40] == pytest.approx(kept * inside, abs=1e-9)
+        assert rough.z[40:-40, 40:-40] == pytest.approx((1 - kept) * inside, abs=1e-9)
+
+
+def test_exact_holes_leave_the_mean_surface_of_what_is_measured():
+    """By the definition at some points: the weights on measured heights, scaled to a sum of one; holes stay holes."""
+    z = np.random.default_rng(6).normal(size=(70, 70))
+    z[20:26, 30:50] = np.nan
+    found = mean_surface(z, (15.0, 15.0))
+    assert np.array_equal(np.isnan(found), np.isnan(z))
+    y, x = np.mgrid[:70, :70]
+    for i, j in ((19, 40), (2, 2), (27, 29)):
+        weight = np.where(np.isnan(z), 0, np.exp(-np.pi * ((y - i) ** 2 + (x - j) ** 2) / (ALPHA * 15) ** 2))
+        assert found[i, j] == pytest.approx((weight * np.nan_to_num(z)).sum() / weight.sum(), abs=1e-9)
+
+
+def test_exact_filters_of_a_report():
+    """S- and L-filter of a long and a short wave: the middle one is left."""
+    z = plane_wave(400, 400, 200.0, 0) + plane_wave(400, 400, 40.0, 90) + plane_wave(400, 400, 5.0, 45)
+    report = report_of(scan(z * UM), 100 * UM, settings=NOTHING._replace(short=12 * UM))
+    kept = np.exp(-np.pi * (ALPHA * 12 / 40) ** 2) * (1 - np.exp(-np.pi * (ALPHA * 100 / 40) ** 2))
+    assert report["Sq"].value == pytest.approx(kept * UM / np.sqrt(2), rel=0.02)
+    assert report.scan.z.shape == (288, 288) and report.shape == (400, 400)
+    assert np.degrees(report["Std"].value) == pytest.approx(90, abs=1)  # seven waves: a step of the spectrum is 8 deg
+
+
+@pytest.mark.parametrize("cutoff, says", [(3 * UM, "shorter than 4 steps of 1 um"),
+                                          (90 * UM, "the shorter side is 79 um long; half a cut-off of 90 um")])
+def test_refuses_a_cutoff(cutoff, says):
+    with pytest.raises(PatchfemError, match=says):
+        filtered_scan(scan(np.zeros((80, 120))), cutoff)
