@@ -320,6 +320,7 @@ def test_exact_other_instruments_through_surface_topography(tmp_path, monkeypatc
     found = read_surface(tmp_path / "scan.nc")
     same(found, Z, 1e-18)
     assert "read as NC by SurfaceTopography 1." in found.notes[0]
+    assert read_surface(tmp_path / "scan.nc", ("mm", "mm")).notes[1].endswith("those that were given are left aside")
     (tmp_path / "scan.opdx").write_bytes(b"\x00\x01junk" * 50)
     with pytest.raises(PatchfemError, match="SurfaceTopography cannot read it"):
         read_surface(tmp_path / "scan.opdx")
@@ -335,23 +336,74 @@ def test_refuses_instruments_without_the_library_with_the_remedy(tmp_path, monke
 
 
 @pytest.mark.parametrize("answer, said", [
-    ('{"error": "CorruptFile: bad"}', r"cannot read it \(CorruptFile: bad\); export the surface as text or X3P"),
-    ("", "failed on it"), ("{}", "found no heights in it")])
+    ('{"error": "CorruptFile: bad", "sizes": []}', r"cannot read it \(CorruptFile: bad\); export the surface as text"),
+    ("", "failed on it; export"), ("{}", "failed on it; export"), ('{"sizes": [7]}', "failed on it; export"),
+    ('{"sizes": []}', "found no heights in it; export the surface as text or X3P")])
 def test_refuses_what_the_other_process_could_not_read(tmp_path, monkeypatch, answer, said):
-    (tmp_path / "python").write_text(f"#!/bin/sh\ncat <<'END'\n{answer}\nEND\n")
+    (tmp_path / "python").write_text(f"#!/bin/sh\nread path\ncat <<'END'\n{answer}\nEND\n")
     (tmp_path / "python").chmod(0o755)
     monkeypatch.setattr(instruments, "PYTHON", str(tmp_path / "python"))
     with pytest.raises(PatchfemError, match=said):
         read(tmp_path, b"\x00\x01\x02" * 99, "scan.opdx")
 
 
-def test_refuses_a_process_that_does_not_end(tmp_path, monkeypatch):
-    (tmp_path / "python").write_text("#!/bin/sh\nexec sleep 30\n")
-    (tmp_path / "python").chmod(0o755)
-    monkeypatch.setattr(instruments, "PYTHON", str(tmp_path / "python"))
-    monkeypatch.setattr(instruments, "SECONDS", 0.3)
-    with pytest.raises(PatchfemError, match=r"did not read it in 0\.3 s; export the surface as text or X3P"):
-        read(tmp_path, b"\x00\x01\x02" * 99, "scan.opdx")
+STAND_IN = """
+import os, time
+class Reader:
+    nb_grid_pts, physical_sizes, unit = (3, 2), (3.0, 2.0), "um"
+    default_channel = property(lambda self: self)
+    def topography(self):
+        return self
+    def to_unit(self, unit):
+        return self
+    def heights(self):
+        return [[os.getpid() * 1e-9, 1.0], [0.0, 1.0], [0.0, 2.0]]
+def open_topography(path):
+    name = os.path.basename(path)
+    while name.startswith("works"):
+        pass
+    if name.startswith("sleeps"):
+        time.sleep(60)
+    if name.startswith("ends"):
+        os._exit(9)
+    if name.startswith("fails"):
+        raise ValueError("bad")
+    if name.startswith("fills"):
+        bytearray(10**11)
+    return Reader()
+"""
+
+
+def test_always_one_process_reads_all_files_and_its_limit_is_cpu_time(tmp_path, monkeypatch):
+    """A stand-in for SurfaceTopography: what works on and on, sleeps, ends, fails or takes all memory is refused by
+    name, and the next file is read; the process stays where nothing happened to it."""
+    (tmp_path / "SurfaceTopography").mkdir()
+    (tmp_path / "SurfaceTopography" / "__init__.py").write_text("")
+    (tmp_path / "SurfaceTopography" / "IO.py").write_text(STAND_IN)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(instruments, "SECONDS", 1.0)
+    data = b"\x00\x01\x02" * 99
+
+    def worker() -> float:
+        return read(tmp_path, data, "good.opdx").z[0, 0]
+
+    first = worker()
+    assert worker() == first
+    for name, said, same in (("fails.opdx", r"cannot read it \(ValueError: bad\)", True),
+                             ("fills.opdx", r"cannot read it \(MemoryError", True),
+                             ("ends.opdx", "failed on it; export the surface as text or X3P", False),
+                             ("works.opdx", r"did not read it in 1 s of CPU time; export the surface as text", False)):
+        with pytest.raises(PatchfemError, match=said):
+            read(tmp_path, data, name)
+        assert (worker() == first) == same
+        first = worker()
+    monkeypatch.setattr(instruments, "WAIT", 0.5)
+    with pytest.raises(PatchfemError, match=r"did not end with it in 0\.5 s; export the surface as text or X3P"):
+        read(tmp_path, data, "sleeps.opdx")
+    monkeypatch.setattr(instruments, "WAIT", 60.0)
+    assert worker() != first
+    instruments._end()
+    assert not instruments._kept
 
 
 def test_exact_mat_files_of_scipy_give_what_scipy_wrote(tmp_path):
