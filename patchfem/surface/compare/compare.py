@@ -80,6 +80,7 @@ class Comparison:
         if self.worn.extent is not None:
             names = (f"worn_{end}_{when}" for when in ("before", "after") for end in ("from", "to"))
             out.update(zip(names, (*self.worn.extent.before, *self.worn.extent.after)))
+            out |= {} if self.worn.within is None else {"worn_depth_within": self.worn.within}
         out.update((f"track_{name.removesuffix('_mean')}", one) for name, one in self.tracks.sizes.items())
         if isinstance(self.before, Profile):
             out["hidden_wear"] = self.hidden

@@ -18,6 +18,7 @@ from .registration import REACH, Registration, together
 MAX, MEAN, AREA = ("largest worn depth, without what noise adds to a largest value",
                    "mean worn depth over the common length",
                    "worn area of the section, that is worn volume per width")
+WITHIN = "mean worn depth from the first to the last worn place, unworn valleys between them included"
 TAIL = (0.02, 0.25)  # share of the lowest heights that both Abbott curves are laid on each other over
 DEPOSIT = 4.0  # deviations above the trace before from which a height is a deposit, not noise
 FROM, TO = "first worn place", "last worn place"
@@ -36,14 +37,15 @@ class Extent(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Worn:
-    """Worn depth of a trace: three `Quantity`, the area [m2] that stands above the first trace (deposits), and from
-    where to where it is worn, None where that is not known."""
+    """Worn depth of a trace: three `Quantity`, the area [m2] that stands above the first trace (deposits), from where
+    to where it is worn and the mean depth within, both None where that is not known."""
 
     largest: Quantity
     mean: Quantity
     area: Quantity
     deposited: float = 0.0
     extent: Extent | None = None
+    within: Quantity | None = None
 
 
 def of_registration(found: Registration) -> Worn:
@@ -57,8 +59,20 @@ def of_registration(found: Registration) -> Worn:
     """
     area, error, length, deposited = summed(found, np.ones(found.rest.size, bool))
     ends = area / found.rest.size / SIDE  # the common length is known to a sample
+    extent = extent_of(found, neighbours(found))
     return Worn(_largest(found), around(area / length, float(np.hypot(error, ends)) / length, "m", MEAN, 0.0),
-                around(area, error, "m2", AREA, 0.0), deposited, extent_of(found, neighbours(found)))
+                around(area, error, "m2", AREA, 0.0), deposited, extent,
+                None if extent is None else within(found, *extent.after))
+
+
+def within(found: Registration, start: Quantity, end: Quantity) -> Quantity | None:
+    """Mean worn depth between two places of the trace after, whose error counts as that of the width; None where the
+    wear is so narrow that these are not known apart."""
+    area, error, width = summed(found, (found.x >= start.value) & (found.x <= end.value))[:3]
+    if width == 0:
+        return None
+    wide = float(np.hypot(start.high - start.low, end.high - end.low)) / (2 * SIDE)
+    return around(area / width, float(np.hypot(error, area / width * wide)) / width, "m", WITHIN, 0.0)
 
 
 def extent_of(found: Registration, together: float) -> Extent | None:
@@ -99,27 +113,38 @@ def edge(rest, noise: float, together: float):
         deep = np.flatnonzero(mean > SURE * noise * np.sqrt((together if many > 1 else 1.0) / many))
         if deep.size and (worn is None or deep[0] + many - 1 < worn):
             worn = int(deep[0] + many - 1)
-    if worn is None:
-        return None
+    return None if worn is None else edge_near(rest, worn, noise, together)
+
+
+def edge_near(rest, worn: int, noise: float, together: float) -> tuple:
+    """(edge, lowest, highest) index of the first worn height beside one that is worn (`extent_of`).
+
+    What stands above the trace before, as pile-up beside a track does, is unworn: it counts with the noise alone, and
+    no flank begins there but for the error of its first height.
+    """
     deep = np.flatnonzero(rest[worn:] > DEEP * noise)
     reach = int(np.clip(deep[0] if deep.size else MOST, LEAST, MOST))
     low, high = max(worn - 2 * reach, 0), min(worn + reach, rest.size)
     part, sums = rest[low:high], []
+    unworn = np.concatenate([[0.0], np.cumsum(np.where(part > 0, part**2, noise**2))])
     for k in range(part.size - 3):
         base = np.vander(np.arange(part.size - k) / part.size, 3)
-        left = part[k:] - base @ np.linalg.lstsq(base, part[k:], rcond=None)[0]
-        sums.append(float(part[:k] @ part[:k] + left @ left))
+        shape = np.linalg.lstsq(base, part[k:], rcond=None)[0]
+        left = part[k:] - base @ shape
+        above = shape[2] < -3 * noise * np.sqrt(together / left.size) and k < worn - low
+        sums.append(np.inf if above else float(unworn[k] + left @ left))
     sums = np.array(sums)
     near = np.flatnonzero(sums <= sums.min() + 1.5 * SIDE**2 * noise**2 * together)
     best = low + int(np.argmin(sums))
     return best, max(low + int(near[0]) - 1, 0), min(low + int(near[-1]) + 1, rest.size - 1)
 
 
-def summed(found: Registration, inside) -> tuple:
-    """(worn area [m2], its standard deviation, length [m], deposited area) of the samples inside (n,), all for bool."""
+def summed(found: Registration, inside, deposits: bool = True) -> tuple:
+    """(worn area [m2], its standard deviation, length [m], deposited area) of the samples inside (n,), all for bool;
+    without deposits all heights count into the worn area, those that stand above the first trace with their sign."""
     width = np.where(inside, widths(found.x), 0.0)
     length, rest = float(width.sum()), found.rest
-    deposit = rest < -DEPOSIT * found.scatter
+    deposit = (rest < -DEPOSIT * found.scatter) & deposits
     weight = np.where(deposit, 0.0, width)
     area = float(weight @ rest)
     far = ~found.used & ~deposit

@@ -12,7 +12,7 @@ from ..profile import Profile, runs_of
 from ..quantity import SIDE, Quantity, around, refused
 from ..roughness.filter import mean_line
 from .carried import median_of_five
-from .depth import edge, summed, widths
+from .depth import edge, edge_near, summed
 from .flanks import PARTS, Flanks
 from .registration import REACH, Registration
 
@@ -25,6 +25,10 @@ FROM, TO = ("where the longest track begins, in the x of the trace after",
             "where the longest track ends, in the x of the trace after")
 DEPTH, BOTTOM = ("lost area of the longest track over its width",
                  "floor of the longest track: bottom of the parabola through the deepest fifth of its width")
+WIDTH, STEP = ("width of the longest track",
+               "step: mean depth over the middle third of the longest track, as of a groove in ISO 5436-1, type A1")
+LEFT, RIGHT = (f"area that stands above the trace before {side} the longest track, to within its width" for side in
+               ("before", "behind"))
 GROSS, PILED, NET = ("area lost in the longest track", "area that stands above the trace before, to within a width of "
                      "the longest track on both sides together", "lost area less pile-up")
 
@@ -64,7 +68,7 @@ def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
     low = spans[at - 1][1] + 1 if at else 0
     high = spans[at + 1][0] if at + 1 < len(spans) else rest.size
     ends = _ends(found, widest, (low, high), together)
-    return Tracks(spans, _sizes(found, *ends), valley)
+    return Tracks(spans, _sizes(found, *ends, together), valley)
 
 
 def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -> tuple:
@@ -76,43 +80,66 @@ def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -
         part, places = (one[side] if text is FROM else one[side][::-1] for one in (rest, x))
         deep = np.flatnonzero(part[:max(outside - MEDIAN, 0)] > 2 * REACH * found.noise)
         beside = int(deep[-1]) + 1 if deep.size else 0  # other worn places do not count
-        at = edge(part[beside:], found.noise, together) or (outside - beside,) * 3
-        value, *ends = (float(places[beside + k]) for k in at)
+        at = edge_near(part[beside:], outside - beside, found.noise, together)
+        half = (places[0] - places[1]) / 2  # an edge lies between the last unworn sample and the first worn one
+        value, *ends = (float(places[beside + k] + half) for k in at)
         out.append(Quantity(value, min(ends), max(ends), "m", text))
     return tuple(out)
 
 
-def _sizes(found: Registration, start: Quantity, end: Quantity) -> dict:
-    """Ends, depth, floor, net and lost area, and pile-up of the track from start to end [m], each a `Quantity`.
+def _sizes(found: Registration, start: Quantity, end: Quantity, together: float) -> dict:
+    """Width, depths, net and lost area, and pile-up of the track from start to end [m], each a `Quantity`.
 
     The interval of the mean depth has that of the width.
     """
     x, width = found.x, max(end.value - start.value, 1e-300)
-    area, error = summed(found, (x >= start.value) & (x <= end.value))[:2]
+    area, error = summed(found, (x > start.value) & (x < end.value), False)[:2]
     wide = float(np.hypot(*(one.high - one.low for one in (start, end)))) / (2 * SIDE)
     depth = area / width
-    raised = -np.asarray(found.rest) * (median_of_five(-found.rest) > REACH * found.noise)
-    near = (abs(x - (start.value + end.value) / 2) < 1.5 * width) & ((x < start.value) | (x > end.value)) & (raised > 0)
-    piled = float(widths(x)[near] @ raised[near])
-    loose = float(widths(x)[near].sum()) * max(found.errors[0], found.noise / max(np.sqrt(near.sum()), 1.0))
-    return {"from": start, "to": end,
+    third = summed(found, abs(x - (start.value + end.value) / 2) <= width / 6, False)
+    sides = [_pile_up(found, low, high, together, text) for low, high, text in
+             ((start.value - width, start.value, LEFT), (end.value, end.value + width, RIGHT))]
+    piled = sides[0].value + sides[1].value
+    loose = float(np.hypot(*(max(one.high - one.value, one.value - one.low) for one in sides))) / SIDE
+    return {"from": start, "to": end, "width": around(width, wide, "m", WIDTH, 0.0),
             "depth_mean": around(depth, float(np.hypot(error / width, depth * wide / width)), "m", DEPTH, 0.0),
-            "depth_floor": _floor(found, start.value, width),
+            "depth_floor": _floor(found, start.value, width, together),
+            "step": around(third[0] / third[2], third[1] / third[2], "m", STEP, 0.0),
             "area_net": around(area - piled, float(np.hypot(error, loose)), "m2", NET),
-            "area_gross": around(area, error, "m2", GROSS, 0.0), "pile_up": around(piled, loose, "m2", PILED, 0.0)}
+            "area_gross": around(area, error, "m2", GROSS, 0.0), "pile_up": around(piled, loose, "m2", PILED, 0.0),
+            "pile_up_left": sides[0], "pile_up_right": sides[1]}
 
 
-def _floor(found: Registration, start: float, width: float) -> Quantity:
-    """Highest depth of the parabola through the deepest fifth of a track, whose vertex errs half as much again."""
+def _pile_up(found: Registration, low: float, high: float, together: float, text: str) -> Quantity:
+    """Area that stands above the trace before from low to high [m], from the edge of the track to the outer edge of
+    what is raised; where nothing is, the interval holds what a low ridge may hide there."""
+    near = np.flatnonzero((found.x > low) & (found.x < high))
+    inward = near if text == LEFT else near[::-1]
+    at = edge(-np.asarray(found.rest)[inward], found.noise, together) if near.size > 8 else None
+    held = np.isin(np.arange(found.x.size), inward[0 if at is None else at[0]:])
+    area, error = summed(found, held, False)[:2] if held.any() else (0.0, 0.0)
+    if at is None or area >= 0:
+        return Quantity(0.0, 0.0, max(-area, 0.0) + SIDE * error, "m2", text)
+    return around(-area, error, "m2", text, 0.0)
+
+
+def _floor(found: Registration, start: float, width: float, together: float) -> Quantity:
+    """Highest depth of the parabola through the deepest fifth of a track, whose vertex errs half as much again: the
+    mean over all fifths that noise alone may make less deep than the deepest."""
     places = np.linspace(start, start + (1 - 1 / FLOOR) * width, 8 * FLOOR)
     parts = [(found.x >= place) & (found.x <= place + width / FLOOR) for place in places]
-    means = [float(found.rest[one].mean()) if one.sum() > 3 else 0.0 for one in parts]
-    deepest = parts[int(np.argmax(means))]
-    area, error, length = summed(found, deepest)[:3]
-    along = np.linspace(-1, 1, int(deepest.sum()))
-    shape = np.polyfit(along, found.rest[deepest], 2)
-    top = float(np.polyval(shape, np.clip(-shape[1] / (2 * shape[0]) if shape[0] < 0 else 0.0, -1, 1)))
+    means = np.array([float(found.rest[one].mean()) if one.sum() > 3 else 0.0 for one in parts])
+    noise, deepest = found.noise * np.sqrt(together / max(parts[0].sum(), 1)), parts[int(np.argmax(means))]
+    top = float(np.mean([_vertex(found.rest[one]) for one, mean in zip(parts, means) if mean >= means.max() - 2 * noise
+                         and one.sum() > 3] or [means.max()]))
+    area, error, length = summed(found, deepest, False)[:3]
     return around(top, 1.5 * float(np.hypot(error / length, (top - area / length) / 4)), "m", BOTTOM, 0.0)
+
+
+def _vertex(depth) -> float:
+    """Highest depth of the parabola through depths (n,) within them."""
+    shape = np.polyfit(np.linspace(-1, 1, depth.size), depth, 2)
+    return float(np.polyval(shape, np.clip(-shape[1] / (2 * shape[0]) if shape[0] < 0 else 0.0, -1, 1)))
 
 
 def _valley(found: Registration, spans: tuple, longest: float) -> Valley | None:
@@ -158,11 +185,14 @@ def of_flanks(found: Flanks) -> Tracks:
     floor = float(np.convolve(inside, np.full(many, 1 / many), "valid").max())
     off = found.largest[2] - found.largest[0]
     why = "what stands beside the track before is not known"
-    return Tracks((), {"from": ends[0], "to": ends[1],
+    width = Quantity(found.width, max(found.width - 2 * part, 0.0), found.width + 2 * part, "m", WIDTH)
+    return Tracks((), {"from": ends[0], "to": ends[1], "width": width,
                        "depth_mean": Quantity(*(one / found.width for one in found.area), "m", DEPTH),
                        "depth_floor": Quantity(floor, max(floor - off, 0.0), floor + off, "m", BOTTOM),
+                       "step": refused("m", STEP, "the roughness that wore away is not known place by place"),
                        "area_net": refused("m2", NET, why), "area_gross": Quantity(*found.area, "m2", GROSS),
-                       "pile_up": refused("m2", PILED, why)})
+                       **{name: refused("m2", text, why) for name, text in
+                          (("pile_up", PILED), ("pile_up_left", LEFT), ("pile_up_right", RIGHT))}})
 
 
 def beside_flanks(after: Profile, found: Flanks, longest: float) -> list:

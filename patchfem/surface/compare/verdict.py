@@ -175,7 +175,9 @@ def _worn(one: Comparison, name: str) -> str:
             f"place.{above}")
     if one.worn.extent is not None and not one.tracks.sizes:
         before, after = (_span(*(end.value for end in ends)) for ends in one.worn.extent)
-        text += f" Worn from x = {before} of the trace before, that is from {after} of the trace after."
+        text += f" Worn from x = {before} of the trace before, that is from {after} of the trace after"
+        mean = one.worn.within
+        text += "." if mean is None else f", and between these places {_length(mean)} in the mean."
     return text
 
 

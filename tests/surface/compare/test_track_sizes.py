@@ -1,0 +1,89 @@
+"""Width, step, floor, lost area and pile-up at each side of a track against the track that was made."""
+
+import numpy as np
+import pytest
+from pairs import UM
+
+from patchfem.core import frozen_array
+from patchfem.surface.compare.compare import compared
+from patchfem.surface.compare.verdict import verdicts
+from patchfem.surface.profile import Profile
+
+RIDGE, COUNT, HELD_OUT = 60.0, 2401, 41000  # base of a ridge [um], samples of 1 um; rules were tuned on 1000 to 1011
+SHAPES = {"band": (lambda t: np.ones(t.size), 1.0, 1.0), "parabola": (lambda t: 1 - t**2, 2 / 3, 26 / 27)}
+
+
+def ridged(kind: str, seed: int, left: float, right: float, depth: float = 1.0, width: float = 600.0):
+    """(before, after, truth by name [SI]) of a rough trace (0.3 um) with a track and a triangular ridge [um] beside
+    either end; noise 20 nm in each trace."""
+    random, spare = np.random.default_rng([seed, 1987]), 100
+    rough = np.convolve(random.standard_normal(COUNT + 2 * spare + 120),
+                        np.exp(-0.5 * (np.arange(-60, 61) / 10)**2), "valid")
+    rough *= 0.3 / rough.std()
+    x, moved = np.arange(float(COUNT)), int(random.integers(-60, 61))
+    middle, place = random.uniform(0.4, 0.6) * COUNT, x - moved
+    shape, share, step = SHAPES[kind]
+    t = (place - middle) / (width / 2)
+    after = rough[spare - moved:spare - moved + COUNT] - np.where(abs(t) <= 1, depth * shape(t), 0.0)
+    for height, side in ((left, -1), (right, 1)):
+        off = place - middle - side * (width + RIDGE) / 2
+        after = after + height * np.maximum(1 - abs(off) / (RIDGE / 2), 0.0)
+    before, after = (one + 0.02 * random.standard_normal(COUNT) for one in (rough[spare:spare + COUNT], after))
+    sides = left * RIDGE / 2, right * RIDGE / 2
+    lengths = {"from": middle - width / 2 + moved, "to": middle + width / 2 + moved, "width": width,
+               "depth_mean": share * depth, "depth_floor": depth, "step": step * depth}
+    areas = {"area_gross": share * depth * width, "area_net": share * depth * width - sum(sides),
+             "pile_up": sum(sides), "pile_up_left": sides[0], "pile_up_right": sides[1]}
+    truth = {name: one * UM for name, one in lengths.items()} | {name: one * UM**2 for name, one in areas.items()}
+    return *(Profile(frozen_array(x * UM), frozen_array(z * UM), name) for z, name in
+             ((before, "before"), (after, "after"))), truth
+
+
+def scored(kind: str, sides: tuple, seeds) -> tuple:
+    """Share of intervals that hold the truth, and the error over the truth by name, of tracks of a kind."""
+    held, off = [], {}
+    for seed in seeds:
+        before, after, truth = ridged(kind, seed, *sides)
+        found = compared(before, after).tracks.sizes
+        held += [found[name].low <= one <= found[name].high for name, one in truth.items()]
+        for name, one in truth.items():
+            off.setdefault(name, []).append(found[name].value / one - 1 if one else found[name].value)
+    return np.mean(held), off
+
+
+@pytest.mark.parametrize("kind, sides", [("band", (0.5, 0.2)), ("parabola", (0.5, 0.2))])
+def test_always_a_track_between_ridges_has_its_width_depths_and_areas(kind, sides):
+    held, off = scored(kind, sides, (HELD_OUT, HELD_OUT + 1))
+    assert held >= 17 / 22
+    limits = {"pile_up_left": 0.1, "pile_up_right": 0.2, "pile_up": 0.1, "width": 0.02, "depth_mean": 0.02}
+    for name, each in off.items():
+        assert max(map(abs, each)) < limits.get(name, 0.015), (name, each)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", SHAPES)
+@pytest.mark.parametrize("sides", [(0.0, 0.0), (0.5, 0.2), (0.2, 1.0)])
+def test_always_20_tracks_of_a_kind_hold_the_truth_in_9_of_10_intervals(kind, sides):
+    assert scored(kind, sides, range(HELD_OUT + 10, HELD_OUT + 30))[0] >= 0.9
+
+
+def test_always_without_pile_up_none_is_said_and_its_interval_is_not_nothing():
+    before, after, _ = ridged("band", HELD_OUT + 2, 0.0, 0.0)
+    found = compared(before, after).tracks.sizes
+    assert found["pile_up"].value == 0.0 < found["pile_up"].high < 0.02 * found["area_gross"].value
+    assert found["area_net"].value == found["area_gross"].value
+
+
+def test_always_tops_worn_between_unworn_valleys_have_a_depth_over_the_worn_extent():
+    """No track, as valleys within it are unworn: the mean over the whole length alone would hide it."""
+    before = ridged("band", HELD_OUT + 3, 0.0, 0.0)[0]
+    x, z = before.x / UM, before.z / UM
+    worn = np.where((x > 700) & (x < 1700), np.maximum(z, 0.0), 0.0)
+    noise = 0.02 * np.random.default_rng(5).standard_normal(x.size)
+    found = compared(before, Profile(before.x, frozen_array((z - worn + noise) * UM), "after"))
+    on = np.flatnonzero(worn > 0.1)  # five noises: what is worn less does not show
+    truth = worn[on[0]:on[-1] + 1].mean() * UM
+    assert not found.tracks.sizes
+    assert found.values["worn_depth_within"].value == pytest.approx(truth, rel=0.03)
+    assert found.values["worn_depth_mean"].value < 0.5 * truth
+    assert any("between these places" in text for text in verdicts([found])[1])
