@@ -34,6 +34,7 @@ class Outcome(StrEnum):
     EXCEEDS_TRAVEL = "exceeds_travel"
     LEAVES_CONTACT = "leaves_contact"
     LEAVES_GROOVES = "leaves_grooves"
+    WORN_THROUGH = "worn_through"
     NO_CONTACT = "no_contact"
     NOT_CONVERGED = "not_converged"
 
@@ -55,6 +56,8 @@ _SENTENCES = {
                             "drive, shorten the slide or lengthen the piece.",
     Outcome.LEAVES_GROOVES: "The inertia of the lifted mass took all of the load, so it left its grooves and the run "
                             "ended there; lower the drive or the lifted mass, or raise the load.",
+    Outcome.WORN_THROUGH: "Wear took all of a coating at its deepest place and the run ended there; ask for fewer "
+                          "cycles or make the coating thicker.",
     Outcome.NO_CONTACT: "The pieces do not touch; raise the load or close the gap.",
     Outcome.NOT_CONVERGED: "A solve did not reach its residual; the result is marked and must not be used.",
 }

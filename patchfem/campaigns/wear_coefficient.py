@@ -104,7 +104,8 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
     curve, most = _curve(model, patch, bounds.high, target.name, progress)
     if not curve[1][-1] >= target.value:
         raise PatchfemError(f"--free {KEY}: with {bounds.high:.4g} m^2/N the scene reaches {target.name} = "
-                            f"{curve[1][-1]:.4g} of the measured {target.value:.4g}; raise the high bound")
+                            f"{curve[1][-1]:.4g} of the measured {target.value:.4g}; "
+                            + ("the coating is worn through then" if curve[0][-1] < 1 else "raise the high bound"))
     inverse = _inverse(curve)
     value, runs, reached = float(bounds.high * inverse(target.value)), 1, math.nan
     while runs < MOST_RUNS:

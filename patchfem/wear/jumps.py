@@ -62,8 +62,8 @@ def start(asked: Wearing) -> Worn:
     return Worn(0.0, zero, asked.press(zero, zero), asked.path(zero), zero, FIRST * asked.cycles, zero, 0.0, zero)
 
 
-def after(asked: Wearing, state: Worn, tolerance: float, count: int | None = None) -> Worn:
-    """The state one jump later.
+def after(asked: Wearing, state: Worn, tolerance: float, count: int | None = None, until: float = np.inf) -> Worn:
+    """The state one jump later, at most after `until` cycles.
 
     count: how many equal jumps there are; None: the jump is as long as the tolerance allows. Its error is the
     difference between one jump and two halves of it, over 3: of the depth against the largest depth, and of the
@@ -72,7 +72,8 @@ def after(asked: Wearing, state: Worn, tolerance: float, count: int | None = Non
     the difference counts as error (Milne's device); as this error is not damped, it is held against the wear of the
     jump alone.
     """
-    left = asked.cycles - state.cycle
+    end = min(asked.cycles, until)
+    left = end - state.cycle
     length = min(asked.cycles / count if count else state.length, left)
     length = left if left - length < 1e-9 * asked.cycles else length
     while True:
@@ -83,7 +84,7 @@ def after(asked: Wearing, state: Worn, tolerance: float, count: int | None = Non
                 break
         length *= max(SHRINK, SAFETY * miss ** (-1 / (ORDER + 1)))
     grown = length * min(GROW, SAFETY * max(miss, 1e-9) ** (-1 / (ORDER + 1)))
-    return replace(found, cycle=asked.cycles if length == left else found.cycle, length=grown)
+    return replace(found, cycle=end if length == left else found.cycle, length=grown)
 
 
 def _corrected(asked: Wearing, state: Worn, found: Worn, miss: float, length: float, tolerance: float) -> tuple:

@@ -30,6 +30,8 @@ WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 135723\n'
 LOAD, KAPPA, CYCLES = 26 * 4.4482216152605, 1e-14, 135723
 SOFT_RIG = TILTED + SHEAR + NONLOCAL + MODE + \
     '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 100\n'
+LONG = WEAR.replace("135723", "1e9").replace("1e-14", "1e-13")
+THIN_COAT = TILTED + COULOMB + SINE + LONG  # the coating is gone before the last of its cycles
 LOOSE = '[accuracy]\ntolerance = 2e-2\n'
 
 
@@ -266,19 +268,20 @@ def _refusing(monkeypatch, cycle):
     """From here on no cycle of a motion repeats once the patch is worn to more than `cycle`."""
     found = evolve.after
 
-    def after(asked, state, *more):
+    def after(asked, state, *more, **until):
         if state.cycle > cycle:
             raise evolve._Unbounded("nothing repeats")
-        return found(asked, state, *more)
+        return found(asked, state, *more, **until)
 
     monkeypatch.setattr(evolve, "after", after)
 
 
-@pytest.mark.share(0, 1)
+@pytest.mark.share(0, 1, 5)
 @pytest.mark.parametrize("text, until", [
     (TILTED + COULOMB + SINE + WEAR + "jumps = 3\n", 1e9), (SOFT_RIG + WEAR + "jumps = 2\n" + LOOSE, 1e9),
     (TILTED + COULOMB + SINE + WEAR, 1e9), (SOFT_RIG + WEAR + LOOSE, 1e9),
-    (TILTED + SHEAR + COULOMB + SINE + WEAR, 1e5)], ids=["bench_jumps", "rig_jumps", "bench", "rig", "stopped"])
+    (TILTED + SHEAR + COULOMB + SINE + WEAR, 1e5), (THIN_COAT + "jumps = 40\n", 1e9)],
+                         ids=["bench_jumps", "rig_jumps", "bench", "rig", "stopped", "worn_through"])
 def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(tmp_path, monkeypatch, text, until):
     """The last state among them, after which no jump is left; until [cycles]: where the motion loses its cycle."""
     scene, states = tmp_path / "worn.toml", []
@@ -304,6 +307,26 @@ def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(tmp_path, m
             assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
         one, two = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("whole", "out"))
         assert {**one, "seconds": 0, "effects": 0} == {**two, "seconds": 0, "effects": 0}
+
+
+@pytest.mark.parametrize("more", ["jumps = 3\n", "", "upper_share = 0.2\njumps = 40\n"])
+def test_exact_a_coating_worn_through_ends_the_run_at_its_cycle(more):
+    """The volume is that of the cycles so far, the depth at the deepest place the coating of the piece that loses
+    most."""
+    found = ran(THIN_COAT + more)
+    cycle, coating = found.measures["worn_through_cycle"], 6 * 25.4e-6
+    share = 0.8 if "share" in more else 0.5
+    assert found.outcome == "worn_through" and 0 < cycle.value < 1e9
+    assert found.measures["worn_depth_max"].value * share == pytest.approx(coating, rel=1e-6)
+    volume = found.measures["worn_volume"].value
+    assert volume == pytest.approx(1e-13 * LOAD * 40e-6 * cycle.value, rel=1e-12)
+    assert found.extra["wear"]["cycle"][-1] == cycle.value
+    assert any(f"lower piece, {152.4:.4g} um, is worn through" in text for text in found.extra["notes"]) or share == 0.5
+    # two coatings of flat pieces that wear evenly: the patch sinks by its volume over its area, and by the tilt
+    even = volume / (12.7e-3) ** 2
+    assert even < found.measures["worn_depth_max"].value < even + 0.1e-3 * 12.7e-3
+    apart = [ran(THIN_COAT.replace("1e9", repr(cycle.value + off)) + more) for off in (-cycle.error, cycle.error)]
+    assert [one.outcome == "worn_through" for one in apart] == [False, True]
 
 
 def test_refuses_an_interrupted_run_of_another_scene_and_names_the_way_on(tmp_path, monkeypatch):

@@ -14,7 +14,7 @@ ENDS = {
     "done": "the run ends as asked", "steady": "the motion settles", "stuck": "the interface holds as a whole",
     "transient": "the run ends before the motion settles", "grows": "the motion grows",
     "exceeds_travel": "the motion passes the stop", "leaves_contact": "the slide passes the end of the piece",
-    "leaves_grooves": "the lifted mass leaves its grooves",
+    "leaves_grooves": "the lifted mass leaves its grooves", "worn_through": "a coating is worn through",
     "no_contact": "the pieces do not touch", "not_converged": "a solve does not converge"}
 SLIPS = "the interface slips as a whole"  # from "stuck" to "steady"
 STATES = {  # measure: what its state is called once it has it, and once it has it no longer

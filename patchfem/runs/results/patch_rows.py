@@ -29,6 +29,8 @@ ROWS = (
         group="patch"),
     Row("worn_volume", "m3", 0.0, "volume worn off both pieces together", group="wear"),
     Row("worn_depth_max", "m", 1e-15, "largest worn depth on the interface, both pieces together", group="wear"),
+    Row("worn_through_cycle", "1", 0.0, "cycles of wear after which a coating is gone at its deepest place",
+        group="wear"),
     Row("groove_amplitude", "m", 1e-12, "half the height of the flanks of the grooves after wear, peak to peak",
         group="wear"),
     Row("roll_moment", "N m", 1e-10, "moment of the pressure about x, of strips that roll", group="patch"),

@@ -22,6 +22,8 @@ from ..rig.numerics import choose
 from .slip import Rubbed, even, frames_for, rubbed
 
 STATE = tuple(Worn.__slots__)
+THIN = 1e-6  # share of a coating that may be left where it counts as worn through
+MOST_TRIES = 60  # jumps that look for the cycle at which it is
 MOMENT = ("cycle", "depth", "used", "pressure", "gap", "miss")
 
 
@@ -113,9 +115,9 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         return Evolved(patch, tuple(coarse), None, (), (), 0.0, perf_counter() - clock, f"nothing was worn: {why}")
     if begin is not None:
         patch = pressed(model.patch, patch.pair, frozen_array(state.depth))
-    while state.cycle < wear.cycles:
+    while state.cycle < wear.cycles and worn_through(model, state.depth) is None:
         try:
-            state = after(asked, state, model.accuracy.tolerance, wear.jumps)
+            state = _jumped(model, asked, state)
         except _Unbounded as why:
             stopped = f"wear was followed to cycle {state.cycle:.6g} of {wear.cycles:.6g}: {why}"
             break
@@ -130,6 +132,43 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
     worn = [pressed(model.patch, other.pair, frozen_array(depth)) for other, depth in zip(others, depths)]
     return Evolved(patch, (*worn, *(None for one in coarse if one is None)), state, moments, depths,
                    moments[-1].miss, perf_counter() - clock, stopped)
+
+
+def worn_through(model, depth) -> tuple | None:
+    """(name, thickness [m]) of the piece whose coating is gone where the depth (m,) [m] of both is largest, else
+    None."""
+    share, name, thickness = max(_taken(model, depth), default=(0.0, "", 0.0))
+    return (name, thickness) if share >= 1 - THIN else None
+
+
+def _taken(model, depth) -> list:
+    """(share of its coating that is gone at the deepest place, name, thickness [m]) of each coated piece."""
+    deepest, upper, asked = float(depth.max(initial=0.0)), model.wear.upper_share, model.patch
+    return [(part * deepest / piece.thickness, name, piece.thickness) for part, piece, name in
+            ((upper, asked.upper, "upper"), (1 - upper, asked.lower, "lower")) if piece.coating is not None]
+
+
+def _jumped(model, asked: Wearing, state: Worn) -> Worn:
+    """The state one jump later, or earlier where a coating is gone, by the Illinois form of regula falsi."""
+    def ahead(one: Worn) -> float:
+        return max(_taken(model, one.depth), default=(0.0,))[0] - 1
+
+    how = asked, state, model.accuracy.tolerance, model.wear.jumps
+    found, low, high, last = after(*how), state.cycle, np.inf, 0.0
+    below, above, end = ahead(state), ahead(found), found.cycle
+    for _ in range(MOST_TRIES):
+        over = ahead(found)
+        if abs(over) <= THIN or (over < 0 and (found.cycle < end or high == np.inf)):
+            return found
+        if over > 0:
+            below = below / 2 if high < np.inf and last > 0 else below
+            high, above = found.cycle, over
+        else:
+            above = above / 2 if last < 0 else above
+            low, below = found.cycle, over
+        last, end = over, low - below * (high - low) / (above - below)
+        found = after(*how, until=end)
+    return found
 
 
 def _first(model, patch, asked: Wearing, motion: _Motion) -> tuple:

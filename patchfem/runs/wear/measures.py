@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import Measure, frozen_array, say
+from ...core import Measure, Outcome, frozen_array, say
 from ..patch.limits import limit
 from ..patch.press import pressed
 from ..patch.values import values
 from ..results.patch_rows import TABLE
+from .evolve import THIN, worn_through
 from .slip import UNBOUNDED, of_point
 
 FRAMES = 24  # of the interface on the way
@@ -31,9 +32,34 @@ def worn(result, found, estimate: bool = True):
     shown = {"period": period, "states": len(fields["time"]) - len(result.fields["time"])}
     static = jumped(model, found, result.measures) if estimate else {}
     lost = of_patch(found, result.measures, estimate)
-    return replace(result, measures=result.measures | static | lost, fields=fields, seconds=seconds,
-                   warnings=[*warnings, *_deep(model, found)],
-                   extra=result.extra | {"wear": history(found), "wear_shown": shown})
+    gone, notes = _gone(model, found, lost["worn_depth_max"].error), result.extra.get("notes", [])
+    outcome = Outcome.WORN_THROUGH if gone and result.outcome not in UNBOUNDED else result.outcome
+    return replace(result, outcome=outcome, measures=result.measures | static | lost | gone, fields=fields,
+                   seconds=seconds, warnings=[*warnings, *_deep(model, found)],
+                   extra=result.extra | {"wear": history(found), "wear_shown": shown,
+                                         "notes": [*notes, *_ended(model, found, gone)]})
+
+
+def _gone(model, found, error: float | None) -> dict:
+    """worn_through_cycle where a coating is gone; error [m]: of the largest depth."""
+    if worn_through(model, found.state.depth) is None:
+        return {}
+    before, last = found.moments[-2:]
+    deepest = int(np.argmax(last.depth))
+    rate = float(last.depth[deepest] - before.depth[deepest]) / (last.cycle - before.cycle)
+    off = None if error is None else (error + THIN * float(last.depth[deepest])) / rate
+    row = TABLE["worn_through_cycle"]
+    return {row.name: Measure(last.cycle, row.unit, off, row.floor)}
+
+
+def _ended(model, found, gone: dict) -> list:
+    """A note on the coating that is gone."""
+    if not gone:
+        return []
+    (name, thickness), depth = worn_through(model, found.state.depth), found.state.depth
+    place = float(found.patch.x[int(np.argmax(depth))])
+    return [f"the coating of the {name} piece, {say(thickness)}, is worn through at x = {say(place, 3)} after "
+            f"{found.state.cycle:.6g} of {model.wear.cycles:.6g} cycles; the measures are of the patch then"]
 
 
 def jumped(model, found, measures: dict) -> dict:
@@ -61,10 +87,7 @@ def _deep(model, found) -> list:
     depth, asked, out = float(found.state.depth.max(initial=0.0)), model.patch, []
     for share, piece, name in ((model.wear.upper_share, asked.upper, "upper"),
                                (1 - model.wear.upper_share, asked.lower, "lower")):
-        if piece.coating is not None and share * depth > piece.thickness:
-            out.append(f"the coating of the {name} piece, {say(piece.thickness)}, is worn through: it lost up to "
-                       f"{say(share * depth, 3)}; from there on the substrate would rub")
-        elif share * depth > 0.2 * (piece.thickness or piece.height):
+        if share * depth > 0.2 * (piece.thickness or piece.height):
             out.append(f"the {name} piece lost up to {say(share * depth, 3)}, more than 0.2 of its "
                        f"{'coating' if piece.coating is not None else 'height'}: its stiffness is still that of the "
                        "unworn piece")
