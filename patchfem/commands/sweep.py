@@ -3,7 +3,6 @@
 import json
 import shlex
 import sys
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -14,9 +13,7 @@ from cyclopts import Parameter
 from .. import core
 from ..campaigns.sweeps import ask, executors
 from ..campaigns.sweeps import sweep as sweeping
-from ..export.pages import lead as leading
-from ..export.sweeps import page as sweep_page
-from ..export.sweeps import run
+from ..export.sweeps import answer, run
 from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, placed, say, texts, word
 
 FIRST = 5  # messages of failed cases that are printed
@@ -99,7 +96,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     target = placed(out, f"{scene.stem}-sweep")
     tells = "json" if json_ else "faults" if quiet else "words"
     if by.collect:
-        _answer(asked, cases, run.collect(asked, cases, target, not no_page), Told(target, not no_page, tells, begin))
+        _answer(run.collect(asked, cases, target, not no_page), Told(target, not no_page, tells, begin))
         return
     line = Progress(quiet)
     try:
@@ -118,7 +115,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
             print(json.dumps({"cases": line.done, "folder": str(target)}) if json_ else
                   f"shard {by.shard}: {line.done} cases in {target}; when all shards are done: the same with --collect")
         return
-    _answer(asked, cases, found, Told(target, not no_page, tells, begin))
+    _answer(found, Told(target, not no_page, tells, begin))
 
 
 class Told(NamedTuple):
@@ -152,19 +149,18 @@ class Progress:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
-def _answer(asked, cases, found, told: Told) -> None:
-    """What came out, the worst first."""
-    counts, target = dict(Counter(map(str, found.outcome)).most_common()), told.target
-    failed = sorted(found.messages)
-    if told.tells != "faults":
-        lead = leading.lead_of(sweep_page.table_of(asked, cases, found, [], target))
+def _answer(found, told: Told) -> None:
+    """What came out, the worst first, as sweep.json has it."""
+    target, failed = told.target, sorted(found.messages)
+    written = answer.read_answer(target / "sweep.json")
+    counts = written["cases"]["outcomes"]
     if told.tells == "json":
-        print(json.dumps({"cases": len(found), "outcomes": counts, "failed": len(failed), "answer": lead.answer(),
-                          "over_tolerance": lead.missed, "folder": str(target),
+        print(json.dumps({"cases": len(found), "outcomes": counts, "failed": len(failed), "answer": written["answer"],
+                          "over_tolerance": written["cases"]["over_tolerance"], "folder": str(target),
                           "seconds": round(perf_counter() - told.begin, 3)}, ensure_ascii=False))
     elif told.tells == "words":
         print(f"{len(found)} cases: " + ", ".join(f"{count} {name}" for name, count in counts.items()))
-        for said in lead.sentences():
+        for said in written["sentences"]:
             print(said)
         if told.page:
             print(f"page: {target / 'report.html'}")

@@ -116,11 +116,23 @@ def with_meshes(work: Work) -> Work:
     return replace(work, meshes=Shared(models, len(numbers) == len(work.cases)))
 
 
+def _least(work: Work) -> int:
+    """Fewest cases of a chunk: as many as march side by side where lanes take the first, since a few of them say
+    nothing of how long many take; else one."""
+    try:
+        batch = many.batch_of(work.asked.model(work.cases.sets(0)), len(work.cases))
+    except Exception:  # what is wrong with the case is told by its own run
+        return 1
+    together = work.keep is None and batch is not None and batch.least and not batch.share
+    return batch.least if together else 1
+
+
 class Chunks:
     """The cases that are still to be handed out, neighbours together, in chunks as long as cases have been found to
-    take."""
+    take, and of `least` cases."""
 
-    def __init__(self, numbers: Sequence[int], workers: int):
+    def __init__(self, numbers: Sequence[int], workers: int, least: int = 1):
+        self.least = least
         self.left, self.alone, self.workers = deque(numbers), deque(), max(workers, 1)
         self.deaths: dict[int, int] = {}
         self.each = SPAN  # seconds of a case, by the last chunk
@@ -135,7 +147,7 @@ class Chunks:
             return [self.alone.popleft()] if self.alone and idle else None
         fair = -(-len(self.left) // (2 * self.workers))  # so that the last chunks end together
         fair = fair if self.workers > 1 else len(self.left)
-        count = max(1, min(int(SPAN / max(self.each, 1e-9)), MOST, fair))
+        count = max(1, min(max(int(SPAN / max(self.each, 1e-9)), self.least), MOST, fair))
         return [self.left.popleft() for _ in range(min(count, len(self.left)))]
 
     def done(self, numbers: Sequence[int], seconds: float) -> None:
@@ -161,7 +173,8 @@ def solved(work: Work, numbers: Sequence[int], executor, say: Callable | None = 
     """
     if not len(numbers):
         return
-    chunks = Chunks(work.cases.neighbours(numbers), executor.workers)
+    chunks = Chunks(work.cases.neighbours(numbers), executor.workers,
+                    _least(work) if executor.workers == 1 else 1)  # others import what runs a case in their workers
     try:
         if hasattr(executor, "begin"):
             executor.begin(work, len(numbers), say)

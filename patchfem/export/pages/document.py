@@ -13,6 +13,7 @@ from . import library
 
 DIGITS = 9  # of the numbers in a page: a picture shows four, a hovered value seven
 NUMBER = f"%.{DIGITS}g,"
+NOT_FINITE = re.compile("nan|-?inf")
 
 
 class Section(NamedTuple):
@@ -84,12 +85,14 @@ def encoded(value) -> str:
     if isinstance(value, dict):
         return "{" + ",".join(f"{json.dumps(str(key))}:{encoded(one)}" for key, one in value.items()) + "}"
     if isinstance(value, np.ndarray):
-        if value.dtype.kind == "f" and value.ndim == 1 and np.isfinite(value).all():
-            return "[" + (NUMBER * value.size % tuple(value.tolist()))[:-1] + "]"  # one by one: six times as long
         value = list(value) if value.ndim > 1 else value.tolist()
     if isinstance(value, list | tuple):
-        if set(map(type, value)) == {float} and all(map(math.isfinite, value)):
-            return "[" + (NUMBER * len(value) % tuple(value))[:-1] + "]"
+        kinds = set(map(type, value))  # one by one: six times as long
+        if kinds == {float}:
+            text = NUMBER * len(value) % tuple(value)
+            return f"[{(text if all(map(math.isfinite, value)) else NOT_FINITE.sub('null', text))[:-1]}]"
+        if kinds <= {str, bool, int}:
+            return json.dumps(value, separators=(",", ":"))
         return "[" + ",".join(map(encoded, value)) + "]"
     if isinstance(value, np.generic):
         value = value.item()

@@ -18,8 +18,8 @@ from .words import linked, zero_below
 DRAWN, LISTED = 20_000, 400  # cases in the pictures and in the table; sweep.csv has them all
 
 
-def page(table: dict) -> str:
-    """The whole HTML page of a sweep.
+def page(table: dict, told: Lead | None = None) -> str:
+    """The whole HTML page of a sweep; told: the `lead_of` its table, where it is known.
 
     table: `title`, `of` (the scene's own title; may be missing), `version`, `command` (the line that made it),
     `scene` (its text), `seconds` of work (NaN: unknown); `grid`: whether the cases are all combinations of the keys'
@@ -34,7 +34,7 @@ def page(table: dict) -> str:
     keys = [_key(one, drawn) for one in table["keys"]]
     measures = [_measure(name, one, drawn, table.get("tolerance", np.nan)) for name, one in table["measures"].items()
                 if np.isfinite(one["values"]).any()]
-    told = lead_of(table)
+    told = told or lead_of(table)
     first = next((name for name in FIRST if any(m["name"] == name for m in measures)), None)
     data = {"keys": keys, "measures": measures, "outcome": [outcome[i] for i in drawn], "settled": SETTLED,
             "grid": bool(table["grid"]), "first": first, "along": _along(keys),

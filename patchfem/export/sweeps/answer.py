@@ -3,34 +3,42 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
-
-import numpy as np
 
 from ...disk.whole import write_text
 from ...runs.many.answers import FAILED
 from ..pages.allowed import as_json
-from ..pages.lead import lead_of
+from ..pages.lead import Lead
 
 
-def answer_of(table: dict) -> dict:
-    """What a sweep comes to; table: as `pages.sweep.page` takes it.
+def answer_of(lead: Lead, outcome: Sequence, sign: str = "") -> dict:
+    """What a sweep comes to; outcome: of each case; sign: of what the tables were written for (`sign_of`).
 
-    `answer`: one sentence; `cases`: `count`, `failed`, `unfinished` (without an answer yet) and `over_tolerance`
-    {measure: {`count`, `worst`: largest error/|value|}}; `ranking` {measure: [{`key`, `first`, `total`, `low`,
-    `high`}]}, shares of the keys in the variance of a measure, {} where the cases do not tell them; `limits`
-    [{`measure`, `key`, `value`, `unit`, `change`, `low`, `high`}]: how far a key may go, between which cases, SI.
+    `answer`: one sentence; `sentences`: all that is printed; `cases`: `count`, `failed`, `unfinished` (without an
+    answer yet), `outcomes` {outcome: count} and `over_tolerance` {measure: {`count`, `worst`: largest error/|value|}};
+    `ranking` {measure: [{`key`, `first`, `total`, `low`, `high`}]}, shares of the keys in the variance of a measure, {}
+    where the cases do not tell them; `limits` [{`measure`, `key`, `value`, `unit`, `change`, `low`, `high`}]: how far
+    a key may go, between which cases, SI.
     """
-    lead, outcome = lead_of(table), np.asarray(table["outcome"], str)
-    return {"answer": lead.answer(), "cases": {
-        "count": outcome.size, "failed": int(np.sum(outcome == FAILED)), "unfinished": int(np.sum(outcome == "")),
+    counts = dict(Counter(map(str, outcome)).most_common())
+    return {"answer": lead.answer(), "sentences": lead.sentences(), "cases": {
+        "count": len(outcome), "failed": counts.get(FAILED, 0), "unfinished": counts.get("", 0), "outcomes": counts,
         "over_tolerance": lead.missed},
         "ranking": {name: [one._asdict() for one in shares] for name, shares in lead.ranks.items()},
-        "limits": as_json(lead.limits)}
+        "limits": as_json(lead.limits), "sign": sign}
 
 
-def write_answer(table: dict, path: Path) -> str:
-    """Write sweep.json to `path`; its sentence."""
-    found = answer_of(table)
+def write_answer(found: dict, path: Path) -> None:
+    """Write sweep.json to `path`."""
     write_text(path, json.dumps(found, allow_nan=False, ensure_ascii=False, indent=1) + "\n")
-    return found["answer"]
+
+
+def read_answer(path: Path) -> dict:
+    """What sweep.json holds, {} where there is none that can be read."""
+    try:
+        found = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) and isinstance(found.get("cases"), dict) else {}

@@ -30,6 +30,7 @@ from ..folder import save
 from ..results import LOCK, PAGE, refuse_others
 from ..summary import read_summary, summary
 from . import chunks
+from .answer import read_answer
 from .chunks import CHUNKS
 
 KEEP = ("none", "summaries", "results", "pages")  # of each case, beside its columns
@@ -201,10 +202,7 @@ class Folder:
 
     def whole(self) -> bool:
         """Whether the folder holds the tables of a sweep that came to its end."""
-        try:
-            return not json.loads((self.target / "sweep.json").read_bytes())["cases"]["unfinished"]
-        except (OSError, ValueError, KeyError, TypeError):
-            return False
+        return read_answer(self.target / "sweep.json").get("cases", {}).get("unfinished") == 0
 
     def there(self, numbers: np.ndarray, keep: str = "none") -> np.ndarray:
         """Those of the cases that have an answer, and the files of each that `keep` asks for."""

@@ -20,6 +20,7 @@ from ...disk.whole import write_text
 from ...runs.many.answers import Answers
 from ...runs.results.result import meaning
 from ..pages import sweep
+from ..pages.lead import Lead
 from ..readback import HUGE, wanted
 from ..written import NUMBER
 from .tables import facts, names_of
@@ -27,9 +28,9 @@ from .tables import facts, names_of
 WHOLE, SHORT = "report.html", "summary.json"  # what a click on a case opens: its page where it has one
 
 
-def write_page(table: dict, folder: Path) -> None:
+def write_page(table: dict, lead: Lead, folder: Path) -> None:
     """Write the page of all cases beside their tables."""
-    write_text(folder / "report.html", sweep.page(table))
+    write_text(folder / WHOLE, sweep.page(table, lead))
 
 
 def table_of(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Path) -> dict:

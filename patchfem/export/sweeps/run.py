@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from ... import __version__
 from ...campaigns.sweeps.asked import Asked
 from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.estimate import FEW, TABLED
@@ -17,9 +20,10 @@ from ...campaigns.sweeps.sweep import Clock, Work, solved
 from ...core import Missing, PatchfemError
 from ...runs.many.answers import Answers
 from .. import netcdf
-from .answer import write_answer
-from .folder import Folder, Summaries, Whole, Writer
-from .page import WHOLE, table_of, write_page
+from ..pages.lead import lead_of
+from .answer import answer_of, read_answer, write_answer
+from .folder import TABLES, Folder, Summaries, Whole, Writer
+from .page import WHOLE, command, opened, table_of, write_page
 from .tables import contents, write_csv
 
 
@@ -79,7 +83,9 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
         folder.answers(total)
         for numbers, found in died:
             total.place(numbers, found)
-        write_tables(asked, cases, total, folder, place.page)
+        sign = sign_of(asked, cases, folder, place.page)
+        if left.size or not _written(sign, folder, place.page):
+            write_tables(asked, cases, total, folder, place.page, sign="" if died else sign)
         folder.tidy(not place.resume, keep)
     return total
 
@@ -142,22 +148,38 @@ def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> Answ
     return found
 
 
+def sign_of(asked: Asked, cases: Cases, folder: Folder, page: bool) -> str:
+    """Sign of all that the tables of a whole sweep are made of: where it is that of sweep.json, they are there."""
+    made = [__version__, asked.text, [(axis.key, axis.texts) for axis in cases.axes], command(asked, cases), page,
+            [opened(folder.target, key) for key in folder.keys()]]
+    return sha256(json.dumps(made).encode() + folder.chunks.names.tobytes()).hexdigest()
+
+
+def _written(sign: str, folder: Folder, page: bool) -> bool:
+    """Whether all tables that a sweep of this sign has are there, and nothing has come in since they were written."""
+    names = TABLES if len(folder.chunks.names) <= TABLED else ("sweep.json", WHOLE)
+    return read_answer(folder.target / "sweep.json").get("sign") == sign and all(
+        (folder.target / name).is_file() for name in names if page or name != WHOLE)
+
+
 def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder, page: bool = True,
-                 every: bool = False) -> None:
+                 every: bool = False, sign: str = "") -> None:
     """Write sweep.json, report.html, and of TABLED cases at most, or where `every` asks for them, sweep.csv and
-    sweep.nc; what is not written is not left of other cases."""
+    sweep.nc; what is not written is not left of other cases. sign: as of `sign_of`, where every case has an answer that
+    is kept."""
     keys, tabled = folder.keys(), every or len(cases) <= TABLED
     table = table_of(asked, cases, found, keys, folder.target) | {"tabled": tabled}
-    answer = write_answer(table, folder.target / "sweep.json")
+    lead = lead_of(table)
     for name in () if tabled else ("sweep.csv", "sweep.nc"):
         (folder.target / name).unlink(missing_ok=True)
     if tabled:
         write_csv(cases, found, keys, folder.target / "sweep.csv")
-        netcdf.write(contents(asked, cases, found, keys, answer), folder.target / "sweep.nc")
+        netcdf.write(contents(asked, cases, found, keys, lead.answer()), folder.target / "sweep.nc")
     if page:
-        write_page(table, folder.target)
+        write_page(table, lead, folder.target)
     else:
         (folder.target / WHOLE).unlink(missing_ok=True)
+    write_answer(answer_of(lead, table["outcome"], sign), folder.target / "sweep.json")  # the last: it signs the others
 
 
 def _part(count: int, shard: tuple | None) -> np.ndarray:

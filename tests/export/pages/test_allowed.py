@@ -9,6 +9,7 @@ from page_data import own_part
 from test_changes import TILT, key
 
 from patchfem.export.pages.allowed import _change, allowed, as_json, sentence
+from patchfem.export.pages.lead import lead_of
 from patchfem.export.pages.sweep import page
 from patchfem.export.sweeps.answer import answer_of
 
@@ -150,13 +151,13 @@ def swept() -> dict:
 
 def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
     """(1 + s)^0.5 is 1.05 at s = 0.1025, a tilt of 0.46 mrad; 2 MPa are doubled at 0.15 mrad; 1 - 0.1 t at 0.5475."""
-    text, found = own_part(page(swept())), answer_of(swept())
+    text, found = own_part(page(swept())), answer_of(lead_of(swept()), swept()["outcome"])
     want = ("Tilt may reach 0.25 mrad (3.2 um over the patch, between cases at 0.2 and 0.5 mrad) before anything that "
             "moves changes by 5 % (loop area first; relative displacement amplitude at 0.46 mrad); the pressure peak "
             "doubles at 0.15 mrad; the stiffness of the patch changes by 5 % at 0.55 mrad (normal).")
     assert f"<p>{want}</p>" in text and "Change against the first case" in text
     assert "between 0.2 and 0.5 mrad, at about 0.25 mrad" in text and "in no case" in text and "+23.8 %" in text
-    assert found["cases"] == {"count": 5, "failed": 0, "unfinished": 0,
+    assert found["cases"] == {"count": 5, "failed": 0, "unfinished": 0, "outcomes": {"steady": 5},
                               "over_tolerance": {"moment": {"count": 2, "worst": pytest.approx(0.4)}}}
     miss = "2 of 5 cases miss the tolerance of 1 % in moment, worst at contact.tilt.angle 1 mrad: 40 % of its value"
     assert found["answer"] == f"{miss}; {want.replace('Tilt', 'tilt', 1)}" and f"<p>{miss}.</p>" in text
@@ -170,7 +171,7 @@ def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
 
 def test_always_the_sentence_of_a_sweep_without_numbers_is_empty():
     table = swept() | {"keys": [key(words=True) | {"unit": "1", "log": False, "texts": list("abcde")}]}
-    found = answer_of(table)
+    found = answer_of(lead_of(table), table["outcome"])
     assert found["limits"] == [] and "moment, worst at contact.tilt.angle e" in found["answer"]
 
 

@@ -172,3 +172,28 @@ def test_always_who_does_not_see_the_folder_hands_its_answers_on(swept, scene, t
     assert cli("sweep", scene, *OVER, "-o", tmp_path / "out", "--keep", "none").code == 3
     for name in TABLES:
         assert (tmp_path / "out" / name).read_bytes() == (swept / name).read_bytes()
+
+
+def test_exact_the_tables_of_a_whole_sweep_are_written_again_only_where_they_are_others(scene, tmp_path):
+    """A whole sweep that is resumed answers the same and writes nothing; one that lacks a table, has its page left
+    out, names its values otherwise or was written with a case less writes all."""
+    out, over = tmp_path / "out", ("--over", "drive.acceleration=1 g,2 g,3 g")
+
+    def stamps():
+        return {one.name: one.stat().st_mtime_ns for one in out.iterdir() if one.is_file()}
+
+    def resumed(*words, over=over):
+        before = stamps()
+        said = cli("sweep", scene, *over, "-o", out, "--keep", "none", "--resume", *words)
+        assert said.code == 0
+        return said.out, {name for name, when in stamps().items() if before.get(name) != when}
+
+    first = cli("sweep", scene, *over, "-o", out, "--keep", "none").out
+    assert resumed() == (first, set())
+    (out / "sweep.nc").unlink()
+    assert resumed()[1] == {"sweep.csv", "sweep.nc", "sweep.json", "report.html"} and resumed()[1] == set()
+    assert resumed("--no-page")[1] == {"sweep.csv", "sweep.nc", "sweep.json"} and not (out / "report.html").exists()
+    named = ("--over", "drive.acceleration=1 g,2 g,29.41995 m/s^2")
+    assert "sweep.csv" in resumed(over=named)[1] and "29.41995" in (out / "sweep.csv").read_text()
+    assert "sweep.csv" in resumed(over=("--over", "drive.acceleration=1 g,2 g"))[1]
+    assert len((out / "sweep.csv").read_text().splitlines()) == 3
