@@ -104,8 +104,9 @@ def test_always_the_python_of_the_guide_runs(tmp_path, monkeypatch):
     assert len(names["axes"].lines) == 2 and (tmp_path / "out" / "mine" / "summary.json").is_file()
 
 
-def test_always_the_recipes_of_the_readme_run(tmp_path, monkeypatch):
-    """As they stand, in an empty folder that holds a trace before and one after; each shows its answer."""
+@pytest.fixture
+def recipes(tmp_path, monkeypatch):
+    """question -> what its recipe prints as it stands, in an empty folder that holds a trace before and one after."""
     monkeypatch.chdir(tmp_path)
     x = np.arange(0, 4e-3, 2e-6)
     before = 2e-6 * np.sin(2 * np.pi * x / 80e-6) + 1e-7 * np.random.default_rng(1).standard_normal(x.size)
@@ -114,14 +115,21 @@ def test_always_the_recipes_of_the_readme_run(tmp_path, monkeypatch):
         rows = "\n".join(f"{1e3 * place},{1e6 * height}" for place, height in zip(x, heights))
         (tmp_path / f"{name}.csv").write_text(f"x [mm],z [um]\n{rows}\n")
     lines = re.search(r"## Three recipes\n\n```bash\n(.*?)```", text("README.md"), re.S)[1].splitlines()
-    said = {}
-    for line in lines:
-        command, _, question = line.partition("#")
-        for words in command.split("&&"):
+    commands = {question.strip().partition("?")[0]: command for command, _, question in
+                (line.partition("#") for line in lines)}
+    assert len(commands) == 3
+
+    def said(question: str) -> str:
+        for words in commands[question].split("&&"):
             answer = cli(*shlex.split(words)[1:])
             assert answer.code == 0, answer.err
-        said[question.strip().partition("?")[0]] = answer.out
-    tilt = said["how much tilt may I allow"]
+        return answer.out
+    return said
+
+
+@pytest.mark.slow
+def test_always_the_recipe_of_tilts_runs_and_every_page_allows_what_it_says(recipes):
+    tilt = recipes("how much tilt may I allow")
     angle, gap = re.search(r"\nTilt may reach (\S+ mrad) \((\S+ um over the patch), between cases at 0.1 and 0.32 "
                            r"mrad\) before anything that moves changes by 5 % \(loop area first", tilt).groups()
     allowed_everywhere(f"{angle} ({gap})", re.search(r"the pressure peak doubles at \S+ mrad", tilt)[0])
@@ -130,9 +138,12 @@ def test_always_the_recipes_of_the_readme_run(tmp_path, monkeypatch):
     scene = Path("tilts.toml").read_text("utf-8").replace("[sweep]\n", "").replace('"contact.tilt.angle" =', "#")
     at_limit = pf.run(scene, **{"contact.tilt.angle": angle}).measures["loop_area"].value
     assert at_limit / first - 1 == pytest.approx(-0.05, abs=0.003)
-    joint = said["how stiff is my joint, what does it damp"]
+
+
+def test_always_the_recipes_of_a_joint_and_of_a_pad_run(recipes):
+    joint = recipes("how stiff is my joint, what does it damp")
     assert "secant_stiffness" in joint and "loop_area" in joint and "dissipated per cycle" in joint
-    assert "worn" in said["is my pad worn"]
+    assert "worn" in recipes("is my pad worn")
 
 
 def allowed_everywhere(limit: str, peak: str) -> None:

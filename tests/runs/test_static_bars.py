@@ -66,6 +66,7 @@ def test_bars_of_a_narrow_contact_hold_a_half_plane_of_finite_height():
         assert abs(found[name].value - truth) <= found[name].error <= 1e-3 * truth
 
 
+@pytest.mark.share(0, 1)
 @pytest.mark.parametrize("text, name, truth", [
     (COATED, "moment", -8.2501e-3), (COATED, "contact_half_width", 9.5556e-4),
     (CROWNED, "contact_half_width", 2.99765e-3), (CROWNED, "contact_fraction", 0.258252)])
@@ -79,7 +80,7 @@ def test_bars_beside_a_step_hold_and_do_not_widen(text, name, truth):
         last = found.error
 
 
-@pytest.mark.share(0, 2, 3, 4)
+@pytest.mark.share(0, 4)
 @pytest.mark.parametrize("seed, name, truth, own", [
     (7005, "moment", 0.17521083, 1e-5), (7017, "moment", -6.73948e-5, 1.4e-9),
     (7029, "normal_stiffness", 220205694.0, 1300.0), (7029, "rotational_stiffness", 1541.8782, 0.06),

@@ -21,7 +21,7 @@ def result_of(text, *sets, estimate=False):
     return run(plan(loads(text, "a.toml", sets)), estimate=estimate)
 
 
-@pytest.mark.share(0, 1, 2)
+@pytest.mark.share(0, 2)  # Coulomb and tanh: each a loop to compile
 @pytest.mark.parametrize("law", ['"nonlocal"\nbond_length = "1 um"', '"coulomb"',
                                  '"elastic-plastic"\nbond_length = "1 um"',
                                  '"tanh"\nreference_speed = "1 mm/s"'])
@@ -64,9 +64,12 @@ def test_exact_the_spring_of_the_holder_is_in_series_with_the_pitch():
     assert np.abs(force - want).max() <= 1e-11 * patch.pressure.load and own < 0.9 * turn
 
 
-def test_exact_a_rig_under_a_swinging_load():
+@pytest.mark.share(1)
+@pytest.mark.parametrize("law", [(), ("friction.law=elastic-plastic", "friction.bond_length=1 um")],
+                         ids=["coulomb", "elastic-plastic"])
+def test_exact_a_rig_under_a_swinging_load(law):
     """normal_load follows its formula, the balance closes, and friction keeps below mu N."""
-    found = result_of(POINT, *SWING, estimate=True)
+    found = result_of(POINT, *SWING, *law, estimate=True)
     time, load = found.response.time, found.response.extra["normal_load"]
     assert load == pytest.approx(26 * 4.4482216152605 + 60 * np.cos(2 * np.pi * 50 * time), abs=1e-9)
     assert found.measures["energy_balance"].value <= 1e-12

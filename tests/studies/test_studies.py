@@ -58,6 +58,7 @@ def test_figure_14_curve_of_the_study(tmp_path):
     assert "<svg" in (tmp_path / "figure.svg").read_text()
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("words", [(), ("--set", "contact.element_size=64 um")])
 def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path, monkeypatch):
     """Errors to every digit printed; seconds hang on the machine, and their ratios to a third or three times."""

@@ -49,6 +49,7 @@ def on_paper(chromium: Chromium, text: str, dark: bool) -> np.ndarray:
     return shot[max(top, 0):top + high, left:left + wide]
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("kind", ["stress", "sweep"])
 def test_exact_a_map_on_paper_has_the_colours_of_its_scale(chromium, table, kind):
     """Inverted, the highest stress of a dark page was the darkest on paper; now light and dark print alike."""

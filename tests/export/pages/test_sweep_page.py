@@ -141,6 +141,7 @@ def test_exact_a_script_cannot_end_its_element():
     assert data_of(hostile) == {"x": "</script><!--"}
 
 
+@pytest.mark.share(2)
 @pytest.mark.parametrize("off", [slice(0, 3), slice(9, 12), slice(None)], ids=["first", "last", "all"])
 def test_always_a_browser_draws_a_sweep_that_does_not_settle_at_an_end(table, browser, off):
     """A shading without a left or right end once left the picture out."""
@@ -184,6 +185,7 @@ def test_exact_values_over_two_decades_have_a_logarithmic_axis_and_what_misses_t
     assert chromium.js("document.getElementById('log').checked") is False
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("shown", ["lines", "map", "cloud"])
 def test_always_a_browser_draws_it(table, browser, shown):
     table["grid"] = shown != "cloud"

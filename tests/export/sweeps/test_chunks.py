@@ -116,6 +116,7 @@ def test_exact_a_sweep_of_columns_has_the_rows_of_one_with_summaries(swept, scen
     assert sum(one.stat().st_size for one in (swept / "chunks").iterdir()) < 600 * 110
 
 
+@pytest.mark.share(2, 3)
 @pytest.mark.parametrize("damage", ["empty", "half", "one byte", "another sign"])
 def test_always_a_damaged_file_is_run_again(swept, scene, tmp_path, monkeypatch, damage):
     out = shutil.copytree(swept, tmp_path / "out")

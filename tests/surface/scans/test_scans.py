@@ -74,6 +74,7 @@ def test_exact_a_groove_between_unworn_parts_has_its_volume_and_its_place(worn):
     assert change.headline(found) == change.WORN
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("mirrored, turned", [("x", False), ("y", True)])
 def test_exact_a_scan_that_is_mirrored_or_turned_over_has_the_same_volume(grooved, worn, mirrored, turned):
     other = change.changed(grooved[0], variant(grooved[1], mirrored, turned))
@@ -90,6 +91,7 @@ def test_exact_a_scan_that_is_turned_half_round_is_found(grooved, worn):
     assert found.values["worn_volume"].value == pytest.approx(worn.values["worn_volume"].value, rel=1e-6)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("depth", [0.0, 0.5e-6])
 def test_always_even_wear_and_none_are_told_alike_and_have_no_depth(depth):
     found = change.changed(*scans(lambda x, y, z: depth + 0 * x))
