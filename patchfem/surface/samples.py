@@ -119,7 +119,8 @@ def plausible(path, x, z, stated: str = "") -> tuple:
     few = max(1, there.size // TRIMMED[1]) if there.size >= TRIMMED[0] else 0
     most = float(there[-1 - few] - there[few])
     if most <= length:
-        return (f"{steep}, without the {few} highest and the {few} lowest of {there.size} {say(most)}: spikes?",)
+        return (f"{steep}, and {say(most)} without the {few} highest and the {few} lowest of {there.size}; write "
+                "nan for those that are faults of the measurement",)
     if not stated:
         raise PatchfemError(f"{steep}; is the unit of z right? a missing height is written nan; --units overrules the "
                             "units of a header")

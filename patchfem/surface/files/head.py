@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from ...core import PatchfemError
 from ...inputs.cells import NUMBER
+from .raw import shown
 from .units import factor_of
 
 WIDEST = 1000  # characters of a line of columns
@@ -42,9 +43,12 @@ _FACTS = {  # what a head may say of a matrix -> how it is written before a colo
     "lateral": "lateral units?|laterale einheit(?:en)?|x[- ]unit|unit x|x-einheit",
     "unit_y": "y[- ]unit|unit y|y-einheit",
     "value": "value units?|einheiten|wert-?einheit(?:en)?|z[- ]unit|unit (?:z|data)|z-einheit",
-    "bit2nm": "bit2nm", "scale": "scale data", "scaled": "datascaleneeded", "factor": r"height\s+conversion\s+factor"}
+    "bit2nm": "bit2nm", "format": "file format",
+    "scale": "scale data", "scaled": "datascaleneeded", "factor": r"height\s+conversion\s+factor"}
 _FACTS = {name: re.compile(rf"(?<![\w-])(?:{words})\s*(?:\(->\s*(?P<of>\w+)\s*\))?\s*[:=：](?P<is>.*)", re.IGNORECASE)
           for name, words in _FACTS.items()}
+_THOUSANDS = re.compile("[1-9][0-9]{0,2},[0-9]{3}")  # or a decimal comma, unless the words are German
+_GERMAN = re.compile("breite|höhe|länge|größe|schritt", re.IGNORECASE)
 
 
 class Head(NamedTuple):
@@ -77,13 +81,18 @@ class Head(NamedTuple):
                 names = number, cells
         return names, units
 
-    def facts(self) -> dict:
-        """name of `_FACTS` -> (number or None, word behind it), of the first line that tells it."""
+    def facts(self, path) -> dict:
+        """name of `_FACTS` -> (number or None, word behind it), of the first line that tells it; PatchfemError for
+        1,234, which may be a thousand or one, where no row has a decimal comma."""
         found = {}
-        for _, line, _ in self.lines:
+        for at, line, _ in self.lines:
             for name, pattern in _FACTS.items():
                 if name not in found and (said := pattern.search(line)):
                     value = _VALUE.match(said["is"])
+                    if _THOUSANDS.fullmatch(value[1] or "") and not _GERMAN.search(said[0]) \
+                            and not any("," in cell for cell in self.row):
+                        raise PatchfemError(f"{path}:{at}: '{shown(line)}': {value[1]} may be a decimal number or one "
+                                            "of thousands; write it with a point, or without a comma")
                     number = value[1] and float(value[1].replace(",", "."))
                     found[name] = number, said["of"] or value[2]
         return found

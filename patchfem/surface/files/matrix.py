@@ -19,7 +19,7 @@ ABOVE = f"write {SIZE}, those of the scan, and `# Value units: um` above its row
 
 def is_matrix(count: int, names: list, facts: dict) -> bool:
     """Whether rows of `count` numbers are a matrix and no columns x, (y,) z."""
-    sized = "width" in facts and ("height" in facts or count == 1)
+    sized = count == 1 and not {"width", "step_x"}.isdisjoint(facts)
     return not named(names) and (count > 3 or sized or facts.get("columns", (0,))[0] == count)
 
 
@@ -30,7 +30,7 @@ def matrix(path, head: Head, facts: dict, given: tuple | None, body: str) -> Pro
     of z, which complete and overrule it. PatchfemError for a matrix of unknown size or unit, or of uneven rows.
     """
     table = _table(path, head, body)
-    if table.shape[1] == 1 and "height" not in facts:
+    if table.shape[1] == 1 and {"height", "step_y"}.isdisjoint(facts):
         table = table.T  # one height a line
     for name, axis, count in (("rows", "rows", table.shape[0]), ("columns", "numbers a row", table.shape[1])):
         stated = facts.get(name, (None,))[0]
@@ -85,7 +85,7 @@ def _step(path, axis: str, count: int, facts: dict, given: tuple | None) -> tupl
                             f"its {'width' if axis == 'x' else 'height'} is not told; {ABOVE}")
     unit = unit or next((facts[name][1] for name in ("unit_y", "lateral") if axis == "y" or name == "lateral"
                          if name in facts), None)
-    if not unit and "bit2nm" in facts:
+    if not unit and facts.get("format", ("", ""))[1].lower() == "ascii":
         unit = "nm"  # SPIP writes places in nanometres
     if given is None and factor_of(unit or "") is None:
         raise PatchfemError(f"{path}: the unit of its width and height, '{shown(unit or '')}', is not known; write "

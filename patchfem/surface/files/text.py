@@ -42,7 +42,7 @@ def columns(raw: Raw, given: tuple | None = None) -> Profile | Areal:
         if factor_of(unit) is None:
             raise PatchfemError(f"{path}: unknown unit '{shown(unit)}'; use one of {LISTED}")
     head = head_of(path, text)
-    facts = {} if head.named else head.facts()
+    facts = {} if head.named else head.facts(path)
     at, names, units = _above(head)
     if not head.named and is_matrix(len(head.row), names, facts):
         return matrix(path, head, facts, given, text[head.start:])

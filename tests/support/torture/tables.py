@@ -125,7 +125,7 @@ def answered(trial: Trial, bad: bool, *words) -> None:
 
 def instruments(trial: Trial) -> None:
     """Traces and scans as instruments and programs write them, with wounded bytes."""
-    kind = trial.draw("npy", "mat", "sdf", "x3p", "dektak", "npz")
+    kind = trial.draw("npy", "mat", "sdf", "x3p", "dektak", "npz", "matrix")
     x, z = np.arange(40.0), trial.r.normal(size=40)
     file = io.BytesIO()
     if kind == "npy":
@@ -145,13 +145,18 @@ def instruments(trial: Trial) -> None:
             head[trial.draw(*head)] = trial.draw(0, -1, 10**9, 10**30, "nan", 1e308, 1e-320, "x", 2.5)
         file.write(("aISO-1.0\n" + "".join(f"{k} = {v}\n" for k, v in head.items()) + "*\n"
                     + " ".join(f"{int(1e4 * one)}" for one in z) + "\n*\n").encode())
+    elif kind == "matrix":
+        head = trial.draw("# Width: 8 um\n# Height: 5 um\n# Value units: um\n", "h = 5, w = 8\npixel size = 1 um\n",
+                          "# Breite: 8,0 µm\n# Höhe: 5,0 µm\n# Einheiten: um\n", "")
+        file.write((head + "".join("\t".join(f"{one:.4f}" for one in row) + "\n" for row in z.reshape(5, 8))).encode())
     else:
         file.write(("Scan Parameters\nLength,40 um\nStylus,Radius: 2.5 um\n\nLateral um,Raw Micrometer,\n"
                     + "".join(f"{a:.1f},{b:.4f},\n" for a, b in zip(x, z))).encode())
     data = file.getvalue() if trial.chance(0.3) else wounded(trial, file.getvalue())
-    (trial.folder / f"scan.{kind.replace('dektak', 'csv')}").write_bytes(data)
-    units = ("--units", "um,um") if kind in ("npy", "mat") else ()
-    answered(trial, False, "profile", f"scan.{kind.replace('dektak', 'csv')}", "--json", *units)
+    name = "scan." + {"dektak": "csv", "matrix": "txt"}.get(kind, kind)
+    (trial.folder / name).write_bytes(data)
+    units = ("--units", "um,um") if kind in ("npy", "mat") or trial.chance(0.1) else ()
+    answered(trial, False, "profile", name, "--json", *units)
 
 
 def _x3p(file, z) -> None:

@@ -224,6 +224,12 @@ def test_always_a_million_samples_take_less_than_a_second(tmp_path):
 
 SEED = text(X, Z).encode()
 lines_of_junk = st.lists(st.text(alphabet="0123456789.,;\t eE+-nax[]um*#\"z()\n", max_size=30), max_size=8)
+words_of_heads = st.one_of(
+    st.sampled_from(["# Width: 4 um", "# Height: 3,0 µm", "Value units: nm", "h = 3, w = 4", "pixel size = 1e-6 m",
+                     "mm;um", "x in um z in um", "Nr.\tx\tz", "Bit2nm = 1e400", "# Width: 0 um", "µm", "1 2 3 4",
+                     "5\t6\t7\t8", "1;2", "3;4", "0,5\t1,5", "Unit Data = V", "X;Y;valid", "[mm];[mm];[1/0]",
+                     "# Width: 1.234,5 um"]),
+    st.text(alphabet="0123456789.,;\t eE=:xyzumwh[]#", max_size=20))
 
 
 def attempt(content: bytes) -> None:
@@ -246,6 +252,7 @@ def attempt(content: bytes) -> None:
 @given(st.one_of(st.binary(max_size=300), st.text(max_size=200).map(lambda t: t.encode("utf-8", "surrogatepass")),
                  st.binary(max_size=100).map(lambda b: b"\x1f\x8b" + b),
                  lines_of_junk.map(lambda rows: ("x [um],z [um]\n" + "\n".join(rows)).encode()),
+                 st.lists(words_of_heads, max_size=12).map(lambda rows: "\n".join(rows).encode()),
                  lines_of_junk.map(lambda rows: "\n".join(rows).encode())))  # fmt: skip
 def test_always_junk_is_refused_by_name(content):
     attempt(content)
