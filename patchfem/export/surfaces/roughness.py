@@ -55,7 +55,7 @@ def heading(report: RoughnessReport) -> str:
     if report.kind == "areal":
         return text + _areal_filters(short, report.cutoff, bool(np.isnan(report.scan.z).any()))
     if report.cutoff is None:
-        fits = fitting_cutoff(report.length, report.step)
+        fits = fitting_cutoff(report.length + report.step, report.step)  # a step for each sample
         text += "; no cut-off, so no roughness profile" + (
             f' (--cutoff "{say(fits)}" is the longest standard one with five sections here)' if fits else
             ", and no standard cut-off has five sections here")

@@ -130,14 +130,12 @@ def direction(surface: Surface) -> float | None:
     return 0.0 if np.pi - found < 1e-9 else found
 
 
-def lacking(surface: Surface, name: str, value: float | None, low: float | None) -> str:
-    """Why a parameter has no value, or no interval; "" where it has both."""
+def lacking(surface: Surface, name: str) -> str:
+    """Why a parameter has no value."""
     near = surface.lobe[0]
     half = min(step * (count // 2) for step, count in zip(surface.steps, surface.z.shape))
     if surface.heights.power == 0:
-        return "the scan is flat" if value is None else ""
-    if value is not None:
-        return "one scan does not tell its interval" if low is None else ""
+        return "the scan is flat"
     if name in ("Sal", "Str", "Std") and near is None:
         return "the autocorrelation stays above 0.2 over half of the scan"
     if name in ("Sal", "Str", "Std") and near < NEAR * max(surface.steps):

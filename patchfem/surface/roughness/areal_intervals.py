@@ -3,13 +3,14 @@
 import numpy as np
 
 from .areal import cosine_taper
-from .intervals import HIGH, LOW
+from .intervals import HIGH, LOW, ODD
 
 SPENT = 0.85  # share of the degrees of freedom that is left when the spectrum is estimated too (240 made scans)
 
 
-def areal_intervals(flat: np.ndarray, values: dict) -> dict:
-    """Interval (low, high), 5 to 95 %, of each parameter that one scan of this size allows; (None, None) without one.
+def areal_intervals(flat: np.ndarray, values: dict) -> tuple:
+    """Interval (low, high), 5 to 95 %, of each parameter that one scan of this size allows, (None, None) without one;
+    and whether none has any because the heights are not Gaussian, as for traces.
 
     The scan counts as one of many with Gaussian heights and its own power spectrum (two-dimensional, under a cosine
     taper). Sq and Sa go by the degrees of freedom of its mean square, Ssk and Sku by their standard deviations
@@ -20,9 +21,11 @@ def areal_intervals(flat: np.ndarray, values: dict) -> dict:
 
     out = dict.fromkeys(values, (None, None))
     if values["Ssk"] is None:
-        return out
+        return out, False
     wider = max(1.0, (values["Sku"] - 1) / 2)
-    shares, cubes, fourths = _scatter(np.nan_to_num(flat))
+    shares, cubes, fourths, sizes = _scatter(np.nan_to_num(flat))
+    if abs(values["Ssk"]) > ODD * np.sqrt(6 * sizes) or values["Sku"] - 3 > ODD * np.sqrt(24 * fourths):
+        return out, True
     freedom = max(SPENT * 2 / shares / wider, 1.0)
     low, high = (float(np.sqrt(freedom / chi2.ppf(p, freedom))) for p in (HIGH, LOW))
     for name in ("Sa", "Sq"):
@@ -30,11 +33,11 @@ def areal_intervals(flat: np.ndarray, values: dict) -> dict:
     for name, share in (("Ssk", 6 * cubes), ("Sku", 24 * fourths)):
         reach = 1.6449 * float(np.sqrt(share * wider))
         out[name] = values[name] - reach, values[name] + reach
-    return out
+    return out, False
 
 
 def _scatter(z: np.ndarray) -> tuple:
-    """Relative variance of the mean square, and the means of rho^3 and rho^4 over all lags of the scan."""
+    """Relative variance of the mean square, and the means of rho^3, rho^4 and |rho|^3 over all lags of the scan."""
     from scipy.fft import fft2, irfft2, rfft2
 
     m, n = z.shape
@@ -47,5 +50,6 @@ def _scatter(z: np.ndarray) -> tuple:
         both[place] = irfft2(np.abs(rfft2(values, shape)) ** 2, shape)
     rho, lags = both[0] / both[0, 0, 0], np.maximum(both[1] / both[1, 0, 0], 1e-3)
     near = lags > 0.1  # beyond, too few pairs are left to tell a correlation
-    means = [float(np.where(near, (rho / lags) ** p * lags, 0.0).sum()) / (m * n) for p in (3, 4)]
-    return shares, abs(means[0]), means[1]
+    rho = np.where(near, rho / lags, 0.0)
+    cubes, fourths, sizes = (float((power * lags).sum()) / (m * n) for power in (rho**3, rho**4, np.abs(rho) ** 3))
+    return shares, abs(cubes), fourths, sizes

@@ -14,13 +14,14 @@ from .areal import Surface, lacking
 from .areal_intervals import areal_intervals
 from .filter import filtered, filtered_scan
 from .form import degree_of, without_form
-from .intervals import Intervals
+from .intervals import LATERAL, Intervals
 from .parameters import Heights, abbott
 from .spectrum import BAND, amplitude_of, refuse_band, spectrum_of
 from .tip import Tip, tip_check
 
 FEWEST = 16  # samples of a trace with a report
-UNTOLD = "the trace does not tell its interval"
+UNTOLD = "one trace does not tell its interval"
+UNEVEN = "the heights are not Gaussian, which intervals of one trace count on; the scatter of several traces tells"
 CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)  # [m] of ISO 21920-3, and one more at each end
 SECTIONS = 6  # cut-offs in a trace: five that count and one that the filter takes
 ROUND = 1e-14  # of the largest height: what levelling leaves of a straight line
@@ -124,7 +125,7 @@ def report_of(surface: Profile | Areal, cutoff: float | None = None, window: tup
         values += [_value(row, _ends(trace) if row.of is None else row.of(heights), found) for row in rows.WINDOW]
     shown, radius = rough or heights, surface.tip_radius if tip is None else tip
     stylus = None if radius is None else tip_check(heights, radius)
-    notes = trace.notes + _spiky(cut) + _skewed(trace.source, values)
+    notes = trace.notes + _spiky(cut)
     return RoughnessReport(
         trace.source, "profile", trace.length, (trace.x.size,), heights.step, tuple(values), notes, form, settings,
         cutoff, window, band, stylus, reread(surface), primary, waviness, roughness, abbott(shown), shown.core,
@@ -221,8 +222,8 @@ def _value(row, value, found: Intervals) -> Quantity:
     elif row.kind == "wave" and low is not None and not (
             found.heights.step <= low <= value <= high <= found.heights.length):
         low, high, reason = None, None, UNTOLD
-    if value is not None and low is None and not reason:
-        reason = "one trace does not tell its interval" if found.heights.power else ""
+    if value is not None and low is None and not reason and found.heights.power:
+        reason = UNEVEN if found.uneven and row.kind not in ("", *LATERAL) else UNTOLD
     return Quantity(value, low, high, row.unit, _text(row, found.heights), reason, row.name)
 
 
@@ -257,18 +258,6 @@ def _spiky(profile: Profile) -> tuple:
     return (f"{profile.source}: {found.sum()} of {found.size} heights {what}; {counts} in every parameter",)
 
 
-def _skewed(source: str, values: list) -> tuple:
-    """A remark where heights are not Gaussian: the intervals of the shape of their distribution count on it."""
-    out = []
-    for one in values:
-        if one.name in ("Psk", "Rsk") and one.low is not None and not one.low <= 0 <= one.high:
-            letter = one.name[0]
-            named = f"{letter}ku, {letter}k, {letter}pk and " + ("PMr2" if letter == "P" else "Mr2")
-            out.append(f"{source}: {one.name} is {one.value:.2g} ({one.low:.2g} to {one.high:.2g}), so the heights are "
-                       f"not Gaussian; the intervals of {named} count on that and are too narrow")
-    return tuple(out)
-
-
 def _of_scan(scan: Areal, cutoff: float | None, settings: Settings) -> RoughnessReport:
     flat, form = without_form(scan, settings.form)
     if settings.short is not None:
@@ -282,10 +271,12 @@ def _of_scan(scan: Areal, cutoff: float | None, settings: Settings) -> Roughness
     steps = tuple(float(axis[-1] - axis[0]) / (axis.size - 1) for axis in (flat.y, flat.x))
     surface = Surface(flat.z, steps, settings.level, settings.ratios)
     found = {row.name: row.of(surface) for row in rows.AREAL}
-    bounds = areal_intervals(flat.z, found)
-    values = tuple(Quantity(found[row.name], *bounds[row.name], row.unit, _text(row, surface),
-                            lacking(surface, row.name, found[row.name], bounds[row.name][0]), row.name)
-                   for row in rows.AREAL)
+    bounds, uneven = areal_intervals(flat.z, found)
+    values = tuple(Quantity(found[name], *bounds[name], row.unit, _text(row, surface),
+                            lacking(surface, name) if found[name] is None else
+                            "" if bounds[name][0] is not None or not surface.heights.power else
+                            (UNEVEN if uneven else UNTOLD).replace("trace", "scan"), name)
+                   for row in rows.AREAL for name in (row.name,))
     lost = int(np.isnan(flat.z).sum())
     notes = scan.notes + ((f"{scan.source}: {lost} of {flat.z.size} heights are missing and do not count",) if lost
                           else ())

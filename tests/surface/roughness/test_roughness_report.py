@@ -65,14 +65,19 @@ def test_exact_spikes_are_told_and_count():
     assert report["Pt"].value > 50 * UM
 
 
-def test_exact_a_plateau_is_told():
-    """Heights cut at half a deviation: the intervals that count on Gaussian heights are named; a sine has no remark."""
-    z = np.minimum(traces(1, 8e-3, UM, 6 * UM, 3)[0], 3 * UM)
-    notes = report_of(Profile(np.arange(z.size) * UM, z, "worn.csv"), 250 * UM).notes
-    assert [note.split(" is ")[0] for note in notes] == ["worn.csv: Psk", "worn.csv: Rsk"]
-    assert notes[1].endswith("so the heights are not Gaussian; the intervals of Rku, Rk, Rpk and Mr2 count on that and "
-                             "are too narrow")
-    assert report_of(made(), 250 * UM).notes == ()
+def test_exact_heights_that_are_not_gaussian_have_no_interval_and_say_so():
+    """Cut at half a deviation, with pits, and lognormal: no interval that counts on Gaussian heights. A Gaussian trace,
+    a sine and its cube keep theirs."""
+    gauss = traces(1, 8e-3, UM, 6 * UM, 3)[0]
+    x = np.arange(gauss.size) * UM
+    pits = gauss - 30 * UM * np.maximum(1 - ((x % 800e-6 - 400e-6) / 10e-6) ** 2, 0)
+    for z in (np.minimum(gauss, 3 * UM), pits, 6 * UM * np.exp(gauss / gauss.std())):
+        report = report_of(Profile(x, z, "worn.csv"), 250 * UM)
+        told = {one.name for one in report.values if one.low is not None}
+        assert told <= {"dominant_wavelength", "band_amplitude"} and "band_amplitude" in told
+        assert report["Rku"].reason.startswith("the heights are not Gaussian") and report["Rku"].value > 0
+    for z in (gauss, 6 * UM * np.sin(2 * np.pi * x / 80e-6), 6 * UM * np.sin(2 * np.pi * x / 80e-6) ** 3):
+        assert report_of(Profile(x, z, "new.csv"))["Pku"].low is not None
 
 
 def test_exact_what_the_instrument_printed_is_read_again():
