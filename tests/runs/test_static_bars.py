@@ -137,7 +137,7 @@ def test_bars_of_a_random_scene_hold_an_independent_program(seed):
     assert [row for row in judged(one) if missed(*row[2:])] == []
 
 
-@pytest.mark.share(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("nu, said", [(0.3, False), (0.4999, False)])
 def test_bars_hold_towards_a_ratio_of_one_half(nu, said):
     """Peak, half-width and approach of a crown by the independent program; no word of an error that is not there."""

@@ -17,6 +17,7 @@ def limited():
     signal.signal(signal.SIGPROF, before)
 
 
+@pytest.mark.share(1, 3, 5)
 @pytest.mark.parametrize("seed", range(2, 10))
 def test_exact_faces_that_decide_at_one_instant(seed, limited):
     """Two of each kind; the slides are those of the reference to 1e-6 of the largest at every event, most to 1e-13."""

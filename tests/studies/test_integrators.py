@@ -26,6 +26,7 @@ def test_exact_two_masses_by_the_event_engine(failure):
         0.28704671337871602595, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_exact_the_sentences_on_the_report_s_failure(failure, capsys):
     rows, curves = failure.main(draw=False)
     at = {r.name: r for r in rows}

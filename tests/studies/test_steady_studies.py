@@ -93,6 +93,7 @@ def fold():
     return study("steady/fold.py")
 
 
+@pytest.mark.slow
 def test_exact_a_sweep_jumps_beyond_the_fold(fold):
     steady = fold.curve(145.5, 148.2)
     assert steady.folds == pytest.approx((147.6777, 146.4509), abs=1e-3)

@@ -95,6 +95,7 @@ def test_exact_a_march_settles_on_the_harmonic_balance(exponent):
     assert marched.measures["energy_created"].value <= 1e-12 * marched.measures["energy_dissipated"].value
 
 
+@pytest.mark.slow
 def test_exact_two_alike_interfaces_move_alike_in_plain_python():
     """The law in the loop of many interfaces without its compilation, over the first two cycles."""
     both, alone, pulls = plain_masses(law_of(2.0, 0.7))
