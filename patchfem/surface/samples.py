@@ -122,6 +122,6 @@ def plausible(path, x, z, stated: str = "") -> tuple:
         return (f"{steep}, and {say(most)} without the {few} highest and the {few} lowest of {there.size}; write "
                 "nan for those that are faults of the measurement",)
     if not stated:
-        raise PatchfemError(f"{steep}; is the unit of z right? a missing height is written nan; --units overrules the "
-                            "units of a header")
+        raise PatchfemError(f"{steep}; is the unit of z right? a missing height is written nan; profile and compare "
+                            "take --units over those of a header")
     return (f"{steep}: {stated}",)

@@ -8,7 +8,7 @@ _WORDS |= {f"{prefix}{end}": factor for prefix, factor in (
     ("", 1.0), ("milli", 1e-3), ("micro", 1e-6), ("mikro", 1e-6), ("nano", 1e-9))
     for end in ("meter", "meters", "metre", "metres")}
 LISTED = ", ".join(UNITS)
-GIVE = 'name the units of x and z, --units "mm,um" (in Python units=("mm", "um"))'
+GIVE = 'give profile or compare the units, --units "mm,um" (in Python units=("mm", "um"))'
 
 ASIDE = "the file itself tells its units; those that were given are left aside"
 

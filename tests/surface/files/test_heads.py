@@ -8,6 +8,7 @@ import os
 
 import numpy as np
 import pytest
+import surfaces as write
 
 from patchfem.core import PatchfemError
 from patchfem.surface.areal import Areal
@@ -180,7 +181,7 @@ CURES = {  # what is refused, what is said, the same text after the remedy, the 
                   "# Width: 4 um\n# Height: 0.8 mm\n# Value units: um\n" + ROWS, None),
     "no unit of the heights": ("# Width: 4 um\n# Height: 3 um\n" + ROWS, "whose unit is not told; write `# Value units",
                                "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS, None),
-    "no unit, but given": ("# Width: 4\n# Height: 3\n" + ROWS, 'or name the units of x and z, --units "mm,um"',
+    "no unit, but given": ("# Width: 4\n# Height: 3\n" + ROWS, 'or give profile or compare the units, --units "mm,um"',
                            "# Width: 4\n# Height: 3\n" + ROWS, ("mm", "um")),
     "a width without unit": ("# Width: 4\n# Height: 3\n# Value units: um\n" + ROWS, "the unit of its width and height, "
                              "'', is not known; write", "# Width: 1.2 mm\n# Height: 0.8 mm\n# Value units: um\n" + ROWS,
@@ -213,8 +214,8 @@ CURES = {  # what is refused, what is said, the same text after the remedy, the 
                         "write the header as", f"x [um]\tz [um]\n{PAIRS}", None),
     "only words": ("Operator: me\nnothing\n", "no row of numbers in its first 2 lines; write the header as `x [um],z "
                    "[um]` above rows of two numbers", f"x [um]\tz [um]\n{PAIRS}", None),
-    "too steep": (f"x [um]\tz [mm]\n{PAIRS}", "is the unit of z right? a missing height is written nan; --units "
-                  "overrules the units of a header", f"x [um]\tz [mm]\n{PAIRS}", ("um", "mm")),
+    "too steep": (f"x [um]\tz [mm]\n{PAIRS}", "is the unit of z right? a missing height is written nan; profile "
+                  "and compare take --units over those of a header", f"x [um]\tz [mm]\n{PAIRS}", ("um", "mm")),
 }
 
 
@@ -242,5 +243,7 @@ def test_exact_a_spike_as_tall_as_the_scan_is_long_is_told_and_kept(tmp_path):
 def test_always_heights_below_an_atom_are_told(tmp_path):
     found = read(tmp_path, "x [um],z [m]\n0,0\n1,1e-13\n2,0\n")
     assert found.notes[0].endswith("less than an atom is wide; is their unit right?")
+    (tmp_path / "logo.x3p").write_bytes(write.x3p_of(write.scan() * 1e-7))
+    assert read_surface(tmp_path / "logo.x3p").notes[0].endswith("less than an atom is wide; is their unit right?")
     assert read(tmp_path, "x [um],z [nm]\n0,0\n1,0.2\n2,0\n").notes == ()
     assert read(tmp_path, "x [um],z [nm]\n0,0\n1,0\n2,0\n").notes == ()

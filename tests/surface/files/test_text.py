@@ -110,7 +110,7 @@ def test_exact_rounded_x_is_evened(tmp_path, step):
         assert profile.notes == ()
 
 
-GIVE = 'or name the units of x and z, --units "mm,um" (in Python units=("mm", "um"))'
+GIVE = 'or give profile or compare the units, --units "mm,um" (in Python units=("mm", "um"))'
 REFUSED = {
     "": "{path}: the profile is empty",
     "\ufeff \n\n": "{path}: the profile is empty",
@@ -149,7 +149,8 @@ REFUSED = {
     "x [m],z [um]\n0,1\n12700,2\n": "{path}:3: x is 1.27e+04 m; is its unit right? a missing height is written nan",
     "x [mm],z [mm]\n0,1\n1,2\n2,99999\n": "{path}:4: z is 100 m; is its unit right? a missing height is written nan",
     "x [um],z [mm]\n0,1\n5,2\n10,1\n": "{path}: heights span 1 mm over a length of 10 um; is the unit of z right? a "
-                                       "missing height is written nan; --units overrules the units of a header",
+                                       "missing height is written nan; profile and compare take --units over "
+                                       "those of a header",
     "x [nm],z [nm]\n0,0\n0.1,0\n": "{path}: the profile is 0.1 nm long; is the unit of x right?",
     "x [um],z [um]\n0,1\n1,2\n3,1\n2,2\n4,1\n": "{path}:5: x turns back, 3 um and then 2 um; a trace runs one way: "
                                                   "keep one trace per file",
