@@ -37,7 +37,9 @@ LOOSER = {"slip_amplitude": 1.4, "stick_fraction": 1.7, "slip_start_phase": 1.4,
 SHARE, LEAST = 0.5, 0.2  # of the typical relative change, that of an irregular and of a regular measure at least
 OF_CHANGE, OF_TYPICAL = 0.5, 0.3  # of runs that a tolerance tells apart
 OF_FINER, OF_TYPICAL_FINER = 2.8, 0.4  # of runs that twice the harmonics tell apart: 99.5 % of 555 bars of 48 rigs
-OF_CELLS = 0.3  # of runs whose cells are half as many
+# of runs whose cells are a quarter as many, and of measures that change less with them: of the first order, or peaks
+OF_CELLS, OF_TYPICAL_CELLS = 0.2, 0.02
+OF_CELL = {"stick_fraction": 0.4, "slip_start_phase": 0.4, "friction_force_peak": 0.5, "drift_per_cycle": 0.3}
 OF_FLOOR = 0.1  # of the floor of a measure, and its square where steps meet a tolerance: nobody uses the digits below.
 # Not of GAPS, which are errors themselves and are read by their size
 ROUND = 1e-12  # of a value, the last digits of a long sum
@@ -184,17 +186,26 @@ def finer_error(values: dict, finer: dict) -> dict:
                                     else 0.0) for name, gap in gaps.items()}
 
 
-def cells_error(fine: dict, coarse: dict) -> dict:
-    """Error by name of a run whose law is a density cut into cells, from one with half as many.
+def cells_error(fine: dict, *coarse: dict) -> dict:
+    """Error by name of a run whose law is a density cut into cells, from runs in which each four are one, in turn from
+    the first, second, third and fourth on (`dynamics.events.elements.merged`).
 
-    The error falls with the square of the cells, so it is a third of the change; three times that counts, and a share
-    of what the main measures of the run typically change by.
+    The force of a density in cells is exact where a cell ends and errs most in its middle, by its square. So the change
+    at coarser cells is some 15 times the error on the mean, but nothing where the motion turns in a part of a cell that
+    both follow alike: half of all places under pairs, a quarter under fours, none under fours from several places on.
+    The largest of the changes counts, times OF_CELLS, and a share of what the main measures of the run typically change
+    by. Of 590 random rigs with 48, 192 and 768 cells 99.7, 99.98 and 99.98 % of the bars held what the closed form of
+    the law gives, all of 98.6 to 99.8 % of the rigs; by pairs it was 96.8, 98.7 and 99.8 %, all of 79, 89 and 98 %.
     """
-    gaps = change(fine, coarse)
-    typical = typical_change(fine, gaps)
-    held = {name for name, gap in gaps.items()  # energies of the whole run, and a force that its limit bounds
-            if of_first(name) in (*APART, GIVEN) and (of_first(name) != APART[0] or gap <= ROUND * abs(fine[name]))}
-    return {name: gap if name in held else max(gap, OF_CELLS * typical * abs(fine[name])) for name, gap in gaps.items()}
+    changes = [change(fine, one) for one in coarse]
+    gaps = {name: max(one[name] for one in changes) for name in fine if all(name in one for one in changes)}
+    typical, out = typical_change(fine, gaps), {}
+    for name, gap in gaps.items():
+        kind, size = of_first(name), abs(fine[name])
+        held = kind == GIVEN or (kind == APART[0] and gap <= ROUND * size)  # a force that its limit bounds
+        out[name] = OF_CELL.get(kind, OF_CELLS) * gap if held else \
+            max(OF_CELL.get(kind, OF_CELLS) * gap, OF_TYPICAL_CELLS * typical * size)
+    return out
 
 
 def pieces_error(fine: dict, coarse: dict) -> dict:

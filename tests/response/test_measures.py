@@ -191,6 +191,17 @@ def test_exact_extremes_of_a_cubic(shift):
     assert high == pytest.approx(max(0.0, y[inner].max()), abs=1e-14)
 
 
+def test_exact_a_rate_of_round_off_beside_a_stop_turns_nothing():
+    """A slide of 1 m that stops between two samples: the rate there is -1e-13 m/s of round-off, and the cubic from the
+    rate before it to that one would swing 1.9 mm beyond the value at which it stops. A turn at rates that are not small
+    stays one, even where their product is only 1e-11 of the square of the largest."""
+    y, dt = np.array([0.0, 0.95, 1.0, 1.0]), 1.0
+    v = np.array([1.0, 0.2, -1e-13, 0.0])
+    assert hermite_extremes(y, v, dt) == (0.0, 1.0)
+    beyond = hermite_extremes(y, np.array([1.0, 0.2, -5e-11, 0.0]), dt)[1]
+    assert beyond == pytest.approx(1 + 0.05 / 27, rel=1e-8)
+
+
 def test_order_extremes_of_a_sine():
     errors = []
     for steps in (20, 40, 80):

@@ -67,17 +67,18 @@ def coulomb(static: float, kinetic: float | None = None) -> Elements:
     return Elements(none, none, frozen_array([], np.int64), float(static), float(kinetic))
 
 
-def paired(parts: Elements) -> Elements:
-    """Half as many elements: each two that yield one after the other as one of their stiffness and limit together; an
-    odd last one stays."""
+def merged(parts: Elements, count: int = 2, first: int = 0) -> Elements:
+    """Fewer elements: each `count` that yield one after the other as one of their stiffness and limit together, from
+    the number `first` on, and those before it; of an odd number the last one stays."""
     k, limit = parts.stiffness, parts.stiffness * parts.yield_slide
-    first = np.arange(0, k.size, 2)
-    if not first.size:
+    if not k.size:
         return parts
-    stiff = np.add.reduceat(k, first)
-    # between those of its two each new yield is, so they rise and differ: nothing to sort
-    return Elements(frozen_array(stiff), frozen_array(np.add.reduceat(limit, first) / stiff),
-                    frozen_array(np.arange(first.size), np.int64))
+    last = k.size % 2
+    begins = np.unique(np.r_[0, np.arange(first, k.size - last, count), [k.size - 1] * last]).astype(int)
+    stiff = np.add.reduceat(k, begins)
+    # between those of its parts each new yield is, so they rise and differ: nothing to sort
+    return Elements(frozen_array(stiff), frozen_array(np.add.reduceat(limit, begins) / stiff),
+                    frozen_array(np.arange(begins.size), np.int64))
 
 
 class Table(NamedTuple):

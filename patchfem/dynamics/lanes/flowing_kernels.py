@@ -12,6 +12,7 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from ...friction.laws import tanh_kernels as friction
 from .names_kernels import FIRST_OF_LAW, LANES, MIDDLE, OWN, PLACE, WAY, D, H, P, V, W, X
+from .rigid_kernels import crossing
 
 RESTS = TURNS_HELD = False  # it never holds
 # of its own state: friction, mean square of the stretches, friction work of the last step
@@ -116,15 +117,9 @@ def ahead(room, i, s0, c0, s1, c1):
 
 
 @njit(error_model="numpy", **LEAN)
-def crossing(y0, y1, m0, m1):
-    """u of [0, 1] at which the cubic with these values and slopes at its ends is 0, by Newton's method from the
-    secant."""
-    c2, c3, u = 3 * (y1 - y0) - 2 * m0 - m1, m0 + m1 - 2 * (y1 - y0), y0 / (y0 - y1)
-    for _ in range(4):
-        slope = m0 + u * (2 * c2 + 3 * c3 * u)
-        u = u - (y0 + u * (m0 + u * (c2 + u * c3))) / slope if slope != 0.0 else u
-        u = min(max(u, 0.0), 1.0)
-    return u
+def zero(y0, y1, m0, m1):
+    """u of [0, 1] at which the cubic with these values and slopes at its ends is 0, from the secant on."""
+    return crossing(y0, m0, 3 * (y1 - y0) - 2 * m0 - m1, m0 + m1 - 2 * (y1 - y0), y0 / (y0 - y1))
 
 
 @njit(error_model="numpy", **LEAN)
@@ -135,11 +130,11 @@ def first_event(room, i, state, after, way, drive, h):
     (x, v, f, z, _), (x1, v1, f1, z1, _) = state, after
     u, turns = 1.0, False
     if way * v1 < 0.0:
-        u = crossing(v, v1, h * (push * drive[0] - damp * v - square * x - f),
-                     h * (push * drive[2] - damp * v1 - square * x1 - f1)) if way * v > 0.0 else 0.0
+        u = zero(v, v1, h * (push * drive[0] - damp * v - square * x - f),
+                 h * (push * drive[2] - damp * v1 - square * x1 - f1)) if way * v > 0.0 else 0.0
         turns = True
     if friction.BENDS and z * z1 < 0.0:
-        bend = crossing(z, z1, h * v * friction.flowing(k, z, v, way)[1], h * v1 * friction.flowing(k, z1, v1, way)[1])
+        bend = zero(z, z1, h * v * friction.flowing(k, z, v, way)[1], h * v1 * friction.flowing(k, z1, v1, way)[1])
         u, turns = (bend, False) if bend < u else (u, turns)
     return u, turns
 
@@ -205,7 +200,7 @@ def held(begin, end, way, room, i, h):
     k, (x, v, _, z), (x1, v1, _, z1) = numbers(room, i), begin, end
     furthest, low, high = slid(x1, z1, room, i), 0.0, 1.0
     if z * z1 < 0.0:
-        u = crossing(z, z1, h * v * friction.flowing(k, z, v, way)[1], h * v1 * friction.flowing(k, z1, v1, way)[1])
+        u = zero(z, z1, h * v * friction.flowing(k, z, v, way)[1], h * v1 * friction.flowing(k, z1, v1, way)[1])
         furthest = cubic(x, x1, h * v, h * v1, u)
     first = sticks(begin, end, way, k, h, 0.0)
     if first == sticks(begin, end, way, k, h, 1.0):

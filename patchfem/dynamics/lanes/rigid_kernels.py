@@ -69,6 +69,16 @@ def begin(room, i):
     """Set what a law has of its own state by the common one when a lane takes a case: nothing."""
 
 
+@njit(error_model="numpy", **LEAN)
+def crossing(y0, m0, c2, c3, u):
+    """u of [0, 1] at which y0 + m0 u + c2 u^2 + c3 u^3 is 0, by Newton's method from u."""
+    for _ in range(4):
+        slope = m0 + u * (2 * c2 + 3 * c3 * u)
+        u = u - (y0 + u * (m0 + u * (c2 + u * c3))) / slope if slope != 0.0 else u
+        u = min(max(u, 0.0), 1.0)
+    return u
+
+
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def linear(room, i, s0, c0):
     """(x, x') after a step in a slip."""

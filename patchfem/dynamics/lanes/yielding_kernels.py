@@ -40,7 +40,7 @@ from .names_kernels import (
     W,
     X,
 )
-from .rigid_kernels import begin, held, path, slid
+from .rigid_kernels import begin, crossing, held, path, slid
 
 __all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "held", "path", "rise", "slid"]
 
@@ -90,16 +90,6 @@ def ahead(room, i, s0, c0, s1, c1):
     length, held = room[LENGTH * LANES + i], way == 0.0
     yields = held and abs(x1 - place) > length
     return x1, v1, place if held else x1 - way * length, yields or v * v1 < 0.0
-
-
-@njit(error_model="numpy", **LEAN)
-def crossing(y0, m0, c2, c3, u):
-    """u of [0, 1] at which y0 + m0 u + c2 u^2 + c3 u^3 is 0, by Newton's method from u."""
-    for _ in range(4):
-        slope = m0 + u * (2 * c2 + 3 * c3 * u)
-        u = u - (y0 + u * (m0 + u * (c2 + u * c3))) / slope if slope != 0.0 else u
-        u = min(max(u, 0.0), 1.0)
-    return u
 
 
 @njit(error_model="numpy", **LEAN)

@@ -86,10 +86,10 @@ def warm_up(modes: ModalBasis, drive: BaseSine, model: ContactModel, say=None) -
     """Load the compiled loop of a model, or compile it, by a march of no steps; say: told before it compiles."""
     runner = _runner(model)
     kind = (model.kind, model.laws, model.loading, modes.damping is None) if runner is Run else None
-    if kind is None or kind not in _WARM:
+    if kind not in _WARM:
         run = runner(modes, drive, model, 4, np.inf, load_kernels(say))
         run.cycle(0, 0, [])
-        _WARM.add(kind)
+        _WARM.update({kind} - {None})
 
 
 _WARM = set()  # kinds of patches that have marched: their code is there

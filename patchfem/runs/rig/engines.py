@@ -26,6 +26,8 @@ from .solution import gauged
 FINER, MERGED = 0.5, 2.0  # merge width of the run that shows what merging does, and times its change
 LOOSE = 1e-2  # tail over the tolerance from which it is checked by a run with less; unpinned it is a tenth of that
 LESS = 0.1  # tail of that run
+# (cells of a density that are one, from which on) in the runs for its error
+JOINED = (4, 0), (4, 1), (4, 2), (4, 3)
 MOST_PIECES = 1e5  # of a period, up to which a steady motion is found by the map of its yields
 
 
@@ -169,13 +171,14 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """The coarser runs of the engine of pieces: the mesh, where its nodes make the elements, and half the cells of a
-    density."""
+    """The coarser runs of the engine of pieces: the mesh, where its nodes make the elements, and fewer cells of
+    a density."""
     out = [Coarser((Variant(numerics, coarse),), pieces_error, of="mesh")] if coarse is not None and model.soft else []
     cells = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
     if not cells:
         return out
-    return [*out, Coarser((Variant(replace(numerics, pairs=numerics.pairs + 1), patch),), cells_error, of="cells")]
+    return [*out, Coarser(tuple(Variant(replace(numerics, joined=one), patch) for one in JOINED), cells_error,
+                          of="cells")]
 
 
 def _fewer(numerics, share: int):

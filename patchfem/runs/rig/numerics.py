@@ -21,7 +21,8 @@ class Numerics:
     """Numerical choices of a run; `pinned` names the ones the scene fixed; shear_modes None: by the tolerance; choice:
     how bonds are summed, None: by the tolerance and the steps; whole: whether the run keeps its histories from before
     the last cycles, which a run for an error need not; local: relative error that a step of the smooth engine may
-    make; pairs: how often each two cells of a law's density count as one."""
+    make; pairs: how often each two cells of a law's density count as one; joined: (how many of those do so besides in a
+    run for an error, from which on), () for none."""
 
     engine: str
     steps: int
@@ -34,6 +35,7 @@ class Numerics:
     whole: bool = True
     local: float = 0.0
     pairs: int = 0
+    joined: tuple = ()
 
     def finer(self):
         """The choices with four times the cells where some count as one, with twice the steps, or a hundredth of the

@@ -203,7 +203,9 @@ class YieldingElements:
         self.held = 1e-3 * min(one.length for one in parts)
         self.groups = tuple(elements_of_law(one) for one in parts)
         for _ in range(numerics.pairs):
-            self.groups = tuple(map(elements.paired, self.groups))
+            self.groups = tuple(map(elements.merged, self.groups))
+        if numerics.joined:
+            self.groups = tuple(elements.merged(one, *numerics.joined) for one in self.groups)
         self.seconds = perf_counter() - begin
 
 

@@ -26,26 +26,23 @@ def missed(found, ones) -> int:
                for case, some in enumerate(rows(found, ones)))
 
 
-CELLS = 4  # times twice the cells of a single run of Iwan, whose bars are too short for 48 cells in 1 of 10
-
-
 def held(law: str, seed: int, count: int) -> None:
     cases = models(law, seed, count)
     found = many.answers(cases)
     mine = [case for case in range(count) if found.numerics[case]["engine"] == "lanes"]
     assert len(mine) > count / 3 and not any("lanes said" in one for notes in found.notes.values() for one in notes)
     some = [cases[case] for case in mine]
-    ones = lumped_answers(some, CELLS) if law in EXACT else one_by_one.solve(some)
+    ones = lumped_answers(some) if law in EXACT else one_by_one.solve(some)
     assert missed(found.some(np.array(mine)), ones) <= 0.03 * len(mine)
 
 
-def lumped_answers(cases, finer: int = 0):
+def lumped_answers(cases):
     """Answers of the exact batch, group by group."""
     found, groups = many.Answers.blank(len(cases)), {}
     for case, model in enumerate(cases):
         groups.setdefault(lumped.group(model), []).append(case)
     for places in groups.values():
-        found.place(places, lumped.solve([cases[case] for case in places], finer=finer))
+        found.place(places, lumped.solve([cases[case] for case in places]))
     return found
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....dynamics.events import histories
-from ....dynamics.events.elements import paired
+from ....dynamics.events.elements import merged
 from ....dynamics.events.names_kernels import FORCE, HIGH, LOW, REACH
 from ....dynamics.events.reading import joined
 from ....effects import has
@@ -17,7 +17,7 @@ from ....response.measures import ROUND, energy_balance, window_amplitudes
 from ....response.ringing import held_ring
 from ....structure.drive_sizes import largest
 from ...rig.costs import pairs_of
-from ...rig.engines import EXACT, PIECES, engine_of
+from ...rig.engines import EXACT, JOINED, PIECES, engine_of
 from ...rig.pieces import RigidElements, elements_of_law, read_off, settles, still_changes
 from .columns import ENDS, MAIN, Runs
 from .threads import in_threads
@@ -64,7 +64,7 @@ def case_of(model, pairs: int = 0) -> Case:
     element = law_from(model.friction, model.point.load).element(model.point.load)
     group = elements_of_law(element)
     for _ in range(pairs):
-        group = paired(group)
+        group = merged(group)
     return Case(model, (group,), 1e-3 * element.length, model.point.load)
 
 
@@ -73,8 +73,10 @@ def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     cases = [case_of(model, pairs) for model in models]
     out = runs_of_cases(cases, cycles, window, say)
     if has(models[0].friction.law, "cells"):
-        fewer = [case._replace(groups=tuple(map(paired, case.groups))) for case in cases]
-        return with_coarser_errors(out, runs_of_cases(fewer, cycles, window, say, steady=False), cells_error)
+        fewer = [[case._replace(groups=tuple(merged(part, *joined) for part in case.groups)) for case in cases]
+                 for joined in JOINED]
+        return with_coarser_errors(out, [runs_of_cases(part, cycles, window, say, steady=False) for part in fewer],
+                                   cells_error)
     return out
 
 
@@ -149,12 +151,14 @@ def _rings(case: Case, one) -> dict | None:
     return None if run_events.rings(more.window, modes, drive, more.log, repeats=True) != ({}, {}) else {}
 
 
-def with_coarser_errors(fine: Runs, coarse: Runs, told_by) -> Runs:
-    """Runs with the errors that coarser runs tell; told_by(fine, coarse): errors by name from values of both."""
-    whole = [one.values | {MAIN: one.amplitudes, "energy_balance": energy_balance(one.book)} for one in (fine, coarse)]
+def with_coarser_errors(fine: Runs, coarser: list, told_by) -> Runs:
+    """Runs with the errors that coarser Runs tell; told_by(fine, *coarser): errors by name from values of all."""
+    whole = [one.values | {MAIN: one.amplitudes, "energy_balance": energy_balance(one.book)} for one in
+             (fine, *coarser)]
     for case in range(len(fine.stuck)):
-        a, b = ({name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])} for one in whole)
-        told = told_by(a, b)
+        a, *others = ({name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])}
+                      for one in whole)
+        told = told_by(a, *others)
         for name, value in a.items():
             fine.errors.setdefault(name, np.zeros(len(fine.stuck)))[case] = told.get(name, abs(value))
     return fine

@@ -119,7 +119,7 @@ def _moved(models, held: list, say) -> tuple:
     coarse = pieces.runs_of_cases(coarser, cycles, window, say, LEAST, steady=False)
     chosen = tuple({"elements": int(one.fine.contact.reduction.stiffness.size),
                     "interface_nodes": int(one.patch.x.size)} for one in held)
-    runs = replace(pieces.with_coarser_errors(fine, coarse, pieces_error), chosen=chosen, again=False)
+    runs = replace(pieces.with_coarser_errors(fine, [coarse], pieces_error), chosen=chosen, again=False)
     found, alone, _ = batch_answers(models, runs, {"engine": PIECES.name, "window_cycles": window})
     alone = alone | runs.stuck | coarse.lost
     for case in np.flatnonzero(~alone).tolist():
