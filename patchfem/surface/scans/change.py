@@ -191,7 +191,7 @@ def sentences(one: Change) -> list:
     out.append(f"Depths count from the {share:.0f} % of the heights that agree up to a plane within "
                f"{say(REACH * one.found.noise, 3)}; what they lost evenly or as one wedge would come on top.")
     if one.found.other is not None:
-        out.append("Another part of the scans may be the unworn one as well: both are planes that meet in an edge; the "
+        out.append("Another part of the scans may be the unworn one as well, as where two planes meet in an edge; the "
                    "intervals hold what either gives.")
     return out
 

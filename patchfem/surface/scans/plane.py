@@ -40,6 +40,19 @@ def unworn_planes(depth, x, y) -> list:
     Fischler and Bolles 1981); then the least-squares plane of these blocks. Where two parts of a scan meet in an edge
     both may be the unworn one: another plane has few of these blocks.
     """
+    tilt = [float(np.nanmedian(np.diff(depth, axis=axis))) / (np.ptp(at) / (at.size - 1))
+            for axis, at in ((1, x), (0, y))]
+    for _ in range(2):  # a tilt inside the blocks would lower their lower edges
+        found = _planes(depth - tilt[0] * x - tilt[1] * y[:, None], x, y)
+        found = [one._replace(slope=one.slope + tilt[0], pitch=one.pitch + tilt[1]) for one in found]
+        if not found:
+            break
+        tilt = found[0].slope, found[0].pitch
+    return found
+
+
+def _planes(depth, x, y) -> list:
+    """Planes of a map of depths whose unworn parts hardly tilt."""
     side = max(min(depth.shape) // BLOCKS, SMALLEST)
     low, at, noise = _blocks(depth, x, y, side)
     if low.size < 12:
@@ -55,7 +68,8 @@ def unworn_planes(depth, x, y) -> list:
         on = np.abs(low - base @ found[0]) <= wide
         other, _ = _fitted(base, low, drawn, wide, max(LEAST, OTHER * on.mean()), on)
         if other is not None and np.median(np.abs(base @ (other[0] - found[0]))) > APART * noise:
-            planes.append(other)
+            above = (low - base @ found[0] < -wide).mean()
+            planes.insert(0 if other[1] > on.mean() - above else 1, other)  # the larger one is the likelier
         return [Plane(float(plane[0]), *(float(one) for one in plane[1:] / scale), float(noise), share)
                 for plane, share in planes]
     return []

@@ -9,10 +9,14 @@ from ..areal import Areal
 
 SIZE = 224  # pixels along the longer side of the images of the search
 ANGLES = np.radians(np.arange(-6.0, 6.01, 0.5))  # rotations that are tried; a pixel at the edge of an image
+FINER = np.radians([-0.375, -0.25, -0.125, 0.125, 0.25, 0.375])  # about the likeliest of them
 OVERLAP = 0.35  # of the smaller scan, at least, lies on the other one
-WAVES = 0.1  # of the shorter side: standard deviation of the Gauss filter whose mean is taken off the heights
-CLEAR = 7.0  # scatters above the likeness at other shifts; the largest of 100 000 normal numbers lies 4.4 off
-SURE = 12.0  # beyond which no other variant is tried
+WAVES = 0.03  # of the shorter side: standard deviation of the Gauss filter whose mean is taken off the heights
+DEEP = 3.0  # scatters below the median beyond which a valley counts no more: a deep groove is no mark of the place
+FLOOR, BESIDE = 0.3, 1.5  # of the root mean square of a spectrum, added to what it is divided by; of its pixels
+TAPER = 0.25  # power of the Hann window that takes the edges of an image off
+CLEAR = 10.0  # scatters above the likeness at other shifts; wrong places of a lay that repeats itself reach 9
+SURE = 14.0  # beyond which no other variant is tried
 TRIED, EACH = 8, 3  # places that are looked at closely, of one variant at most
 APART = 0.02  # rad from which on two rotations at one shift are two places
 NEAR = 4  # pixels around the likest shift that belong to it
@@ -53,7 +57,8 @@ def guesses(before: Areal, after: Areal) -> list:
     alone where it is clear.
 
     Heights are averaged over pixels, long waves taken off, and what lies above the median is cut off, as wear does.
-    The masked correlation is taken by transforms at each rotation, missing heights left out.
+    All wavelengths are made about as strong, so that a lay that repeats itself does not hide the marks that do not
+    (Kuglin and Hines 1975). The masked correlation is taken by transforms at each rotation, missing heights left out.
     """
     step, out = step_of(before, after), []
     fixed = image(before, step)
@@ -97,7 +102,7 @@ def image(scan: Areal, step: float) -> tuple:
 
 def _even(axis, step: float) -> np.ndarray:
     """Places about the middle of an axis at an even step [m]."""
-    count = max(int(np.ptp(axis) / step) + 1, 2)
+    count = max(int(np.ptp(axis) / step + 1e-6) + 1, 2)
     return (axis[0] + axis[-1]) / 2 + step * (np.arange(count) - (count - 1) / 2)
 
 
@@ -111,9 +116,19 @@ def without_waves(z, known, sigma: float) -> np.ndarray:
 
 
 def valleys(z, known) -> tuple:
-    """What lies below the median of the heights without long waves, about its mean, and what was measured."""
+    """What lies below the median of the heights without long waves, every wavelength about as strong (whitened), about
+    its mean, and what was measured."""
+    from scipy.fft import irfft2, rfft2
+    from scipy.ndimage import gaussian_filter
+
     flat = without_waves(z, known, WAVES * min(z.shape))
-    low = np.minimum(flat - np.median(flat[known]), 0.0)
+    flat = flat - np.median(flat[known])
+    low = np.where(known, np.clip(flat, -DEEP * 1.4826 * np.median(np.abs(flat[known])), 0.0), 0.0)
+    window = np.outer(*(np.hanning(count + 2)[1:-1]**TAPER for count in z.shape))
+    waves = rfft2(low * window)
+    power = np.abs(waves)**2
+    waves = waves / (np.sqrt(gaussian_filter(power, BESIDE)) + max(FLOOR * np.sqrt(power.mean()), 1e-300))
+    low = irfft2(waves, z.shape)
     return np.where(known, low - low[known].mean(), 0.0), known
 
 
@@ -148,21 +163,29 @@ class _Search:
         enough = (count > OVERLAP * min(self.known.sum(), known.sum())) & (square > 1e-12 * square.max())
         return np.where(enough, product / np.sqrt(np.where(enough, square, 1.0)), -1.0)
 
-    def best(self, moved: tuple, half: float, step: float) -> list:
-        """(angle, shift [m], likeness, clear) of the likest places of an image, turned half round or not."""
+    def _turned(self, moved: tuple, half: float, angle: float) -> tuple:
+        """(likeness at every lag, the likeliest one) of an image turned by an angle, and half round or not."""
         from scipy.ndimage import rotate
 
+        z, known = (np.rot90(one, 2) for one in moved) if half else moved
+        # the image in the axes of the fixed one: rows count along y, so a positive angle turns them back
+        z, known = (rotate(one.astype(float), np.degrees(angle), reshape=False, order=1) for one in (z, known))
+        known = known > 0.5
+        here = self.likeness(np.where(known, z, 0.0), known)
+        return here, np.unravel_index(np.argmax(here), here.shape)
+
+    def best(self, moved: tuple, half: float, step: float) -> list:
+        """(angle, shift [m], likeness, clear) of the likest places of an image, turned half round or not."""
         found, like = [], None
         for angle in ANGLES:
-            z, known = (np.rot90(one, 2) for one in moved) if half else moved
-            # the image in the axes of the fixed one: rows count along y, so a positive angle turns them back
-            z, known = (rotate(one.astype(float), np.degrees(angle), reshape=False, order=1) for one in (z, known))
-            known = known > 0.5
-            here = self.likeness(np.where(known, z, 0.0), known)
-            at = np.unravel_index(np.argmax(here), here.shape)
+            here, at = self._turned(moved, half, angle)
             if like is None or here[at] > max(found)[0]:
                 like, top = here, at
             found.append((float(here[at]), angle, at))
+        for _, angle, _ in sorted(found, reverse=True)[:1]:
+            for finer in angle + FINER:
+                here, at = self._turned(moved, half, finer)
+                found.append((float(here[at]), finer, at))
         kept = []
         for one in sorted(found, reverse=True):
             if len(kept) < EACH and all(abs(one[1] - other[1]) > APART or

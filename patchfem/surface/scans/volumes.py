@@ -53,7 +53,7 @@ def measured(found: Laid, x, y) -> Volumes:
     first = _measured(found, x, y)
     if found.other is None:
         return first
-    second = _measured(found.other, x, y)
+    second = measured(found.other, x, y)
     both = {name: one._replace(low=min(one.low, second.values[name].low), high=max(one.high, second.values[name].high))
             for name, one in first.values.items()}
     return first._replace(values=both)
@@ -65,7 +65,8 @@ def _measured(found: Laid, x, y) -> Volumes:
     depth, cell = _filled(found), _cells(x, y)
     inside = np.isfinite(depth)
     heights, area, values = np.where(inside, depth, 0.0), float(cell[inside].sum()), {}
-    worn, grown = (_beyond(sign * depth, found) & inside for sign in (1.0, -1.0))
+    squares = _squares(depth, found)
+    worn, grown = (_beyond(squares, sign) & inside for sign in (1.0, -1.0))
     grown &= ~worn
     bent = _bent(found, worn | grown)
     for name, mask, sign, beside in (("worn_volume", worn, 1.0, grown), ("grown_volume", grown, -1.0, worn)):
@@ -78,7 +79,7 @@ def _measured(found: Laid, x, y) -> Volumes:
         left = max(sign * float((cell * heights)[inside & ~worn & ~grown].sum()), 0.0)
         values[name] = Quantity(max(volume, 0.0), max(volume - reach, 0.0), max(volume + reach + left, 0.0), "m3",
                                 WORN[name])
-    share = [float(cell[_beyond(depth, found, *rule) & inside].sum()) / area
+    share = [float(cell[_beyond(squares, 1.0, *rule) & inside].sum()) / area
              for rule in ((CLEAR, 0.0), (2 * CLEAR, 0.0), (CLEAR, 2.0), (CLEAR / 1.8, 2.0))]
     values["worn_share"] = Quantity((share[0] + share[2]) / 2, min(share), max(share), "1", WORN["worn_share"])
     mean = (one / area for one in values["worn_volume"][:3])
@@ -126,19 +127,33 @@ def _scatter(means, used, side: int) -> float:
     return 1.4826 * float(np.median(np.abs(here)))
 
 
-def _beyond(depth, found: Laid, clear: float = CLEAR, less: float = 2.0) -> np.ndarray:
-    """Which heights are deep: by the mean of a square around them, of which the smaller squares inside have their
-    share, but for `less` of their scatter; beside a groove they have not."""
-    out, seen = np.zeros(depth.shape, bool), []
+class _Square(NamedTuple):
+    """Means of the depths (m, n) in the square of `side` heights around each place, and their scatter where unworn."""
+
+    side: int
+    means: np.ndarray
+    scatter: float
+
+
+def _squares(depth, found: Laid) -> list:
+    """The means for each side of a square, the smallest first."""
+    out = []
     for side in SQUARES:
         means = _means(depth, side)
-        scatter = max(_scatter(means, found.used, side), found.noise / side)
+        out.append(_Square(side, means.astype(np.float32), max(_scatter(means, found.used, side), found.noise / side)))
+    return out
+
+
+def _beyond(squares: list, sign: float = 1.0, clear: float = CLEAR, less: float = 2.0) -> np.ndarray:
+    """Which heights are deep, sign > 0, or high: by the mean of a square around them, of which the smaller squares
+    inside have their share, but for `less` of their scatter; beside a groove they have not."""
+    out = np.zeros(squares[0].means.shape, bool)
+    for k, one in enumerate(squares):
         with np.errstate(invalid="ignore"):
-            deep = means > (ALONE if side == 1 else 1.0) * clear * scatter
-            for inner, noise in seen:
-                deep &= ~(inner < SHARE * means - less * noise)
+            deep = sign * one.means > (ALONE if one.side == 1 else 1.0) * clear * one.scatter
+            for inner in squares[:k]:
+                deep &= ~(sign * inner.means < sign * SHARE * one.means - less * inner.scatter)
         out |= deep
-        seen.append((means, scatter))
     return out
 
 
