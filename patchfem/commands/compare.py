@@ -49,8 +49,9 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
                                                     "surface, such as rig.toml")] = None,
             set_: Sets = (), out: Out = None, json_: Json = False, quiet: Quiet = False):
     """Compare the surface in BEFORE with that in AFTER: registration, worn depth, ratios, a verdict, a page; of areal
-    scans the worn volume and maps; two more files are the pair of the other direction, of traces. A table of many
-    pairs has mean, scatter and interval over them; two results folders, the second of a run with [wear], what wore off.
+    scans the worn volume, maps and the levelled difference as X3P and text; two more files are the pair of the other
+    direction, of traces. A table of many pairs has mean, scatter and interval over them; two results folders, the
+    second of a run with [wear], what wore off.
 
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """
@@ -77,6 +78,7 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
         data = paper.data_of(parts, found, directions, pressing)
         summary.write_json(data, folder.path / "compare.json")
         paper.write_page(folder.path / "report.html", parts, found, pressing)
+        paper.write_difference(folder.path, parts[0])
     for text in data["notes"]:
         note(text)
     if json_:

@@ -8,7 +8,6 @@ import numpy as np
 from ... import __version__
 from ...campaigns.compare import Pressed
 from ...campaigns.compare import data_of as pressed_data
-from ...core import say
 from ...disk.whole import write_text
 from ...scales import LADDERS, plain, step_of
 from ...surface.areal import level_plane
@@ -21,7 +20,8 @@ from ...surface.roughness.spectrum import BAND
 from ...surface.scans.change import Change, hidden
 from ..pages.document import Section, document, figure, table, warned
 from ..pages.words import pair
-from . import pictures
+from . import line, pictures
+from .areal import write_columns, write_x3p
 
 WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_max": "worn depth, largest",
          "worn_depth_mean": "worn depth, mean", "worn_area": "worn area", "amplitude_ratio": "amplitude ratio",
@@ -159,6 +159,16 @@ def write_trace(path: Path, trace: Profile) -> Path:
     return path
 
 
+def write_difference(folder: Path, one: Comparison) -> None:
+    """Write the worn depth of two scans that lie on each other, NaN where a height is missing, as difference.x3p and,
+    where these are few enough, as columns in difference.csv."""
+    if one.change is None or one.change.found is None:
+        return
+    place = one.change.before.x, one.change.before.y, one.change.found.depth
+    write_x3p(folder / "difference.x3p", *place, "worn depth: height before less height after, laid on each other")
+    write_columns(folder / "difference.csv", *place)
+
+
 def write_page(path: Path, parts: list, found: tuple, pressing: Pressed | None = None) -> None:
     """Write the page."""
     write_text(path, page(parts, found, pressing))
@@ -183,7 +193,11 @@ def page(parts: list, found: tuple, pressing: Pressed | None = None) -> str:
                                 "\n".join(body)))
     if pressing is not None:
         sections.append(Section("pressed", f"{pressing.title}, pressed with each surface", _pressing(pressing)))
-    return document(title, lead, sections, paper=True)
+    found = parts[0].change
+    if found is None or found.found is None:
+        return document(title, lead, sections, paper=True)
+    sections.insert(1, line.section(found))
+    return document(title, lead, sections, {"charts": [], "scans": line.film(found)}, line.SCRIPTS, paper=True)
 
 
 def figures(one: Comparison) -> list:
@@ -222,26 +236,18 @@ def figures(one: Comparison) -> list:
 
 def _maps(one: Change) -> list:
     """Pictures of two scans that lie on each other."""
-    x, y, depth = one.before.x, one.before.y, one.volumes.filled
-    first = level_plane(one.before).z
+    x, y, (first, second, depth) = one.before.x, one.before.y, line.laid(one)
     worn = one.volumes.values["worn_volume"]
-    out = [(pictures.maps(x, y, (first, first - depth, depth)), "Left and middle: the scan before and, laid on it, "
+    out = [(pictures.maps(x, y, (first, second, depth)), "Left and middle: the scan before and, laid on it, "
             "the scan after, about the plane of the scan before; white: no height. Right: depth of the scan after "
             "below the scan before, missing ones from their neighbours; white: beyond the scan after.",
             f"Maps of both scans and of the worn depth: worn volume {' '.join(shown(worn)[::2])}")]
-    row, column = (int(one) for one in np.unravel_index(np.nanargmax(_wide(depth)), depth.shape))
-    lines = [(x, first[row], (first - depth)[row], f"along x, at y = {say(float(y[row]), 3)}"),
-             (y, first[:, column], (first - depth)[:, column], f"along y, at x = {say(float(x[column]), 3)}")]
-    out.append((pictures.sections(lines), "Sections through the place of the largest wide depth.",
-                "Heights before and after along two lines through the deepest wear"))
+    known = np.isfinite(depth)
+    heights = [first[there := known & np.isfinite(first)], second[there]]
+    out.append((pictures.both_heights(heights, [_bearing(z) for z in heights]), "Left: share of the heights in each "
+                "class. Right: Abbott curves. Both over the common region, about the plane of the scan before.",
+                "Histograms and Abbott curves of the heights before and after"))
     return out
-
-
-def _wide(depth) -> np.ndarray:
-    """Depths averaged over 9 x 9 heights, to find a place by."""
-    from scipy.ndimage import uniform_filter
-
-    return np.where(np.isfinite(depth), uniform_filter(np.nan_to_num(depth), 9), -np.inf)
 
 
 def _abbott(surface) -> tuple:

@@ -9,6 +9,7 @@ from ..drawing.charts import axis, chart, line, mark
 from ..drawing.pictures import BLUE, draw, drawing, styled
 
 POINTS, CURVE = 2400, 400  # of a line and of a spectrum
+BINS = 120  # of a histogram
 FINE = 400  # samples that the closer view shows, at least
 SIDES = (("soft", "before"), ("accent", "after"))
 VOLUME = 1e18  # um^3
@@ -122,15 +123,16 @@ def maps(x, y, heights: tuple):
     return figure
 
 
-def sections(lines: list) -> str:
-    """Heights before and after along lines; lines: (place (n,) [m], before (n,) [m], after (n,) [m], title) each."""
-    made = []
-    for place, first, second, title in lines:
-        (along, mm), (up, um) = axis_unit(place, "m"), axis_unit(np.concatenate([first, second]), "m")
-        marks = [line(place[(there := np.isfinite(z))] * mm, z[there] * um, colour, name, most=POINTS, width=0.9)
-                 for z, (colour, name) in zip((first, second), SIDES)]
-        made.append(chart(title, _place("place", along, place * mm), axis("height", up), marks))
-    return draw(made, height=2.9)
+def both_heights(heights: tuple, curves: tuple) -> str:
+    """How often heights (k,) [m] before and after occur, and their Abbott curves ((ratio, height) each)."""
+    both = np.concatenate(heights)
+    up, um = axis_unit(both, "m")
+    edges = np.linspace(*np.quantile(both, (0.001, 0.999)), BINS + 1)
+    shares = [np.histogram(z, edges)[0] * 100 / z.size for z in heights]
+    bars = [line((edges[:-1] + edges[1:]) / 2 * um, share, *side, width=1.2) for share, side in zip(shares, SIDES)]
+    lines = [line(100 * ratio, height * um, *side) for (ratio, height), side in zip(curves, SIDES)]
+    return draw([chart("Heights", axis("height", up), axis("share of the points", "%"), bars),
+                 chart("Abbott curves", _place("material ratio", "%", [0, 100]), axis("height", up), lines)])
 
 
 def overlay(x, first, second, rest, where: tuple) -> str:

@@ -9,6 +9,7 @@ from known_scans import make
 
 from patchfem.__main__ import main
 from patchfem.surface.areal import Areal, filled
+from patchfem.surface.files.read import read_surface
 from patchfem.surface.scans import change
 from patchfem.surface.scans.search import rotation, variant
 
@@ -157,6 +158,17 @@ def test_always_a_refused_place_names_the_likeness_that_it_wants(grooved, worn, 
 
 
 @pytest.mark.share(1)
+@pytest.mark.parametrize("seed", [0, 18, 25, 7])
+def test_always_the_place_of_an_independent_pair_lies_in_its_interval(seed):
+    """A deep groove, two lays that repeat themselves, and slow errors of an unworn scan."""
+    _, *sides, truth = make(seed)
+    found = change.changed(*(Areal(*map(np.asarray, one), "a scan") for one in sides)).registration
+    assert all(one.low <= truth[name] <= one.high for name, one in found.items())
+    pixel = sides[0][0][1]
+    assert all(one.high - one.low < 0.3 * pixel for name, one in found.items() if name != "rotation")
+
+
+@pytest.mark.share(1)
 @pytest.mark.parametrize("seed", [1, 6, 4, 8, 13, 19, 22, 26])
 def test_always_a_pair_made_by_an_independent_program_has_its_volume(seed):
     kind, *sides, truth = make(seed)
@@ -179,4 +191,14 @@ def test_always_the_verb_tells_volumes_and_draws_maps(grooved, tmp_path, capsys)
     assert {"shift_x", "shift_y", "rotation", "mirrored", "turned"} <= set(data["registration"])
     assert data["removed"] == {"before": 0, "after": 0} and data["hidden_wear"]["reason"].startswith("unworn parts")
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "laid on it" in page and "Sections through" in page
+    assert "laid on it" in page and 'id="line"' in page and '"scans":' in page
+    found = change.changed(*grooved)
+    files = [read_surface(tmp_path / "out" / f"difference.{end}") for end in ("x3p", "csv")]
+    for one in files:
+        there = np.isfinite(found.found.depth)
+        rows, columns = (np.isin(np.round(axis, 12), np.round(kept, 12)) for axis, kept in
+                         ((found.before.y, one.y), (found.before.x, one.x)))
+        assert not there[~rows].any() and not there[:, ~columns].any()  # a row without a height has none in columns
+        wanted = found.found.depth[np.ix_(rows, columns)]
+        assert one.z.shape == wanted.shape and np.array_equal(np.isnan(one.z), np.isnan(wanted))
+        assert np.nanmax(np.abs(one.z - wanted)) < 1e-15
