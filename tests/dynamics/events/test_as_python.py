@@ -20,6 +20,7 @@ def springs(rng, count):
     return elements_of(rng.uniform(0.2, 1.0, count), rng.uniform(0.05, 1.0, count))
 
 
+@pytest.mark.share(0, 1, 2, 3, 5, 6)
 @pytest.mark.parametrize("seed, n, faces, kind, drive", [
     (1, 1, 1, "rigid", SINE), (2, 1, 1, "springs", SINE), (3, 3, 2, "rigid", SINE), (4, 2, 2, "springs", SINE),
     (5, 5, 5, "rigid", SINE), (6, 2, 1, "rigid", SWEEP), (7, 1, 1, "none", SINE)])
