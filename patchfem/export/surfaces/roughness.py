@@ -201,8 +201,9 @@ def _table(report: RoughnessReport) -> str:
         value, interval, unit = shown(one, units[one.name])
         rows.append([escape(one.name), *([escape(value), escape(interval), escape(unit)] if one.value is not None else
                                          [f"<td colspan=3 class=soft>{escape(one.reason)}</td>"])])
-    return (f"<h3>Parameters</h3>{table(('parameter', '>value', '>90 %: from .. to', 'unit'), rows)}<p class=soft>"
-            f"{escape(AREAL if report.kind == 'areal' else INTERVAL)}</p>"
+    return (f"<h3>Parameters</h3>{table(('parameter', '>value', '>90 %: from .. to', 'unit'), rows)}"
+            + (f"<p class=soft>{escape(AREAL if report.kind == 'areal' else INTERVAL)}</p>"
+               if any(one.low is not None for one in report.values) else "")
             + "".join(f"<p class=soft>No interval of {escape(', '.join(names))}: {escape(reason)}.</p>"
                       for reason, names in _untold(report).items()))
 

@@ -14,7 +14,7 @@ from .areal import Surface, lacking
 from .areal_intervals import areal_intervals
 from .filter import filtered, filtered_scan
 from .form import degree_of, without_form
-from .intervals import LATERAL, Intervals
+from .intervals import LATERAL, SIZES, Intervals
 from .parameters import Heights, abbott
 from .spectrum import BAND, amplitude_of, refuse_band, spectrum_of
 from .tip import Tip, tip_check
@@ -25,6 +25,7 @@ UNEVEN = "the heights are not Gaussian, which intervals of one trace count on; t
 CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)  # [m] of ISO 21920-3, and one more at each end
 SECTIONS = 6  # cut-offs in a trace: five that count and one that the filter takes
 ROUND = 1e-14  # of the largest height: what levelling leaves of a straight line
+LONG = "fewer than four of the strongest waves fit the trace, so that a longer one would tell another value"
 PRINTED = {"Ra": "Pa", "Rq": "Pq", "Skew": "Psk", "RzDin": "RzDin", "MaxDev": "MaxDev", "ASH": "ASH",
            "Wa": "Pa", "Wq": "Pq", "WMaxDev": "MaxDev"}  # names of a Dektak, which filters nothing unless asked
 
@@ -223,7 +224,8 @@ def _value(row, value, found: Intervals) -> Quantity:
             found.heights.step <= low <= value <= high <= found.heights.length):
         low, high, reason = None, None, UNTOLD
     if value is not None and low is None and not reason and found.heights.power:
-        reason = UNEVEN if found.uneven and row.kind not in ("", *LATERAL) else UNTOLD
+        reason = UNEVEN if found.uneven and row.kind not in ("", *LATERAL) else \
+            LONG if found.long and row.kind in SIZES else UNTOLD
     return Quantity(value, low, high, row.unit, _text(row, found.heights), reason, row.name)
 
 

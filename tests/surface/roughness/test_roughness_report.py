@@ -80,6 +80,16 @@ def test_exact_heights_that_are_not_gaussian_have_no_interval_and_say_so():
         assert report_of(Profile(x, z, "new.csv"))["Pku"].low is not None
 
 
+def test_exact_a_trace_as_long_as_its_waves_has_no_interval_of_heights():
+    """A self-affine trace without a longest wave: heights have none, slope and skewness have theirs."""
+    frequency = np.arange(1, 16_001)
+    numbers = np.random.default_rng(3).standard_normal((2, 16_000))
+    z = np.fft.irfft(np.concatenate([[0], frequency**-1.3 * (numbers[0] + 1j * numbers[1])]))[:2000]
+    report = report_of(Profile(np.arange(2000) * UM, z / z.std() * UM, "fractal.csv"))
+    assert report["Pq"].low is None and report["Pq"].reason.startswith("fewer than four of the strongest waves")
+    assert report["Pdq"].low is not None and report["Psk"].low is not None
+
+
 def test_exact_what_the_instrument_printed_is_read_again():
     """A window of the file's cursors, levelled; results of other names or with wide cursors are left alone."""
     cursors = {"reference": (100 * UM, 0.0), "measure": (900 * UM, 0.0)}
