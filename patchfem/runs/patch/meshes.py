@@ -18,13 +18,14 @@ from ...mesh.tensor import TensorGrid
 from ...model.patch import Meshes
 from . import grids, ladder
 from .condensed import condensed
-from .measures import measures, met
+from .measures import measures, missed
 from .press import pressed
 
 CASES = 48  # cases that a mesh is chosen by; of more, those that lie farthest apart
 ROUNDS = 4  # of the search for the contacts
 MOST_NODES = 400  # of the finest interface
 # times the cells that a case asks of its coarsest mesh: the first that are enough are taken
+FASTEST = 3.0  # order by which errors of static measures fall at most: meshes too coarse by it are not tried
 START = (4.0, 2.8, 2.0, 1.7, 1.4, 1.2, 1.0)
 CLOSE = 2.0  # ratio of the cells of neighbouring cases up to which one band holds what lies between them
 
@@ -52,10 +53,14 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
              for share in grids.SWING]
     layout = _layout([*cases, *swept], not (every and all_))
     # a contact that moves on the way has measures that its first state tells nothing of
+    enough = np.inf  # times the cells, above which no mesh meets it
     for share in () if layout is None else START[-1:] if asked.sweeps else START:
-        levels, good = _climbed(cases, grids.grids_of(asked, layout.times(share)), tolerance, share > 1)
-        if good or share == START[-1]:
+        if share > max(enough, START[-1]):
+            continue
+        levels, missed_by = _climbed(cases, grids.grids_of(asked, layout.times(share)), tolerance, share > 1)
+        if missed_by <= 1 or share == START[-1]:
             return with_digest(levels)
+        enough = share * missed_by**(-1 / FASTEST)
     return None
 
 
@@ -155,21 +160,23 @@ def _filled(layouts: list) -> list:
 
 def _climbed(cases: list, bodies, tolerance: float, once: bool) -> tuple:
     """Levels of nested meshes from the coarsest `bodies`, fine to coarse, up to one on which every case meets the
-    tolerance, or the dearest that is worth it; and whether every case does. once: no more than the least levels."""
+    tolerance, or the dearest that is worth it; and the largest error over the tolerance of the first case that misses
+    it, 0 where none does. once: no more than the least levels."""
     pairs, tolerance = [], cases[0].mesh_tolerance or tolerance
     while True:
         pairs.insert(0, condensed(cases[0], *bodies))
         bodies = [finer(body) for body in bodies]
         if len(pairs) < grids.LEAST_LEVELS:
             continue
-        good = all(_enough(one, pairs, tolerance) for one in cases)  # ends with the first that is not
-        if good or once or bodies[0].x.size > MOST_NODES or grids.seconds_of(bodies) > grids.SPENT[cases[0].still]:
-            return [(pair.grid, None if pair.upper is pair.piece else pair.upper_grid) for pair in pairs], good
+        missed_by = next((by for one in cases if (by := _missed(one, pairs, tolerance)) > 1), 0.0)
+        dear = bodies[0].x.size > MOST_NODES or grids.seconds_of(bodies) > grids.SPENT[cases[0].still]
+        if missed_by <= 1 or once or dear:
+            return [(pair.grid, None if pair.upper is pair.piece else pair.upper_grid) for pair in pairs], missed_by
 
 
-def _enough(asked, pairs: list, tolerance: float) -> bool:
-    """Whether a case meets the tolerance on these pieces, or cannot be pressed at all."""
+def _missed(asked, pairs: list, tolerance: float) -> float:
+    """Largest error of a case on these pieces over the tolerance; 0 where it cannot be pressed at all."""
     try:
-        return met(measures(*ladder.on_pairs(asked, pairs), tolerance=tolerance), tolerance)
+        return missed(measures(*ladder.on_pairs(asked, pairs), tolerance=tolerance), tolerance)
     except PatchfemError:
-        return True
+        return 0.0
