@@ -37,6 +37,9 @@ def matrix(path, head: Head, facts: dict, given: tuple | None, body: str) -> Pro
         if stated is not None and stated != count:
             raise PatchfemError(f"{path}: {count} {axis} where its head says {stated:g}; the file is cut off or was "
                                 "put together: export the scan anew")
+    if min(table.shape) > 3 and _even(table[0, 1:]) and _even(table[1:, 0]) and not _even(table[1, 1:]):
+        raise PatchfemError(f"{path}: the first row and the first column of its matrix grow evenly, as places and no "
+                            "heights do; leave them out")
     steps, notes = [], ()
     for axis, count in zip(("x", "y"), table.shape[::-1]):
         if axis == "y" and count == 1:
@@ -51,6 +54,12 @@ def matrix(path, head: Head, facts: dict, given: tuple | None, body: str) -> Pro
         return Profile(trace.x, trace.z, trace.source, (*notes, *trace.notes))
     axes = [np.arange(count) * step for count, step in zip(table.shape[::-1], steps)]
     return areal(path, *axes, table, said, notes)
+
+
+def _even(values) -> bool:
+    """Whether numbers (n,) grow by one step."""
+    steps = np.diff(values)
+    return bool(steps[0] > 0 and np.ptp(steps) < 1e-6 * steps[0])
 
 
 def _height(path, facts: dict, given: tuple | None) -> tuple:

@@ -199,6 +199,10 @@ CURES = {  # what is refused, what is said, the same text after the remedy, the 
     "thousands": ("# Width: 4,000 um\n# Height: 3,000 um\n# Value units: nm\n" + ROWS, ":1: 'Width: 4,000 um': 4,000 "
                   "may be a decimal number or one of thousands; write it with a point, or without a comma",
                   "# Width: 4000 um\n# Height: 3000 um\n# Value units: nm\n" + ROWS, None),
+    "axes": ("# Width: 4 um\n# Height: 4 um\n# Value units: nm\n0 0 1 2 3\n0 3 1 4 1\n1 5 9 2 6\n2 5 3 5 8\n"
+             "3 9 7 9 3\n", "the first row and the first column of its matrix grow evenly, as places and no heights "
+             "do; leave them out",
+             "# Width: 4 um\n# Height: 4 um\n# Value units: nm\n3 1 4 1\n5 9 2 6\n5 3 5 8\n9 7 9 3\n", None),
     "two scans": ("# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS + "# Channel: Phase\n" + ROWS,
                   ":7: '# Channel: Phase' begins another scan or ends this one; keep one scan in a file",
                   "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS, None),
