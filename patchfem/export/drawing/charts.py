@@ -376,8 +376,7 @@ def wear(x, cycles, pressure, depth, history: dict) -> list:
         lines = [line(x * size, values[k] * scale, colour, "new" if cycles[k] == 0 else f"{cycles[k]:.6g} cycles")
                  for k, colour in zip(pick, ("soft", *COLOURS))]
         out.append(chart(title, axis("x", along), axis(title.lower(), name), lines))
-    top = float(np.max(pressure[-1])) * axis_unit(pressure, "Pa")[1]
-    out[0]["y"]["range"] = [0.0, min(2.5 * top, 1.05 * float(np.max(pressure)) * axis_unit(pressure, "Pa")[1])]
+    out[0]["y"]["range"] = [0.0, 1.05 * float(np.max(pressure)) * axis_unit(pressure, "Pa")[1]]
     over = [line(history["cycle"], history[name] / history[name][0], colour, text)
             for colour, (name, text) in zip(COLOURS, WORN.items())
             if history.get(name) is not None and history[name][0]]

@@ -1,0 +1,61 @@
+"""The jumps of a wear run before it runs, and the pressure axis of its picture."""
+
+import numpy as np
+import pytest
+
+import patchfem as pf
+from patchfem.export.drawing import charts
+from patchfem.runs.patch.result import solve_all
+from patchfem.runs.wear.evolve import evolve
+from patchfem.runs.wear.plan import SMOOTH, jumps_about
+
+SCENE = """
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "26 lbf"
+substrate = "Ti-8Al-1Mo-1V"
+[friction]
+law = "coulomb"
+static = 0.3
+[slide]
+kind = "sine"
+amplitude = "10 um"
+frequency = "143 Hz"
+cycles = 2
+[accuracy]
+tolerance = 1e-2
+[wear]
+coefficient = "1e-14 m^2/N"
+"""
+TILT, CROWN = '[contact.tilt]\nangle = "{}"\n', '[contact.crown]\nradius = "{}"\n'
+
+
+def model_of(shape: str, more: str):
+    return pf.build(SCENE.replace("[friction]", shape + "[friction]") + more)
+
+
+@pytest.mark.share(1, 3)
+@pytest.mark.parametrize("shape, cycles", [(TILT.format("0.1 mrad"), 1e5), (TILT.format("0.1 mrad"), 1e8),
+                                           (TILT.format("0.5 mrad"), 1e7), (CROWN.format("10 m"), 1e7)])
+def test_always_a_plan_tells_the_jumps_within_a_factor_of_one_and_a_half(shape, cycles):
+    model = model_of(shape, f"cycles = {cycles:g}\n")
+    patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]
+    taken = len(evolve(model, patch, (None, None)).moments) - 1
+    assert 1 / 1.5 < jumps_about(model) / taken < 1.5
+
+
+def test_exact_asked_jumps_and_those_of_asperities_that_touch_everywhere():
+    assert jumps_about(model_of(TILT.format("0.1 mrad"), "cycles = 1e8\njumps = 7\n")) == 7
+    rough = '[contact.asperities]\nlaw = "exponential"\nnormal_stiffness = "1e13 Pa/m"\ndecay_length = "2.5 um"\n'
+    assert jumps_about(model_of(rough, "cycles = 1e8\n")) == SMOOTH
+
+
+def test_exact_the_picture_of_wear_holds_the_pressure_of_the_new_patch():
+    """It was cut at 2.5 times the last peak, without a mark."""
+    x, pressure = np.linspace(-1, 1, 5), np.array([[0.0, 8e6, 3e6, 0.0, 0.0], [7e5] * 5])
+    made = charts.wear(x, np.array([0.0, 1e8]), pressure, pressure * 1e-12, {"cycle": np.array([0.0, 1e8])})
+    low, high = made[0]["y"]["range"]
+    drawn = [one["y"] for one in made[0]["marks"]]
+    assert low == 0 and high >= max(np.max(one) for one in drawn)
