@@ -252,7 +252,7 @@ def table(limits: Limits, measures: dict) -> str:
     least = " Of the values of the other keys those are told that allow least." if several else ""
     return (f"<p class=soft>{escape(key['name'])} grows from {escape(at(limits.found[0].start))}. A measure has left "
             "its first value where it differs from it by so much and by more than both numerical errors; cases that "
-            "did not settle or miss their tolerance do not count."
+            "miss their tolerance do not count, nor those that did not settle where settled ones have the measure."
             f"{least}</p>" + document.table(
                 ("measure", ">first case", ">change up to the last", "leaves by", "where"), rows, "wide"))
 

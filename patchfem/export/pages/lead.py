@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...runs.many.answers import FAILED
 from ...scales import plain, short
 from .. import missed
 from ..written import NUMBER, label
@@ -23,7 +24,7 @@ class Lead(NamedTuple):
     span: from where to where the main measure runs; turns: what changes as the key grows. "" where there is nothing to
     say. ranks, spread, peaks: as `ranked.ranks_of`, `ranked.quantiles` and `peaks.found` give them; rank, scatter,
     peak: what matters most, where nine in ten drawn cases lie, where a swept frequency has its peak, in sentences;
-    left: how many cases have no answer yet."""
+    left: how many cases have no answer yet, and that none has settled."""
 
     missed: dict
     misses: str
@@ -75,14 +76,18 @@ def lead_of(table: dict) -> Lead:
     tops = peaks.found(keys, columns(table), trusted, table["grid"])
     return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
                 allowed.sentence(limits), span(columns(table), trusted, settled),
-                changes(keys, columns(table), outcome, table["grid"]), *ranked.told(table, trusted),
+                changes(keys, columns(table), outcome, table["grid"]), *ranked.told(table, trusted, settled.any()),
                 tops, peaks.sentence(tops), _left(outcome))
 
 
 def _left(outcome: np.ndarray) -> str:
-    """How many cases of an interrupted sweep have no answer, "" where all have one."""
-    count = int(np.sum(outcome == ""))
-    return f"{count} of {outcome.size} cases have no answer yet; what follows is of the others." if count else ""
+    """What holds of all that follows: how many cases of an interrupted sweep have no answer, and that of those that run
+    none has settled; "" where neither is so."""
+    count, ran = int(np.sum(outcome == "")), outcome[(outcome != "") & (outcome != FAILED)]
+    said = f"{count} of {outcome.size} cases have no answer yet; what follows is of the others." if count else ""
+    if ran.size and not np.isin(ran, SETTLED).any():
+        said += " No case has settled; what follows is of the motions as they ended."
+    return said.strip()
 
 
 def span(measures: dict, trusted: dict, settled: np.ndarray) -> str:

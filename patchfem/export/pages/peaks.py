@@ -15,11 +15,13 @@ from .words import linked, zero_below
 KEYS = ("drive.frequency",)
 HEIGHTS = ("relative_displacement_amplitude", "absolute_acceleration_peak")
 LEAST = 5  # frequencies that show a peak
+KNOWN = 0.01  # of a steady estimate, up to which it tells the height of a peak
 
 
 class Peak(NamedTuple):
     """The peak along one line of cases: name of the measure; what the other keys are; frequency [Hz], its distance to
-    the next cases [Hz], height [SI]; half-power width [Hz], NaN where a side stays above it; unit of the height."""
+    the next cases [Hz], height [SI], NaN where cases beside the largest do not count; half-power width [Hz], NaN where
+    a side stays above it; unit of the height."""
 
     name: str
     held: str
@@ -49,20 +51,25 @@ def found(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
 
 
 def _heights(name: str, measures: dict, trusted: dict) -> np.ndarray:
-    """The measure of every case that settled, the steady estimate of one that has not, NaN without one."""
+    """The measure of every case that settled, the steady estimate of one that has not where it is KNOWN, else NaN."""
     values, steady = np.asarray(measures[name][0], float), measures.get(f"{name}_steady")
-    estimate = np.nan if steady is None else np.where(trusted[f"{name}_steady"], np.asarray(steady[0], float), np.nan)
+    if steady is None:
+        return np.where(trusted[name], values, np.nan)
+    estimate = np.where(np.asarray(steady[1], float) <= KNOWN * np.abs(steady[0]), steady[0], np.nan)
     return np.where(trusted[name], values, estimate)
 
 
 def _peak(frequency: np.ndarray, height: np.ndarray) -> tuple | None:
-    """(frequency, distance of the cases there, height, half-power width) of the largest value inside the range, None
-    where there is none: by the parabola of 1/y^2 over f^2 through it and its neighbours, which one mode has."""
+    """(frequency, distance of the cases there, height, half-power width) of the largest value inside the range, NaN
+    where a case beside it has none, None where it stands at an end: by the parabola of 1/y^2 over f^2 through it and
+    its neighbours, which one mode has."""
     there = np.isfinite(height) & (height > 0)
     x, y = frequency[there], height[there]
     top = int(np.argmax(y)) if y.size >= LEAST else 0
     if not 0 < top < y.size - 1:
         return None
+    if not there[np.flatnonzero(there)[top] + np.array([-1, 1])].all():
+        return (np.nan,) * 4
     part, square = slice(top - 1, top + 2), x**2 - x[top]**2
     a, b, c = np.polyfit(square[part], y[part]**-2.0, 2)
     at = float(np.clip(-b / (2 * a), square[top - 1], square[top + 1])) if a > 0 else 0.0
@@ -83,6 +90,22 @@ def _crossing(x: np.ndarray, y: np.ndarray, level: float) -> float:
 
 def sentence(peaks: list) -> str:
     """Where the peak is, or from where to where it moves; "" without one."""
+    known, lost = ([one for one in peaks if np.isfinite(one.height) == there] for there in (True, False))
+    return " ".join(said for said in (_known(known), _lost(lost, bool(known))) if said)
+
+
+def _lost(peaks: list, others: bool) -> str:
+    """For which lines the peak is not known; others: whether it is for some."""
+    if not peaks:
+        return ""
+    more = f" and {len(peaks) - 1} other{'s' * (len(peaks) > 2)}" if len(peaks) > 1 else ""
+    held = f" with {peaks[0].held}{more}" if peaks[0].held else ""
+    what = "it" if others else label(peaks[0].name)
+    return (f"Where {what} peaks{held} is not known: cases beside the largest have not settled or miss the "
+            "tolerance; more drive.cycles may cure that.")
+
+
+def _known(peaks: list) -> str:
     if not peaks:
         return ""
     first, last = peaks[0], peaks[-1]
@@ -109,10 +132,11 @@ def table(peaks: list) -> str:
     """The peaks as a table; "" without any."""
     if not peaks:
         return ""
-    rows = [[escape(one.held), plain(one.frequency, 5), _high(one),
-             plain(one.width, 2) if np.isfinite(one.width) else "&ndash;"] for one in peaks]
+    told = [(plain(one.frequency, 5), _high(one)) if np.isfinite(one.height) else ("not known",) * 2 for one in peaks]
+    rows = [[escape(one.held), *cells, plain(one.width, 2) if np.isfinite(one.width) else "&ndash;"]
+            for one, cells in zip(peaks, told)]
     return (f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve, by a parabola "
             "of 1/y&sup2; over f&sup2; through the largest case and its neighbours; a case that has not settled "
-            "counts by its steady estimate, one without is left out. A width is given where the curve falls to its "
-            "peak/&radic;2 on both sides within the swept range.</p>"
+            "counts by its steady estimate where that is known to 1 %, else it is left out. "
+            "A width is given where the curve falls to its peak/&radic;2 on both sides within the swept range.</p>"
             + document.table(("", ">at [Hz]", ">height", ">half-power width [Hz]"), rows, "wide"))

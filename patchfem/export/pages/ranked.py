@@ -20,11 +20,12 @@ SETTLED = 0.95  # of the drawn cases, below which those left out may be one of i
 NAMED = 3  # keys in the sentence
 
 
-def told(table: dict, trusted: dict) -> tuple:
-    """(ranks, rank, quantiles, scatter) of the Lead of a sweep; trusted: as `lead` makes it."""
+def told(table: dict, trusted: dict, settled: bool = True) -> tuple:
+    """(ranks, rank, quantiles, scatter) of the Lead of a sweep; trusted: as `lead` makes it; settled: whether any case
+    has."""
     ranks, found, of = ranks_of(table), quantiles(table, trusted), len(table["outcome"])
     left = of - int(np.sum(trusted[next(iter(ranks))])) if ranks else 0
-    return ranks, sentence(ranks, left), found, scatter(found, of)
+    return ranks, sentence(ranks, left), found, scatter(found, of, settled)
 
 
 def ranks_of(table: dict) -> dict:
@@ -78,18 +79,21 @@ def quantiles(table: dict, trusted: dict) -> dict:
     return out
 
 
-def scatter(found: dict, of: int) -> str:
-    """Where nine in ten of `of` drawn cases lie; found: as `quantiles` gives them; "" where there are none."""
+def scatter(found: dict, of: int, settled: bool = True) -> str:
+    """Where nine in ten of `of` drawn cases lie; found: as `quantiles` gives them; settled: whether any case has; ""
+    where there are none."""
     said, most = [], max((found[name][2] for name in SPREAD if name in found), default=0)
     if most and most < SETTLED * of:
-        return (f"{of - most} of {of} drawn cases have not settled within the tolerance, perhaps those that move "
-                "most: how far the answers scatter is not known.")
+        missed = "have not settled within" if settled else "miss"
+        return (f"{of - most} of {of} drawn cases {missed} the tolerance, perhaps those that move most: "
+                "how far the answers scatter is not known.")
     for name in [name for name in SPREAD if name in found]:
         unit, (low, _, high), count = found[name]
         low, high = (short(one, unit, 3, zero_below(name)) for one in (low, high))
         some = f" (in the {count} that have one)" if count < most else ""
         said.append(f"{'an' if name[0] in 'aeio' else 'a'} {label(name)} from {low} to {high}{some}")
-    whose = f"{of} drawn cases" if most == of else f"{most} of {of} drawn cases that settled"
+    count = "settled" if settled else "meet the tolerance"
+    whose = f"{of} drawn cases" if most == of else f"{most} of {of} drawn cases that {count}"
     return f"Nine in ten of the {whose} have {', '.join(said)}." if said else ""
 
 
@@ -128,4 +132,5 @@ def spread(found: dict) -> str:
     if not rows:
         return ""
     return (document.table(("measure", ">5 %", ">half", ">95 %", "unit", ">cases"), rows, "wide") +
-            "<p class=soft>So many of the drawn cases, of those that settled within the tolerance, have less.</p>")
+            "<p class=soft>So many of the drawn cases have less, of those that meet the tolerance and, where any "
+            "case has settled, have settled.</p>")

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import __version__
 from ...campaigns.sweeps.asked import Asked
 from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.estimate import FEW, TABLED
+from ...campaigns.sweeps.executors.cluster import own_of
 from ...campaigns.sweeps.sweep import Clock, Work, solved
 from ...core import Missing, PatchfemError
 from ...runs.many.answers import Answers
@@ -150,8 +150,8 @@ def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> Answ
 
 def sign_of(asked: Asked, cases: Cases, folder: Folder, page: bool) -> str:
     """Sign of all that the tables of a whole sweep are made of: where it is that of sweep.json, they are there."""
-    made = [__version__, asked.text, [(axis.key, axis.texts) for axis in cases.axes], command(asked, cases), page,
-            [opened(folder.target, key) for key in folder.keys()]]
+    made = [own_of()["patchfem"], asked.text, [(axis.key, axis.texts) for axis in cases.axes], command(asked, cases),
+            page, [opened(folder.target, key) for key in folder.keys()]]
     return sha256(json.dumps(made).encode() + folder.chunks.names.tobytes()).hexdigest()
 
 

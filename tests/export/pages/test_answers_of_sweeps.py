@@ -9,6 +9,7 @@ from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.export.pages import peaks, ranked
 from patchfem.export.pages.lead import lead_of
+from patchfem.export.sweeps.page import read_table
 
 RIG = POINT + COULOMB + SHORT
 
@@ -36,7 +37,13 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
         assert one.height == pytest.approx(1e-6 / (2 * damping * np.sqrt(1 - damping**2)), rel=1e-9)
         assert one.width == pytest.approx(2 * damping * centre, rel=5 * damping**2 + 0.005)
     said = peaks.sentence(found)
-    assert "with drive.acceleration 1 g" in said and "with drive.acceleration 2 g" in said and "0.25 Hz apart" in said
+    assert "with drive.acceleration 1 g" in said and "with drive.acceleration 2 g" in said
+    assert "(cases lie 0.25 Hz apart)" in said
+    some = np.where(np.abs(np.tile(x, 2) - 99.6) < 0.4, np.nan, both)  # beside the first peak alone
+    found = peaks.found(keys, {name: (some, 0 * both, "m")}, {name: np.ones(322, bool)}, True)
+    assert np.isnan(found[0].height) and found[1].frequency == pytest.approx(95 * np.sqrt(1 - 2 * damping**2), abs=1e-3)
+    assert "Where it peaks with drive.acceleration 1 g is not known" in peaks.sentence(found)
+    assert "not known" in peaks.table(found) and peaks.sentence(found[:1]).startswith("Where relative displacement am")
 
 
 def test_always_a_peak_at_an_end_is_none_and_a_side_that_stays_up_has_no_width():
@@ -94,3 +101,15 @@ def test_always_a_scatter_that_unsettled_cases_hide_is_not_told():
     some = found | {"equivalent_damping": ("1", np.array([0.1, 0.2, 0.3]), 40)}  # those that stick have none
     assert ranked.scatter(some, 100).startswith("40 of 100 drawn cases have not settled")
     assert ranked.scatter(some, 60).endswith("an equivalent damping from 0.1 to 0.3 (in the 40 that have one).")
+
+
+def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
+    """Their numbers then count as they ended; 256 such cases were told as if they had settled."""
+    table = read_table(drawn[0])
+    count = len(table["outcome"])
+    said = "No case has settled; what follows is of the motions as they ended."
+    assert said not in "".join(lead_of(table).sentences())
+    lead = lead_of(table | {"outcome": ["transient"] * (count - 2) + ["failed", ""]})
+    assert lead.sentences()[0] == f"1 of {count} cases have no answer yet; what follows is of the others. {said}"
+    assert lead.answer().startswith(lead.left) and "settled" not in lead.scatter
+    assert lead_of(table | {"outcome": ["failed"] * count}).left == ""
