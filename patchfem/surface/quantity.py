@@ -6,6 +6,8 @@ The interval holds what it tells of in 95 of 100 cases where two surfaces are co
 
 from typing import NamedTuple
 
+import numpy as np
+
 LEVEL = 0.95
 SIDE = 1.959964  # standard deviations to either side
 
@@ -32,3 +34,31 @@ def around(value: float, error: float, unit: str, text: str, least: float | None
 def refused(unit: str, text: str, reason: str) -> Quantity:
     """No quantity, and why."""
     return Quantity(None, None, None, unit, text, reason)
+
+
+class Mean(NamedTuple):
+    """A number that several measurements have: mean and its interval; scatter: standard deviation of one; count: how
+    many."""
+
+    mean: Quantity
+    scatter: float
+    count: int
+
+
+def mean_of(each: list, text: str) -> Mean | None:
+    """Mean of quantities that have a value, None of less than two.
+
+    Its 95 % interval is Student's t of their scatter, s t / sqrt(n), or that of their own intervals where this is
+    wider: a few may agree by chance. Where no interval reaches below zero, that of the mean does not.
+    """
+    from scipy.stats import t
+
+    if len(each) < 2:
+        return None
+    values = np.array([one.value for one in each])
+    own = np.array([(one.high - one.low) / 2 if one.high is not None else 0.0 for one in each])
+    scatter, middle = float(values.std(ddof=1)), float(values.mean())
+    side = max(float(t.ppf((1 + LEVEL) / 2, values.size - 1)) * scatter, float(np.sqrt((own**2).mean())))
+    side, least = side / np.sqrt(values.size), 0.0 if min(one.low for one in each) >= 0 else -np.inf
+    return Mean(Quantity(middle, float(max(middle - side, least)), float(middle + side), each[0].unit, text), scatter,
+                values.size)

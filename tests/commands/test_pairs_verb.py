@@ -10,7 +10,8 @@ from pairs import UM, track
 from scipy.stats import t
 
 import patchfem as pf
-from patchfem.surface.compare.pairs import mean_of, read_pairs
+from patchfem.surface.compare.pairs import read_pairs
+from patchfem.surface.quantity import Quantity, mean_of
 
 COUNT = 1201
 
@@ -70,7 +71,7 @@ def test_always_the_interval_of_a_mean_holds_the_truth_in_95_of_100():
         held = []
         for _ in range(400):
             values = 50 + random.normal(0, np.hypot(scatter, own), 4)
-            one = mean_of([{"value": v, "low": v - 1.96 * own, "high": v + 1.96 * own, "unit": "m"} for v in values])
+            one = mean_of([Quantity(v, v - 1.96 * own, v + 1.96 * own, "m", "") for v in values], "")
             held.append(one.mean.low <= 50 <= one.mean.high)
         assert np.mean(held) > 0.92
 

@@ -7,7 +7,7 @@ from ... import __version__
 from ...disk.whole import write_rows, write_text
 from ...scales import LADDERS, plain
 from ...surface.compare import pairs, verdict
-from ...surface.quantity import Quantity
+from ...surface.quantity import Mean
 from ..pages.document import Section, document, figure, table, warned
 from . import compare, pictures
 
@@ -83,11 +83,6 @@ def _cell(value: float | None) -> str:
     return "" if value is None else repr(value)
 
 
-def quantity(one: dict) -> Quantity:
-    """A number of a pair as a `Quantity`."""
-    return Quantity(one["value"], one["low"], one["high"], one["unit"], "", one.get("reason", ""))
-
-
 def lines_of(rows: list) -> list:
     """The answer as lines: each pair, then the means of each group."""
     out = [headline(rows), ""]
@@ -127,13 +122,13 @@ def _lead(row: dict) -> list:
         return []
     out = []
     for name in _leading(row):
-        value, interval, unit = compare.shown(quantity(row[name]))
+        value, interval, unit = compare.shown(pairs.quantity(row[name]))
         if interval:
             out.append(f"{words(name)} {value} ({interval.replace(' .. ', ' to ')}) {unit}".rstrip())
     return out
 
 
-def _scatter(one: pairs.Mean, unit: str) -> str:
+def _scatter(one: Mean, unit: str) -> str:
     """The scatter in the unit of its mean."""
     steps = {**LADDERS, "m2": (("um^2", 1e12),)}.get(one.mean.unit, ())
     return plain(one.scatter * next((scale for name, scale in steps if name == unit), 1.0), 3)
@@ -160,7 +155,7 @@ def _heading(group: tuple, count: int) -> str:
 def _means(number: int, group: tuple, rows: list, found: dict) -> str:
     """Picture and table of the means of a group."""
     of = [row for row in rows if row["outcome"] == "done" and pairs.group_of(row) == group]
-    panels = [(words(name), [(row["line"], quantity(row[name])) for row in of], found[name].mean)
+    panels = [(words(name), [(row["line"], pairs.quantity(row[name])) for row in of], found[name].mean)
               for name in _leading(of[0]) if name in found]
     drawn = [figure(f"m{number}", pictures.each_and_mean(panels), "Each pair with its interval, by its line of the "
                     "table; the band: the mean with its interval.",

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..edges import edge
 from ..profile import Profile, even, level
 from ..quantity import LEVEL, SIDE, Quantity, around, refused
 from ..roughness.intervals import made_traces
@@ -22,9 +23,6 @@ WITHIN = "mean worn depth from the first to the last worn place, unworn valleys 
 TAIL = (0.02, 0.25)  # share of the lowest heights that both Abbott curves are laid on each other over
 DEPOSIT = 4.0  # deviations above the trace before from which a height is a deposit, not noise
 FROM, TO = "first worn place", "last worn place"
-SURE = 5.0  # noises of a mean of neighbours from which they are worn: chance brings it in 1 of 1000 traces
-MEANS = (1, 4, 16, 64)  # neighbours
-DEEP, LEAST, MOST = 10.0, 12, 400  # noises at which a flank of the wear ends; samples of it to either side
 SLIGHT = 0.5  # noises: wear less deep than that passes for none (test_registration)
 
 
@@ -101,42 +99,6 @@ def extent_of(found: Registration, together: float) -> Extent | None:
     before = tuple(Quantity(back(place), back(low) - moved, back(high) + moved, "m", f"{text}, in the x of the trace "
                             "before") for (place, low, high), text in zip(places, (FROM, TO)))
     return Extent(before, after)
-
-
-def edge(rest, noise: float, together: float):
-    """(edge, lowest, highest) index of the first worn height, None without one."""
-    worn = None
-    for many in MEANS:
-        if many > rest.size:
-            break
-        mean = np.convolve(rest, np.full(many, 1 / many), "valid")
-        deep = np.flatnonzero(mean > SURE * noise * np.sqrt((together if many > 1 else 1.0) / many))
-        if deep.size and (worn is None or deep[0] + many - 1 < worn):
-            worn = int(deep[0] + many - 1)
-    return None if worn is None else edge_near(rest, worn, noise, together)
-
-
-def edge_near(rest, worn: int, noise: float, together: float) -> tuple:
-    """(edge, lowest, highest) index of the first worn height beside one that is worn (`extent_of`).
-
-    What stands above the trace before, as pile-up beside a track does, is unworn: it counts with the noise alone, and
-    no flank begins there but for the error of its first height.
-    """
-    deep = np.flatnonzero(rest[worn:] > DEEP * noise)
-    reach = int(np.clip(deep[0] if deep.size else MOST, LEAST, MOST))
-    low, high = max(worn - 2 * reach, 0), min(worn + reach, rest.size)
-    part, sums = rest[low:high], []
-    unworn = np.concatenate([[0.0], np.cumsum(np.where(part > 0, part**2, noise**2))])
-    for k in range(part.size - 3):
-        base = np.vander(np.arange(part.size - k) / part.size, 3)
-        shape = np.linalg.lstsq(base, part[k:], rcond=None)[0]
-        left = part[k:] - base @ shape
-        above = shape[2] < -3 * noise * np.sqrt(together / left.size) and k < worn - low
-        sums.append(np.inf if above else float(unworn[k] + left @ left))
-    sums = np.array(sums)
-    near = np.flatnonzero(sums <= sums.min() + 1.5 * SIDE**2 * noise**2 * together)
-    best = low + int(np.argmin(sums))
-    return best, max(low + int(near[0]) - 1, 0), min(low + int(near[-1]) + 1, rest.size - 1)
 
 
 def summed(found: Registration, inside, deposits: bool = True) -> tuple:

@@ -4,11 +4,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from ...core import PatchfemError
 from ...inputs.cells import cells_of, header_of, text_of
-from ..quantity import LEVEL, SIDE, Quantity
+from ..quantity import Quantity, mean_of
 
 HEADER = "before,after"
 KINDS = {"scans": "areal scans", "place": "traces laid on each other", "flanks": "traces with a track below its flanks",
@@ -27,15 +25,6 @@ class Asked(NamedTuple):
     paths: tuple
     direction: str
     labels: Mapping
-
-
-class Mean(NamedTuple):
-    """A number of several pairs: mean and its interval; scatter: standard deviation of a pair; count: how many pairs
-    have it."""
-
-    mean: Quantity
-    scatter: float
-    count: int
 
 
 def read_pairs(path) -> list[Asked]:
@@ -97,6 +86,11 @@ def numbers_of(row: dict) -> dict:
     return {name: one for name, one in {**row, **other}.items() if isinstance(one, dict) and "value" in one}
 
 
+def quantity(one: dict) -> Quantity:
+    """A number of a pair as a `Quantity`."""
+    return Quantity(one["value"], one["low"], one["high"], one["unit"], "", one.get("reason", ""))
+
+
 def means_of(rows: list) -> list[tuple]:
     """(`group_of`, how many pairs, name -> `Mean`) of the answers of pairs, for each group of them."""
     groups = {}
@@ -107,8 +101,8 @@ def means_of(rows: list) -> list[tuple]:
     for group, each in groups.items():
         names = dict.fromkeys(name for one in each for name in one if name.removesuffix("_x").removesuffix("_y")
                               in AVERAGED)
-        found = {name: mean_of([one[name] for one in each if one.get(name, {}).get("value") is not None])
-                 for name in names}
+        found = {name: mean_of([quantity(one[name]) for one in each if one.get(name, {}).get("value") is not None],
+                               "mean over the pairs") for name in names}
         out.append((group, len(each), {name: one for name, one in found.items() if one is not None}))
     return out
 
@@ -118,22 +112,3 @@ def group_of(row: dict) -> tuple:
     from flanks, or over an area are means of different things."""
     kind = "scans" if "worn_volume" in row else row["reference"] or "nothing"
     return row["labels"].get("group", ""), "" if kind == "scans" else row["direction"] or "", kind
-
-
-def mean_of(each: list) -> Mean | None:
-    """Mean of numbers {value, low, high, unit}, None of less than two.
-
-    Its 95 % interval is Student's t of their scatter, s t / sqrt(n), or that of their own intervals where this is
-    wider: a few pairs may agree by chance.
-    """
-    from scipy.stats import t
-
-    if len(each) < 2:
-        return None
-    values = np.array([one["value"] for one in each])
-    own = np.array([(one["high"] - one["low"]) / (2 * SIDE) if one["high"] is not None else 0.0 for one in each])
-    many, scatter = np.sqrt(values.size), float(values.std(ddof=1))
-    side = max(float(t.ppf((1 + LEVEL) / 2, values.size - 1)) * scatter, SIDE * float(np.sqrt((own**2).mean()))) / many
-    middle, least = float(values.mean()), 0.0 if min(one["low"] for one in each) >= 0 else -np.inf
-    return Mean(Quantity(middle, float(max(middle - side, least)), middle + side, each[0]["unit"],
-                         "mean over the pairs"), scatter, values.size)

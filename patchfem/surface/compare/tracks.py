@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import frozen_array
+from ..edges import FLOOR, edge, edge_near, floor_of
 from ..profile import Profile, runs_of
 from ..quantity import SIDE, Quantity, around, refused
 from ..roughness.filter import mean_line
 from .carried import median_of_five
-from .depth import edge, edge_near, summed
+from .depth import summed
 from .flanks import PARTS, Flanks
 from .registration import REACH, Registration
 
@@ -20,7 +21,6 @@ LONG = 3.0  # longest waves of the band, and a track is longer; so is a piece of
 MEDIAN, UNWORN = 5, 0.05  # samples of the running median that is worn in a track, share of unworn heights in it
 NEW = 10.0  # noises that a new valley is deeper than the trace before, and 3 below all of it nearby
 FORM = 2.5  # longest waves, from which the shape of the depth is the form of a track
-FLOOR = 5  # parts of a track, the deepest of which is its floor
 FROM, TO = ("where the longest track begins, in the x of the trace after",
             "where the longest track ends, in the x of the trace after")
 DEPTH, BOTTOM = ("lost area of the longest track over its width",
@@ -124,22 +124,10 @@ def _pile_up(found: Registration, low: float, high: float, together: float, text
 
 
 def _floor(found: Registration, start: float, width: float, together: float) -> Quantity:
-    """Highest depth of the parabola through the deepest fifth of a track, whose vertex errs half as much again: the
-    mean over all fifths that noise alone may make less deep than the deepest."""
-    places = np.linspace(start, start + (1 - 1 / FLOOR) * width, 8 * FLOOR)
-    parts = [(found.x >= place) & (found.x <= place + width / FLOOR) for place in places]
-    means = np.array([float(found.rest[one].mean()) if one.sum() > 3 else 0.0 for one in parts])
-    noise, deepest = found.noise * np.sqrt(together / max(parts[0].sum(), 1)), parts[int(np.argmax(means))]
-    top = float(np.mean([_vertex(found.rest[one]) for one, mean in zip(parts, means) if mean >= means.max() - 2 * noise
-                         and one.sum() > 3] or [means.max()]))
+    """Floor of a track (`floor_of`), which errs half as much again as the mean of its fifth."""
+    top, deepest = floor_of(found.x, found.rest, (start, width), found.noise * np.sqrt(together))
     area, error, length = summed(found, deepest, False)[:3]
     return around(top, 1.5 * float(np.hypot(error / length, (top - area / length) / 4)), "m", BOTTOM, 0.0)
-
-
-def _vertex(depth) -> float:
-    """Highest depth of the parabola through depths (n,) within them."""
-    shape = np.polyfit(np.linspace(-1, 1, depth.size), depth, 2)
-    return float(np.polyval(shape, np.clip(-shape[1] / (2 * shape[0]) if shape[0] < 0 else 0.0, -1, 1)))
 
 
 def _valley(found: Registration, spans: tuple, longest: float) -> Valley | None:
