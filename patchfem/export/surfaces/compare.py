@@ -28,9 +28,10 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "slope_ratio": "slope ratio", "worn_from_before": "worn from, x before", "worn_to_before": "worn to, x before",
          "worn_from_after": "worn from, x after", "worn_to_after": "worn to, x after",
          "worn_depth_within": "worn depth, mean from there to there",
-         "track_from": "track from, x after", "track_to": "track to, x after", "track_width": "track width",
-         "track_depth": "track depth, mean", "track_step": "track, step height",
-         "track_pile_up_left": "track, pile-up at smaller x", "track_pile_up_right": "track, pile-up at larger x",
+         "track_from": "track from", "track_to": "track to", "track_direction": "track, direction",
+         "track_length": "track length", "track_volume": "track, area times length",
+         "track_width": "track width", "track_depth": "track depth, mean", "track_step": "track, step height",
+         "track_pile_up_left": "track, pile-up at 'from'", "track_pile_up_right": "track, pile-up at 'to'",
          "track_depth_floor": "track depth, floor", "track_area_gross": "track, lost area",
          "track_pile_up": "track, pile-up", "track_area_net": "track, lost less pile-up",
          "hidden_wear": "wear that a wedge may hide, mean",
@@ -128,8 +129,18 @@ def _of_scans(one: Change) -> dict:
     guess = None if one.found is None else one.found.guess
     flags = {"mirrored": bool(guess and guess.mirrored), "turned": bool(guess and guess.turned)}
     return {"registration": {**{name: plain_of(each) for name, each in one.registration.items()}, **flags},
-            "hidden_wear": plain_of(hidden(one)),
+            "hidden_wear": plain_of(hidden(one)), "track": _of_track(one),
             "removed": dict(zip(("before", "after"), one.removed))}
+
+
+def _of_track(one: Change) -> dict | None:
+    """The track of two scans, with the scatter of groups of sections along it; why there is none as `reason`."""
+    if one.track is None:
+        return None
+    if one.track.why:
+        return {"reason": one.track.why}
+    return {"sections": one.track.sections, **{name: {**plain_of(each), "scatter": one.track.scatter.get(name)}
+                                               for name, each in one.track.values.items()}}
 
 
 def plain_of(one: Quantity) -> dict:
@@ -247,6 +258,12 @@ def _maps(one: Change) -> list:
     out.append((pictures.both_heights(heights, [_bearing(z) for z in heights]), "Left: share of the heights in each "
                 "class. Right: Abbott curves. Both over the common region, about the plane of the scan before.",
                 "Histograms and Abbott curves of the heights before and after"))
+    if one.track is not None and not one.track.why:
+        found = one.track.values
+        out.append((pictures.mean_section(one.track, found["from"].value, found["to"].value),
+                    f"Mean of {one.track.sections} sections across the track; the band: one standard deviation of the "
+                    "sections to either side; between the lines: the track.",
+                    f"Mean section of the track: width {' '.join(shown(found['width'])[::2])}"))
     return out
 
 

@@ -135,6 +135,21 @@ def both_heights(heights: tuple, curves: tuple) -> str:
                  chart("Abbott curves", _place("material ratio", "%", [0, 100]), axis("height", up), lines)])
 
 
+def mean_section(track, start: float, end: float) -> str:
+    """The mean section of a track, its scatter, and where the track begins and ends [m]."""
+    there = np.isfinite(track.section)
+    x, depth, spread = track.across[there], track.section[there], track.spread[there]
+    (along, mm), (up, um) = axis_unit(x, "m"), axis_unit(depth, "m")
+    marks = [mark("band", "soft", "scatter of the sections", x=x * mm, low=(depth - spread) * um,
+                  high=(depth + spread) * um), line(x * mm, depth * um, "warm", "mean", most=POINTS, width=1.2),
+             line(x[[0, -1]] * mm, [0.0, 0.0], "#4d4d4d", width=0.8),
+             *(mark("rule", "#4d4d4d", x=place * mm, dash="dotted") for place in (start, end))]
+    low, high = float((depth - spread).min()), float((depth + spread).max())
+    room = 0.05 * (high - low)
+    return draw([chart("", _place("across the track", along, x * mm),
+                       axis("worn depth", up) | {"range": [(high + room) * um, (low - room) * um]}, marks)], height=2.7)
+
+
 def overlay(x, first, second, rest, where: tuple) -> str:
     """Both traces (n,) [m] over x (n,) [m], the second laid on the first, and between them what wore off.
 

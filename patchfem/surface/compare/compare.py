@@ -73,6 +73,8 @@ class Comparison:
         """Every `Quantity` by its name."""
         if isinstance(self.before, Areal):
             own = {} if self.change is None else {**self.change.values, **self.change.registration}
+            if self.change is not None and self.change.track is not None and not self.change.track.why:
+                own |= _named(self.change.track.values)
             return {**own, "amplitude_ratio": self.amplitude_ratio, "slope_ratio": self.slope_ratio}
         out = {"shift": self.shift, "worn_depth_max": self.worn.largest, "worn_depth_mean": self.worn.mean,
                "worn_area": self.worn.area, "amplitude_ratio": self.amplitude_ratio, "slope_ratio": self.slope_ratio,
@@ -81,7 +83,7 @@ class Comparison:
             names = (f"worn_{end}_{when}" for when in ("before", "after") for end in ("from", "to"))
             out.update(zip(names, (*self.worn.extent.before, *self.worn.extent.after)))
             out |= {} if self.worn.within is None else {"worn_depth_within": self.worn.within}
-        out.update((f"track_{name.removesuffix('_mean')}", one) for name, one in self.tracks.sizes.items())
+        out |= _named(self.tracks.sizes)
         if isinstance(self.before, Profile):
             out["hidden_wear"] = self.hidden
         return out if self.abbott is None else {**out, "worn_depth_mean_from_abbott": self.abbott}
@@ -112,6 +114,11 @@ def compared(before: Profile | Areal, after: Profile | Areal, direction: str = "
     removed = tuple(int(one.missing.sum()) for one in (place.before, place.after))
     return _placed(place, direction, band, removed) if place.found is not None else \
         _apart(place, direction, band, removed)
+
+
+def _named(track) -> dict:
+    """Sizes of a track by the names that a comparison has for them."""
+    return {f"track_{name.removesuffix('_mean')}": one for name, one in track.items()}
 
 
 def identical(before, after) -> bool:

@@ -13,8 +13,8 @@ KINDS = {"scans": "areal scans", "place": "traces laid on each other", "flanks":
          "nothing": "traces without a common place"}
 AVERAGED = ("worn_volume", "grown_volume", "worn_share", "worn_depth_mean", "worn_depth_within", "worn_depth_max",
             "worn_area", "track_width", "track_depth", "track_depth_floor", "track_step", "track_area_gross",
-            "track_area_net", "track_pile_up", "track_pile_up_left", "track_pile_up_right", "amplitude_ratio",
-            "slope_ratio")  # no places and tilts, which differ by how a trace was laid
+            "track_area_net", "track_pile_up", "track_pile_up_left", "track_pile_up_right", "track_length",
+            "track_volume", "amplitude_ratio", "slope_ratio")  # no places, which differ by how a trace was laid
 
 
 class Asked(NamedTuple):

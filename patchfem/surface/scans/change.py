@@ -9,6 +9,7 @@ from ..areal import Areal, filled
 from ..quantity import SIDE, Quantity, refused
 from .registration import REACH, Laid, laid
 from .search import CLEAR, variant
+from .track import ScanTrack, track_of
 from .volumes import Volumes, measured, nothing
 
 SHIFT = "a place of the scan before, turned about its middle, stands so far along {} in the scan after"
@@ -31,7 +32,7 @@ class Change:
 
     before, after: the scans without spikes; found, volumes: None where they show no common place, for the reason why;
     removed: heights left out of each as spikes, specks of the depths counted with the scan after; registration: shift
-    and rotation by name.
+    and rotation by name; track: None where no wear is shown.
     """
 
     before: Areal
@@ -41,6 +42,7 @@ class Change:
     why: str = ""
     removed: tuple = (0, 0)
     registration: dict = field(default_factory=dict)
+    track: ScanTrack | None = None
 
     @property
     def values(self) -> dict:
@@ -72,7 +74,9 @@ def changed(before: Areal, after: Areal, keep_spikes: bool = False) -> Change:
         before, guess = variant(before, "", True), found.guess  # it counts into the material instead
         found, volumes, specks = _laid(before, variant(after, "", True), keep_spikes)
         found = replace(found, guess=guess)
-    return Change(before, after, found, volumes, "", (removed[0], removed[1] + specks), _place(found, ""))
+    track = track_of(found, volumes.filled, volumes.worn, (before.x, before.y), volumes.error) \
+        if volumes.values["worn_volume"].low > 0 else None
+    return Change(before, after, found, volumes, "", (removed[0], removed[1] + specks), _place(found, ""), track)
 
 
 def _laid(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
@@ -184,6 +188,7 @@ def sentences(one: Change) -> list:
     else:
         out.append("Worn volume: none shown. Even wear of any depth, and a wedge that the mounting turned back, would "
                    "look the same; only an unworn part beside the rubbed one, in both scans, would settle it.")
+    out += [] if one.track is None or one.track.why else [_track(one.track)]
     if grown.low > 0:
         out.append(f"{_volume(grown)} stand above the scan before: pile-up or deposits"
                    + (", or the two files are in the wrong order." if headline(one) == GREW else "."))
@@ -194,6 +199,17 @@ def sentences(one: Change) -> list:
         out.append("Another part of the scans may be the unworn one as well, as where two planes meet in an edge; the "
                    "intervals hold what either gives.")
     return out
+
+
+def _track(one: ScanTrack) -> str:
+    """The wear track as a sentence."""
+    found = one.values
+    text = (f"A track at {np.degrees(found['direction'].value):.1f} degrees from x: over {one.sections} sections "
+            f"across it in the mean {_length(found['width'])} wide, {_length(found['depth_mean'])} deep, its floor "
+            f"{_length(found['depth_floor'])}; ")
+    if found["volume"].value is None:
+        return text + f"its volume is not known: {found['volume'].reason}."
+    return text + f"{_length(found['length'])} long, so that area times length is {_volume(found['volume'])}."
 
 
 def _ways(one: Change) -> list:

@@ -29,12 +29,14 @@ WORN = {"worn_volume": "volume that went, over the region that both scans show",
 
 class Volumes(NamedTuple):
     """What `measured` found: values by the names of `WORN`; worn and grown (m, n): which heights; filled (m, n) [m]:
-    the depths, missing ones from their neighbours, NaN beyond the common region."""
+    the depths, missing ones from their neighbours, NaN beyond the common region; error [m]: standard deviation of the
+    plane they count from, below the wear."""
 
     values: dict
     worn: np.ndarray
     grown: np.ndarray
     filled: np.ndarray
+    error: float = 0.0
 
 
 def nothing(reason: str) -> dict:
@@ -85,7 +87,9 @@ def _measured(found: Laid, x, y) -> Volumes:
     mean = (one / area for one in values["worn_volume"][:3])
     values["worn_depth_mean"] = Quantity(*mean, "m", WORN["worn_depth_mean"])
     values["worn_depth_max"] = _largest(found, worn)
-    return Volumes(values, worn, grown, depth)
+    known = max(float(cell[worn].sum()), 1e-300)
+    error = float(np.hypot(_of_plane(found, worn, cell, x, y) / known, UNDER * bent)) if worn.any() else 0.0
+    return Volumes(values, worn, grown, depth, error)
 
 
 def _cells(x, y) -> np.ndarray:
