@@ -95,6 +95,8 @@ def _finer(step: float, finest: float) -> list:
 def _record(fit, guess: Guess, state, plane, noise: float, covariance) -> Laid:
     """The registration on a plane as a record."""
     depth = fit.map(state, plane)
+    if np.isfinite(depth).sum() < FEWEST:
+        raise PatchfemError("hardly any heights of both scans lie on each other")
     return Laid(guess, float(state[0]), state[1:], depth, covariance, noise, _unworn(depth, noise), fit.region(state),
                 fit.like(state, plane, noise))
 
