@@ -19,7 +19,7 @@ assert plotter.screenshot(None, return_img=True).std() > 0
 SECONDS = 60  # for a first picture on a slow disk
 # what pyproject.toml names: an installation that was made from an older one does not say so itself
 NEEDED = ("numpy", "scipy", "scikit-fem", "meshio", "pyvista", "numba", "matplotlib", "pydantic", "cyclopts", "rich",
-          "xarray", "h5netcdf", "h5py", "threadpoolctl")
+          "xarray", "h5netcdf", "h5py", "threadpoolctl", "contourpy")
 EXTRAS = {"pyuff": ("lab", "universal files"), "nbclient": ("notebook", "the notebooks of studies/notebooks"),
           "SurfaceTopography": ("profiles", "files of more instruments"),
           "distributed": ("cluster", "sweeps over several machines"), "trame": ("web", "fields in a browser")}

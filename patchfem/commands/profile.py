@@ -14,7 +14,7 @@ from .shared import Json, Refused, Units, flag, note, out_in, pair, quantity, wo
 
 def profile(file: Path, /, *more: Path,
             cutoff: word('wavelength that splits roughness from waviness (L-filter), such as "0.25 mm"') = "",
-            form: word("what is subtracted first: a degree from 1 (line or plane) to 9, or cylinder") = "1",
+            form: word("what is subtracted first: a degree from 1 (line or plane) to 9 such as 2, or cylinder") = "1",
             s_filter: word('wavelength below which waves are left out first, such as "2.5 um"') = "",
             level: word('height over the mean line at which the material ratio is read, such as "0.5 um"') = "0 um",
             ratios: word('material ratios whose heights are set side by side, such as "10,90" in percent') = "10,90",

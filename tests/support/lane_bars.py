@@ -119,10 +119,11 @@ def line_of(law: str, seed: int, count: int, singles: int) -> dict:
             "measures": sum(len(some) for some, ours in zip(pairs, mine) if ours), "misses": misses}
 
 
-def truth(law: str, seed: int, case: int, name: str) -> float:
-    """Value of a measure of a case at a tolerance of 1e-6."""
+def truth(law: str, seed: int, case: int, name: str) -> float | None:
+    """Value of a measure of a case at a tolerance of 1e-6; None where that run lacks it, as one that settles does."""
     sets = drawn(law, seed, case + 1)[1][case]
-    return pf.run(SCENE.format(law=LAWS[law]), **sets, **{"accuracy.tolerance": 1e-6}).measures[name].value
+    found = pf.run(SCENE.format(law=LAWS[law]), **sets, **{"accuracy.tolerance": 1e-6}).measures.get(name)
+    return None if found is None else found.value
 
 
 def printed(lines: list) -> None:

@@ -65,10 +65,10 @@ def _ended(model, found, gone: dict) -> list:
 def jumped(model, found, measures: dict) -> dict:
     """Measures of the worn patch with what the length of the jumps adds to their errors.
 
-    That is twice the change to the depth by the same jumps undivided, of few jumps more, six times of a single one: in
-    a long jump a moving contact edge leaves the nodes it has just taken too high, on both.
+    That is twice the change to the depth by the same jumps undivided, of few jumps more, four times of two and of a
+    single one: in a long jump a moving contact edge leaves the nodes it has just taken too high, on both.
     """
-    times = 2 + (4 / model.wear.jumps if model.wear.jumps else 0)
+    times = min(2 + (4 / model.wear.jumps if model.wear.jumps else 0), 4)
     rough = values(pressed(model.patch, found.patch.pair, frozen_array(found.state.rough)))
     here = values(found.patch)
     return {name: replace(m, error=m.error + times * abs(here[name] - rough[name])) for name, m in measures.items()
