@@ -162,9 +162,8 @@ class Folder:
             try:
                 self.claim.take()
             except Missing:
-                for empty in () if self.claim.path.exists() else (self.target / CHUNKS, self.target):  # or is another's
-                    with suppress(OSError):  # it holds what is older
-                        empty.rmdir()
+                if not self.claim.path.exists():  # else the folder is another's
+                    self._remove_empty()
                 raise
         write_bytes(self.target / CHUNKS / self.token, b"")
         self.chunks.look()
@@ -195,10 +194,17 @@ class Folder:
         if numbers:
             self.chunks.look()
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, fault, *_) -> None:
         (self.target / CHUNKS / self.token).unlink(missing_ok=True)
         if not self.shared:
             self.claim.release()
+            if fault is not None:
+                self._remove_empty()
+
+    def _remove_empty(self) -> None:
+        for place in (self.target / CASES, self.target / CHUNKS, self.target):
+            with suppress(OSError):  # it holds what is older, or what this sweep has answered
+                place.rmdir()
 
     def whole(self) -> bool:
         """Whether the folder holds the tables of a sweep that came to its end."""

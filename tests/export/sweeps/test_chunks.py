@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import cli
+from limits import limited
 from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.campaigns.sweeps import sweep
@@ -198,3 +199,16 @@ def test_exact_the_tables_of_a_whole_sweep_are_written_again_only_where_they_are
     assert "sweep.csv" in resumed(over=named)[1] and "29.41995" in (out / "sweep.csv").read_text()
     assert "sweep.csv" in resumed(over=("--over", "drive.acceleration=1 g,2 g"))[1]
     assert len((out / "sweep.csv").read_text().splitlines()) == 3
+
+
+@pytest.mark.parametrize("older", [False, True])
+def test_a_sweep_without_room_for_its_first_case_leaves_no_folder_but_what_was_there(scene, tmp_path, older):
+    out = tmp_path / "out"
+    if older:
+        out.mkdir()
+        (out / "sweep.csv").write_text("older", encoding="utf-8")
+    with limited(200):  # the summary of a case wants some kB
+        found = cli("sweep", scene, "--over", "drive.acceleration=1 g,2 g", "-o", out)
+    assert found.code == 4 and "a case cannot be written" in found.err
+    assert [place.read_text() for place in tmp_path.rglob("*") if place.is_file()] == ["older"] * older
+    assert [place.name for place in tmp_path.rglob("*") if place.is_dir()] == ["out"] * older
