@@ -35,10 +35,9 @@ From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is im
 and a module that is taken as a whole, as in `from .contact import unilateral`, is loaded at its first use (`later`).
 """
 
-from typing import TYPE_CHECKING
-
 from .later import modules_of
 
+TYPE_CHECKING = False  # a type checker takes it for true; typing itself would be loaded before an interrupt is answered
 if TYPE_CHECKING:
     from .api import (
         Measure,

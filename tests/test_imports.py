@@ -44,6 +44,15 @@ def test_exact_a_patch_needs_no_motion():
     assert {"patchfem.contact.unilateral", "patchfem.mesh.tensor"} <= modules
 
 
+def test_exact_little_is_loaded_before_the_command_line_answers_an_interrupt():
+    """`patchfem.__main__` answers signals; before it runs the package itself is loaded, where a signal ends in a
+    traceback."""
+    code = "import sys; had = {*sys.modules}; sys.path[0] = sys.argv[1]; import patchfem; print(*{*sys.modules} - had)"
+    words = [sys.executable, "-S", "-c", code, str(RIG.parents[2])]
+    run = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert {one.partition(".")[0] for one in run.stdout.split()} <= {"patchfem", "importlib", "types", "warnings"}
+
+
 @pytest.mark.parametrize("table, module", [
     ('[contact.asperities]\nlaw = "exponential"\ndecay_length = "1 um"\n', "contact.skin"),
     ("[contact.strips]\ncount = 2\n", "contact.strips"),
