@@ -159,4 +159,6 @@ def _where(found: list, order: np.ndarray, at: Callable, others: list, lines: in
     if beside and all_lines:
         return (f"{start} {early}{end}{not_yet} with {name} {beside(first.at)}, {start} {late}{end} with "
                 f"{beside(last.at)},")
-    return f"{start} {bare(early, late)} to {late}{end}{not_yet}, {'depending on ' if all_lines else of}{name},"
+    befores = " and ".join(bare(at(one.before), late) for one in (first, last))
+    return (f"{start} {bare(early, late)} to {late}{end} (not yet at {befores}), "
+            f"{'depending on ' if all_lines else of}{name},")

@@ -95,7 +95,7 @@ def test_exact_another_key_says_where_it_comes_first_and_last():
                                                      "the contact fraction is below 1.")
     some = "for 2 of 3 values of normal.load, the contact fraction is below 1."
     assert found(np.where(load > 25, 2.0, 0.15)) == start + f"0.2 mrad on (not yet at 0.1), {some}"
-    assert found(np.where(load > 25, 2.0, load / 80)) == start + f"0.2 to 0.5 mrad on (not yet at 0.1), {some}"
+    assert found(np.where(load > 25, 2.0, load / 80)) == start + f"0.2 to 0.5 mrad on (not yet at 0.1 and 0.2), {some}"
 
 
 def test_exact_of_more_keys_only_the_combinations_are_counted():
@@ -107,11 +107,11 @@ def test_exact_of_more_keys_only_the_combinations_are_counted():
 
     start = "As contact.tilt.angle grows: from "
     assert found(0.15) == start + "0.2 mrad on (not yet at 0.1) the contact fraction is below 1."
-    assert found(load * friction / 27) == (start + "0.2 to 1 mrad on (not yet at 0.1), depending on the other 2 keys, "
-                                           "the contact fraction is below 1.")
+    assert found(load * friction / 27) == (start + "0.2 to 1 mrad on (not yet at 0.1 and 0.5), depending on the other "
+                                           "2 keys, the contact fraction is below 1.")
     assert found(np.where(load > 25, 2.0, load * friction / 27)) == (
-        start + "0.2 to 0.5 mrad on (not yet at 0.1), in 4 of 6 combinations of the other 2 keys, the contact fraction "
-        "is below 1.")
+        start + "0.2 to 0.5 mrad on (not yet at 0.1 and 0.2), in 4 of 6 combinations of the other 2 keys, the contact "
+        "fraction is below 1.")
     assert found(np.where((load > 15) | (friction > 0.5), 2.0, 0.15)) == (
         start + "0.2 mrad on (not yet at 0.1), in 1 of 6 combinations of the other 2 keys, the contact fraction is "
         "below 1.")
