@@ -145,6 +145,7 @@ EFFECTS = {
                                        "events over a period"),
     "wear": Effect("patchfem.wear.depth", "g += h, dh = coefficient p ds per point, or tau ds of form 'energy'",
                    ("pressure", "traction")),
+    "wear.friction": Effect("", "mu = mu_0 c(h), eps = eps_0 l(h), h = worn volume/area", ("traction",)),
     "measured": Effect("", "overlay of measured rows"),
     "measured.reading=fundamental": Effect("patchfem.response.spectrum", "|a_1| of a(t) = Re sum a_n exp(i n w t)"),
     "measured.reading=rms": Effect("patchfem.response.spectrum", "sqrt(1/T int a^2 dt)"),

@@ -82,8 +82,8 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             evolved = evolve.evolved_with(kept, key, model, patch, coarse[:2], progress)
             progress = None  # it has told of all cycles
             patch, coarse = evolved.patch, evolved.coarse
-            if model.grooves is not None and evolved.state is not None:
-                here = replace(what, model=evolve.lowered(model, patch, evolved.state.depth))
+            if evolved.state is not None:
+                here = replace(what, model=evolve.worn_model(model, patch, evolved.state.depth))
         module, function = KINDS[what.kind].split()
         solve = getattr(import_module(f"patchfem.runs.{module}"), function)
         try:
@@ -98,7 +98,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
             result = replace(result, measures=of_patch.measured(model, patch, coarse) | found)
         if model.wear is not None:
-            result = replace(measures.worn(result, evolved, estimate), plan=what)
+            result = measures.worn(replace(result, plan=what), evolved, estimate)
     if what.compile_seconds and estimate:
         compiled.ran(memory.compiled_kind(model, what.engine, what.unknowns))
     return _whole(result, notes, begin, coarse)

@@ -67,8 +67,8 @@ Damping is viscous; hysteretic damping of a file is taken as viscous. A complex 
 
 **Grooves.** Matched waves are climbed as a whole, not ridge by ridge.
 
-**Wear.** Archard's law on the pressure and the slip of each point; debris, heat and a change of friction with wear
-are left out. A rig repeats its last cycle between jumps.
+**Wear.** Archard's law on the pressure and the slip of each point; debris and heat are left out, and friction
+changes by the table `[wear.friction]` alone, for the patch as a whole. A rig repeats its last cycle between jumps.
 
 **Errors.** Stated errors are estimates from coarser runs, to hold in 19 of 20 scenes; they do not know what the model
 leaves out. A step in the gap makes the peak of the pressure infinite: its number belongs to the mesh.

@@ -33,6 +33,9 @@ ROWS = (
         group="wear"),
     Row("groove_amplitude", "m", 1e-12, "half the height of the flanks of the grooves after wear, peak to peak",
         group="wear"),
+    Row("static_coefficient", "1", 0.0, "coefficient of static friction after wear, of [wear.friction]", group="wear"),
+    Row("bond_length", "m", 0.0, "length over which a bond forms and breaks after wear, of [wear.friction]",
+        group="wear"),
     Row("roll_moment", "N m", 1e-10, "moment of the pressure about x, of strips that roll", group="patch"),
     Row("roll", "rad", 1e-12, "roll of the upper piece about x, positive opens at +y, of strips", group="patch"),
 )

@@ -74,26 +74,39 @@ class _Motion:
     def __init__(self, model, patch):
         self.model, self.pair = model, patch.pair
         self.frames = frames_for(model.accuracy.tolerance)
-        self.same = model.grooves is None and even(model, model.rig is not None and choose(model).per_point)
+        self.same = model.grooves is None and model.wear.friction is None and even(
+            model, model.rig is not None and choose(model).per_point)
         self.last: Rubbed | None = None
 
     def __call__(self, worn) -> np.ndarray:
         if self.last is None or not self.same:
             worn = np.zeros_like(worn) if self.same else worn
             patch = pressed(self.model.patch, self.pair, worn)
-            found = rubbed(lowered(self.model, patch, worn), patch, self.frames)
+            found = rubbed(worn_model(self.model, patch, worn), patch, self.frames)
             if found.outcome is not None:
                 raise _Unbounded(found.outcome.sentence)
             self.last = found
         return self.last.path
 
 
-def lowered(model, patch, depth):
-    """The model whose grooves are lowered by the mean of a worn depth (m,) [m] on its patch; itself without grooves."""
-    if model.grooves is None:
-        return model
+def mean_depth(patch, depth) -> float:
+    """Worn volume over the area of the patch [m], of a depth (m,) [m]."""
     area = patch.pieces.interface.weight
-    return replace(model, grooves=model.grooves.worn(float(depth @ area / area.sum()), model.wear.upper_share))
+    return float(depth @ area / area.sum())
+
+
+def worn_model(model, patch, depth):
+    """The model with grooves and friction as the mean of a worn depth (m,) [m] on its patch leaves them; itself where
+    it changes neither."""
+    wear, new = model.wear, {}
+    if model.grooves is not None:
+        new["grooves"] = model.grooves.worn(mean_depth(patch, depth), wear.upper_share)
+    if wear.friction is not None:
+        law = new["friction"] = wear.friction.after(model.friction, mean_depth(patch, depth))
+        if model.rig is not None:
+            new["rig"] = replace(model.rig, interfaces=tuple(replace(one, numbers=law)
+                                                             for one in model.rig.interfaces))
+    return replace(model, **new) if new else model
 
 
 def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep=None) -> Evolved:
@@ -154,7 +167,7 @@ def _jumped(model, asked: Wearing, state: Worn) -> Worn:
         return max(_taken(model, one.depth), default=(0.0,))[0] - 1
 
     how = asked, state, model.accuracy.tolerance, model.wear.jumps
-    found, low, high, last = after(*how), state.cycle, np.inf, 0.0
+    found, low, high, last = after(*how, until=next_row(model.wear, asked, state)), state.cycle, np.inf, 0.0
     below, above, end = ahead(state), ahead(found), found.cycle
     for _ in range(MOST_TRIES):
         over = ahead(found)
@@ -171,6 +184,22 @@ def _jumped(model, asked: Wearing, state: Worn) -> Worn:
     return found
 
 
+def next_row(wear, asked: Wearing, state: Worn) -> float:
+    """Cycle up to which an automatic jump may go, so that it follows the friction from row to row of its table.
+
+    That is where the wear per cycle as it is now reaches the next row, or the one after it where the next is nearer
+    than a tenth of the way between them; a jump past a row would not see what lies between.
+    """
+    change, weight = wear.friction, asked.area / asked.area.sum()
+    mean = float(state.depth @ weight)
+    ahead = [] if change is None or wear.jumps else [row for row in change.depth if row > mean]
+    if not ahead:
+        return np.inf
+    near = len(ahead) > 1 and ahead[0] - mean < 0.1 * (ahead[1] - ahead[0])
+    rate = float(rates(asked.coefficient, state.path, asked.area) * state.force @ weight)
+    return state.cycle + (ahead[near] - mean) / rate if rate > 0 else np.inf
+
+
 def _first(model, patch, asked: Wearing, motion: _Motion) -> tuple:
     """(state, moments) before any wear; an explicit jump that is too long is refused here."""
     state = start(asked)
@@ -182,9 +211,14 @@ def _first(model, patch, asked: Wearing, motion: _Motion) -> tuple:
 def _moment(patch, state: Worn, motion: _Motion) -> Moment:
     area = patch.pieces.interface.weight
     worn = {"worn_volume": float(state.depth @ area), "worn_depth_max": float(state.depth.max(initial=0.0))}
+    after_wear = worn_model(motion.model, patch, state.depth)
     if motion.model.grooves is not None:
-        left = lowered(motion.model, patch, state.depth).grooves
+        left = after_wear.grooves
         worn["groove_amplitude"] = 0.0 if left is None else left.amplitude
+    if motion.model.wear.friction is not None:
+        law = after_wear.friction
+        worn |= {"static_coefficient": law.static} | ({} if law.bond_length is None else
+                                                      {"bond_length": law.bond_length})
     return Moment(state.cycle, state.depth, state.used, patch.pressure.sigma_n, patch.pressure.gap, motion.last.miss,
                   values(patch) | motion.last.values | worn)
 

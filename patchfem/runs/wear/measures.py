@@ -1,6 +1,7 @@
 """What was worn, as measures with their errors, and its way there as arrays over the cycles."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from ..patch.limits import limit
 from ..patch.press import pressed
 from ..patch.values import values
 from ..results.patch_rows import TABLE
-from .evolve import THIN, worn_through
+from .evolve import THIN, mean_depth, worn_through
 from .slip import UNBOUNDED, of_point
 
 FRAMES = 24  # of the interface on the way
@@ -32,10 +33,12 @@ def worn(result, found, estimate: bool = True):
     shown = {"period": period, "states": len(fields["time"]) - len(result.fields["time"])}
     static = jumped(model, found, result.measures) if estimate else {}
     lost = of_patch(found, result.measures, estimate)
+    if model.wear.friction is not None:
+        lost |= friction_of(model, found, result.measures, lost["worn_volume"].error)
     gone, notes = _gone(model, found, lost["worn_depth_max"].error), result.extra.get("notes", [])
     outcome = Outcome.WORN_THROUGH if gone and result.outcome not in UNBOUNDED else result.outcome
     return replace(result, outcome=outcome, measures=result.measures | static | lost | gone, fields=fields,
-                   seconds=seconds, warnings=[*warnings, *_deep(model, found)],
+                   seconds=seconds, warnings=[*warnings, *_deep(model, found), *_beyond_table(model, found)],
                    extra=result.extra | {"wear": history(found), "wear_shown": shown,
                                          "notes": [*notes, *_ended(model, found, gone)]})
 
@@ -123,6 +126,48 @@ def of_patch(found, motion: dict, estimate: bool = True) -> dict:
     if left is not None:
         lost, row = out["worn_volume"].error, TABLE["groove_amplitude"]
         out[row.name] = Measure(left, row.unit, None if lost is None else lost / float(area.sum()), row.floor)
+    return out
+
+
+def friction_of(model, found, motion: dict, error: float | None) -> dict:
+    """Numbers of the law after wear, and measures of the motion with what the error of the mean depth adds to theirs.
+
+    error [m3]: of the worn volume, or None. A measure changes with the depth as it did in the last two jumps.
+    """
+    change, area = model.wear.friction, float(found.patch.pieces.interface.weight.sum())
+    deep = [mean_depth(found.patch, one.depth) for one in found.moments[-3:]]
+    off = None if error is None else error / area
+    ends = () if off is None else tuple(change.after(model.friction, max(deep[-1] + sign * off, 0.0))
+                                        for sign in (-1, 1))
+    law, out = change.after(model.friction, deep[-1]), {}
+    for name, key in (("static_coefficient", "static"), ("bond_length", "bond_length")):
+        value, row = getattr(law, key), TABLE[name]
+        if value is not None:
+            spread = max((abs(getattr(end, key) - value) for end in ends), default=None)
+            out[name] = Measure(value, row.unit, spread, row.floor)
+    steps = [(one, two, b - a) for (one, a), (two, b) in pairwise(zip(found.moments[-3:], deep)) if b > a]
+    for name, m in motion.items():
+        if off is not None and m.error is not None and name not in values(found.patch):
+            rates = [abs(two.values[name] - one.values[name]) / step for one, two, step in steps
+                     if name in one.values and name in two.values]
+            out[name] = replace(m, error=m.error + off * max(rates, default=0.0))
+    return out
+
+
+def _beyond_table(model, found) -> list:
+    """Warnings of wear beyond the last row of the table of friction, and of jumps past its rows."""
+    change = model.wear.friction
+    if change is None:
+        return []
+    deep, out = [mean_depth(found.patch, one.depth) for one in found.moments], []
+    if deep[-1] > change.depth[-1]:
+        out.append(f"the mean worn depth, {say(deep[-1], 3)}, is beyond the last of wear.friction.depth, "
+                   f"{say(change.depth[-1], 3)}, from which on friction is held as it is there; add a row at "
+                   f"{say(deep[-1], 3)}")
+    past = max(sum(one < row < two for row in change.depth) for one, two in pairwise(deep)) if len(deep) > 1 else 0
+    if model.wear.jumps and past > 1:
+        out.append(f"a jump passes {past} rows of wear.friction, so what lies between them is not seen; leave "
+                   "wear.jumps out")
     return out
 
 

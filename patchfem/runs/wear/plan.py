@@ -6,6 +6,7 @@ from ...core import PatchfemError
 from ...model.patch import bars
 from ...structure.drive_sizes import largest, omega_of
 from ...wear.jumps import Wearing, after, start
+from .evolve import next_row
 
 PRESSED = 20  # contact solves in a jump with its corrections
 SOLVE = 1.2e-8  # s per squared interface point of one of them, and of the measures after it
@@ -31,11 +32,18 @@ def jumps_about(model) -> int:
     x = np.linspace(-asked.length / 2, asked.length / 2, most + 1)
     area = np.gradient(x) * asked.width * asked.pairs
     press = _springs(asked, x, area)
-    path = np.full(x.size, _path_about(model))
-    row = Wearing(press, lambda worn: path, area, wear.coefficient, wear.cycles)
+    path, law = np.full(x.size, _path_about(model)), model.friction
+    path = path * (law.static if wear.energy else 1.0)
+
+    def changing(worn):
+        mean = float(worn @ area / area.sum())
+        return path * (wear.friction.after(law, mean).static / law.static) if law.static else path
+
+    slides = changing if wear.energy and wear.friction is not None else lambda worn: path
+    row = Wearing(press, slides, area, wear.coefficient, wear.cycles)
     state, count = start(row), 0
     while state.cycle < wear.cycles and count < MOST:
-        state, count = after(row, state, model.accuracy.tolerance), count + 1
+        state, count = after(row, state, model.accuracy.tolerance, until=next_row(wear, row, state)), count + 1
     least = min(count, 6)
     return round(least + (count - least) * 0.6 * model.accuracy.tolerance**-0.18)
 
@@ -76,7 +84,7 @@ def _springs(asked, x, area):
 
 def _anew(model) -> bool:
     """Whether wear changes the motion."""
-    return bool(model.soft) or model.side == "lower" or model.grooves is not None
+    return bool(model.soft) or model.side == "lower" or model.grooves is not None or model.wear.friction is not None
 
 
 def cost(model, points: int, motion: float) -> float:

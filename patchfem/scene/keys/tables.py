@@ -253,6 +253,17 @@ class Drive(Table):
         return [format_si(parse(one, "force"), "acceleration") for one in value]
 
 
+class WornFriction(Table):
+    """Friction that changes with the worn depth: a table, straight between its rows, held beyond the last."""
+
+    depth: key(Annotated[tuple[quantity("length", ge=0), ...], Field(min_length=2)], "mean worn depth of both pieces "
+               "together, worn volume over the area of the patch; rising from 0")
+    coefficient_factor: key(Annotated[tuple[Positive, ...], Field(min_length=2)] | None, "factor on static and kinetic "
+                            "at each depth; 1 at depth 0", "unless bond_length_factor") = None
+    bond_length_factor: key(Annotated[tuple[Positive, ...], Field(min_length=2)] | None, "factor on bond_length at "
+                            "each depth; 1 at depth 0", "unless coefficient_factor") = None
+
+
 class Wear(Table):
     """Material removed over many cycles."""
 
@@ -266,6 +277,7 @@ class Wear(Table):
               "per area") = "archard"
     scheme: key(Literal["implicit", "explicit"], "'explicit' takes the pressure from the start of a step and is "
                 "refused beyond its critical length") = "implicit"
+    friction: WornFriction | None = None
 
 
 class Measured(Table):

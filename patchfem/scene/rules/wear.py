@@ -1,6 +1,10 @@
 """What [wear] asks of the rest of a scene."""
 
-from ...effects import has, unbuilt
+from itertools import pairwise
+from math import pi
+
+from ...effects import has, takes, unbuilt, using
+from ..keys.tables import WornFriction
 from .draft import Draft
 from .grooves import grooves_of
 
@@ -18,6 +22,8 @@ def check_wear(draft: Draft, kind: str) -> None:
         draft.say("wear", unbuilt(f"beside {key}", words))
     if draft.given("wear.scheme") and tables.wear.scheme == "explicit" and not draft.given("wear.jumps"):
         draft.lacks("wear.jumps", "scheme 'explicit' needs the number of its jumps")
+    if tables.wear.friction is not None:
+        _friction(draft, tables.wear.friction)
     if tables.normal is not None:
         for key in ("jumps", "upper_share", "scheme"):
             if draft.given(f"wear.{key}"):
@@ -25,6 +31,45 @@ def check_wear(draft: Draft, kind: str) -> None:
     elif draft.given("wear.upper_share") and grooves_of(tables) is None and not _coated(tables.contact):
         draft.remark("wear.upper_share has no effect on the measures without grooves or a coating: worn_depth is that "
                      "of both pieces together")
+
+
+def _friction(draft: Draft, change: WornFriction) -> None:
+    """Say every mistake of the table of friction over the worn depth."""
+    at, law, depth = "wear.friction", draft.tables.friction, change.depth
+    if draft.tables.normal is not None:
+        draft.say(at, "a point has no area over which its wear is a depth: use [contact]")
+    if depth is not None and (depth[0] != 0 or any(two <= one for one, two in pairwise(depth))):
+        draft.say(f"{at}.depth", "depths that rise from 0 are wanted, such as [\"0 um\", \"1 um\", \"5 um\"]")
+    names = ("coefficient_factor", "bond_length_factor")
+    if not any(draft.given(f"{at}.{name}") for name in names):
+        draft.lacks(f"{at}.coefficient_factor", "the table wants what changes: this factor, bond_length_factor or both")
+    for name in names:
+        factors = getattr(change, name)
+        if factors is not None and depth is not None and len(factors) != len(depth):
+            draft.say(f"{at}.{name}", f"{len(factors)} factors at {len(depth)} depths; one at each is wanted")
+        elif factors is not None and factors[0] != 1:
+            draft.say(f"{at}.{name}", f"{factors[0]:g} at depth 0, where [friction] itself tells the new contact; 1 is "
+                                      "wanted first")
+    if law is None:
+        return
+    if change.bond_length_factor is not None and not takes(law.law, "bond_length"):
+        draft.say(f"{at}.bond_length_factor", f"law '{law.law}' has no bond length; leave it out, or use "
+                                              f"{using('bond_length')}")
+    if change.coefficient_factor is not None and law.static == 0:
+        draft.remark(f"{at}.coefficient_factor has no effect on static = 0")
+    _locks(draft, change, law.static)
+
+
+def _locks(draft: Draft, change: WornFriction, static: float | None) -> None:
+    """Say grooves on whose flanks friction holds against any force where it has risen."""
+    found = grooves_of(draft.tables)
+    if found is None or change.coefficient_factor is None or None in (static, found[1].amplitude, found[1].wavelength):
+        return
+    steepest, most = 2 * pi * found[1].amplitude / found[1].wavelength, static * max(change.coefficient_factor)
+    if most * steepest >= 1 > static * steepest:
+        draft.say("wear.friction.coefficient_factor", f"{max(change.coefficient_factor):g} makes static = {most:g}, "
+                  f"which locks on the flanks of the new grooves, of slope {steepest:.6g}; factors below "
+                  f"{1 / steepest / static:.6g} are wanted")
 
 
 def _coated(contact) -> bool:
