@@ -1,22 +1,22 @@
 """How do time, memory and bytes grow with cases, modes, interfaces, elements, cycles and steps?
 
-At most linearly, but for the elements of a patch, whose dense pieces grow as the power 1.6 between the last two sizes.
+At most linearly, but for the elements of a patch and the interfaces of a structure, whose dense matrices grow as the
+power 1.6 between the last two sizes.
 
 | what | sizes | CPU s | its exponent | MB | bytes on disk |
 |---|---|---|---|---|---|
 | Coulomb cases | 1e2, 1e3, 1e4 | 0.33, 0.81, 5.4 | 0.8 | 142, 147, 203 | 4.2e5, 1.5e6, 1.2e7 |
 | modes | 1, 10, 30 | 0.08, 0.08, 0.11 | 0.3 | 135, 139, 142 | 1.8e5, 3.7e5, 7.3e5 |
-| interfaces | 1, 5 | 0.08, 0.10 | 0.2 | 154, 159 | 2.2e5, 5.1e5 |
+| interfaces | 1, 5, 10, 20 | 0.07, 0.09, 0.17, 0.52 | 1.6 | 154, 159, 162, 171 | 2.2e5, 5.1e5, 9.7e5, 2.2e6 |
 | elements | 100, 400, 1600 | 0.18, 0.39, 3.4 | 1.6 | 91, 123, 552 | 5.3e5, 3.0e6, 1.1e7 |
 | cycles of Coulomb | 1e2, 1e4, 1e6 | 0.07, 0.08, 0.28 | 0.3 | 137, 138, 246 | 3.0e5, 3.6e5, 5.6e5 |
 | cycles of tanh | 1e2, 1e3, 1e4 | 0.13, 0.22, 0.22 | 0.0 | 143, 142, 149 | 3.0e5, 3.5e5, 8.0e5 |
 | steps a cycle | 100, 1600, 25 600 | 0.09, 0.16, 0.99 | 0.7 | 136, 142, 211 | 1.1e5, 5.4e5, 7.2e6 |
 
-Measured on one core that did much else. A chain of 20 Coulomb interfaces is refused by name: no state of stick and slip
-was found after an event. Each row is a process of its own, which runs a small one of its kind before, so that nothing
-is compiled or imported in the time that it tells: CPU seconds of a run with its error bars, its largest resident
-memory, the bytes of its results folder without a page. The exponent is that of the last two sizes, the slope of the
-logarithms.
+Measured on one core that did much else. Each row is a process of its own, which runs a small one of its kind before, so
+that nothing is compiled or imported in the time that it tells: CPU seconds of a run with its error bars, its largest
+resident memory, the bytes of its results folder without a page. The exponent is that of the last two sizes, the slope
+of the logarithms.
 
 Run: python studies/speed/growth.py            (the small sizes, a minute)
      python studies/speed/growth.py --full     (all; the longest are a million cases and 1e6 cycles of tanh)

@@ -208,8 +208,9 @@ class _Run:
         if code == self.kernels.PILED:
             raise NotConverged(f"dynamics: events pile up at t = {rows[max(used - 1, 0), 0]:.9g} s")
         if code == self.kernels.OPEN:
+            nearer = "bring kinetic nearer to static, or " if np.any(self.table.kinetic < self.table.static) else ""
             raise NotConverged("dynamics: no state of stick and slip that satisfies the law of friction was found "
-                               "after an event; bring friction.kinetic nearer to static, or use method = \"march\"")
+                               f"after an event; {nearer}use method = \"march\"")
         self.passed = code == self.kernels.TRAVEL
         return code, rows[:0 if self.passed else used]
 

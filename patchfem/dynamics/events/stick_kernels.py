@@ -19,6 +19,7 @@ LOOSER = 1e4  # times that for sets of badly conditioned slides
 LAST = 8  # order of the terms that are looked at
 FEW, MANY = 4, 8  # slides at rest up to which every choice is tried at once, at last
 EDGES = 10  # slides at their limit of which every share is tried
+EXCHANGES = 8  # exchanges for each slide, after which a choice by exchange is given up
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
@@ -215,8 +216,9 @@ def margin(face, side, noise, limit, room):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def judge(noise, motion, plant, table, memory, h, room):
-    """Whether the signs of slip in room.guess (i,), 0 of slides that hold, obey the law just after an event, those of
-    room.resting having no speed.
+    """(slide, side) of the first one for which the signs of slip in room.guess (i,), 0 of slides that hold, break the
+    law just after an event, those of room.resting having no speed: overloaded on a side, 1 or -1, or 0 where it does
+    not go the way of its slip; (-1, 0) where all obey.
 
     memory.head, force, springs and what holds are left as they are under the guess, orders as the search for the next
     event takes them.
@@ -240,16 +242,32 @@ def judge(noise, motion, plant, table, memory, h, room):
         if memory.head[f] != 0.0:
             order, lead = leaves(f, memory.head[f], noise, plant, room)
             if lead <= 0.0:
-                return False
+                return f, 0
             room.orders[f, 0] = order
             continue
         for side in (1, -1):
             order, lead = margin(f, side, noise, table.static[f], room)
             if lead < 0.0:
-                return False
+                return f, side
             if lead > 0.0:
                 room.orders[f, (1 - side) // 2] = order
-    return True
+    return -1, 0
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def exchanged(noise, motion, plant, table, memory, h, room):
+    """Whether a choice is found from room.guess (i,) on, by exchanging the first slide that breaks the law.
+
+    The rule of least index (Murty 1974). It ends with the one solution wherever the complementarity problem has a
+    P-matrix, also over power series in time, which are ordered by their first term; that is the case for slides that
+    are independent and break at their kinetic limit.
+    """
+    for _ in range(EXCHANGES * len(plant.reach)):
+        slide, side = judge(noise, motion, plant, table, memory, h, room)
+        if slide < 0:
+            return True
+        room.guess[slide] = float(side)
+    return False
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
@@ -268,7 +286,7 @@ def every(noise, motion, plant, table, memory, h, room):
                     digit = left % 3
                     room.guess[f] = -1.0 if digit == 2 else float(digit)
                     left, found = left // 3, found + (digit > 0)
-            if found == slips and judge(noise, motion, plant, table, memory, h, room):
+            if found == slips and judge(noise, motion, plant, table, memory, h, room)[0] < 0:
                 return True
     return False
 
@@ -389,7 +407,8 @@ def by_squares(kinetic, noise, motion, plant, table, memory, h, room):
     """Whether a choice holds that the smallest accelerations tell, for many slides at rest; kinetic: their forces are
     within the kinetic limits, where the law always has a solution, else within the static ones.
 
-    Slides that move under these forces slip; those at their limit that do not are tried in every combination.
+    Slides that move under these forces slip; from those at their limit that do not, slides are exchanged, and a few of
+    these are tried in every combination.
     """
     n, count = len(plant.square), len(plant.reach)
     within, fixed, pull = room.row[6], room.row[7], room.scales[0]
@@ -416,10 +435,15 @@ def by_squares(kinetic, noise, motion, plant, table, memory, h, room):
             break
     edges = 0
     for f in range(count):
-        room.row[5, f] = 0.0  # what is at its limit without moving
         at_limit = abs(room.row[3, f]) > within[f] * (1 - 1e-6)
-        if room.resting[f] == 1.0 and fixed[f] == 0.0 and at_limit and edges < EDGES:
-            room.row[5, f], edges = 1.0, edges + 1
+        waits = room.resting[f] == 1.0 and fixed[f] == 0.0 and at_limit
+        room.row[5, f] = 1.0 if waits and edges < EDGES else 0.0  # what is at its limit without moving
+        edges += int(room.row[5, f])
+        room.guess[f] = fixed[f] if room.resting[f] == 1.0 else room.signs[f]
+        if waits:
+            room.guess[f] = 1.0 if room.row[3, f] > 0 else -1.0
+    if exchanged(noise, motion, plant, table, memory, h, room):
+        return True
     for code in range(2**edges - 1, -1, -1):
         left = code
         for f in range(count):
@@ -428,7 +452,7 @@ def by_squares(kinetic, noise, motion, plant, table, memory, h, room):
                 if left % 2 == 1:
                     room.guess[f] = 1.0 if room.row[3, f] > 0 else -1.0
                 left //= 2
-        if judge(noise, motion, plant, table, memory, h, room):
+        if judge(noise, motion, plant, table, memory, h, room)[0] < 0:
             return True
     return False
 
@@ -453,7 +477,7 @@ def settle(motion, plant, table, memory, h, room):
     for noise in (NOISE, LOOSER * NOISE):
         for f in range(faces):
             room.guess[f] = room.signs[f]
-        if judge(noise, motion, plant, table, memory, h, room):
+        if judge(noise, motion, plant, table, memory, h, room)[0] < 0:
             return True
         if len(plant.reach) > FEW and count > FEW:
             for kinetic in (False, True):

@@ -177,9 +177,10 @@ def test_exact_dependent_stick_holds_up_to_the_sum_of_limits():
     assert done.ledger["friction"] == pytest.approx(one.ledger["friction"], rel=1e-12)
 
 
-def test_exact_seven_interfaces_stop_together():
-    """Seven equal blocks: more than are tried one by one."""
-    modes = basis_of(np.ones(7), 0.02, np.eye(7), np.ones(7), np.eye(7)[0])
+@pytest.mark.parametrize("count", [7, 16])
+def test_exact_many_interfaces_stop_and_slip_together(count):
+    """Equal blocks: seven, more than are tried one by one, and sixteen, more than whose combinations are tried."""
+    modes = basis_of(np.ones(count), 0.02, np.eye(count), np.ones(count), np.eye(count)[0])
     drive = BaseSine(1.0, 1.1)
     many, one = simulate(modes, drive, 0.5, 0.5, 6, 6), simulate(basis_of(1.0, 0.02), drive, 0.5, 0.5, 6, 6)
     np.testing.assert_allclose(many.amplitudes, one.amplitudes, atol=1e-13)
