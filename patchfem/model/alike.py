@@ -1,4 +1,4 @@
-"""Models that are one lumped model under a sine with other plain numbers: one by one, or as columns."""
+"""Models that are one rig under a sine or one pressed patch with other plain numbers: one by one, or as columns."""
 
 from __future__ import annotations
 
@@ -73,6 +73,8 @@ def renumbered(model: Model, like: Numbered, values: Sequence, sets: tuple = ())
     tables = {table for table, _, _ in numbers}
     if "normal" in tables:
         new["point"] = replace(model.point, load=numbers["normal", None, "load"])
+    if "contact" in tables:
+        new["patch"] = _pressed(model.patch, numbers)
     if "friction" in tables:
         new["friction"] = like.table("friction", numbers)
         rig["interfaces"] = tuple(replace(one, numbers=new["friction"]) for one in model.rig.interfaces)
@@ -85,6 +87,16 @@ def renumbered(model: Model, like: Numbered, values: Sequence, sets: tuple = ())
     found = replace(model, source=None, **new, **({"rig": replace(model.rig, **rig)} if rig else {}))
     write = partial(_resolved, like, tuple(values), sets, found)
     return replace(found, source=replace(model.source, write=write, sets=like.sets(sets)))
+
+
+def _pressed(patch, numbers: dict):
+    """A `PatchModel` under the numbers of its load and its tilt."""
+    load, angle = (numbers.get(key) for key in (("contact", None, "load"), ("contact", "tilt", "angle")))
+    if angle is not None:
+        shapes = tuple((name, part.model_copy(update={"angle": angle}) if name == "tilt" else part)
+                       for name, part in patch.gap.shapes)
+        patch = replace(patch, gap=replace(patch.gap, shapes=shapes))
+    return patch if load is None else replace(patch, load=load)
 
 
 def _driven(drive, asked, numbers: dict) -> dict:

@@ -16,8 +16,10 @@ from .rules.structure import HEAVY
 from .scene import Scene, files_of, scene_of, with_files
 
 MOST = 4096  # tables with other values that are remembered
-# keys of a lumped rig under a sine -> end of the values > 0 of which no rule or remark tells one from another
-PLAIN = {"normal.load": inf, "friction.static": inf, "friction.bond_length": inf, "drive.acceleration": inf,
+# keys of a rig under a sine or of a pressed patch -> end of the values > 0 of which no rule or remark tells one from
+# another
+PLAIN = {"normal.load": inf, "contact.load": inf, "contact.tilt.angle": inf, "friction.static": inf,
+         "friction.bond_length": inf, "drive.acceleration": inf,
          "drive.frequency": inf, "structure.moving_mass": inf, "structure.mode.frequency": inf,
          "structure.mode.damping": HEAVY}
 
@@ -75,7 +77,8 @@ class Base:
     def numbered(self, like: Scene, keys: Sequence[str]) -> Numbered | None:
         """How scenes with other numbers at these keys are made from one that `changed` gave for the same keys; None
         where a key is not plain, or where a rule of such a scene looks at what the key holds."""
-        if not _lumped(like) or ("friction.static" in keys and "kinetic" in self.raw.get("friction", {})):
+        told = "friction.static" in keys and "kinetic" in self.raw.get("friction", {})
+        if told or not (_lumped(like) or _pressed(like)):
             return None
         places = [_place_of(like, key) for key in keys]
         return None if None in places else Numbered(like, tuple(places))
@@ -83,8 +86,8 @@ class Base:
 
 @dataclass(frozen=True, slots=True)
 class Numbered:
-    """Scenes that are one scene with other numbers, which no rule tells from it; places: (table, number of a mode or
-    None, attribute, end of its values) of each key."""
+    """Scenes that are one scene with other numbers, which no rule tells from it; places: (table, number of a mode, name
+    of a shape or None, attribute, end of its values) of each key."""
 
     like: Scene
     places: tuple
@@ -94,7 +97,7 @@ class Numbered:
         return bool(np.all((values > 0) & (values < [place[-1] for place in self.places])))
 
     def numbers(self, values: Sequence) -> dict[tuple, Any]:
-        """(table, number of a mode or None, attribute) -> value, of a value per key."""
+        """(table, number of a mode, name of a shape or None, attribute) -> value, of a value per key."""
         out = {place[:3]: value for place, value in zip(self.places, values)}
         if ("friction", None, "static") in out and self.like.friction.kinetic is not None:
             out["friction", None, "kinetic"] = out["friction", None, "static"]  # its default
@@ -102,16 +105,15 @@ class Numbered:
 
     def table(self, name: str, numbers: dict[tuple, Any]) -> Any:
         """A table of the scene with its numbers of `numbers`."""
-        new: dict[str, Any] = {key: value for (table, mode, key), value in numbers.items()
-                               if table == name and mode is None}
-        modes: dict[int, dict] = {}
-        for (_, mode, key), value in numbers.items() if name == "structure" else ():
-            if mode is not None:
-                modes.setdefault(mode, {})[key] = value
-        if modes:
-            new["mode"] = tuple(_with(one, modes[k]) if k in modes else one
-                                for k, one in enumerate(self.like.structure.mode))
-        return _with(getattr(self.like, name), new)
+        mine, new, parts = getattr(self.like, name), {}, {}
+        for (table, part, key), value in numbers.items():
+            if table == name:
+                (new if part is None else parts.setdefault(part, {}))[key] = value
+        if name == "structure" and parts:
+            new["mode"] = tuple(_with(one, parts[k]) if k in parts else one for k, one in enumerate(mine.mode))
+        else:
+            new |= {part: _with(getattr(mine, part), held) for part, held in parts.items()}
+        return _with(mine, new)
 
     def sets(self, sets: Sequence[str]) -> tuple:
         """All `key=value` strings of a scene in which the keys are set as `sets`."""
@@ -137,19 +139,39 @@ def _lumped(scene: Scene) -> bool:
         (drive.kind, drive.waveform, drive.duration) == ("base", "sine", None) and not files_of(scene)
 
 
+def _pressed(scene: Scene) -> bool:
+    """Whether a scene is a patch under a load, with or without the modes of a rig under a sine of the base, in which
+    plain numbers are what PLAIN says: no load line, no strips, no grooves and no file."""
+    contact, rig = scene.contact, scene.kind == "rig"
+    if not contact or contact.load is None or scene.kind not in ("patch", "rig") or scene.normal or scene.wear:
+        return False
+    if contact.load_line or contact.strips or contact.grooves or contact.holder or files_of(scene):
+        return False
+    law, drive = scene.friction, scene.drive
+    return not rig or bool(law and law.temperature is None and law.spread is None and scene.structure.mode
+                           and not scene.structure.interface and not scene.structure.bonded
+                           and drive.duration is None
+                           and (drive.kind, drive.waveform) == ("base", "sine"))
+
+
 def _place_of(scene: Scene, key: str) -> tuple | None:
-    """(table, number of a mode or None, attribute, end of its values) of a key of PLAIN; None where it is none, or what
-    it holds in the scene does not lie inside."""
-    pieces, mode = pieces_of(key), None
-    if len(pieces) == 4:
+    """(table, number of a mode, name of a shape or None, attribute, end of its values) of a key of PLAIN; None where it
+    is none, or what it holds in the scene does not lie inside."""
+    pieces, part = pieces_of(key), None
+    if pieces[:2] == ["structure", "mode"] and len(pieces) == 4:
         names = [one.name for one in scene.structure.mode]
         number = pieces.pop(2)
-        mode = names.index(number) if number in names else int(number) if number.isdecimal() else len(names)
-    end = PLAIN.get(".".join(pieces))
-    if end is None or (mode is None) != (len(pieces) == 2) or (mode is not None and mode >= len(scene.structure.mode)):
+        part = names.index(number) if number in names else int(number) if number.isdecimal() else len(names)
+        if part >= len(names):
+            return None
+    elif len(pieces) == 3:
+        part = pieces[1]
+    end, table = PLAIN.get(".".join(pieces)), getattr(scene, pieces[0], None)
+    if end is None or (pieces[0] == "structure" and (part is None) != (len(pieces) == 2)):
         return None
-    held = getattr(getattr(scene, pieces[0]) if mode is None else scene.structure.mode[mode], pieces[-1])
-    return (pieces[0], mode, pieces[-1], end) if held is not None and 0 < held < end else None
+    holder = table.mode[part] if isinstance(part, int) else table if part is None else getattr(table, part, None)
+    held = getattr(holder, pieces[-1], None)
+    return (pieces[0], part, pieces[-1], end) if held is not None and 0 < held < end else None
 
 
 def _by_table(sets: tuple[str, ...]) -> dict[str, tuple[str, ...]]:

@@ -86,14 +86,15 @@ def handed(work: Work, numbers: Sequence[int], found: Answers, told: list) -> tu
 
 
 def _alike(work: Work, numbers: Sequence[int]) -> Alike | None:
-    """The models of cases that differ in plain numbers alone; None of others."""
+    """The models of cases that differ in plain numbers alone; None of others, and of patches, which share meshes."""
     cases, values = np.asarray(numbers), work.cases.columns(numbers)
     if work.keep is not None or values is None:
         return None
     try:
-        return work.asked.alike([axis.key for axis in work.cases.axes], values, work.cases.sets, cases)
+        found = work.asked.alike([axis.key for axis in work.cases.axes], values, work.cases.sets, cases)
     except PatchfemError:  # the first of them has no model
         return None
+    return found if found is not None and found.first.patch is None else None
 
 
 def _model(work: Work, number: int):
@@ -117,14 +118,13 @@ def with_meshes(work: Work) -> Work:
 
 
 def _least(work: Work) -> int:
-    """Fewest cases of a chunk: as many as march side by side where lanes take the first, since a few of them say
-    nothing of how long many take; else one."""
+    """Fewest cases of a chunk: as many as the batch of the first is worth, since a few of them say nothing of how long
+    many take."""
     try:
-        batch = many.batch_of(work.asked.model(work.cases.sets(0)), len(work.cases))
+        batch = many.batch_of(_model(work, 0), len(work.cases))
     except Exception:  # what is wrong with the case is told by its own run
         return 1
-    together = work.keep is None and batch is not None and batch.least and not batch.share
-    return batch.least if together else 1
+    return batch.together if work.keep is None and batch is not None else 1
 
 
 class Chunks:
@@ -173,12 +173,13 @@ def solved(work: Work, numbers: Sequence[int], executor, say: Callable | None = 
     """
     if not len(numbers):
         return
-    chunks = Chunks(work.cases.neighbours(numbers), executor.workers,
-                    _least(work) if executor.workers == 1 else 1)  # others import what runs a case in their workers
     try:
         if hasattr(executor, "begin"):
             executor.begin(work, len(numbers), say)
-        yield from _handed(chunks, executor.run(with_meshes(work), chunks.take, say))
+        work = with_meshes(work)
+        chunks = Chunks(work.cases.neighbours(numbers), executor.workers,
+                        _least(work) if executor.workers == 1 else 1)  # others import what runs a case in their workers
+        yield from _handed(chunks, executor.run(work, chunks.take, say))
     finally:
         if hasattr(executor, "end"):
             executor.end()

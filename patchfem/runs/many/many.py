@@ -24,7 +24,8 @@ class Batch(NamedTuple):
     say) -> Answers of a group, equal to single runs to 1e-12, bars too, whatever else is in the group; share: seconds
     of a case over those of its own run, 0 where they are next to nothing; compile: CPU seconds of the first group;
     least: fewest cases of a study that it serves: such a batch gives answers with bars of their own, each the same
-    whatever else is in the group; parts(Alike) -> {group: places} of those that it takes, where it reads columns.
+    whatever else is in the group; parts(Alike) -> {group: places} of those that it takes, where it reads columns;
+    together: fewest cases of a chunk of a sweep, where what they share is worth so many.
     """
 
     name: str
@@ -35,10 +36,11 @@ class Batch(NamedTuple):
     compile: float = 0.0
     least: int = 0
     parts: Callable | None = None
+    together: int = 1
 
 
 def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least: int = 0,
-           columns: bool = False) -> Batch:
+           columns: bool = False, together: int = 1) -> Batch:
     """The batch of the module of this name, which takes models of this kind and is imported for the first of them."""
     @cache
     def module():
@@ -49,14 +51,16 @@ def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least
 
     asked = of("refuses")
     return Batch(name, lambda model: asked(model) if model.kind == kind else f"it is a {model.kind}", of("group"),
-                 of("solve"), share, compile, least, of("parts") if columns else None)
+                 of("solve"), share, compile, least, of("parts") if columns else None,
+                 together)
 
 
 # the first that does not refuse a model takes it
-BATCHES: tuple[Batch, ...] = (_batch("patches", "patch"),
-                              _batch("lumped.lanes", "rig", compile=6.0, least=64, columns=True),
+BATCHES: tuple[Batch, ...] = (_batch("patches", "patch", together=512),
+                              _batch("lumped.lanes", "rig", compile=6.0, least=64, columns=True, together=64),
                               _batch("lumped.lumped", "rig", compile=12.0),
-                              _batch("lumped.sheared", "rig", 0.4, 12.0), _batch("gathered", "rig", 0.2, least=32))
+                              _batch("lumped.sheared", "rig", 0.4, 12.0, together=16),
+                              _batch("gathered", "rig", 0.2, least=32))
 
 
 def batch_compile_seconds(batch: Batch, model: Model) -> float:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scene_texts import COULOMB, DRIVE, MODE, POINT, SECOND, friction_of
+from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, POINT, SECOND, SHEAR, friction_of
 
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.core import PatchfemError
@@ -16,14 +16,21 @@ from patchfem.scene.changed import PLAIN
 
 PLASTIC = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"\n'
 UNITS = {"load": "N", "bond_length": "m", "acceleration": "m/s^2", "frequency": "Hz", "moving_mass": "kg"}
-KEYS = [key.replace("mode.", f"mode.{mode}.") for key in PLAIN for mode in ("axial", "1")]
+UNITS |= {"angle": "rad"}
+KEYS = [key.replace("mode.", f"mode.{mode}.") for key in PLAIN if not key.startswith("contact.")
+        for mode in ("axial", "1")]
 RIG = MODE + SECOND + DRIVE
+TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
 SCENES = {"coulomb": POINT + COULOMB + RIG, "elastic-plastic": POINT + PLASTIC + RIG,
           "weakening": POINT + COULOMB + "kinetic = 0.2\n" + RIG,
           "two loads": POINT + 'amplitude = "3 N"\nfrequency = "70 Hz"\n' + COULOMB + RIG,
           "duration": POINT + COULOMB + RIG.replace("cycles = 30", 'duration = "0.3 s"'),
           "bonded": POINT + COULOMB + RIG + '[structure.bonded]\nstiffness = "1e5 N/m"\n',
           "start": POINT + COULOMB + RIG + '[structure.start]\nvelocity = ["0.1 m/s", "0 m/s"]\n'}
+PATCHES = {"static": TILTED, "lower": TILTED + 'on = "lower"\n[contact.asperities]\nlaw = "linear"\n'
+           'normal_stiffness = "1e14 Pa/m"\n', "sheared": TILTED + SHEAR + PLASTIC + RIG,
+           "bonds": TILTED + SHEAR + NONLOCAL + RIG, "rigid": TILTED + COULOMB + RIG}
+HELD = TILTED + '[contact.holder]\nrotational_stiffness = "100 N m/rad"\n'
 
 
 def same(a, b) -> bool:
@@ -71,6 +78,24 @@ def test_exact_models_made_from_the_first_are_those_built_from_text(name):
         assert same(found, built), sets
         alike += asked._like(sets, values) is not None if not isinstance(built, str) else 0
     assert alike == 0 if name == "duration" else alike > 5
+
+
+@pytest.mark.parametrize("name", PATCHES)
+def test_exact_patches_made_from_the_first_are_those_built_from_text(name):
+    asked, r = Asked(Path("a.toml"), PATCHES[name]), np.random.default_rng(len(name))
+    keys = ["contact.load", "contact.tilt.angle"]
+    keys += ["friction.static", "drive.acceleration"] if "friction" in PATCHES[name] else []
+    for _ in range(20):
+        some = list(r.choice(keys, r.integers(1, len(keys) + 1), replace=False))
+        values = 10.0 ** r.uniform(-6, 0, (1, len(some)))
+        sets, values = written(some, values, 0), tuple(values[0].tolist())
+        made = "friction.static" not in some or "kinetic" not in PATCHES[name]
+        assert (asked._like(sets, values) is not None) == made
+        assert same(told(asked, sets, values), told(asked, sets, ())), sets
+    for sets, values in ((("contact.load=-1 N",), (-1.0,)), (("contact.tilt.angle=-1 mrad",), (-1e-3,))):
+        assert asked._like(sets, values) is None and same(told(asked, sets, values), told(asked, sets, ()))
+    for text in (HELD, PATCHES["rigid"] + '[structure.bonded]\nstiffness = "1e5 N/m"\n'):
+        assert Asked(Path("b.toml"), text)._like(("contact.load=3 N",), (3.0,)) is None
 
 
 ONE = POINT + "{}" + MODE + DRIVE
