@@ -4,7 +4,7 @@ Node i with area A_i carries f_i = A_i P(s_i); the mean planes are s_i = g_i + t
 P >= 0 falls with s, so f minimises the strictly convex energy f.Cf/2 + g.f + sum A_i Psi(f_i/A_i) with Psi' = -P^-1
 under the given load (and moment, and the spring of the holder): one answer for every law, gap and control.
 
-The linear skin adds 1/(k A_i) to the diagonal of C and is then exactly the unilateral problem of `unilateral`.
+The linear skin adds 1/(k A_i) to the diagonal of C; `unilateral` solves the contact of these softer pieces.
 The smooth laws are solved by Newton on (s, delta, theta) in the symmetric form I + D^1/2 C D^1/2, D = -A P'. A node
 that gains force moves along log P, one that loses force along s, and one with a negligible force may rise at once to
 1 % of the mean pressure: of P's tangent each step keeps the side that cannot overshoot. Where that wanders, the law is
@@ -20,9 +20,10 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ..core import NotConverged, Outcome, PatchfemError, frozen_array
 from ..elasticity.lapack import one_thread
-from .skin_laws import ExponentialSkin, LinearSkin
+from .skin_laws import ExponentialSkin
 from .unilateral import LIMIT, solve_forces
 
+STEPS = 60  # of Newton's method, before softer laws are tried
 FLOOR = -300.0  # log pressure below which an approach does not reach the skin
 
 
@@ -97,10 +98,10 @@ def _step(c, control, lack, slope, missing) -> tuple:
     return gain, motion, missing - control.rigid @ motion + c[:, live] @ gain[live]
 
 
-def _newton(skin, c, weight, gap, control, s, q, limit: int) -> tuple | None:
-    """Forces, separations, motions and steps from the start (s, q); None where `limit` steps do not settle."""
+def _newton(skin, c, weight, gap, control, s, q) -> tuple | None:
+    """Forces, separations, motions and steps from the start (s, q); None where STEPS of them do not settle."""
     rigid, target = control.rigid, control.target
-    for count in range(1, limit + 1):
+    for count in range(1, STEPS + 1):
         log, fall = skin.log_pressure(s)
         log = log + np.log(weight)
         force = np.exp(np.minimum(log, 600.0))
@@ -142,7 +143,7 @@ def _start(skin, c, x, weight, gap, target, spring) -> tuple:
     return np.where(stress > mean, skin.separation(np.maximum(stress, mean)), low), motion
 
 
-def _softening(skin, c, x, weight, gap, target, limit: int, spring: float = 0.0) -> tuple | None:
+def _softening(skin, c, x, weight, gap, target, spring: float = 0.0) -> tuple | None:
     """The answer by way of softer laws: from a law as long as the whole gap back to the law itself; None where one
     fails."""
     control = _control(x, target, spring)
@@ -154,7 +155,7 @@ def _softening(skin, c, x, weight, gap, target, limit: int, spring: float = 0.0)
     total = 0
     for factor in factors:
         law = skin.softened(factor)
-        answer = _newton(law, c, weight, gap, control, s, q, limit)
+        answer = _newton(law, c, weight, gap, control, s, q)
         if answer is None:
             return None
         force, s, q, count = answer
@@ -179,8 +180,8 @@ def _reach(skin, c, weight, overlap) -> np.ndarray | None:
     return s
 
 
-def _smooth(skin, c, x, weight, gap, target, delta, start, limit, spring=0.0) -> tuple:
-    """Forces, separations, motions (delta or delta, -theta) and Newton steps of a smooth law."""
+def _settled(skin, c, x, weight, gap, target, delta, spring) -> tuple:
+    """Forces, separations, motions (delta or delta, -theta) and Newton steps."""
     control = _control(x, target, spring)
     scale = control.scale
     if not target.size:
@@ -188,13 +189,11 @@ def _smooth(skin, c, x, weight, gap, target, delta, start, limit, spring=0.0) ->
         s, q = _reach(skin, c, weight, -gap), np.zeros(0)
         if s is None:
             return np.zeros(x.size), gap, np.array([delta]), 0
-    elif start is not None:
-        s, q = start.separation, np.array([start.delta, -start.theta])[:target.size] * scale
     else:
         s, q = _start(skin, c, x, weight, gap, target, spring)
-    answer = _newton(skin, c, weight, gap, control, s, q, limit)
+    answer = _newton(skin, c, weight, gap, control, s, q)
     if answer is None and target.size:
-        answer = _softening(skin, c, x, weight, gap, target, limit, spring)
+        answer = _softening(skin, c, x, weight, gap, target, spring)
     if answer is None:
         raise NotConverged("contact.asperities: the skin did not settle; raise the decay length or the height "
                            "deviation, or take law = \"linear\"")
@@ -202,58 +201,16 @@ def _smooth(skin, c, x, weight, gap, target, delta, start, limit, spring=0.0) ->
     return force, s, q / scale if target.size else np.array([delta]), count
 
 
-def _crush(skin, c, weight, gap, control, s, q) -> tuple:
-    """Semismooth Newton's method on the crush of a linear skin: forces, separations, motions and steps.
-
-    60 steps mean that it did not settle.
-    """
-    for count in range(1, 61):
-        held = np.where(s < 0, skin.k * weight, 0.0)
-        force = -held * s
-        gain, motion, change = _step(c, control, control.lack(force, q), held,
-                                     gap - control.rigid @ q + c @ force - s)
-        same = np.array_equal(s + change < 0, s < 0)
-        force, s, q = force + gain, s + change, q + motion
-        if same and np.abs(gain).max() <= 1e-12 * np.abs(force).max():
-            return np.maximum(force, 0.0), s, q, count
-    return np.maximum(force, 0.0), s, q, 60
-
-
-def _linear(skin, c, x, weight, gap, target, delta, start, spring) -> tuple:
-    """Forces, separations, motions (delta or delta, -theta) and steps of the linear skin.
-
-    The active set of `unilateral` finds the nodes that carry. Steps on the crush then take out the round-off of gaps
-    that are far larger than the crush.
-    """
-    control = _control(x, target, spring)
-    scale = control.scale
-    gap = gap if target.size else gap - delta
-    if not target.size and gap.min() >= 0:
-        return np.zeros(x.size), gap, np.array([delta]), 0
-    active = None if start is None or not (start.force > 0).any() else start.force > 0
-    try:
-        force, motion, count = solve_forces(c + np.diag(1 / (skin.k * weight)), x, gap, target, active, spring=spring)
-    except (np.linalg.LinAlgError, NotConverged):  # a thin smooth skin finds the nodes that carry
-        mean = (target[0] if target.size else skin.k * weight @ np.maximum(-gap, 0.0)) / weight.sum()
-        thin = ExponentialSkin(mean / skin.k, mean)
-        force, _, motion, count = _smooth(thin, c, x, weight, gap, target, 0.0, None, 60, spring)
-        force, motion = np.where(force > 0.05 * mean * weight, force, 0.0), motion[:target.size]
-    s = np.where(force > 0, -force / (skin.k * weight), np.abs(gap - control.rigid @ (motion * scale) + c @ force))
-    force, s, q, _ = _crush(skin, c, weight, gap, control, s, motion * scale)
-    return force, s, q / scale if target.size else np.array([delta]), count
-
-
 def residuals(skin, c, x, weight, gap, force, delta: float, free: float, load=None, moment=None,
               spring: float = 0.0) -> MappingProxyType:
     """Relative residuals of a solved skin, recomputed from its definition alone; `free` rotation beyond the gap's.
 
-    Keys: law (largest mismatch of a force, against the largest force and what the law gains over the depth of the
-    gap, or 1e-5 of it for the smooth laws; pressures below exp(FLOOR) count as none), tension, and force_balance,
-    moment_balance where prescribed.
+    Keys: law (largest mismatch of a force, against the largest force and 1e-5 of what the law gains over the depth of
+    the gap; pressures below exp(FLOOR) count as none), tension, and force_balance, moment_balance where prescribed.
     """
     opening = gap + free * x - delta + c @ force
     depth = np.ptp(gap) + np.abs(c @ force).max() + abs(free) * np.ptp(x)
-    gain = depth * (weight * (skin.k if isinstance(skin, LinearSkin) else 1e-5 * skin.stiffness(opening))).max()
+    gain = 1e-5 * depth * (weight * skin.stiffness(opening)).max()
     most = max(force.max(), np.exp(FLOOR))
     miss = np.abs(force - weight * skin.pressure(opening)) - weight * np.exp(FLOOR)
     out = {"law": max(0.0, miss.max()) / (most + gain),
@@ -266,14 +223,14 @@ def residuals(skin, c, x, weight, gap, force, delta: float, free: float, load=No
 
 def solve(skin, c: np.ndarray, x: np.ndarray, weight: np.ndarray, gap: np.ndarray, load: float | None = None,
           moment: float | None = None, approach: float | None = None, rotation: float = 0.0,
-          start: SkinState | None = None, limit: int = 60, spring: float = 0.0) -> SkinState:
-    """Press two bodies through a rough skin.
+          spring: float = 0.0) -> SkinState:
+    """Press two bodies through a rough skin of a smooth law (`skin_laws.Smooth`).
 
     c: closing compliance of the bodies (m, m) [m/N], symmetric, positive semidefinite, 0 for rigid bodies; x: (m,) [m];
     weight: nodal areas (m,) [m2]; gap: (m,) [m]. Controls: `load` [N] with `rotation` [rad] held (already in the gap,
     so only reported); `load` and `moment` [N m] with the rotation free, or against the `spring` [N m/rad] of the holder
-    from `rotation` on; `approach` [m] with the rotation held. start: a neighbouring answer under the same control. Zero
-    load, or an approach that leaves the skin open, gives the outcome no_contact.
+    from `rotation` on; `approach` [m] with the rotation held. Zero load, or an approach that leaves the skin open,
+    gives the outcome no_contact.
 
     PatchfemError for other controls, a load below zero, a moment that no pressure can carry, a gap that is not finite
     or an exponential law without `reference` under an approach; NotConverged above a residual of 1e-9.
@@ -282,14 +239,10 @@ def solve(skin, c: np.ndarray, x: np.ndarray, weight: np.ndarray, gap: np.ndarra
     target = np.array([value for value in (load, moment) if value is not None])
     if isinstance(skin, ExponentialSkin) and skin.reference is None and load:
         skin = replace(skin, reference=load / weight.sum())
-    if start is not None:
-        start = replace(start, theta=start.theta - rotation)
     force, s, motion, count, checks = np.zeros(x.size), gap - gap.min(), np.array([gap.min()]), 0, {}
     with one_thread():
-        if load != 0 and isinstance(skin, LinearSkin):
-            force, s, motion, count = _linear(skin, c, x, weight, gap, target, approach, start, spring)
-        elif load != 0:
-            force, s, motion, count = _smooth(skin, c, x, weight, gap, target, approach, start, limit, spring)
+        if load != 0:
+            force, s, motion, count = _settled(skin, c, x, weight, gap, target, approach, spring)
     free, touch = -float(motion[1]) if motion.size > 1 else 0.0, bool((force > 0).any())
     if load != 0:
         checks = residuals(skin, c, x, weight, gap, force, float(motion[0]), free, load, moment, spring)
@@ -315,17 +268,3 @@ def _refuse(skin, x, gap, load, moment, approach, spring: float = 0.0) -> None:
     if load is None and isinstance(skin, ExponentialSkin) and skin.reference is None:
         raise PatchfemError("contact.approach with contact.asperities.law = \"exponential\": the law has no first "
                             "touch to measure from; give contact.load, or another law")
-
-
-def tangent(c: np.ndarray, weight: np.ndarray, stiffness: np.ndarray) -> float:
-    """Stiffness [N/m] of the whole patch, skin and bodies in series, for one common rigid motion.
-
-    stiffness (m,) [Pa/m] of the skin. With the normal compliance and k_n: dN/d(delta) at fixed rotation; with the
-    tangential compliance and tangential_ratio * k_n: dT/d(slide) in stick. Nodes of no stiffness carry nothing.
-    """
-    d = weight * stiffness
-    live = _live(d)
-    root = np.sqrt(d[live])
-    with one_thread():
-        system = np.eye(live.size) + root[:, None] * c[np.ix_(live, live)] * root
-        return float(root @ cho_solve(cho_factor(system, lower=True), root))

@@ -110,7 +110,7 @@ def residuals(skin, c, x, weight, gap, force, delta: float, free: float, load=No
 def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.ndarray, gap: np.ndarray,
                  roll: float = 0.0, load: float | None = None, moment: float | None = None,
                  approach: float | None = None, rotation: float = 0.0, spring: float = 0.0, skin=None,
-                 start: StripsState | None = None, lateral: float | None = None) -> StripsState:
+                 lateral: float | None = None) -> StripsState:
     """Press strips by one holder.
 
     c: closing compliance (m, m) [m/N] of each strip (`one_strip`); x: (m,) [m]; weight: nodal areas (m,) [m2] of one
@@ -118,8 +118,7 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
     `load` [N] of all strips with `rotation` [rad] held (already in the gap, only reported); `load` and `moment` sum f x
     [N m] with the rotation free, or held by the holder's `spring` [N m/rad] from `rotation` on; `approach` [m] with the
     rotation held; beside a load `lateral` sum f y [N m] with the roll free, counted from `roll` on. skin: None (bare),
-    or a law of `skin_laws`; rigid bodies (c = 0) need a skin. start: a neighbouring answer. Where nothing touches the
-    outcome is no_contact.
+    or a law of `skin_laws`; rigid bodies (c = 0) need a skin. Where nothing touches the outcome is no_contact.
 
     PatchfemError for other controls, a moment that no pressure carries, an exponential law without reference under an
     approach; NotConverged above a residual of 1e-9.
@@ -140,9 +139,7 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
             s, motion = None, np.array([approach])
         else:
             target = np.array([value for value in (load, moment, lateral) if value is not None])
-            before = None if start is None else (start.force, start.gap, _freed(
-                (start.delta, rotation - start.theta, roll - start.roll), moment, lateral))
-            force, s, motion, count = loaded(skin, c, x, weight, gap, motions, target, before)
+            force, s, motion, count = loaded(skin, c, x, weight, gap, motions, target)
     delta, free = float(motion[0]), -float(motion[1]) if motion.size > 1 and moment is not None else 0.0
     rolled = -float(motion[-1]) if lateral is not None else 0.0
     gap = gap + rolled * offsets[:, None]
@@ -158,12 +155,6 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
     elif isinstance(skin, LinearSkin):
         opening = np.where(force > 0, -force / (skin.k * weight), np.maximum(opening, 0.0))
     return _state(skin, weight, x, offsets, force, opening, (delta, rotation + free, roll + rolled), count, checks)
-
-
-def _freed(motion: tuple, moment, lateral) -> np.ndarray:
-    """The free ones of (delta, -theta, -roll)."""
-    return np.array([value for value, free in zip(motion, (True, moment is not None, lateral is not None), strict=True)
-                     if free])
 
 
 def _refuse_roll(offsets, load, lateral) -> None:

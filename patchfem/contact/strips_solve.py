@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ..core import PatchfemError
+from .skin import STEPS
 from .skin import solve as solve_skin
 from .skin_laws import LinearSkin
 from .unilateral import solve_forces
@@ -136,11 +137,11 @@ def _bordered(c, gap, motions, target, active) -> tuple:
     return force, motion + rest + nearest * np.eye(1, target.size)[0]
 
 
-def _active_set(c, gap, motions, target, active, limit: int = 60) -> tuple | None:
+def _active_set(c, gap, motions, target, active) -> tuple | None:
     """Primal-dual active set of bare strips: forces, motion and steps; None where it does not settle."""
     seen, bend, least = set(), np.abs(c).max(), target.size - bool(motions.spring.any())
     span = 1e-13 * np.ptp(gap, axis=1, keepdims=True) + 1e-15 * np.ptp(gap)  # round-off of an opening
-    for count in range(1, limit + 1):
+    for count in range(1, STEPS + 1):
         if active.sum() < least:
             active = np.ones(gap.shape, bool)
         if (key := active.tobytes()) in seen:
@@ -171,11 +172,11 @@ def _tangent_step(c, motions, slope, missing, lack) -> tuple:
     return gain, motion, missing - motions.closing(motion) + gain @ c
 
 
-def _newton(skin, c, weight, gap, motions, target, s, q, limit: int = 60) -> tuple | None:
+def _newton(skin, c, weight, gap, motions, target, s, q) -> tuple | None:
     """Forces, separations, motion, steps of a smooth skin from (s, q) by the steps of `skin`; None: not settled."""
     mean = target[0] / (weight.sum() * len(gap))
     faint = skin.separation(np.array(0.01 * mean))
-    for count in range(1, limit + 1):
+    for count in range(1, STEPS + 1):
         log, fall = skin.log_pressure(s)
         log = log + np.log(weight)
         force = np.exp(np.minimum(log, 600.0))
@@ -267,11 +268,9 @@ def _first_set(gap, motions, target) -> np.ndarray:
     return height <= height.min() + 0.5 * (np.ptp(height) + 1e-300)
 
 
-def _bare_loaded(c, x, gap, motions, target, active=None) -> tuple:
+def _bare_loaded(c, x, gap, motions, target) -> tuple:
     """Forces, motion q, steps of bare strips under a load (and moments), by the active set or down the dual."""
-    if active is None:
-        active = _first_set(gap, motions, target)
-    if (found := _active_set(c, gap, motions, target, active)) is not None:
+    if (found := _active_set(c, gap, motions, target, _first_set(gap, motions, target))) is not None:
         return found
     depth = np.abs(c).max() * target[0]
     force, q, steps = _downhill(None, c, x, None, gap, motions, target, depth / len(gap), np.ptp(gap) + depth)
@@ -303,18 +302,16 @@ def _smooth_loaded(skin, c, x, weight, gap, motions, target, first) -> tuple:
     return force, s, q, steps + more
 
 
-def loaded(skin, c, x, weight, gap, motions, target, start=None) -> tuple:
+def loaded(skin, c, x, weight, gap, motions, target) -> tuple:
     """Forces, separations, free motions (delta, -theta, -roll) and steps of strips under a load, and moments of the
     motions that are free.
 
-    target: load [N] and moments [N m]; start: (forces, separations, motions) of a neighbouring answer. Separations are
-    None but for a smooth skin.
+    target: load [N] and moments [N m]. Separations are None but for a smooth skin.
     """
     scale, target = motions.scale, target / motions.scale
     if not smooth(skin):
-        active = None if start is None else start[0] > 0
-        force, q, count = _bare_loaded(softer(skin, c, weight), x, gap, motions, target, active)
+        force, q, count = _bare_loaded(softer(skin, c, weight), x, gap, motions, target)
         return force, None, q / scale, count
-    first = _linearised(skin, c, x, weight, gap, motions, target) if start is None else (start[1], start[2] * scale)
+    first = _linearised(skin, c, x, weight, gap, motions, target)
     force, s, q, count = _smooth_loaded(skin, c, x, weight, gap, motions, target, first)
     return force, s, q / scale, count

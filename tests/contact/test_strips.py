@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
+from skins import solve, tangent
 
 from patchfem.closed_forms.contact import wedge_linear, wedge_opening, wedge_skin
-from patchfem.contact import skin as skins
 from patchfem.contact import strips_solve
 from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin
 from patchfem.contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
@@ -55,7 +55,7 @@ def whole(skin, cells, gap, moment=None, spring=0.0, load=LOAD):
         pair = Compliance(pair.interface, softer(skin, pair.normal, weight), pair.tangential)
         state = press(pair, gap, load, moment, spring=spring)
         return state.sigma_n * weight, state.approach, state.rotation
-    state = skins.solve(skin, pair.normal, x, weight, gap, load, moment)
+    state = solve(skin, pair.normal, x, weight, gap, load, moment)
     return state.force, state.delta, state.theta
 
 
@@ -118,8 +118,8 @@ def test_exact_smooth_skins_answer_is_that_of_one_block_diagonal_operator(skin):
     for c, x, weight, y, gap, roll, load, moment, spring in dense_cases(9):
         if spring == 0:
             state = press_strips(c, x, weight, y, gap, roll, load, moment, skin=skin)
-            other = skins.solve(skin, np.kron(np.eye(y.size), c), np.tile(x, y.size), np.tile(weight, y.size),
-                                (gap + roll * y[:, None]).ravel(), load, moment)
+            other = solve(skin, np.kron(np.eye(y.size), c), np.tile(x, y.size), np.tile(weight, y.size),
+                          (gap + roll * y[:, None]).ravel(), load, moment)
             assert np.abs(state.force.ravel() - other.force).max() <= 1e-10 * load
             assert np.abs(state.gap.ravel() - other.separation).max() <= 1e-9 * np.ptp(other.separation)
 
@@ -394,20 +394,7 @@ def test_exact_approach_of_a_load_gives_the_load_back(skin):
 def test_always_few_steps_on_the_test_piece(skin, roll):
     c, x, weight, y = real(8, 200)
     state = press_strips(c, x, weight, y, 1e-4 * x, roll, load=LOAD, skin=skin)
-    again = press_strips(c, x, weight, y, 1e-4 * x, roll, load=LOAD, skin=skin, start=state)
-    assert state.iterations <= 12 and again.iterations <= 2
-    assert np.abs(again.force - state.force).max() <= 1e-12 * LOAD
-
-
-def test_exact_start_of_a_neighbour_leads_to_the_same():
-    for skin in SKINS.values():
-        c, x, weight, y = real(4, 30)
-        near, cold = (press_strips(c, x, weight, y, 2e-5 * x, roll, LOAD, 0.0, rotation=0.1, skin=skin)
-                      for roll in (4e-5, 5e-5))
-        warm = press_strips(c, x, weight, y, 2e-5 * x, 5e-5, LOAD, 0.0, rotation=0.1, skin=skin, start=near)
-        assert np.abs(warm.force - cold.force).max() <= 1e-11 * LOAD
-        again = press_strips(c, x, weight, y, 2e-5 * x, 5e-5, LOAD, 0.0, rotation=0.1, skin=skin, start=cold)
-        assert again.iterations <= 2 and warm.iterations <= cold.iterations
+    assert state.iterations <= 12
 
 
 # ---------------------------------------------------------------------------------------------------------- stiffnesses
@@ -434,7 +421,7 @@ def test_exact_stiffnesses_without_roll_are_those_of_one_patch():
                                                                      rel=1e-12)
     skin = SKINS["hertz"]
     rough_one = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD, skin=skin)
-    one = skins.tangent(pair.tangential, pair.interface.weight, 0.8 * rough_one.stiffness[0])
+    one = tangent(pair.tangential, pair.interface.weight, 0.8 * rough_one.stiffness[0])
     assert strips_tangent(tangential, weight, rough_one, 0.8) == pytest.approx(one, rel=1e-12)
     stiff = strips_tangent(tangential, weight, rough_one, np.inf)
     assert stiff == pytest.approx(tangential_stiffness(pair.tangential, np.ones(61, bool)), rel=1e-12)
@@ -475,9 +462,8 @@ def test_exact_a_free_roll_under_the_moment_of_a_held_one_is_that_roll(skin, con
         free = press_strips(c, x, weight, y, gap, 0.0, LOAD, skin=skin, lateral=held.roll_moment, **control)
         assert free.roll == pytest.approx(roll, rel=1e-8) and max(free.residuals.values()) <= LIMIT
         assert np.abs(free.force - held.force).max() <= 1e-9 * LOAD
-        again = press_strips(c, x, weight, y, gap, 0.5 * roll, LOAD, skin=skin, lateral=held.roll_moment, start=free,
-                             **control)
-        assert again.roll == pytest.approx(roll, rel=1e-8) and again.iterations <= 2
+        other = press_strips(c, x, weight, y, gap, 0.5 * roll, LOAD, skin=skin, lateral=held.roll_moment, **control)
+        assert other.roll == pytest.approx(roll, rel=1e-8)
 
 
 @each_skin

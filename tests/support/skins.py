@@ -1,0 +1,35 @@
+"""A skin between two pieces as a run presses it: the smooth laws by `contact.skin`, the linear one as softer pieces."""
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from patchfem.contact import skin as smooth
+from patchfem.contact.skin_laws import LinearSkin
+from patchfem.contact.unilateral import press, press_by
+from patchfem.core import Compliance, Interface
+
+
+def solve(skin, c, x, weight, gap, load=None, moment=None, approach=None, rotation=0.0, spring=0.0):
+    """`contact.skin.solve` for any law."""
+    if not isinstance(skin, LinearSkin):
+        return smooth.solve(skin, c, x, weight, gap, load, moment, approach, rotation, spring)
+    soft = Compliance(Interface(x, weight, 1.0), c + np.diag(1 / (skin.k * weight)), c)
+    found = press(soft, gap, load, moment, rotation, spring=spring) if approach is None else \
+        press_by(soft, gap, approach, rotation)
+    force = found.sigma_n * weight
+    free = gap + (found.rotation - rotation) * x - found.approach + c @ force
+    return smooth.SkinState(force, found.sigma_n, np.where(force > 0, -found.sigma_n / skin.k, free),
+                            np.where(force > 0, skin.k, 0.0), found.approach, found.rotation, found.load, found.moment,
+                            found.iterations, found.outcome, found.residuals)
+
+
+def tangent(c, weight, stiffness) -> float:
+    """Stiffness [N/m] of the whole patch, skin and bodies in series, for one common rigid motion.
+
+    stiffness (m,) [Pa/m] of the skin; nodes of no stiffness carry nothing.
+    """
+    d = weight * stiffness
+    live = np.flatnonzero(d > 1e-18 * d.max())
+    root = np.sqrt(d[live])
+    system = np.eye(live.size) + root[:, None] * c[np.ix_(live, live)] * root
+    return float(root @ cho_solve(cho_factor(system, lower=True), root))
