@@ -39,7 +39,7 @@ def test_exact_a_patch_needs_no_motion():
     absent(modules, "friction", "structure", "dynamics", "response", "inputs", "wear", "identify", "runs.bench",
            "runs.rig", "runs.wear", "model.slide", "model.structure", "closed_forms.contact", "compiled", "surface",
            "contact.skin", "contact.skin_laws", "contact.strips", "contact.gradients", "elasticity.mortar",
-           "elasticity.substructure", "elasticity.fronts", "elasticity.recovery", "mesh.anymesh", "slip.tangent",
+           "elasticity.substructure", "elasticity.fronts", "elasticity.recovery", "mesh.anymesh",
            "export", "skfem", "scipy")
     assert {"patchfem.contact.unilateral", "patchfem.mesh.tensor"} <= modules
 
@@ -60,7 +60,7 @@ def test_exact_little_is_loaded_before_the_command_line_answers_an_interrupt():
 def test_exact_an_effect_brings_its_own_module(table, module):
     modules = run_of(PATCH + table)
     assert f"patchfem.{module}" in modules
-    absent(modules, *{"elasticity.mortar", "surface", "slip.tangent"})
+    absent(modules, *{"elasticity.mortar", "surface"})
 
 
 def test_exact_a_rubbing_point_needs_no_patch():

@@ -18,7 +18,7 @@ import numpy as np
 
 from .. import compiled
 from ..contact.unilateral import INDEFINITE
-from ..core import PatchfemError, frozen_array
+from ..core import Compliance, PatchfemError, frozen_array
 from ..elasticity.lapack import dpotrf, dpotri, one_thread
 
 KERNELS = "slip.yield_kernels"
@@ -322,6 +322,18 @@ def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:
     """
     index = np.flatnonzero(active)
     return float(np.linalg.solve(tangential[np.ix_(index, index)], np.ones(index.size)).sum())
+
+
+def coupled_stiffness(pieces: Compliance, closing: np.ndarray, active: np.ndarray) -> float:
+    """Tangential stiffness dT/d(slide) [N/m] of unlike pieces that stick, at held approach and rotation.
+
+    closing: (m, m) normal closing per shear force [m/N]; active: (m,) bool contact set, without which it is 0.
+    """
+    here = np.ix_(*2 * (np.flatnonzero(active),))
+    system = np.block([[pieces.normal[here], closing[here]], [closing[here].T, pieces.tangential[here]]])
+    slide = np.repeat([0.0, 1.0], len(system) // 2)
+    with one_thread():
+        return float(slide @ np.linalg.solve(system, slide))
 
 
 def rotational_stiffness(normal: np.ndarray, x: np.ndarray, active: np.ndarray) -> float:

@@ -20,16 +20,23 @@ from slip_unlike import coupled_forces
 from patchfem.contact.unilateral import residuals, undetermined
 from patchfem.core import Compliance, NotConverged, PatchfemError, frozen_array
 from patchfem.elasticity.lapack import one_thread
-from patchfem.slip import tangent
 
 LIMIT = 1e-10  # largest relative residual that still counts as solved
 EVEN = 1e-12  # share of mu N within which a shear load counts as all that friction allows
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Operators(tangent.Operators):
-    """`slip.tangent.Operators` of a pair; kept: inverses on the last contact set, which no answer depends on."""
+class Operators:
+    """Compliance of a pair for normal and shear forces.
 
+    x: (m,) [m]; normal, tangential: (m, m) [m/N] as in `core.Compliance`; coupling: (m, m) [m/N], closing per shear
+    force, None for alike pieces; kept: inverses on the last contact set, which no answer depends on.
+    """
+
+    x: np.ndarray
+    normal: np.ndarray
+    tangential: np.ndarray
+    coupling: np.ndarray | None = None
     kept: dict = field(default_factory=dict, repr=False)
 
     def inverse(self, name: str) -> Kept:
@@ -45,9 +52,16 @@ class Operators(tangent.Operators):
 
 
 def operators_of(pieces: Compliance, coupling: np.ndarray | None = None) -> Operators:
-    """`slip.tangent.operators_of` with inverses."""
-    one = tangent.operators_of(pieces, coupling)
-    return Operators(one.x, one.normal, one.tangential, one.coupling)
+    """Operators of a pair; a coupling (m, m) [m/N] that is zero throughout is dropped.
+
+    PatchfemError for a shape or a value that cannot be.
+    """
+    if coupling is not None:
+        coupling = frozen_array(coupling)
+        if coupling.shape != pieces.normal.shape or not np.isfinite(coupling).all():
+            raise PatchfemError(f"contact: the coupling must be {pieces.normal.shape} and finite, has {coupling.shape}")
+        coupling = coupling if coupling.any() else None
+    return Operators(pieces.interface.x, pieces.normal, pieces.tangential, coupling)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -9,7 +9,7 @@ from ...closed_forms import contact
 from ...contact import edges
 from ...core import Outcome
 from ...elasticity.lapack import one_thread
-from ...slip import tangent
+from ...slip import shear_modes
 from . import strips
 from .press import Patch
 
@@ -130,10 +130,8 @@ def shear_stiffness(patch: Patch, found: list) -> float:
     if not patch.pair.closing.any():
         return edges.stiffness(patch.pieces.tangential, patch.active, np.ones(patch.x.size), found)
 
-    operators = tangent.operators_of(patch.pieces, patch.pair.closing)
-
     def of(active) -> float:
-        return tangent.operating_tangent(operators, active).tangential
+        return shear_modes.coupled_stiffness(patch.pieces, patch.pair.closing, active)
 
     whole = out = of(patch.active)
     for end in found if patch.active.sum() > 2 else ():
