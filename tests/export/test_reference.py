@@ -1,11 +1,11 @@
 """The reference of keys, effects and measures: it agrees with the records it is made from, and leaves nothing out."""
 
 import pytest
+from reference import limits, records
+from reference.keys import FILE, tables, text
 from scene_texts import SMALL_PATCH, STRUCTURE
 
 from patchfem.effects import EFFECTS, LAWS
-from patchfem.export.reference import limits, records
-from patchfem.export.reference.keys import FILE, tables, text
 from patchfem.response.rows import TABLE as MOTION
 from patchfem.runs.results.patch_rows import TABLE as STATIC
 from patchfem.scene.keys.contact import Tilt
@@ -33,8 +33,8 @@ def section(header: str) -> list:
 
 def test_exact_the_committed_file_is_what_the_records_say():
     for page in (records.Measures, records.Materials, limits):
-        assert page.FILE.read_text("utf-8") == page.text(), "run python -m patchfem.export.reference"
-    assert FILE.read_text("utf-8") == PAGE, "run python -m patchfem.export.reference"
+        assert page.FILE.read_text("utf-8") == page.text(), "run python tests/support/reference"
+    assert FILE.read_text("utf-8") == PAGE, "run python tests/support/reference"
 
 
 def test_always_every_key_has_a_sentence_and_may_have_a_condition():

@@ -4,9 +4,9 @@ import re
 from functools import cache
 from typing import NamedTuple
 
-from ...effects import LAWS
-from ...scene.rules.limits import sideways
-from ...scene.scene import SceneError, loads
+from patchfem.effects import LAWS
+from patchfem.scene.rules.limits import sideways
+from patchfem.scene.scene import SceneError, loads
 
 PATCH = """\
 [contact]

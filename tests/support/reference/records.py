@@ -1,11 +1,12 @@
 """The pages of measures and of materials."""
 
-from ...response.rows import ROWS as MOTION
-from ...runs.results.patch_rows import ROWS as STATIC
-from ...scene.keys.materials import MATERIALS, THERMAL, YIELD
+from patchfem.response.rows import ROWS as MOTION
+from patchfem.runs.results.patch_rows import ROWS as STATIC
+from patchfem.scene.keys.materials import MATERIALS, THERMAL, YIELD
+
 from .keys import FOLDER, grid
 
-MADE = "Generated from the program's own records by `python -m patchfem.export.reference`; a test compares the two."
+MADE = "Generated from the program's own records by `python tests/support/reference`; a test compares the two."
 
 
 class Measures:

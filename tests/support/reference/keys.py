@@ -4,16 +4,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, get_args, get_origin
 
-from ...effects import EFFECTS, WAVEFORMS
-from ...scene.keys.contact import Coating, Material
-from ...scene.keys.quantities import EXAMPLES, KINDS
-from ...scene.keys.tables import Tables
-from ...scene.keys.types import keys, kind_of, meaning, model_of, parts, record
-from ...scene.reader import is_value
-from ...scene.rules.draft import SELECTORS
-from ...scene.rules.limits import NOT_YET_BUILT
+from patchfem.effects import EFFECTS, WAVEFORMS
+from patchfem.scene.keys.contact import Coating, Material
+from patchfem.scene.keys.quantities import EXAMPLES, KINDS
+from patchfem.scene.keys.tables import Tables
+from patchfem.scene.keys.types import keys, kind_of, meaning, model_of, parts, record
+from patchfem.scene.reader import is_value
+from patchfem.scene.rules.draft import SELECTORS
+from patchfem.scene.rules.limits import NOT_YET_BUILT
 
-FOLDER = Path(__file__).parents[2] / "scene"
+FOLDER = Path(__file__).parents[3] / "patchfem" / "scene"
 FILE = FOLDER / "README.md"
 NEEDS = {f"{table}.{key}": used for table, (_, key, used) in SELECTORS.items()} | {
     "drive.waveform": {name: one.keys for name, one in WAVEFORMS.items()}}
@@ -21,7 +21,7 @@ SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 HEAD = """\
 # What a scene may say
 
-Generated from the program's own records by `python -m patchfem.export.reference`; a test holds the two together.
+Generated from the program's own records by `python tests/support/reference`; a test holds the two together.
 A quantity is a text of one number and one unit, `"12.7 mm"`; the units of each kind stand below. A table named in a
 scene acts, one left out does not exist. A key that only some values of a selector need names them under "required".
 

@@ -1,0 +1,13 @@
+"""Write the generated pages of patchfem/scene anew: python tests/support/reference."""
+
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from reference import keys, limits, records
+
+for page in (keys, records.Measures, records.Materials, limits):
+    page.FILE.write_text(page.text(), encoding="utf-8")
+    print(page.FILE)
