@@ -51,14 +51,14 @@ def mean_of(each: list, text: str) -> Mean | None:
     Its 95 % interval is Student's t of their scatter, s t / sqrt(n), or that of their own intervals where this is
     wider: a few may agree by chance. Where no interval reaches below zero, that of the mean does not.
     """
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     if len(each) < 2:
         return None
     values = np.array([one.value for one in each])
     own = np.array([(one.high - one.low) / 2 if one.high is not None else 0.0 for one in each])
     scatter, middle = float(values.std(ddof=1)), float(values.mean())
-    side = max(float(t.ppf((1 + LEVEL) / 2, values.size - 1)) * scatter, float(np.sqrt((own**2).mean())))
+    side = max(float(stdtrit(values.size - 1, (1 + LEVEL) / 2)) * scatter, float(np.sqrt((own**2).mean())))
     side, least = side / np.sqrt(values.size), 0.0 if min(one.low for one in each) >= 0 else -np.inf
     return Mean(Quantity(middle, float(max(middle - side, least)), float(middle + side), each[0].unit, text), scatter,
                 values.size)

@@ -105,8 +105,7 @@ def ratio(part: str, text: str, over: Size, under: Size, alike: float = 0.0) -> 
     interval is that of F; those of one place before and after vary together, and the interval is Pitman's for two
     correlated variances (Biometrika 31 (1939) 9), by Student's t with the fewer degrees of freedom.
     """
-    from scipy.stats import f as fisher
-    from scipy.stats import t as student
+    from scipy.special import fdtri, stdtrit
 
     place = ("amplitude", "slope").index(part)
     one, other = over[place], under[place]
@@ -115,10 +114,10 @@ def ratio(part: str, text: str, over: Size, under: Size, alike: float = 0.0) -> 
     value, (first, second) = one / other, (over.freedom[place], under.freedom[place])
     tail = (1 - LEVEL) / 2
     if alike <= 0:
-        low, high = (1 / fisher.ppf(p, first, second) for p in (1 - tail, tail))
+        low, high = (1 / fdtri(first, second, p) for p in (1 - tail, tail))
     else:
         freedom = max(min(first, second) - 1, 1.0)
-        k = 2 * (1 - min(alike, 1.0) ** 2) * student.ppf(1 - tail, freedom) ** 2 / freedom
+        k = 2 * (1 - min(alike, 1.0) ** 2) * stdtrit(freedom, 1 - tail) ** 2 / freedom
         high = 1 + k + np.sqrt(k * (2 + k))
         low = 1 / high
     return Quantity(value, value * float(np.sqrt(low)), value * float(np.sqrt(high)), "1", text)

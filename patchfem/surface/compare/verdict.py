@@ -47,6 +47,8 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
         headline = " and ".join(told) + ", no change of the waves shown" if told else headline
     if (areal == EXCHANGED or any(one.exchanged for one in parts)) and not worn:
         headline = f"{EXCHANGED}; as given: {headline}"
+    elif areal == scans.OPEN:
+        headline = f"{areal}; {'no change of the waves shown' if headline == 'no change shown' else headline}"
     elif areal == ELSEWHERE or any(_elsewhere(one) for one in parts):
         headline = f"{ELSEWHERE}; {headline}"
     if any(_gain(one, "") and word != "no change shown" for one, word in zip(parts, words)):
@@ -77,11 +79,11 @@ def changed(ratio: Quantity) -> str:
 
 def confidence(ratio: Quantity) -> float:
     """Confidence [1] at which the interval of a ratio just reaches one, from its own width in the logarithm."""
-    from scipy.stats import norm
+    from scipy.special import ndtr
 
     side = (ratio.high if ratio.value < 1 else ratio.low) / ratio.value
     error = abs(np.log(side)) / SIDE
-    return float(2 * norm.cdf(abs(np.log(ratio.value)) / error) - 1) if error > 0 else 1.0
+    return float(2 * ndtr(abs(np.log(ratio.value)) / error) - 1) if error > 0 else 1.0
 
 
 def sure(ratio: Quantity) -> str:

@@ -17,7 +17,7 @@ def areal_intervals(flat: np.ndarray, values: dict) -> tuple:
     sqrt(6 int rho^3 / area) and sqrt(24 int rho^4 / area), with the autocorrelation rho of that spectrum. A kurtosis
     above 3 makes them wider, as for traces. Sz, an extreme, has none.
     """
-    from scipy.stats import chi2
+    from scipy.special import chdtri
 
     out = dict.fromkeys(values, (None, None))
     if values["Ssk"] is None:
@@ -27,7 +27,7 @@ def areal_intervals(flat: np.ndarray, values: dict) -> tuple:
     if abs(values["Ssk"]) > ODD * np.sqrt(6 * sizes) or values["Sku"] - 3 > ODD * np.sqrt(24 * fourths):
         return out, True
     freedom = max(SPENT * 2 / shares / wider, 1.0)
-    low, high = (float(np.sqrt(freedom / chi2.ppf(p, freedom))) for p in (HIGH, LOW))
+    low, high = (float(np.sqrt(freedom / chdtri(freedom, 1 - p))) for p in (HIGH, LOW))
     for name in ("Sa", "Sq"):
         out[name] = values[name] * low, values[name] * high
     for name, share in (("Ssk", 6 * cubes), ("Sku", 24 * fourths)):

@@ -102,10 +102,10 @@ class Intervals:
         return max((whole - SPENT) / self._wider[kind == "slope"] ** 2, FLOOR)
 
     def _by_freedom(self, kind: str, value: float) -> tuple:
-        from scipy.stats import chi2
+        from scipy.special import chdtri
 
         freedom = self.freedom(kind)
-        return tuple(value * float(np.sqrt(freedom / chi2.ppf(p, freedom))) for p in (HIGH, LOW))
+        return tuple(value * float(np.sqrt(freedom / chdtri(freedom, 1 - p))) for p in (HIGH, LOW))
 
     def _by_traces(self, row: Parameter, value: float) -> tuple:
         if self._made is None:

@@ -35,10 +35,10 @@ class Spectrum:
 
     def band(self, share: float = 0.95) -> tuple:
         """Lower and upper bound (k,) [m3] between which the true density lies with this probability, by chi-square."""
-        from scipy.stats import chi2
+        from scipy.special import chdtri
 
         freedom = 2 * self.tapers
-        low, high = (freedom / chi2.ppf(p, freedom) for p in ((1 + share) / 2, (1 - share) / 2))
+        low, high = (freedom / chdtri(freedom, 1 - p) for p in ((1 + share) / 2, (1 - share) / 2))
         return self.density * low, self.density * high
 
     @cached_property

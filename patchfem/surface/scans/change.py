@@ -23,6 +23,8 @@ WORN, NONE = "worn", "no wear shown"
 GREW = "material grew, or the files are in the wrong order"
 ELSEWHERE = "not comparable place by place"
 HIDDEN = "mean depth that even wear or a wedge may hide"
+OPEN = "changed: worn on one part or grown on another"
+EITHER = "two parts of the scans agree each up to a plane of its own, and either may be the unworn one"
 UNSURE = "the scans agree up to a plane: even wear and a wedge would look the same"
 
 
@@ -52,7 +54,7 @@ class Change:
         found = self.volumes.values
         if found["worn_volume"].low > 0:
             return found
-        blank = nothing(UNSURE)
+        blank = nothing(EITHER if self.volumes.open else UNSURE)
         return blank | {"grown_volume": found["grown_volume"]} if found["grown_volume"].low > 0 else blank
 
 
@@ -162,7 +164,8 @@ def hidden(one: Change) -> Quantity:
     if one.volumes is None:
         return refused("m", HIDDEN, one.why)
     carried = one.volumes.values["worn_volume"].low > 0
-    return refused("m", HIDDEN, "unworn parts carry the registration" if carried else UNSURE)
+    return refused("m", HIDDEN, "unworn parts carry the registration" if carried else
+                   EITHER if one.volumes.open else UNSURE)
 
 
 def headline(one: Change) -> str:
@@ -172,6 +175,8 @@ def headline(one: Change) -> str:
     worn, grown = (one.volumes.values[name] for name in ("worn_volume", "grown_volume"))
     if grown.low > 0 and grown.value > 2 * worn.value:
         return GREW
+    if one.volumes.open:
+        return OPEN
     return WORN if worn.low > 0 else NONE
 
 
@@ -185,6 +190,10 @@ def sentences(one: Change) -> list:
         out.append(f"Worn: {_volume(worn)} over {100 * values['worn_share'].value:.3g} % of the region that both scans "
                    f"show, {_length(values['worn_depth_mean'])} in the mean over that region, "
                    f"{_length(values['worn_depth_max'])} at the deepest place.")
+    elif one.volumes.open:
+        out.append(f"Which part is unworn stays open: {EITHER}. If it is one of them, up to {_most(worn)} wore off the "
+                   f"other; if it is the other, up to {_most(grown)} grew on the first. A scan that reaches farther "
+                   "beyond the rubbed part would settle it.")
     else:
         out.append("Worn volume: none shown. Even wear of any depth, and a wedge that the mounting turned back, would "
                    "look the same; only an unworn part beside the rubbed one, in both scans, would settle it.")
@@ -195,7 +204,7 @@ def sentences(one: Change) -> list:
     share = 100 * float(one.found.used.sum()) / max(float(np.isfinite(one.found.depth).sum()), 1.0)
     out.append(f"Depths count from the {share:.0f} % of the heights that agree up to a plane within "
                f"{say(REACH * one.found.noise, 3)}; what they lost evenly or as one wedge would come on top.")
-    if one.found.other is not None:
+    if one.found.other is not None and not one.volumes.open:
         out.append("Another part of the scans may be the unworn one as well, as where two planes meet in an edge; the "
                    "intervals hold what either gives.")
     return out
@@ -231,9 +240,20 @@ def over(one: Change) -> str:
     return f"one scan is {' and '.join(words)} against the other" if words else ""
 
 
+def _most(one: Quantity) -> str:
+    """The upper end of a volume as words."""
+    scale, unit = _scale(one)
+    return f"{one.high * scale:.{DIGITS}g} {unit}"
+
+
+def _scale(one: Quantity) -> tuple:
+    """um^3, or mm^3 from a thousandth of one on: (how many in a m^3, name)."""
+    return (1e9, "mm^3") if max(one.high, 0.0) >= 1e-12 else (1e18, "um^3")
+
+
 def _volume(one: Quantity) -> str:
-    """A volume as words: um^3, or mm^3 from a thousandth of one on."""
-    scale, unit = (1e9, "mm^3") if max(one.high, 0.0) >= 1e-12 else (1e18, "um^3")
+    """A volume with its interval as words."""
+    scale, unit = _scale(one)
     return f"{one.value * scale:.{DIGITS}g} {unit} ({one.low * scale:.{DIGITS}g} to {one.high * scale:.{DIGITS}g})"
 
 

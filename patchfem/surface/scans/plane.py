@@ -62,17 +62,28 @@ def _planes(depth, x, y) -> list:
     drawn = _drawn(base, low)
     for width in (one * noise for one in WIDTHS if len(drawn)):
         found, _ = _fitted(base, low, drawn, width, LEAST)
-        if found is None:
-            continue
-        planes, wide = [found], EDGE * noise
-        on = np.abs(low - base @ found[0]) <= wide
-        other, _ = _fitted(base, low, drawn, wide, max(LEAST, OTHER * on.mean()), on)
-        if other is not None and np.median(np.abs(base @ (other[0] - found[0]))) > APART * noise:
-            above = (low - base @ found[0] < -wide).mean()
-            planes.insert(0 if other[1] > on.mean() - above else 1, other)  # the larger one is the likelier
-        return [Plane(float(plane[0]), *(float(one) for one in plane[1:] / scale), float(noise), share)
-                for plane, share in planes]
+        if found is not None:
+            return [Plane(float(plane[0]), *(float(one) for one in plane[1:] / scale), float(noise), share)
+                    for plane, share in _likely(base, low, drawn, found, noise)]
     return []
+
+
+def _likely(base, low, drawn, found: tuple, noise: float) -> list:
+    """(plane, share) of all that may be the unworn one: `found`, another one of blocks beside it, and one below it of
+    as many blocks, on which either the others grew or these wore off evenly; the likeliest first."""
+    wide, planes = EDGE * noise, [found]
+    on = np.abs(low - base @ found[0]) <= wide
+    for least, above in ((LEAST, 1.0), (on.mean(), 0.0)):
+        other, _ = _fitted(base, low, drawn, wide, least, on, above)
+        if other is not None and all(np.median(np.abs(base @ (other[0] - one))) > APART * noise for one, _ in planes):
+            planes.append(other)
+    off = [low - base @ plane for plane, _ in planes]
+    sizes = [float((np.abs(one) <= wide).mean()) for one in off]
+    scores = [size - float((one < -wide).mean()) for size, one in zip(sizes, off)]
+    first = int(np.argmax(scores))
+    kept = [k for k in np.argsort(scores)[::-1] if k == first or scores[k] >= OTHER * sizes[first]
+            or sizes[k] >= sizes[first]]
+    return [planes[k] for k in kept]
 
 
 def _drawn(base, low) -> np.ndarray:
@@ -84,12 +95,12 @@ def _drawn(base, low) -> np.ndarray:
     return np.array(planes).reshape(-1, 3)
 
 
-def _fitted(base, low, drawn, width: float, least: float, but=None) -> tuple:
+def _fitted(base, low, drawn, width: float, least: float, but=None, above: float = 1.0) -> tuple:
     """((plane, share), blocks on it) of the likeliest plane, (None, None) below `least`; but: blocks of which it must
-    not hold more than a quarter."""
+    not hold more than a quarter; above: how much a block above it counts against one on it."""
     off = low - drawn @ base.T
     on = np.abs(off) <= width
-    score = on.mean(axis=1) - (off < -width).mean(axis=1)
+    score = on.mean(axis=1) - above * (off < -width).mean(axis=1)
     if but is not None:
         score = np.where((on & but).sum(axis=1) < SHARED * but.sum(), score, -1.0)
     if score.max() < least:
@@ -114,8 +125,15 @@ def _blocks(depth, x, y, side: int) -> tuple:
     places = places.reshape(2, -1).T[:, ::-1]
     if not known.any():
         return np.zeros(0), places[known], 0.0
-    with np.errstate(invalid="ignore"):
-        scatter = 1.4826 * np.nanmedian(steps[known], axis=1) / np.sqrt(2)
-        low = np.nanquantile(cut[known], LOW, axis=1)
+    scatter, low = 1.4826 * _quantile(steps[known], 0.5) / np.sqrt(2), _quantile(cut[known], LOW)
     noise = max(float(np.nanquantile(scatter, QUIET)), 1e-300)
     return low + DEVIATIONS * noise, places[known], noise
+
+
+def _quantile(values, share: float) -> np.ndarray:
+    """Quantile of the known values in each row, NaN where none is, as `nanquantile`, which takes rows one by one."""
+    values = np.sort(values, axis=1)  # NaN come last
+    place = share * np.maximum(np.isfinite(values).sum(axis=1) - 1, 0)
+    first = place.astype(int)
+    low, high = (np.take_along_axis(values, one[:, None], 1)[:, 0] for one in (first, np.ceil(place).astype(int)))
+    return low + (place - first) * (high - low)

@@ -25,18 +25,21 @@ WORN = {"worn_volume": "volume that went, over the region that both scans show",
         "worn_share": "share of the common region that wore",
         "worn_depth_mean": "worn volume over the common region",
         "worn_depth_max": "largest worn depth, of the median of 3 x 3 heights"}
+BOTH = "worn_volume", "grown_volume"
 
 
 class Volumes(NamedTuple):
     """What `measured` found: values by the names of `WORN`; worn and grown (m, n): which heights; filled (m, n) [m]:
     the depths, missing ones from their neighbours, NaN beyond the common region; error [m]: standard deviation of the
-    plane they count from, below the wear."""
+    plane they count from, below the wear; open: whether something changed whichever part is the unworn one, and neither
+    wear nor growth in all cases."""
 
     values: dict
     worn: np.ndarray
     grown: np.ndarray
     filled: np.ndarray
     error: float = 0.0
+    open: bool = False
 
 
 def nothing(reason: str) -> dict:
@@ -58,22 +61,24 @@ def measured(found: Laid, x, y) -> Volumes:
     second = measured(found.other, x, y)
     both = {name: one._replace(low=min(one.low, second.values[name].low), high=max(one.high, second.values[name].high))
             for name, one in first.values.items()}
-    return first._replace(values=both)
+    shown = [any(each[name].low > 0 for name in BOTH) for each in (first.values, second.values, both)]
+    return first._replace(values=both, open=(second.open or shown[1]) and shown[0] and not shown[2])
 
 
 def _measured(found: Laid, x, y) -> Volumes:
     from scipy.ndimage import binary_erosion
 
-    depth, cell = _filled(found), _cells(x, y)
-    inside = np.isfinite(depth)
+    place, cell, inside = _nearest(found.depth), _cells(x, y), found.region
+    depth = np.where(inside, found.depth[place], np.nan)
     heights, area, values = np.where(inside, depth, 0.0), float(cell[inside].sum()), {}
-    squares = _squares(depth, found)
-    worn, grown = (_beyond(squares, sign) & inside for sign in (1.0, -1.0))
+    many = np.bincount(np.ravel_multi_index(place, cell.shape)[inside], minlength=cell.size).reshape(cell.shape)
+    squares = _squares(found)
+    worn, grown = (_beyond(squares, sign)[place] & inside for sign in (1.0, -1.0))
     grown &= ~worn
     bent = _bent(found, worn | grown)
     for name, mask, sign, beside in (("worn_volume", worn, 1.0, grown), ("grown_volume", grown, -1.0, worn)):
         volume = float((sign * cell * heights)[mask].sum())
-        noise = found.noise * float(np.sqrt((cell[mask]**2).sum())) * TOGETHER
+        noise = found.noise * float(np.sqrt((cell[mask]**2 * many[place][mask]).sum())) * TOGETHER
         edge = EDGE * float((cell * np.abs(heights))[mask & ~binary_erosion(mask)].sum())
         slow = UNDER * bent * float(cell[mask].sum())
         reach = SIDE * float(np.hypot(np.hypot(_of_plane(found, mask, cell, x, y), slow), noise)) + edge
@@ -81,7 +86,7 @@ def _measured(found: Laid, x, y) -> Volumes:
         left = max(sign * float((cell * heights)[inside & ~worn & ~grown].sum()), 0.0)
         values[name] = Quantity(max(volume, 0.0), max(volume - reach, 0.0), max(volume + reach + left, 0.0), "m3",
                                 WORN[name])
-    share = [float(cell[_beyond(squares, 1.0, *rule) & inside].sum()) / area
+    share = [float(cell[_beyond(squares, 1.0, *rule)[place] & inside].sum()) / area
              for rule in ((CLEAR, 0.0), (2 * CLEAR, 0.0), (CLEAR, 2.0), (CLEAR / 1.8, 2.0))]
     values["worn_share"] = Quantity((share[0] + share[2]) / 2, min(share), max(share), "1", WORN["worn_share"])
     mean = (one / area for one in values["worn_volume"][:3])
@@ -97,12 +102,11 @@ def _cells(x, y) -> np.ndarray:
     return np.gradient(y)[:, None] * np.gradient(x)[None, :]
 
 
-def _filled(found: Laid) -> np.ndarray:
-    """Depths, those missing inside the common region from the nearest one."""
+def _nearest(depth) -> tuple:
+    """Rows and columns (m, n) of the known depth that is nearest to each place."""
     from scipy.ndimage import distance_transform_edt
 
-    place = distance_transform_edt(~np.isfinite(found.depth), return_distances=False, return_indices=True)
-    return np.where(found.region, found.depth[tuple(place)], np.nan)
+    return tuple(distance_transform_edt(~np.isfinite(depth), return_distances=False, return_indices=True))
 
 
 def _means(depth, side: int, even: bool = True) -> np.ndarray:
@@ -139,11 +143,12 @@ class _Square(NamedTuple):
     scatter: float
 
 
-def _squares(depth, found: Laid) -> list:
-    """The means for each side of a square, the smallest first."""
+def _squares(found: Laid) -> list:
+    """The means for each side of a square, the smallest first, of known depths alone: one beside holes, read for all of
+    them, would look like many that agree."""
     out = []
     for side in SQUARES:
-        means = _means(depth, side)
+        means = _means(found.depth, side)
         out.append(_Square(side, means.astype(np.float32), max(_scatter(means, found.used, side), found.noise / side)))
     return out
 

@@ -121,6 +121,30 @@ def test_always_either_side_of_an_edge_may_be_the_unworn_one():
     assert any("edge" in text for text in change.sentences(found))
 
 
+@pytest.mark.share(1)
+@pytest.mark.parametrize("sign, half", [(1, 0.29), (-1, 0.21)])
+def test_always_a_part_as_large_as_the_rest_leaves_open_whether_it_wore_or_the_rest_grew(sign, half):
+    """A flat floor over 58 % that keeps its roughness; one over 42 % in two scans in the wrong order."""
+    def wide(x, y, z):
+        return 0.8e-6 * (np.abs(x - SIDE / 2) < half * SIDE)
+    found = change.changed(*scans(wide)[::sign])
+    assert change.headline(found) == change.OPEN
+    assert all(one.value is None and "either may be the unworn" in one.reason for one in found.values.values())
+    volume = found.volumes.values["worn_volume" if sign > 0 else "grown_volume"]
+    assert volume.low <= common(0.03, (12e-6, -18e-6), wide) <= volume.high
+
+
+def test_always_a_noisy_height_between_holes_is_no_growth():
+    """One height, four times the noise off, in the middle of a hole that is filled from it."""
+    before, after = scans(lambda x, y, z: 0 * x, angle=0.0, shift=(0.0, 0.0), noise=2e-8, holes=0.0)
+    z = after.z.copy()
+    z[90:110, 90:110] = np.nan
+    z[98:103, 98:103] = after.z[98:103, 98:103]
+    z[100, 100] += 1e-7
+    found = change.changed(before, replace(after, z=z))
+    assert found.volumes.values["grown_volume"].low == 0.0 and change.headline(found) == change.NONE
+
+
 def test_exact_single_holes_are_bridged_to_the_fourth_order():
     """On a cubic the bi-Laplacian is zero: a hole has its height but for round-off."""
     x, y = np.meshgrid(np.linspace(-1, 1, 31), np.linspace(-1, 1, 21))
