@@ -1,6 +1,9 @@
 """patchfem compare of two results folders: what wore off between them, by the names that traces have, refusals."""
 
 import json
+import re
+import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +15,8 @@ import patchfem as pf
 from patchfem.export.surfaces import worn
 from patchfem.export.surfaces.worn import hidden_line
 
+ROOT = Path(__file__).parents[2]
+GUIDE = ROOT / "patchfem" / "scene" / "GUIDE.md"
 TILTED = """
 [contact]
 length = "12.7 mm"
@@ -65,7 +70,10 @@ def test_exact_a_wedge_is_told_apart_from_what_a_trace_shows(runs):
     mean, hidden = found["worn_depth_mean"]["value"], found["hidden_wear"]["value"]
     assert 0.8 * mean < hidden < mean and "a trace alone could not show" in found["verdict"]
     found = pf.compare(runs / "new", runs / "half")
-    assert found["hidden_wear"]["value"] == 0 and "trace" not in found["verdict"]
+    assert found["hidden_wear"]["value"] == 0
+    track, end = found["track"], pf.compare(runs / "new", runs / "half")["track"]["to"]["value"]
+    assert 0.5 * track["depth_mean"]["value"] < track["hidden_wear"]["value"] < track["depth_mean"]["value"]
+    assert end < 0 and "is a wedge that a trace within this part alone could not show" in found["verdict"]
 
 
 def test_exact_hidden_wear_is_the_highest_line_below_the_depth():
@@ -96,6 +104,31 @@ def test_exact_the_verb_says_what_python_says_and_writes_a_page(runs, tmp_path):
     lost = worn.lost(runs / "half", runs / "worn")
     table = "\n".join(worn.lines_of(lost, worn.verdict(lost)))
     assert found["verdict"] in table and "worn volume" in table and "pressure peak" in table
+
+
+@pytest.mark.parametrize("ends, kind", [((0.0, 2.0), "a wedge"), ((2.0, 0.3), "a wedge"), ((1.0, 2.0), "even wear with "
+                                         "a wedge"), ((2.0, 1.7), "even wear"), ((1.0, 1.0), "even wear")])
+def test_exact_kinds_of_hidden_wear(ends, kind):
+    assert worn._kind(ends) == kind
+
+
+STORY = re.search(r"in three commands:\n\n```bash\n(.*?)```\n\n((?:> [^\n]*\n)+)", GUIDE.read_text(), re.S)
+QUICK = ["--set", "drive.cycles=20", "--set", "contact.element_size=0.8 mm", "--set", "wear.jumps=2"]
+
+
+@pytest.mark.parametrize("more", [QUICK, pytest.param([], marks=pytest.mark.slow)], ids=["quick", "whole"])
+def test_always_the_story_of_the_guide_runs_and_says_its_verdict(tmp_path, monkeypatch, more):
+    """Of a few cycles on a coarse mesh it ends in a verdict of the same form; the whole story prints the guide's."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "studies").symlink_to(ROOT / "studies")
+    for line in STORY[1].splitlines():
+        words = shlex.split(line)
+        sets = more if "wear.cycles" in line else more[:4]
+        answer = cli(*words[1:], *(sets if words[1] == "run" else ()), "-q")
+        assert words[0] == "patchfem" and answer.code == 0, answer.err
+    told = " ".join(STORY[2].replace("> ", "").split())
+    head = answer.out.splitlines()[0]
+    assert "that a trace within this part alone could not show" in head if more else head == told
 
 
 @pytest.mark.parametrize("names, told", [

@@ -36,7 +36,7 @@ TEXTS = {"worn_volume": ("m3", "material lost over the whole patch, both pieces 
          "worn_area": ("m2", "worn volume over the width"),
          "worn_share": ("1", "share of the patch that lost more than the error of the depth"),
          "hidden_wear": ("m", "mean of the highest straight line of wear that no worn depth lies below: even wear and "
-                              "a wedge, which a trace alone could not show")}
+                              "a wedge, which a trace of just this part could not show alone")}
 
 
 class Worn(NamedTuple):
@@ -258,7 +258,8 @@ def _track(x, depth, off: float, area: float) -> dict:
     width = float(x[b] - x[a])
     even = np.interp(np.linspace(x[a], x[b], 100 * FLOOR), x, depth)
     floor = float(np.convolve(even, np.full(100, 0.01), "valid").max())
-    return {"from": ends[0], "to": ends[1],
+    under = max(float(np.mean(hidden_line(x[a:b + 1], depth[a:b + 1]))), 0.0)
+    return {"from": ends[0], "to": ends[1], "hidden_wear": _with(under, off, *TEXTS["hidden_wear"]),
             "depth_mean": _with(area / width, off + area / width * sum(cells) / width, "m", "lost area over its width"),
             "depth_floor": _with(floor, off, "m", "mean over the deepest fifth of its width"),
             "area_net": _with(area, off * width, "m2", "lost area less pile-up, of which wear makes none"),
@@ -268,27 +269,33 @@ def _track(x, depth, off: float, area: float) -> dict:
 
 def verdict(one: Lost) -> tuple:
     """(headline, sentences)."""
-    mean, hidden = (one.values[name] for name in ("worn_depth_mean", "hidden_wear"))
+    mean, hidden, track = one.values["worn_depth_mean"], one.values["hidden_wear"], one.track
     if not mean.value > 0:
         return "nothing was worn between the two runs", []
-    ends = hidden_line(one.after.x, one.depth)
-    head = f"worn by {say(mean.value, 3)} in the mean over the patch"
+    head, where, inside = f"worn by {say(mean.value, 3)} in the mean over the patch", "", np.ones(one.depth.size, bool)
+    if track and one.values["worn_share"].value < 0.999:
+        mean, hidden, where = track["depth_mean"], track["hidden_wear"], " within this part"
+        inside = (one.after.x >= track["from"].value) & (one.after.x <= track["to"].value)
+        head += f", by {say(mean.value, 3)} from x = {say(track['from'].value, 3)} to {say(track['to'].value, 3)}"
     if hidden.value > 0.01 * mean.value:
-        kind = "a wedge" if abs(ends[1] - ends[0]) > 0.2 * abs(ends[1] + ends[0]) else "even wear"
-        head += f", of which {say(hidden.value, 3)} is {kind}, which a trace alone could not show"
-    place, track, volume = one.after.x[int(np.argmax(one.depth))], one.track, one.values["worn_volume"]
+        head += f", of which {say(hidden.value, 3)} is {_kind(hidden_line(one.after.x[inside], one.depth[inside]))} " \
+                f"that a trace{where} alone could not show"
+    place, volume = one.after.x[int(np.argmax(one.depth))], one.values["worn_volume"]
     told = [f"Worn volume {' '.join(shown(volume)[::2])}; {say(float(one.depth.max()), 3)} at the deepest place, "
             f"x = {say(float(place), 3)}; both pieces together; {one.after.cycles:.6g} cycles of wear"
             f"{f', {one.before.cycles:.6g} before' if one.before.cycles else ''}."]
-    if track and one.values["worn_share"].value < 0.999:
-        told.append(f"Worn from x = {say(track['from'].value, 3)} to {say(track['to'].value, 3)}, "
-                    f"{say(track['depth_mean'].value, 3)} deep in the mean there.")
     for name in ("contact_fraction", "pressure_peak", "loop_area"):
         sides = [each.measure(name) for each in (one.before, one.after)]
         if None not in sides:
             first, second = (pair(name, side) for side in sides)
             told.append(f"{label(name)}: {first} before, {second} after.")
     return head, told
+
+
+def _kind(ends: tuple) -> str:
+    """What wear along a straight line with these depths at both ends is."""
+    low, high = sorted(ends)
+    return "a wedge" if low < 0.2 * high else "even wear" if low > 0.8 * high else "even wear with a wedge"
 
 
 def data_of(one: Lost, found: tuple) -> dict:
@@ -323,10 +330,11 @@ def _rows(one: Lost) -> list:
     track = {f"track_{name.removesuffix('_mean')}": each for name, each in one.track.items()}
     words = WORDS | {"track_from": "worn part from", "track_to": "worn part to", "track_depth": "worn part, mean",
                      "track_depth_floor": "worn part, floor",
+                     "track_hidden_wear": "worn part, even wear and wedge",
                      "hidden_wear": "even wear and wedge, mean", "worn_share": "worn share of the patch"}
-    return [(words[name], each) for name, each in (one.values | {
-        name: track[name] for name in ("track_from", "track_to", "track_depth", "track_depth_floor")
-        if name in track}).items()]
+    of_part = ("track_from", "track_to", "track_depth", "track_depth_floor", "track_hidden_wear")
+    shown_of = one.values | {name: track[name] for name in of_part if name in track}
+    return [(words[name], each) for name, each in shown_of.items()]
 
 
 def _texts(each: Quantity) -> tuple:
