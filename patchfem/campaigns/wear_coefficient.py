@@ -15,6 +15,7 @@ from scipy.interpolate import PchipInterpolator
 from ..core import Missing, NotConverged, PatchfemError
 from ..model.model import Model
 from ..runs.patch import ladder
+from ..runs.patch.press import areas
 from ..runs.wear import evolve
 from ..scene.keys.quantities import parse
 from ..scene.ranges import Range, ranges
@@ -141,8 +142,8 @@ def _curve(model: Model, patch, coefficient: float, name: str, progress) -> tupl
     found = evolve.evolve(model, patch, (None, None), progress)
     if found.stopped:
         raise PatchfemError(f"fit {KEY}: {found.stopped}")
-    area = patch.pieces.interface.weight
-    rows = np.array([one.depth for one in found.moments])
+    area = areas(model.patch, patch.pieces.interface).ravel()
+    rows = np.array([one.depth.ravel() for one in found.moments])
     depth = rows.max(axis=1) if name == "worn_depth_max" else rows @ area / area.sum()
     return (np.array([one.cycle for one in found.moments]) / model.wear.cycles, depth), float(depth[-1])
 

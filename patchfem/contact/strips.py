@@ -17,11 +17,21 @@ from ..core import Compliance, NotConverged, Outcome, PatchfemError, frozen_arra
 from ..elasticity.lapack import one_thread
 from .skin import _refuse
 from .skin_laws import ExponentialSkin, LinearSkin
-from .strips_solve import bare_parts, by_strip, closing_alone, holder_motions, loaded, skin_parts, smooth, softer
+from .strips_solve import (
+    Slices,
+    bare_parts,
+    by_strip,
+    closing_alone,
+    holder_motions,
+    loaded,
+    skin_parts,
+    smooth,
+    softer,
+)
 from .unilateral import LIMIT
 
 NEGLECTED = ("the strips over the width do not feel each other: the shear between them is neglected; fields and "
-             "pictures show their mean, result.nc every strip")
+             "pictures show their mean where they name no strips, result.nc every strip")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -80,14 +90,14 @@ def one_strip(pieces: Compliance, count: int) -> tuple:
     return pieces.normal * count, pieces.tangential * count, pieces.interface.weight / count
 
 
-def residuals(skin, c, x, weight, gap, force, delta: float, free: float, load=None, moment=None,
+def residuals(skin, c: Slices, x, weight, gap, force, delta: float, free: float, load=None, moment=None,
               spring: float = 0.0) -> MappingProxyType:
     """Relative residuals of pressed strips, recomputed from the definitions alone.
 
     Keys: the worst strip's penetration, tension and complementarity (bare) or law and tension (skin); force_balance and
     moment_balance of all strips, where prescribed. free: rotation [rad] beyond that in the gap.
     """
-    bent = force @ c
+    bent = c.bends(force)
     opening = gap + free * x - delta + bent
     depth = np.ptp(gap, axis=1) + np.abs(bent).max() + abs(free) * np.ptp(x) + 1e-150
     most, total = max(force.max(), 1e-150), max(force.sum(), 1e-150)
@@ -110,7 +120,7 @@ def residuals(skin, c, x, weight, gap, force, delta: float, free: float, load=No
 def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.ndarray, gap: np.ndarray,
                  roll: float = 0.0, load: float | None = None, moment: float | None = None,
                  approach: float | None = None, rotation: float = 0.0, spring: float = 0.0, skin=None,
-                 lateral: float | None = None) -> StripsState:
+                 lateral: float | None = None, own=None) -> StripsState:
     """Press strips by one holder.
 
     c: closing compliance (m, m) [m/N] of each strip (`one_strip`); x: (m,) [m]; weight: nodal areas (m,) [m2] of one
@@ -118,12 +128,13 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
     `load` [N] of all strips with `rotation` [rad] held (already in the gap, only reported); `load` and `moment` sum f x
     [N m] with the rotation free, or held by the holder's `spring` [N m/rad] from `rotation` on; `approach` [m] with the
     rotation held; beside a load `lateral` sum f y [N m] with the roll free, counted from `roll` on. skin: None (bare),
-    or a law of `skin_laws`; rigid bodies (c = 0) need a skin. Where nothing touches the outcome is no_contact.
+    or a law of `skin_laws`; rigid bodies (c = 0) need a skin. own: (s, m) [m/N] added to the diagonal of c strip by
+    strip, as wear does. Where nothing touches the outcome is no_contact.
 
     PatchfemError for other controls, a moment that no pressure carries, an exponential law without reference under an
     approach; NotConverged above a residual of 1e-9.
     """
-    offsets = np.atleast_1d(np.asarray(offsets, float))
+    offsets, c = np.atleast_1d(np.asarray(offsets, float)), Slices(c, own)
     gap = np.broadcast_to(gap, (offsets.size, x.size)) + roll * offsets[:, None]
     _refuse(skin, x, gap, load, None if spring and load is not None else moment, approach)
     _refuse_roll(offsets, load, lateral)
@@ -149,7 +160,7 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
         checks = MappingProxyType({**checks, "roll_balance": float(off)})
     _refuse_loose(skin, force, checks, free_rotation=motion.size > 1 and moment is not None and spring == 0,
                   free_roll=lateral is not None)
-    opening = gap + free * x - delta + force @ c if s is None else s
+    opening = gap + free * x - delta + c.bends(force) if s is None else s
     if skin is None:
         opening = np.where(force > 0, 0.0, np.maximum(opening, 0.0))
     elif isinstance(skin, LinearSkin):
@@ -204,7 +215,7 @@ def strips_tangent(c: np.ndarray, weight: np.ndarray, state: StripsState, ratio:
     """
     if not state.load:
         return 0.0
-    alone = closing_alone(weight.size, len(state.offsets))
+    alone, c = closing_alone(weight.size, len(state.offsets)), Slices(c)
     with one_thread():
         if state.stiffness is None or np.isinf(ratio):
             return float(bare_parts(c, alone, state.force > 0)[1][0, 0])

@@ -22,12 +22,47 @@ def smooth(skin) -> bool:
     return skin is not None and not isinstance(skin, LinearSkin)
 
 
-def softer(skin, c, weight) -> np.ndarray:
-    """Compliance (m, m) [m/N] with the linear skin in series, C + diag(1/(k A)); C itself under any other skin.
+@dataclass(frozen=True, eq=False, slots=True)
+class Slices:
+    """Compliance of strips: what all of them have, and what each of them adds to its diagonal.
 
-    So bare contact of it is contact through the linear skin. c: (m, m) [m/N]; weight: nodal areas A (m,) [m2].
+    common: C (m, m) [m/N]; own: (s, m) [m/N], None where nothing is added.
     """
-    return c + np.diag(1 / (skin.k * weight)) if isinstance(skin, LinearSkin) else c
+
+    common: np.ndarray
+    own: np.ndarray | None = None
+
+    def among(self, strip: int, nodes) -> np.ndarray:
+        """Compliance (k, k) [m/N] of some nodes (k,) of a strip."""
+        block = self.common[np.ix_(nodes, nodes)]
+        if self.own is not None:
+            block[np.diag_indices_from(block)] += self.own[strip, nodes]
+        return block
+
+    def bends(self, force) -> np.ndarray:
+        """Displacements C_j f_j (s, m) [m] of nodal forces (s, m) [N]."""
+        return force @ self.common if self.own is None else force @ self.common + self.own * force
+
+    def alike(self, strip: int) -> bytes:
+        """What two strips of the same compliance have in common."""
+        return b"" if self.own is None else self.own[strip].tobytes()
+
+    @property
+    def largest(self) -> float:
+        """Largest entry [m/N]."""
+        return float(np.abs(self.common).max() + (0.0 if self.own is None else self.own.max()))
+
+    def plus(self, diagonal) -> "Slices":
+        """The strips with (m,) [m/N] more on the diagonal of each."""
+        return Slices(self.common + np.diag(diagonal), self.own)
+
+
+def softer(skin, c: Slices, weight) -> Slices:
+    """Compliance with the linear skin in series, C + diag(1/(k A)); itself under any other skin.
+
+    So bare contact of it is contact through the linear skin. weight: nodal areas A (m,) [m2].
+    """
+    return c.plus(1 / (skin.k * weight)) if isinstance(skin, LinearSkin) else c
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -89,11 +124,11 @@ def bare_parts(c, motions, active, gap=None) -> tuple:
     groups, parts, base, system = {}, [], motions.base, np.zeros((motions.size, motions.size))
     for strip, row in enumerate(active):
         if row.any():
-            groups.setdefault(row.tobytes(), []).append(strip)
+            groups.setdefault((row.tobytes(), c.alike(strip)), []).append(strip)
     for strips in map(np.array, groups.values()):
         nodes = np.flatnonzero(active[strips[0]])
         sides = base[nodes] if gap is None else np.column_stack([base[nodes], gap[np.ix_(strips, nodes)].T])
-        answer = cho_solve(cho_factor(c[np.ix_(nodes, nodes)], lower=True, overwrite_a=True), sides)
+        answer = cho_solve(cho_factor(c.among(strips[0], nodes), lower=True, overwrite_a=True), sides)
         parts.append((strips, nodes, *np.split(answer, [base.shape[1]], axis=1)))
         system += motions.folded(strips, base[nodes].T @ parts[-1][2])
     return parts, system
@@ -111,7 +146,7 @@ def skin_parts(c, motions, slope, missing) -> tuple:
         if not (nodes := np.flatnonzero(row > least)).size:
             continue
         root = np.sqrt(row[nodes])
-        own = root[:, None] * c[np.ix_(nodes, nodes)] * root
+        own = root[:, None] * c.among(strip, nodes) * root
         own[np.diag_indices_from(own)] += 1.0
         sides = root[:, None] * np.column_stack([motions.base[nodes], missing[strip, nodes]])
         answer = cho_solve(cho_factor(own, lower=True, overwrite_a=True), sides)
@@ -139,7 +174,7 @@ def _bordered(c, gap, motions, target, active) -> tuple:
 
 def _active_set(c, gap, motions, target, active) -> tuple | None:
     """Primal-dual active set of bare strips: forces, motion and steps; None where it does not settle."""
-    seen, bend, least = set(), np.abs(c).max(), target.size - bool(motions.spring.any())
+    seen, bend, least = set(), c.largest, target.size - bool(motions.spring.any())
     span = 1e-13 * np.ptp(gap, axis=1, keepdims=True) + 1e-15 * np.ptp(gap)  # round-off of an opening
     for count in range(1, STEPS + 1):
         if active.sum() < least:
@@ -151,7 +186,7 @@ def _active_set(c, gap, motions, target, active) -> tuple | None:
             force, motion = _bordered(c, gap, motions, target, active)
         except np.linalg.LinAlgError:  # this set does not determine the motion
             return None
-        opening = gap - motions.closing(motion) + force @ c
+        opening = gap - motions.closing(motion) + c.bends(force)
         noise = span + 1e-13 * bend * np.abs(force).sum(axis=1, keepdims=True)
         following = (active & (force > 0)) | (~active & (opening < -noise))
         if np.array_equal(following, active):
@@ -169,7 +204,7 @@ def _tangent_step(c, motions, slope, missing, lack) -> tuple:
     motion = np.linalg.lstsq(system + motions.spring, lack + motions.resultant(gain), rcond=1e-14)[0]
     for strip, nodes, root, answer in parts:
         gain[strip, nodes] = root * (answer[:, :size] @ (motions.shares[strip] @ motion) - answer[:, size])
-    return gain, motion, missing - motions.closing(motion) + gain @ c
+    return gain, motion, missing - motions.closing(motion) + c.bends(gain)
 
 
 def _newton(skin, c, weight, gap, motions, target, s, q) -> tuple | None:
@@ -184,12 +219,12 @@ def _newton(skin, c, weight, gap, motions, target, s, q) -> tuple | None:
         with np.errstate(over="ignore", invalid="ignore"):
             try:
                 gain, motion, change = _tangent_step(c, motions, force * fall,
-                                                     gap - motions.closing(q) + force @ c - s, lack)
+                                                     gap - motions.closing(q) + c.bends(force) - s, lack)
             except (np.linalg.LinAlgError, ValueError):  # left the numbers
                 return None
         q, folds = q + motion, -change * fall
         share = np.exp(np.minimum(0.0, np.maximum(log, log + folds) - log.max()))
-        depth = np.ptp(gap) + np.abs(force @ c).max() + 2 * np.abs(q[1:]).sum()
+        depth = np.ptp(gap) + np.abs(c.bends(force)).max() + 2 * np.abs(q[1:]).sum()
         noise = 1e-12 + 1e-15 * depth * fall[force > 1e-6 * force.max()].max()
         if max(np.abs(lack).max() / target[0], np.max(share * np.abs(folds))) <= noise:
             follow = np.exp(np.minimum(log + folds, 600.0))  # what carries next to nothing takes its law
@@ -207,11 +242,13 @@ def by_strip(skin, c, x, weight, gap) -> tuple:
     """
     force, steps = np.zeros(gap.shape), 0
     if smooth(skin):
-        states = [solve_skin(skin, c, x, weight, row, approach=0.0) for row in gap]
+        every = np.arange(x.size)
+        states = [solve_skin(skin, c.among(strip, every), x, weight, row, approach=0.0)
+                  for strip, row in enumerate(gap)]
         force, slope = (np.array([getattr(state, name) for state in states]) for name in ("force", "stiffness"))
         return force, slope * weight, sum(state.iterations for state in states)
     for strip in np.flatnonzero(gap.min(axis=1) < 0):
-        force[strip], _, count = solve_forces(c, x, gap[strip], np.zeros(0))
+        force[strip], _, count = solve_forces(c.among(strip, np.arange(x.size)), x, gap[strip], np.zeros(0))
         steps += count
     return force, force > 0, steps
 
@@ -272,7 +309,7 @@ def _bare_loaded(c, x, gap, motions, target) -> tuple:
     """Forces, motion q, steps of bare strips under a load (and moments), by the active set or down the dual."""
     if (found := _active_set(c, gap, motions, target, _first_set(gap, motions, target))) is not None:
         return found
-    depth = np.abs(c).max() * target[0]
+    depth = c.largest * target[0]
     force, q, steps = _downhill(None, c, x, None, gap, motions, target, depth / len(gap), np.ptp(gap) + depth)
     force, q, more = _active_set(c, gap, motions, target, force > 0) or (force, q, 0)
     return force, q, steps + more
@@ -284,9 +321,9 @@ def _linearised(skin, c, x, weight, gap, motions, target) -> tuple:
     rest = skin.separation(np.array([mean]))
     k = mean * skin.log_pressure(rest)[1][0]
     edge = rest[0] + mean / k  # where the tangent is zero
-    force, q, _ = _bare_loaded(c + np.diag(1 / (k * weight)), x, gap - edge, motions, target)
+    force, q, _ = _bare_loaded(c.plus(1 / (k * weight)), x, gap - edge, motions, target)
     stress = force / weight
-    low = np.where(force > 0, edge - stress / k, gap - motions.closing(q) + force @ c)
+    low = np.where(force > 0, edge - stress / k, gap - motions.closing(q) + c.bends(force))
     return np.where(stress > mean, skin.separation(np.maximum(stress, mean)), low), q
 
 
@@ -297,7 +334,7 @@ def _smooth_loaded(skin, c, x, weight, gap, motions, target, first) -> tuple:
     rest = skin.separation(np.array([target[0] / (weight.sum() * len(gap))]))
     span = 1 / skin.log_pressure(rest)[1][0]
     force, q, steps = _downhill(skin, c, x, weight, gap, motions, target, -rest[0], span)
-    s = gap - motions.closing(q) + force @ c
+    s = gap - motions.closing(q) + c.bends(force)
     force, s, q, more = _newton(skin, c, weight, gap, motions, target, s, q) or (force, s, q, 0)
     return force, s, q, steps + more
 

@@ -90,8 +90,8 @@ def of_run(histories: dict, modal, fields: dict, x, weight, strips: tuple | None
     """Contents of a run.
 
     histories: name -> (k,), or (i, k) of the interfaces so named, with "time"; modal: (names, (k, n)) or None; fields:
-    name -> (f, m) with "time", or {}; x, weight: (m,) or None; strips: (offsets (s,) [m], pressure (s, m) [Pa]) of a
-    patch in strips; levels: name -> (unit, (l,)) of a run in levels.
+    name -> (f, m), or (f, s, m) of strips, with "time", or {}; x, weight: (m,) or None; strips: (offsets (s,) [m],
+    pressure (s, m) [Pa]) of a patch in strips; levels: name -> (unit, (l,)) of a run in levels.
     """
     data, coords = {}, {}
     if histories:
@@ -113,8 +113,9 @@ def of_run(histories: dict, modal, fields: dict, x, weight, strips: tuple | None
                 flags = {"long_name": "contact status", "flag_meanings": "open stick slip",
                          "flag_values": np.array([0, 1, 2], np.int8)}
                 data[name] = (("frame", "x"), values, flags)
-            elif np.ndim(values) == 2:
-                data[name] = (("frame", "x"), values, _attributes(name))
+            elif np.ndim(values) >= 2:
+                over = ("frame", "x") if np.ndim(values) == 2 else ("frame", "strip", "x")
+                data[name] = (over, values, _attributes(name))
     if strips is not None:
         coords["strip_offset"] = ("strip", strips[0], {"units": "m", "long_name": "place of the strip over the width"})
         data["strip_normal_stress"] = (("strip", "x"), strips[1], _attributes("strip_normal_stress"))
@@ -178,8 +179,8 @@ def with_curve(data: Contents, curve: dict) -> Contents:
 
 
 def with_surfaces(data: Contents, gap) -> Contents:
-    """The contents with the gap (m,) [m] of the unloaded surfaces, wear included."""
-    return data.also({"unloaded_gap": ("x", np.asarray(gap), _attributes("unloaded_gap"))})
+    """The contents with the gap (m,) [m] of the unloaded surfaces, wear included; of strips (s, m), as each has it."""
+    return data.also({"unloaded_gap": (("strip", "x")[-np.ndim(gap):], np.asarray(gap), _attributes("unloaded_gap"))})
 
 
 def with_wear(data: Contents, history: dict, units: dict) -> Contents:

@@ -115,11 +115,20 @@ def _wear(data: dict) -> Picture | None:
     if "wear" not in data:
         return None
     states, history = data["wear"]["states"], data["wear"]["history"]
-    profiles = (states["time"] / data["wear"]["period"], states["normal_stress"], states["worn_depth"])
+    depth = states["worn_depth"]
+    mean = depth.mean(axis=1) if depth.ndim == 3 else depth
+    profiles = (states["time"] / data["wear"]["period"], states["normal_stress"], mean)
     return Picture(charts.wear, (data["x"], *profiles, history),
                    f"The patch as it wears over {history['cycle'][-1]:.6g} cycles: pressure and worn depth of both "
-                   "pieces together, and measures of patch and motion over their values on the new patch. All other "
-                   "pictures show the worn patch.")
+                   f"pieces together{', means over the width' if depth.ndim == 3 else ''}, and measures of patch and "
+                   "motion over their values on the new patch. All other pictures show the worn patch.")
+
+
+def _worn_map(data: dict) -> Picture | None:
+    if "wear" not in data or (depth := data["wear"]["states"]["worn_depth"][-1]).ndim < 2 or not depth.any():
+        return None
+    return Picture(charts.worn_map, (data["x"], data["width"], depth), "Worn depth of both pieces together after "
+                   f"{data['wear']['history']['cycle'][-1]:.6g} cycles, in every strip over the width.")
 
 
 def _interface(data: dict) -> Picture | None:
@@ -215,8 +224,8 @@ def _measured(data: dict) -> Picture | None:
 
 
 # in the order of the page
-PICTURES = {"wear": _wear, "curve": _curve, "levels": _levels, "pressure": _interface, "bodies": _bodies, "loop": _loop,
-            "history": _histories, "measured": _measured}
+PICTURES = {"wear": _wear, "worn": _worn_map, "curve": _curve, "levels": _levels, "pressure": _interface,
+            "bodies": _bodies, "loop": _loop, "history": _histories, "measured": _measured}
 
 
 def _factor(measured: dict) -> float:

@@ -30,7 +30,8 @@ def report_data(result: Result) -> dict:
             "sentence": verdict(summary), "released": released(result),
             "cycles": cycles_of(result), "engine": result.extra.get("engine", ""),
             "fields": result.fields,
-            "x": None if result.patch is None else result.patch.x, "versions": versions(),
+            "x": None if result.patch is None else result.patch.x,
+            "width": None if result.patch is None else result.plan.model.patch.width, "versions": versions(),
             "means": {name: one.text for name, one in result.measures.items()}}
     if "curve" in result.extra:
         data["curve"] = result.extra["curve"]

@@ -19,7 +19,7 @@ class Wearing:
 
     press(worn, softening) -> contact forces (m,) [N], as `depth.jump` wants it; path(worn) -> slip path (m,) [m] of
     one cycle, the same array object as long as wear does not change it; area (m,) [m2]; coefficient [m2/N]; cycles:
-    all of them; explicit: forward Euler in place of the implicit jump.
+    all of them; explicit: forward Euler in place of the implicit jump. Of a patch in strips all (m,) are (s, m).
     """
 
     press: Callable

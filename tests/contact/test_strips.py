@@ -15,6 +15,7 @@ from patchfem.closed_forms.contact import wedge_linear, wedge_opening, wedge_ski
 from patchfem.contact import strips_solve
 from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin
 from patchfem.contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
+from patchfem.contact.strips_solve import Slices
 from patchfem.contact.unilateral import LIMIT, press, press_by, solve_forces
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
 from patchfem.slip.shear_modes import normal_stiffness, tangential_stiffness
@@ -315,7 +316,7 @@ def test_exact_going_down_the_dual_alone_finds_the_same(skin, control, monkeypat
     c, x, weight, y = real(4, 24)
     gap = random_gaps(np.random.default_rng(8), x, 4, 1e-6)
     state = press_strips(c, x, weight, y, gap, 1e-4, LOAD, skin=skin, **control)
-    first = strips_solve._linearised(*_smooth_case(skin, c, x, weight, gap + 1e-4 * y[:, None], control)) \
+    first = strips_solve._linearised(*_smooth_case(skin, Slices(c), x, weight, gap + 1e-4 * y[:, None], control)) \
         if isinstance(skin, ExponentialSkin | HertzSkin) else None
     monkeypatch.setattr(strips_solve, "_active_set", lambda *a: None)
     monkeypatch.setattr(strips_solve, "_newton", lambda *a: None)
@@ -522,3 +523,26 @@ def test_refuses_a_free_roll_that_nothing_determines():
     ridge = np.where(np.arange(4) == 1, 0.0, 1.0)[:, None] + 0 * x
     with pytest.raises(NotConverged, match="roll"):
         press_strips(c, x, weight, y, ridge, load=LOAD, lateral=y[1] * LOAD)
+
+
+@pytest.mark.parametrize("skin", [None, LinearSkin(1e13)], ids=["bare", "linear"])
+def test_exact_strips_with_diagonals_of_their_own_are_one_block_diagonal_operator(skin):
+    for number, (c, x, weight, y, gap, roll, load, moment, spring) in enumerate(dense_cases(6)):
+        own = np.random.default_rng(number).uniform(0, 2, gap.shape) * c.max()
+        own[-1] = own[0]  # two strips share a factorisation where they are alike
+        state = press_strips(c, x, weight, y, gap, roll, load, moment, spring=spring, skin=skin, own=own)
+        target = np.array([load] if moment is None else [load, moment])
+        whole = np.kron(np.eye(y.size), softer(skin, c, weight)) + np.diag(own.ravel())
+        force, motion, _ = solve_forces(whole, np.tile(x, y.size), (gap + roll * y[:, None]).ravel(), target,
+                                        spring=spring)
+        assert np.abs(state.force.ravel() - force).max() <= 1e-10 * load
+        assert state.delta == pytest.approx(motion[0], rel=1e-10)
+
+
+def test_exact_smooth_skins_carry_diagonals_of_the_strips():
+    for number, (c, x, weight, y, gap, roll, load, _, _) in enumerate(dense_cases(3)):
+        own = np.random.default_rng(number).uniform(0, 2, gap.shape) * c.max()
+        state = press_strips(c, x, weight, y, gap, roll, load, skin=SKINS["hertz"], own=own)
+        other = solve(SKINS["hertz"], np.kron(np.eye(y.size), c) + np.diag(own.ravel()), np.tile(x, y.size),
+                      np.tile(weight, y.size), (gap + roll * y[:, None]).ravel(), load)
+        assert np.abs(state.force.ravel() - other.force).max() <= 1e-10 * load

@@ -234,7 +234,6 @@ def test_exact_plan_names_the_jumps_and_what_they_share():
 def test_refuses_what_wear_does_not_go_with():
     text = TILTED + COULOMB + SINE + WEAR
     assert "scheme 'explicit' needs" in only(text + 'scheme = "explicit"\n')
-    assert any("contact.strips" in line for line in mistakes(text + "[contact.strips]\ncount = 4\n"))
     assert any("wear" in line for line in mistakes(TILTED + WEAR))
     free = POINT + COULOMB + MODE + '[drive]\nkind = "free"\ndisplacement = "1 mm"\ncycles = 5\n' + WEAR
     assert "steady motion" in only(free)

@@ -159,6 +159,19 @@ def bodies(x, depths, mises, sigma) -> list:
     return out[::-1]
 
 
+def worn_map(x, width: float, depth) -> list:
+    """Worn depth (s, m) [m] of strips over x (m,) [m] and the width [m], as a map."""
+    edges = np.linspace(-width / 2, width / 2, len(depth) + 1)
+    (unit, scale), (name, size) = axis_unit(depth, "m"), axis_unit(np.concatenate([x, edges]), "m")
+    along, over, means = coarser(x, edges, (depth[:, 1:] + depth[:, :-1]).T / 2 * scale, GRID)
+    values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(means.shape)
+    marks = [mark("cells", "", "worn depth", x=along * size, y=over * size, value=values, top=float(values.max()),
+                  unit=unit)]
+    across, up = ({"range": [low * size, high * size]} for low, high in ((x[0], x[-1]), (edges[0], edges[-1])))
+    return [chart("Worn depth", axis("x", name) | across, axis("y", name) | up, marks)
+            | {"frame": _frame(float(np.ptp(x)) / width)}]
+
+
 def coarser(x, depth, cells, most: int) -> tuple:
     """Lines (n,), (m,) and cells (n - 1, m - 1) of a grid of about `most` cells, each with the mean over its area."""
     if cells.size <= most:

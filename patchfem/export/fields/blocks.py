@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 LINE, TRIANGLE, QUAD = 3, 5, 9  # cell types of VTK
-NAMES = ("lower", "upper", "interface")  # the place of a name is its code in `part`
+NAMES = ("lower", "upper", "interface")
+PARTS = (*NAMES, "strips")  # the last of a patch that wears in strips; the place of a name is its code in `part`
 MEANINGS = {"stress_error": "share of a cell in the estimated error of the stress: square root of the strain energy of "
             "the recovered less the computed stress over the strain energy of both pieces (Zienkiewicz-Zhu); the"
             " squares of all cells add up; an indicator of where the mesh is coarse, no bound of a stress"}
-CODES = {"part": dict(enumerate(NAMES)), "material": {0: "substrate", 1: "coating"},
+CODES = {"part": dict(enumerate(PARTS)), "material": {0: "substrate", 1: "coating"},
          "status": {0: "open", 1: "stick", 2: "slip"}}
 
 
@@ -38,26 +39,44 @@ def block(points, cells: list, point_data: dict, cell_data: dict) -> Block:
                  np.array([0, 0, LINE, TRIANGLE, QUAD], np.uint8)[sizes], point_data, cell_data)
 
 
-def blocks_of(lower: dict, upper: dict, x, interface: dict) -> dict:
+def blocks_of(lower: dict, upper: dict, x, interface: dict, width: float = 0.0) -> dict:
     """The blocks of a pair, by name.
 
     lower, upper: "points" (n, 2) [m], "blocks" of cells numbered from 0, "material" (t,) of all of them, "interface"
     (m,) node numbers by rising x, "displacement" (f, n, 2) [m], "stress" (f, t, 4) as xx, yy, zz, xy [Pa], "mises"
     (f, t) [Pa], "stress_error" (f, t) [1], "bond" name -> (f, k), stress under its coating at x, {} without one;
-    interface: name -> (f, k) at the places x (k,) [m]. The interface moves with the lower piece.
+    interface: name -> (f, k) at the places x (k,) [m], or (f, s, k) of strips, of which it has the mean over the width
+    [m] and a block `strips` all. The interface moves with the lower piece.
     """
     line = lower["interface"]
     own = lower["points"][line, 0]
     move = np.zeros((len(lower["displacement"]), len(x), 3), np.float32)
     for axis in (0, 1):
         move[..., axis] = [np.interp(x, own, row) for row in lower["displacement"][:, line, axis]]
+    areal = {name: np.asarray(rows, np.float32) for name, rows in interface.items() if np.ndim(rows) == 3}
+    means = {name: rows.mean(axis=1) if name in areal else rows for name, rows in interface.items()}
     fields = {"displacement": move} | {name: np.asarray(rows, np.int8 if name in CODES else np.float32)
-                                       for name, rows in interface.items()}
+                                       for name, rows in means.items()}
     for side, body in (("lower", lower), ("upper", upper)):
         fields |= {f"{name}_{side}": np.asarray(rows, np.float32) for name, rows in body["bond"].items()}
     ends = np.stack([np.arange(len(x) - 1), np.arange(1, len(x))], axis=1)
     return {"lower": _body(lower), "upper": _body(upper),
-            "interface": block(np.column_stack([x, np.zeros(len(x))]), [ends], fields, {})}
+            "interface": block(np.column_stack([x, np.zeros(len(x))]), [ends], fields, {})} \
+        | ({"strips": _strips(x, width, areal)} if areal else {})
+
+
+def _strips(x, width: float, areal: dict) -> Block:
+    """Strips side by side over the width [m] in the plane of the interface, each with its values (f, s, k) from edge to
+    edge; `width` runs along z."""
+    count, k = next(iter(areal.values())).shape[1:]
+    edges = np.linspace(-width / 2, width / 2, count + 1)
+    sides = np.stack([edges[:-1], edges[1:]], axis=1).ravel()  # of each strip in turn
+    low = (np.arange(count)[:, None] * 2 * k + np.arange(k - 1)).ravel()
+    one = block(np.column_stack([np.tile(x, 2 * count), np.zeros(2 * count * k)]),
+                [np.stack([low, low + 1, low + k + 1, low + k], axis=1)],
+                {name: np.repeat(rows, 2, axis=1).reshape(len(rows), -1) for name, rows in areal.items()}, {})
+    one.points[:, 2] = np.repeat(sides, k)
+    return one
 
 
 def _body(body: dict) -> Block:
@@ -78,7 +97,7 @@ def joined(blocks: dict) -> Block:
     first = np.cumsum([0, *(len(one.points) for one in blocks.values())])
     ends = np.cumsum([0, *(one.connectivity.size for one in blocks.values())])
     all_of = list(blocks.values())
-    part = np.repeat(np.array([NAMES.index(name) for name in blocks], np.int8), [len(one.types) for one in all_of])
+    part = np.repeat(np.array([PARTS.index(name) for name in blocks], np.int8), [len(one.types) for one in all_of])
     return Block(np.concatenate([one.points for one in all_of]),
                  np.concatenate([one.connectivity + at for one, at in zip(all_of, first)]),
                  np.concatenate([[0], *(one.offsets[1:] + at for one, at in zip(all_of, ends))]),

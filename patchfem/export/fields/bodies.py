@@ -52,7 +52,7 @@ def write_fields(result, path: Path) -> dict:
     notes = result.extra.setdefault("notes", [])
     notes += [one for one in beyond_yield(result.plan.model.patch, {"lower": low, "upper": high}) if one not in notes]
     steps = {"lower": low["steps"], "upper": high["steps"]}
-    write_series(path, blocks_of(low, high, patch.x, interface), times, UNITS, steps)
+    write_series(path, blocks_of(low, high, patch.x, interface, result.plan.model.patch.width), times, UNITS, steps)
     if not isinstance(patch.pair.piece, Piece):
         return {}
     shape, shown = (patch.x.size - 1, -1), result.extra.get("wear_shown", {"states": 0})["states"]

@@ -8,13 +8,14 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from ..readback import HUGE, numeric, readable, wanted
-from .blocks import NAMES, Block, joined
+from .blocks import NAMES, PARTS, Block, joined
 from .vtkhdf import NAME
 
 TAILS = {"displacement": (3,), "stress": (6,)}  # of arrays with several values a place
 BODY = {"PointData": ("displacement",), "CellData": ("material", "stress", "von_mises")}
 LINE = {"PointData": ("displacement", "gap", "normal_stress"), "CellData": ()}
-LEAST = {"lower": BODY, "upper": BODY, "interface": LINE}  # what a reader relies on
+LEAST = {"lower": BODY, "upper": BODY, "interface": LINE,
+         "strips": {"PointData": (), "CellData": ()}}  # what a reader relies on
 MOST = 4  # nodes of a cell
 APART = 3.0  # of the usual step between frames: a longer one divides the pressed state from the last cycle
 
@@ -87,7 +88,8 @@ class Series:
                "Steps/Values are no times")
         texts = self.root["lower/FieldData/units"][:]
         self.units = dict(text.decode().rstrip("]").split(" [", 1) for text in texts)
-        for name in NAMES:
+        self.parts = [name for name in PARTS if name in NAMES or name in self.root]
+        for name in self.parts:
             self._looked(name, self.root[name])
 
     def _looked(self, name: str, group) -> None:
@@ -130,7 +132,7 @@ class Series:
             raise PatchfemError(f"--frame: {number} is not there, {self.path} has frames 0 to {count - 1}")
         number %= count
         with readable(self.path, f"frame {number}"):
-            blocks = {name: self._block(self.root[name], number) for name in NAMES}
+            blocks = {name: self._block(self.root[name], number) for name in self.parts}
         one = joined(blocks)
         return Frame(one.points, one.connectivity, one.offsets, one.types, one.point_data, one.cell_data, blocks,
                      self.units | {"part": "1"}, float(self.times[number]), number)

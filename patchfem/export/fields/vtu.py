@@ -20,7 +20,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...disk.whole import fault, unfinished, whole, write_text
-from .blocks import CODES, NAMES, Block
+from .blocks import CODES, PARTS, Block
 from .series import Frame, Series
 
 BLOCK = 1 << 20  # bytes of a compressed block
@@ -119,7 +119,7 @@ def _listing(path: Path, kind: str, version: str, lines: list) -> None:
 
 
 def _ours(name: str) -> bool:
-    return re.fullmatch(rf"frame_\d+(\.vtm|(_({'|'.join(NAMES)}))?\.vtu)", name) is not None
+    return re.fullmatch(rf"frame_\d+(\.vtm|(_({'|'.join(PARTS)}))?\.vtu)", name) is not None
 
 
 def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> None:

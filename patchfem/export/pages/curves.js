@@ -57,7 +57,7 @@
       const cells = fig.quad({field: "left"}, {field: "right"}, {field: "bottom"}, {field: "top"},
         {source: new Bokeh.ColumnDataSource({data: box}), fill_color: fill, line_color: fill, line_width: 1});
       fig.add_tools(new Bokeh.HoverTool({renderers: [cells], formatters: {"@value": "printf"},
-        tooltips: [["stress", `@value{%.4g} ${mark.unit}`]]}));
+        tooltips: [[mark.name || "stress", `@value{%.4g} ${mark.unit}`]]}));
     },
   };
 

@@ -41,7 +41,7 @@ def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple
         if low == bottom:
             apart = replace(asked, load=0.0, approach=None, rotates=False, spring=0.0)
             pieces, still, skin, strips = under(apart, pieces, gap)
-            open_ = frozen_array(gap - min(distance, gap.min()))
+            open_ = frozen_array(np.atleast_2d(gap).min(axis=0) - min(distance, gap.min()))
             return pieces, replace(still, gap=open_, approach=distance), skin, strips
         low, top = max(low - 2, bottom), low
     brentq(short, low, top, xtol=1e-13, rtol=1e-14)

@@ -78,16 +78,24 @@ def strip_error(asked, patch: Patch, found: dict) -> dict:
     That is the change to half as many strips on the mesh of `patch`, three times what second order leaves of it; four
     times the change to twice as many where half as many would not reach to the load line.
     """
-    count, roll, offset = asked.strips
-    if count < 2:
+    other, share = other_strips(asked)
+    if not share:
         return found
+    beside, here = values(pressed(other, patch.pair)), values(patch)
+    return {name: m if m.value is None else replace(m, error=m.error + share * abs(here[name] - beside[name]))
+            for name, m in found.items()}
+
+
+def other_strips(asked) -> tuple:
+    """(the `PatchModel` in half as many strips, times that the change to it counts as the error of the strips); in
+    twice as many where half as many would not reach to the load line; (itself, 0) without strips to halve."""
+    count, roll, offset = asked.strips or (1, 0.0, None)
+    if count < 2:
+        return asked, 0.0
     other, share = count // 2, 1.0
     if offset is not None and abs(offset) >= outermost(asked.width, other):
         other, share = 2 * count, 4.0
-    beside = values(pressed(replace(asked, strips=(other, roll, offset)), patch.pair))
-    here = values(patch)
-    return {name: m if m.value is None else replace(m, error=m.error + share * abs(here[name] - beside[name]))
-            for name, m in found.items()}
+    return replace(asked, strips=(other, roll, offset)), share
 
 
 def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:
@@ -345,7 +353,7 @@ def _wedge(patch: Patch) -> float:
     """Pressure [Pa] that the gap just beside a contact of few nodes allows at most: E* times its slope there."""
     x, active = patch.x, patch.active
     ends = np.flatnonzero(active[1:] != active[:-1])
-    slope = (np.abs(np.diff(patch.gap)) / np.diff(x))[ends].max()
+    slope = (np.abs(np.diff(patch.gap)) / np.diff(x))[..., ends].max()
     bending = [(1 - nu**2) / young for piece in (patch.pair.piece, patch.pair.upper)
                for young, nu in (max(piece.layers.coating, piece.layers.substrate),)]
     return float(slope / sum(bending))

@@ -1,6 +1,7 @@
 """The static patch of a scene: the pieces condensed to their interface, the gap between them, and what presses them."""
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -84,7 +85,8 @@ def solve(asked, grid, upper_grid=None, fresh: bool = False) -> Patch:
 def pressed(asked, pair: Pair, worn=None) -> Patch:
     """The pair under the shapes, the load and the holder of a `PatchModel`; the pair serves any number of them.
 
-    worn (m,) [m]: depth that wear has added to the gap. PatchfemError where a profile does not fit the mesh.
+    worn (m,) [m], of strips (s, m): depth that wear has added to the gap. PatchfemError where a profile does not fit
+    the mesh.
     """
     x = pair.compliance.interface.x
     gap, notes, seconds = asked.gap.at(x)
@@ -129,8 +131,16 @@ def _on(asked, pair: Pair, gap, notes: tuple, seconds: dict) -> Patch:
                  averaging=asked.gap.averaging(pieces.interface.x, pressure.sigma_n > 0))
 
 
+def areas(asked, interface) -> np.ndarray:
+    """Nodal areas (m,) [m2] of a `PatchModel` on an interface, of strips (s, m) those of each."""
+    if asked.strips is None:
+        return interface.weight
+    return np.repeat(interface.weight[None] / asked.strips[0], asked.strips[0], axis=0)
+
+
 def presser(asked, pair: Pair):
-    """A function of (worn (m,) [m], softening (m,) [m/N]) -> contact forces (m,) [N] of a `PatchModel`.
+    """A function of (worn (m,) [m], softening (m,) [m/N]) -> contact forces (m,) [N] of a `PatchModel`; of strips all
+    three are (s, m).
 
     worn adds to the gap, softening to the diagonal of the compliance; what they share is made once. PatchfemError where
     a profile does not fit the mesh.
@@ -138,6 +148,9 @@ def presser(asked, pair: Pair):
     gap, _, _ = asked.gap.at(pair.compliance.interface.x)
     gap, bare = gap + pair.rise, pair.compliance
     how = _how(asked)
+    if asked.strips is not None:
+        return lambda worn, softening: _how(asked, partial(_under, own=softening if softening.any() else None))(
+            asked, bare, gap + worn)[3].force
 
     def press(worn, softening):
         soft = replace(bare, normal=bare.normal + np.diag(softening)) if softening.any() else bare
@@ -151,21 +164,23 @@ def pressure_on(asked, pieces: Compliance, gap) -> Pressure:
     return _how(asked)(asked, pieces, gap)[1]
 
 
-def _how(asked):
-    """Function (asked, pieces, gap) -> (Compliance with its skin, Pressure, skin, strips) that presses the pair."""
+def _how(asked, under=None):
+    """Function (asked, pieces, gap) -> (Compliance with its skin, Pressure, skin, strips) that presses the pair; under:
+    that of a load, None for `_under`."""
+    under = under or _under
     if asked.approach is None or not (asked.rotates or asked.spring > 0):
-        return _under
+        return under
     bare = with_linear_skin if asked.skin is not None and asked.skin.law == "linear" else lambda skin, pieces: pieces
-    return lambda asked, pieces, gap: closed_by(asked, pieces, gap, _under, bare(asked.skin, pieces))
+    return lambda asked, pieces, gap: closed_by(asked, pieces, gap, under, bare(asked.skin, pieces))
 
 
-def _under(asked, pieces: Compliance, gap) -> tuple:
+def _under(asked, pieces: Compliance, gap, own=None) -> tuple:
     """The pair under its load, or under its approach with the rotation held: (Compliance with its skin, Pressure, skin,
-    strips)."""
+    strips); own: (s, m) [m/N] that strips add to their diagonals."""
     strips = skin = None
     angle, moment, spring = asked.gap.angle, asked.moment, asked.spring
     if asked.strips is not None:
-        pieces, pressure, skin, strips = strip_press.in_strips(asked, pieces, gap, angle, moment, spring)
+        pieces, pressure, skin, strips = strip_press.in_strips(asked, pieces, gap, (angle, moment, spring), own)
     elif asked.skin is not None and asked.skin.law != "linear":
         pieces, pressure, skin = skin_press.behind_skin(asked, pieces, gap, angle, moment, spring)
     else:

@@ -11,20 +11,22 @@ from ...slip import shear_modes
 from .skin import BEARING, borne, skin_law
 
 
-def in_strips(asked, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
+def in_strips(asked, pieces: Compliance, gap, held: tuple, own=None) -> tuple:
     """Press a pair in strips: (Compliance of all strips, Pressure of their means over the width, skin or None,
     StripsState).
 
-    The Compliance is what the pieces would have in full contact over the width; stiffnesses are those of the strips.
+    gap: (m,) or (s, m) [m]; held: rotation [rad], moment or None, spring of the holder; own: (s, m) [m/N] of
+    `press_strips`. The Compliance is what the pieces would have in full contact over the width; stiffnesses are those
+    of the strips.
     """
-    (count, roll, offset), interface = asked.strips, pieces.interface
+    (count, roll, offset), interface, (angle, moment, spring) = asked.strips, pieces.interface, held
     skin = skin_of(asked)
     by = asked.approach
     one, _, weight = one_strip(pieces, count)
     state = press_strips(one, interface.x, weight, strip_offsets(asked.width, count), gap, roll,
                          asked.load if by is None else None, moment if by is None else None, by, angle,
                          spring if by is None else 0.0, skin,
-                         lateral=None if offset is None else asked.load * offset)
+                         lateral=None if offset is None else asked.load * offset, own=own)
     mean = (borne(state.pressure) if smooth(skin) else state.pressure).mean(axis=0)
     answer = Pressure(frozen_array(mean), frozen_array(state.gap.min(axis=0)), state.delta, state.theta, state.load,
                       state.moment, state.outcome, state.iterations, state.residuals)

@@ -11,15 +11,17 @@ from time import perf_counter
 
 import numpy as np
 
+from ...contact.strips import strip_offsets
 from ...core import PatchfemError, frozen_array
 from ...disk.whole import whole
 from ...effects import unbuilt
 from ...wear.depth import critical_jump, rates, refuse_explicit
 from ...wear.jumps import Wearing, Worn, after, replayed, start
-from ..patch.press import pressed, presser
+from ..patch.measures import other_strips
+from ..patch.press import areas, pressed, presser
 from ..patch.values import values
 from ..rig.numerics import choose
-from .slip import Rubbed, even, frames_for, rubbed
+from .slip import Rubbed, apart, even, frames_for, rubbed
 
 STATE = tuple(Worn.__slots__)
 THIN = 1e-6  # share of a coating that may be left where it counts as worn through
@@ -31,8 +33,9 @@ MOMENT = ("cycle", "depth", "used", "pressure", "gap", "miss")
 class Moment:
     """The interface after `cycle` cycles.
 
-    depth [m] worn so far; used [m]: slip path per cycle of the last jump; pressure [Pa]; gap [m] that remains; all
-    (m,); miss: relative error of the slip path by its frames; values: measures of patch and motion by name.
+    depth [m] worn so far; used [m]: slip path per cycle of the last jump; both (m,), of strips (s, m); pressure [Pa];
+    gap [m] that remains; both (m,), of strips the mean pressure and the least gap over the width; miss: relative error
+    of the slip path by its frames; values: measures of patch and motion by name.
     """
 
     cycle: float
@@ -48,9 +51,10 @@ class Moment:
 class Evolved:
     """A wear run: the worn patch with those on coarser meshes (None where there are none), and the way there.
 
-    state: at the end; moments: after every jump, the first before any wear; depths: worn depth (k,) [m] on the coarser
-    meshes, each on its own nodes; miss: relative error of the slip path by its frames; stopped: why the cycles ended
-    early, else "".
+    state: at the end; moments: after every jump, the first before any wear; depths: worn depth (k,) [m], of strips
+    (s, k), on the coarser meshes, each on its own nodes; stripped: (patch, depth (t, m) [m]) of other strips by the
+    same jumps (`measures.other_strips`), None without; miss: relative error of the slip path by its frames; stopped:
+    why the cycles ended early, else "".
     """
 
     patch: object
@@ -58,6 +62,7 @@ class Evolved:
     state: Worn
     moments: tuple
     depths: tuple
+    stripped: tuple | None
     miss: float
     seconds: float
     stopped: str
@@ -74,7 +79,7 @@ class _Motion:
     def __init__(self, model, patch):
         self.model, self.pair = model, patch.pair
         self.frames = frames_for(model.accuracy.tolerance)
-        self.same = model.grooves is None and model.wear.friction is None and even(
+        self.same = model.grooves is None and model.wear.friction is None and not apart(model) and even(
             model, model.rig is not None and choose(model).per_point)
         self.last: Rubbed | None = None
 
@@ -90,14 +95,14 @@ class _Motion:
 
 
 def mean_depth(patch, depth) -> float:
-    """Worn volume over the area of the patch [m], of a depth (m,) [m]."""
+    """Worn volume over the area of the patch [m], of a depth (m,) [m], of strips (s, m)."""
     area = patch.pieces.interface.weight
-    return float(depth @ area / area.sum())
+    return float(np.atleast_2d(depth).mean(axis=0) @ area / area.sum())
 
 
 def worn_model(model, patch, depth):
-    """The model with grooves and friction as the mean of a worn depth (m,) [m] on its patch leaves them; itself where
-    it changes neither."""
+    """The model with grooves and friction as the mean of a worn depth (m,) or (s, m) [m] on its patch leaves them;
+    itself where it changes neither."""
     wear, new = model.wear, {}
     if model.grooves is not None:
         new["grooves"] = model.grooves.worn(mean_depth(patch, depth), wear.upper_share)
@@ -120,12 +125,13 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         text = unbuilt("beside a slide in two directions", "leave out [wear] or the lateral column")
         raise PatchfemError(text, "wear")
     clock, wear, motion, stopped = perf_counter(), model.wear, _Motion(model, patch), ""
-    asked = Wearing(presser(model.patch, patch.pair), motion, patch.pieces.interface.weight, wear.coefficient,
-                    wear.cycles, wear.explicit)
+    asked = Wearing(presser(model.patch, patch.pair), motion, areas(model.patch, patch.pieces.interface),
+                    wear.coefficient, wear.cycles, wear.explicit)
     try:
         state, moments = begin or _first(model, patch, asked, motion)
     except _Unbounded as why:
-        return Evolved(patch, tuple(coarse), None, (), (), 0.0, perf_counter() - clock, f"nothing was worn: {why}")
+        return Evolved(patch, tuple(coarse), None, (), (), None, 0.0, perf_counter() - clock,
+                       f"nothing was worn: {why}")
     if begin is not None:
         patch = pressed(model.patch, patch.pair, frozen_array(state.depth))
     while state.cycle < wear.cycles and worn_through(model, state.depth) is None:
@@ -141,15 +147,16 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         if progress is not None:
             progress(state.cycle / wear.cycles)
     others = [one for one in coarse if one is not None]
-    depths = tuple(_on(model, patch, other, moments) for other in others)
-    worn = [pressed(model.patch, other.pair, frozen_array(depth)) for other, depth in zip(others, depths)]
-    return Evolved(patch, (*worn, *(None for one in coarse if one is None)), state, moments, depths,
+    worn, depths = zip(*(_on(model.patch, model, patch, other, moments) for other in others)) if others else ((), ())
+    other, share = other_strips(model.patch)
+    stripped = _on(other, model, patch, patch, moments) if share and others else None
+    return Evolved(patch, (*worn, *(None for one in coarse if one is None)), state, moments, depths, stripped,
                    moments[-1].miss, perf_counter() - clock, stopped)
 
 
 def worn_through(model, depth) -> tuple | None:
-    """(name, thickness [m]) of the piece whose coating is gone where the depth (m,) [m] of both is largest, else
-    None."""
+    """(name, thickness [m]) of the piece whose coating is gone where the depth (m,) or (s, m) [m] of both is largest,
+    else None."""
     share, name, thickness = max(_taken(model, depth), default=(0.0, "", 0.0))
     return (name, thickness) if share >= 1 - THIN else None
 
@@ -191,12 +198,12 @@ def next_row(wear, asked: Wearing, state: Worn) -> float:
     than a tenth of the way between them; a jump past a row would not see what lies between.
     """
     change, weight = wear.friction, asked.area / asked.area.sum()
-    mean = float(state.depth @ weight)
+    mean = float(np.vdot(state.depth, weight))
     ahead = [] if change is None or wear.jumps else [row for row in change.depth if row > mean]
     if not ahead:
         return np.inf
     near = len(ahead) > 1 and ahead[0] - mean < 0.1 * (ahead[1] - ahead[0])
-    rate = float(rates(asked.coefficient, state.path, asked.area) * state.force @ weight)
+    rate = float(np.vdot(rates(asked.coefficient, state.path, asked.area) * state.force, weight))
     return state.cycle + (ahead[near] - mean) / rate if rate > 0 else np.inf
 
 
@@ -209,8 +216,8 @@ def _first(model, patch, asked: Wearing, motion: _Motion) -> tuple:
 
 
 def _moment(patch, state: Worn, motion: _Motion) -> Moment:
-    area = patch.pieces.interface.weight
-    worn = {"worn_volume": float(state.depth @ area), "worn_depth_max": float(state.depth.max(initial=0.0))}
+    area = areas(motion.model.patch, patch.pieces.interface)
+    worn = {"worn_volume": float(np.vdot(state.depth, area)), "worn_depth_max": float(state.depth.max(initial=0.0))}
     after_wear = worn_model(motion.model, patch, state.depth)
     if motion.model.grooves is not None:
         left = after_wear.grooves
@@ -223,10 +230,20 @@ def _moment(patch, state: Worn, motion: _Motion) -> Moment:
                   values(patch) | motion.last.values | worn)
 
 
-def _on(model, patch, other, moments) -> np.ndarray:
-    """Worn depth on a coarser mesh by the same jumps and slip paths."""
-    legs = [(two.cycle - one.cycle, np.interp(other.x, patch.x, two.used)) for one, two in pairwise(moments)]
-    return replayed(presser(model.patch, other.pair), other.pieces.interface.weight, model.wear.coefficient, legs)
+def _on(asked, model, patch, other, moments) -> tuple:
+    """(patch, worn depth) of a `PatchModel` on another mesh, or in other strips, by the same jumps and slip paths."""
+    area = areas(asked, other.pieces.interface)
+
+    def path(used) -> np.ndarray:
+        if asked.strips is None:
+            return np.interp(other.x, patch.x, used)
+        rows = np.array([np.interp(other.x, patch.x, row) for row in used])
+        y, own = (strip_offsets(asked.width, len(one)) for one in (area, rows))
+        return np.array([np.interp(y, own, column) for column in rows.T]).T
+
+    legs = [(two.cycle - one.cycle, path(two.used)) for one, two in pairwise(moments)]
+    depth = replayed(presser(asked, other.pair), area, model.wear.coefficient, legs)
+    return pressed(asked, other.pair, frozen_array(depth)), depth
 
 
 def _critical(model, patch, state: Worn) -> float:

@@ -7,13 +7,15 @@ import numpy as np
 
 from ...core import Measure, Outcome, frozen_array, say
 from ..patch.limits import limit
-from ..patch.press import pressed
+from ..patch.measures import other_strips
+from ..patch.press import areas, pressed
 from ..patch.values import values
 from ..results.patch_rows import TABLE
 from .evolve import THIN, mean_depth, worn_through
 from .slip import UNBOUNDED, of_point
 
 FRAMES = 24  # of the interface on the way
+STRIPS = 1.5  # the wear of a corner settles with the strips a little slower than to first order
 HOLDER = {"closing": "approach", "rotation": "rotation"}
 
 
@@ -32,7 +34,7 @@ def worn(result, found, estimate: bool = True):
     fields = frames(found, result.fields, period)
     shown = {"period": period, "states": len(fields["time"]) - len(result.fields["time"])}
     static = jumped(model, found, result.measures) if estimate else {}
-    lost = of_patch(found, result.measures, estimate)
+    lost = of_patch(model, found, result.measures, estimate)
     if model.wear.friction is not None:
         lost |= friction_of(model, found, result.measures, lost["worn_volume"].error)
     gone, notes = _gone(model, found, lost["worn_depth_max"].error), result.extra.get("notes", [])
@@ -49,8 +51,8 @@ def _gone(model, found, error: float | None) -> dict:
         return {}
     before, last = found.moments[-2:]
     deepest = int(np.argmax(last.depth))
-    rate = float(last.depth[deepest] - before.depth[deepest]) / (last.cycle - before.cycle)
-    off = None if error is None else (error + THIN * float(last.depth[deepest])) / rate
+    rate = float(last.depth.flat[deepest] - before.depth.flat[deepest]) / (last.cycle - before.cycle)
+    off = None if error is None else (error + THIN * float(last.depth.flat[deepest])) / rate
     row = TABLE["worn_through_cycle"]
     return {row.name: Measure(last.cycle, row.unit, off, row.floor)}
 
@@ -60,8 +62,11 @@ def _ended(model, found, gone: dict) -> list:
     if not gone:
         return []
     (name, thickness), depth = worn_through(model, found.state.depth), found.state.depth
-    place = float(found.patch.x[int(np.argmax(depth))])
-    return [f"the coating of the {name} piece, {say(thickness)}, is worn through at x = {say(place, 3)} after "
+    strip, node = divmod(int(np.argmax(depth)), found.patch.x.size)
+    place = f"x = {say(float(found.patch.x[node]), 3)}"
+    if model.patch.strips is not None:
+        place += f" of the strip at y = {say(float(found.patch.strips.offsets[strip]), 3)}"
+    return [f"the coating of the {name} piece, {say(thickness)}, is worn through at {place} after "
             f"{found.state.cycle:.6g} of {model.wear.cycles:.6g} cycles; the measures are of the patch then"]
 
 
@@ -69,12 +74,15 @@ def jumped(model, found, measures: dict) -> dict:
     """Measures of the worn patch with what the length of the jumps adds to their errors.
 
     That is twice the change to the depth by the same jumps undivided, of few jumps more, four times of two and of a
-    single one: in a long jump a moving contact edge leaves the nodes it has just taken too high, on both.
+    single one: in a long jump a moving contact edge leaves the nodes it has just taken too high, on both. Strips add
+    what other strips change.
     """
     times = min(2 + (4 / model.wear.jumps if model.wear.jumps else 0), 4)
     rough = values(pressed(model.patch, found.patch.pair, frozen_array(found.state.rough)))
     here = values(found.patch)
-    return {name: replace(m, error=m.error + times * abs(here[name] - rough[name])) for name, m in measures.items()
+    other, share = values(found.stripped[0]) if found.stripped else here, STRIPS * other_strips(model.patch)[1]
+    added = {name: times * abs(here[name] - rough[name]) + share * abs(here[name] - other[name]) for name in here}
+    return {name: replace(m, error=m.error + added[name]) for name, m in measures.items()
             if name in here and m.error is not None}
 
 
@@ -106,21 +114,23 @@ def slip_miss(measures: dict) -> float:
     return 0.0
 
 
-def of_patch(found, motion: dict, estimate: bool = True) -> dict:
+def of_patch(model, found, motion: dict, estimate: bool = True) -> dict:
     """worn_volume and worn_depth_max of an `Evolved`; motion: measures of the run on the worn patch."""
-    state, area = found.state, found.patch.pieces.interface.weight
+    state, area = found.state, areas(model.patch, found.patch.pieces.interface)
     share = found.miss + slip_miss(motion) + _coarser(found, motion)
-    mine, *others = [{"worn_volume": float(depth @ weight), "worn_depth_max": float(depth.max(initial=0.0))}
-                       for depth, weight in [(state.depth, area), *((depth, one.pieces.interface.weight)
-                                             for one, depth in zip(found.coarse, found.depths))]]
-    jumps = {"worn_volume": float(np.abs(state.depth - state.rough) @ area) + state.strayed * float(area.sum()),
+    mine, *others = [_lost(model.patch, *one) for one in [(found.patch, state.depth),
+                                                          *zip(found.coarse, found.depths)]]
+    asked, times = other_strips(model.patch)
+    strips = _lost(asked, *found.stripped) if found.stripped else mine
+    jumps = {"worn_volume": float(np.vdot(np.abs(state.depth - state.rough), area)) + state.strayed * float(area.sum()),
              "worn_depth_max": state.error}
     out = {}
     for name, value in mine.items():
         error = None
         if others and estimate:
             meshes = limit([*(one[name] for one in reversed(others)), value])
-            error = jumps[name] + share * value + meshes.error + 1e-12 * value
+            error = jumps[name] + share * value + meshes.error + 1e-12 * value + STRIPS * times * abs(strips[name]
+                                                                                                      - value)
         out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor)
     left = found.moments[-1].values.get("groove_amplitude")
     if left is not None:
@@ -171,6 +181,12 @@ def _beyond_table(model, found) -> list:
     return out
 
 
+def _lost(asked, patch, depth) -> dict:
+    """Worn volume [m3] and largest depth [m] of a `PatchModel` by name."""
+    return {"worn_volume": float(np.vdot(depth, areas(asked, patch.pieces.interface))),
+            "worn_depth_max": float(depth.max(initial=0.0))}
+
+
 def _coarser(found, motion: dict) -> float:
     """Relative difference between the slip of the last cycle that wore the patch and that of the run on the worn patch,
     whose steps may have been halved for its tolerance."""
@@ -187,7 +203,8 @@ def volume_of_point(model, result, estimate: bool = True) -> dict:
 
 
 def frames(found, fields: dict, period: float) -> dict:
-    """Fields (frame, x) of the way and of the last cycle: states after some of the jumps first, then the motion.
+    """Fields (frame, x), of strips their worn depth as (frame, strip, x), of the way and of the last cycle: states
+    after some of the jumps first, then the motion.
 
     The time of a state is its cycle times the period [s], the last cycle follows on.
     """
@@ -199,7 +216,7 @@ def frames(found, fields: dict, period: float) -> dict:
               "normal_stress": np.array([one.pressure for one in shown]).reshape(count, m),
               "gap": np.array([one.gap for one in shown]).reshape(count, m),
               "status": np.array([one.pressure > 0 for one in shown], np.int8).reshape(count, m),
-              "worn_depth": np.array([one.depth for one in shown]).reshape(count, m)}
+              "worn_depth": np.array([one.depth for one in shown]).reshape(count, *found.state.depth.shape)}
     moving = fields | {f"holder_{name}": np.full(len(fields["time"]), getattr(found.patch.pressure, of))
                        for name, of in HOLDER.items()}
     states |= {f"holder_{name}": np.array([one.values[of] for one in shown]) for name, of in HOLDER.items()}

@@ -10,6 +10,7 @@ from ...response.outcome import settle
 from ..bench import bench
 from ..bench.closed import over_steps
 from ..bench.engine import steps_of
+from ..patch.press import areas
 from ..results.travel import outcome_on_piece
 from ..rig.engines import ENGINES
 from ..rig.fields import fields_of
@@ -22,9 +23,10 @@ LEAST_FRAMES, MOST_FRAMES = 64, 800
 class Rubbed(NamedTuple):
     """What one cycle of a motion does to the interface.
 
-    path (m,) [m]: slip path of each node, or with form 'energy' its friction work per area over its pressure, along the
-    flanks of grooves where there are any; miss: its relative error by the frames it is read from, and by what the
-    cycles of the window still differ; values: measures of the motion; outcome: why no cycle repeats, else None.
+    path (m,), of strips (s, m) [m]: slip path of each node, or with form 'energy' its friction work per area over its
+    pressure, along the flanks of grooves where there are any; miss: its relative error by the frames it is read from,
+    and by what the cycles of the window still differ; values: measures of the motion; outcome: why no cycle repeats,
+    else None.
     """
 
     path: np.ndarray
@@ -42,8 +44,13 @@ def frames_for(tolerance: float) -> int:
 
 
 def even(model, per_point: bool = False) -> bool:
-    """Whether every point of the patch slides alike."""
-    return not model.soft and not per_point and model.side == "upper"
+    """Whether every point of the patch, or of each of its strips, slides alike."""
+    return not model.soft and model.side == "upper" and (model.patch.strips is not None or not per_point)
+
+
+def apart(model) -> bool:
+    """Whether strips slide each by themselves, as wear then changes."""
+    return model.rig is not None and model.rig.strips_slide_apart
 
 
 def rubbed(model, patch, frames: int) -> Rubbed:
@@ -91,6 +98,8 @@ def _rig(model, patch, frames: int) -> Rubbed:
                 window.time.size, patch.pressure.load)))
             local, tau = slip_path_of(model, patch, slide, lifted, local, tau)
         out = _read(model, patch, local, tau, True, found.values, outcome)
+    elif apart(model):
+        out = _in_strips(model, patch, found, outcome)
     else:
         out = _alike(model, patch, last, patch.pressure.load, found.values, outcome)
     return out._replace(miss=out.miss + beat)
@@ -125,6 +134,26 @@ def _last_cycle(model, window, load: float) -> list:
     return [part[last] for part in (window.slide, window.slip, window.force, loads)]
 
 
+def _in_strips(model, patch, found, outcome) -> Rubbed:
+    """The path of every strip of a rig whose modes yaw, along x; an open strip slides as the nearest that bears.
+
+    Every third sample tells what turns between samples hide, as in `_read`.
+    """
+    window, loads = found.window, patch.strips.force.sum(axis=1)
+    last = window.time >= window.time[-1] - model.rig.drive.period * (1 + 1e-9)
+    slips, forces = window.extra.get("slips", window.extra["slides"])[last], window.extra["forces"][last]
+    weight = np.abs(forces) / np.where(loads > 0, loads, 1.0) if model.wear.energy else np.ones_like(slips)
+
+    def path(some) -> np.ndarray:
+        return np.array([_summed(slip, heavy) for slip, heavy in zip(slips[some].T, weight[some].T)])
+
+    whole, ends = path(np.arange(len(slips))), [0, len(slips) - 1]
+    lost = [(whole - path(np.unique([*ends, *range(first, len(slips), 3)]))) @ loads for first in range(3)]
+    total, nearest = float(whole @ loads), _nearest(patch.strips.offsets, loads > 0)
+    return Rubbed(np.repeat(whole[nearest, None], patch.x.size, axis=1),
+                  1.5 * float(np.mean(np.abs(lost))) / total if total > 0 else 0.0, found.values, outcome)
+
+
 def _alike(model, patch, last: list, scale: float, values: dict, outcome) -> Rubbed:
     """The path of a slide that is the same at every point: its length under `scale` [N], from slide, slip, force and
     load (k,) of the last cycle."""
@@ -136,7 +165,8 @@ def _alike(model, patch, last: list, scale: float, values: dict, outcome) -> Rub
     path = _summed(slip, weight) / scale if scale > 0 else 0.0
     if model.grooves is not None and path > 0:
         miss = abs(path - _summed(slip[::2], weight[::2]) / scale) / path
-    return Rubbed(np.full(1 if patch is None else patch.x.size, path), miss, values, outcome)
+    return Rubbed(np.full(1 if patch is None else areas(model.patch, patch.pieces.interface).shape, path), miss, values,
+                  outcome)
 
 
 def _summed(slip, weight) -> float:

@@ -18,7 +18,7 @@ def check_wear(draft: Draft, kind: str) -> None:
         return
     if kind == "patch":
         draft.say("wear", "nothing slides: wear needs [friction] with [slide], or with [structure] and [drive]")
-    for key, words in _beside(tables, kind):
+    for key, words in _beside(draft, tables, kind):
         draft.say("wear", unbuilt(f"beside {key}", words))
     if draft.given("wear.scheme") and tables.wear.scheme == "explicit" and not draft.given("wear.jumps"):
         draft.lacks("wear.jumps", "scheme 'explicit' needs the number of its jumps")
@@ -78,7 +78,17 @@ def _coated(contact) -> bool:
     return contact is not None and any(one is not None and one.coating is not None for one in (contact, *pieces))
 
 
-def _beside(tables, kind: str):
+def _beside_strips(draft: Draft, contact):
+    """What wear of strips does not go with, each with what to do."""
+    if contact.gives_way:
+        yield f"contact.strips with {contact.gives_way}", LATER.format("either")
+    if any(shape.on == "lower" for shape in contact.shapes.values()):
+        yield "contact.strips with a shape on the lower piece", LATER.format("put all shapes on the upper piece")
+    if draft.given("wear.scheme") and draft.tables.wear.scheme == "explicit":
+        yield "contact.strips with scheme 'explicit'", LATER.format("leave out wear.scheme")
+
+
+def _beside(draft: Draft, tables, kind: str):
     """Tables and values that wear does not go with, each with what to do."""
     contact, structure, drive = tables.contact, tables.structure, tables.drive
     method = tables.accuracy and tables.accuracy.method  # None where [accuracy] could not be read
@@ -86,13 +96,13 @@ def _beside(tables, kind: str):
     if grooves is not None and tables.normal is not None and grooves[1].amplitude:
         yield f"[{grooves[0]}]", "a point has no area from which the wear lowers the grooves: use [contact]"
     if contact is not None and contact.strips is not None:
-        yield "contact.strips", LATER.format("the strips")
+        yield from _beside_strips(draft, contact)
     if tables.normal is not None and tables.normal.amplitude and kind == "rig":
         yield "normal.amplitude", LATER.format("the amplitude")
     if structure is not None and structure.interface:
         yield "[[structure.interface]]", LATER.format("write one interface as [friction] and [normal]")
-    if structure is not None and any(mode.normal or mode.pitch or mode.yaw for mode in structure.mode or ()):
-        yield "modes with normal, pitch or yaw", LATER.format("these keys")
+    if structure is not None and any(mode.normal or mode.pitch for mode in structure.mode or ()):
+        yield "modes with normal or pitch", LATER.format("these keys")
     if kind == "rig" and drive is not None and (drive.kind == "free" or drive.waveform not in (None, "sine")):
         yield f"a drive '{drive.kind if drive.kind == 'free' else drive.waveform}'", \
             "wear repeats the last cycle of a steady motion: use " + \

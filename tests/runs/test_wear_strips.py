@@ -1,0 +1,152 @@
+"""Wear beside strips: every strip by its own pressure and slip, against one dense problem and closed forms."""
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import cli
+from scene_texts import COATED, COULOMB, MODE, PIECE, mistakes
+
+import patchfem as pf
+from patchfem.contact.unilateral import solve_forces
+from patchfem.model.model import build
+from patchfem.runs.patch.press import areas, presser
+from patchfem.runs.patch.result import solve_all
+from patchfem.runs.wear import evolve
+from patchfem.scene.scene import loads
+from patchfem.wear.jumps import Wearing, after, start
+
+STRIPS = '[contact.strips]\ncount = 4\n'
+ROLLED = STRIPS + 'roll = "0.1 mrad"\n'
+TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
+SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
+WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 135723\n'
+LOOSE = "[accuracy]\ntolerance = 1e-2\n"
+DRIVEN = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 60\n'
+LOAD, VOLUME = 26 * 4.4482216152605, 1e-14 * 26 * 4.4482216152605 * 40e-6 * 135723
+
+
+def ran(text, **sets):
+    return pf.run(loads(text, "strips.toml"), **sets)
+
+
+def worn(result) -> np.ndarray:
+    return result.fields["worn_depth"][-1]
+
+
+def test_exact_strips_without_roll_wear_as_one_patch():
+    plain, strips = (ran(TILTED + beside + COULOMB + SINE + WEAR + LOOSE) for beside in ("", STRIPS))
+    assert worn(strips).shape == (4, worn(plain).size)
+    assert np.abs(worn(strips) - worn(plain)).max() < 1e-13 * worn(plain).max()
+    for name in ("worn_volume", "worn_depth_max", "pressure_peak", "approach", "normal_stiffness"):
+        assert strips.measures[name].value == pytest.approx(plain.measures[name].value, rel=1e-9)
+
+
+def test_exact_volume_and_depth_of_rolled_strips_mirror_with_the_roll():
+    one, other = (ran(TILTED + ROLLED.replace("0.1", roll) + COULOMB + SINE + WEAR + LOOSE) for roll in ("0.1", "-0.1"))
+    assert one.measures["worn_volume"].value == pytest.approx(VOLUME, rel=1e-12)
+    assert np.abs(worn(one) - worn(other)[::-1]).max() < 1e-9 * worn(one).max()
+    assert worn(one).max(axis=1)[0] == one.measures["worn_depth_max"].value
+    assert (np.diff(worn(one).max(axis=1)) <= 0).all()  # a roll opens at +y
+
+
+def test_exact_jumps_of_strips_are_those_of_one_block_diagonal_problem():
+    model = build(loads(TILTED + ROLLED + COULOMB + SINE + WEAR + LOOSE, "strips.toml"))
+    pair = solve_all(model.patch, 1e-2, False)[0].pair
+    x, area = pair.compliance.interface.x, areas(model.patch, pair.compliance.interface)
+    gap = (model.patch.gap.at(x)[0] + 1e-4 * (np.arange(4) - 1.5)[:, None] * 12.7e-3 / 4).ravel()
+    dense, path = np.kron(np.eye(4), 4 * pair.compliance.normal), np.linspace(1, 2, area.size) * 40e-6
+
+    def press(depth, softening):
+        return solve_forces(dense + np.diag(softening), np.tile(x, 4), gap + depth, np.array([LOAD]))[0]
+
+    asked = [Wearing(press, lambda _: path, area.ravel(), 1e-14, 1e5),
+             Wearing(presser(model.patch, pair), lambda _: path.reshape(area.shape), area, 1e-14, 1e5)]
+    flat, strips = (start(one) for one in asked)
+    for _ in range(3):
+        flat, strips = (after(one, state, 1e-2, 20) for one, state in zip(asked, (flat, strips)))
+    assert np.abs(strips.depth.ravel() - flat.depth).max() < 1e-9 * flat.depth.max()
+    assert np.abs(strips.force.ravel() - flat.force).max() < 1e-9 * LOAD
+
+
+def test_exact_a_rolled_pad_on_springs_evens_its_pressure_out():
+    """Winkler: p = p_mean + (p_0 - p_mean) exp(-kappa s k N) in full contact, on pieces that hardly give way."""
+    stiff = PIECE + 'load = "26 lbf"\nelement_size = "4 mm"\nsubstrate = {young = "1e17 Pa", poisson = 0.3, ' \
+        'density = "1000 kg/m^3"}\n'
+    skin, k, n = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e12 Pa/m"\n', 1e12, 5e4
+    found = ran(stiff + skin + ROLLED.replace("0.1", "0.05") + COULOMB + SINE + WEAR.replace("135723", "5e4")
+                + "[accuracy]\ntolerance = 1e-4\n")
+    y, mean = (np.arange(4) - 1.5) * 12.7e-3 / 4, LOAD / 12.7e-3**2
+    first = -k * 0.05e-3 * y
+    assert (mean + first > 0).all()
+    share = 1e-14 * 40e-6 * n
+    expected = mean * share + first / k * (1 - np.exp(-share * k))
+    assert np.abs(worn(found) - expected[:, None]).max() < 2e-4 * expected.max()
+
+
+@pytest.mark.slow
+def test_always_few_strips_say_how_wrong_they_are():
+    text = TILTED + ROLLED + COULOMB + SINE + WEAR + LOOSE
+    few, many = (ran(text.replace("count = 4", f"count = {count}")).measures for count in (4, 16))
+    for name in ("worn_depth_max", "pressure_peak", "approach", "contact_fraction", "normal_stiffness"):
+        assert abs(few[name].value - many[name].value) <= few[name].error + many[name].error, name
+
+
+@pytest.mark.parametrize("yaw", ["0", "20"])
+def test_exact_a_rig_wears_its_strips_by_their_own_slides(yaw):
+    mode = MODE + f'yaw = "{yaw} rad/m"\n'
+    found = ran(COATED + STRIPS + COULOMB + mode + DRIVEN + WEAR.replace("135723", "1e3") + "jumps = 1\n" + LOOSE)
+    slides, last = found.window.extra.get("slides"), found.window.time >= found.window.time[-1] - (1 + 1e-9) / 143
+    volumes = worn(found).mean(axis=1) * 12.7e-3**2 / 4
+    if yaw == "0":
+        assert slides is None
+        expected = np.full(4, found.measures["slip_amplitude"].value)
+    else:
+        expected = np.ptp(slides[last], axis=0) / 2
+        assert np.ptp(expected) > 1e-2 * expected.mean()
+    assert volumes == pytest.approx(1e-14 * LOAD / 4 * 4 * expected * 1e3, rel=5e-3)
+
+
+def test_exact_files_hold_the_depth_of_every_strip(tmp_path):
+    scene = tmp_path / "strips.toml"
+    scene.write_text(TILTED + ROLLED + COULOMB + SINE + WEAR + LOOSE)
+    assert cli("run", scene, "-o", tmp_path / "out", "-q").code == 0
+    with xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as data, \
+            h5py.File(tmp_path / "out" / "fields.vtkhdf") as file:
+        assert data.worn_depth.dims == ("frame", "strip", "x") and data.unloaded_gap.dims == ("strip", "x")
+        depth = data.worn_depth.values
+        assert float((data.worn_depth[-1] * data.weight / 4).sum()) == pytest.approx(VOLUME, rel=1e-12)
+        block = file["VTKHDF/strips"]
+        sides = block["Points"][:].reshape(4, 2, -1, 3)
+        held = block["PointData/worn_depth"][:].reshape(len(depth), 4, 2, -1)
+        assert np.abs(sides[..., 2].mean(axis=1) - data.strip_offset.values[:, None]).max() < 1e-9
+        assert np.abs(held - depth[:, :, None]).max() < 1e-6 * depth.max()
+    assert "in every strip over the width" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_exact_an_interrupted_run_of_strips_goes_on_to_the_same_bits(tmp_path):
+    model = build(loads(TILTED + ROLLED + COULOMB + SINE + WEAR + LOOSE, "strips.toml"))
+    patch, *coarse = solve_all(model.patch, 1e-2)
+    kept = []
+    whole = evolve.evolve(model, patch, coarse[:2], keep=lambda *state: kept.append(state))
+    evolve.save_state(tmp_path / "state.npz", "key", *kept[2])
+    on = evolve.evolve(model, patch, coarse[:2], begin=evolve.load_state(tmp_path / "state.npz", "key"))
+    assert 3 < len(on.moments) == len(whole.moments)
+    for name in ("depth", "force", "rough", "path"):
+        assert np.array_equal(getattr(on.state, name), getattr(whole.state, name))
+    assert np.array_equal(on.stripped[1], whole.stripped[1]) and np.array_equal(on.depths[0], whole.depths[0])
+
+
+def test_refuses_what_strips_do_not_wear_beside():
+    text = TILTED + STRIPS + COULOMB + SINE + WEAR
+    assert any("explicit" in line for line in mistakes(text + 'scheme = "explicit"\njumps = 40\n'))
+    soft = TILTED + STRIPS + "[contact.shear]\n" + COULOMB + MODE + DRIVEN + WEAR
+    assert any("contact.strips with [contact.shear]" in line for line in mistakes(soft))
+
+
+def test_exact_friction_over_the_worn_depth_is_alike_in_strips():
+    table = '[wear.friction]\ndepth = ["0 um", "20 nm", "60 nm"]\ncoefficient_factor = [1, 1.3, 1.5]\n'
+    plain, strips = (ran(TILTED + beside + COULOMB + SINE + WEAR + table + LOOSE) for beside in ("", STRIPS))
+    assert plain.measures["static_coefficient"].value > 0.32
+    for name in ("static_coefficient", "worn_volume", "loop_area"):
+        assert strips.measures[name].value == pytest.approx(plain.measures[name].value, rel=1e-9)
