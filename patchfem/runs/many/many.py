@@ -59,7 +59,7 @@ def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least
 BATCHES: tuple[Batch, ...] = (_batch("patches", "patch", together=512),
                               _batch("lumped.lanes", "rig", compile=6.0, least=64, columns=True, together=64),
                               _batch("lumped.lumped", "rig", compile=12.0),
-                              _batch("lumped.sheared", "rig", 0.4, 12.0, together=16),
+                              _batch("lumped.sheared", "rig", 0.4, 12.0, together=64),
                               _batch("gathered", "rig", 0.2, least=32))
 
 

@@ -118,8 +118,13 @@ def zigzags(x, sigma) -> float:
 def _on(asked, pair: Pair, gap, notes: tuple, seconds: dict) -> Patch:
     """The pair pressed on the gap (m,) [m]; notes and seconds of what made it."""
     begin = perf_counter()
-    pieces, pressure, skin, strips = _how(asked)(asked, pair.compliance, gap)
-    seconds = seconds | {"press": perf_counter() - begin}
+    how = _how(asked)(asked, pair.compliance, gap)
+    return as_patch(asked, pair, gap, notes, seconds | {"press": perf_counter() - begin}, how)
+
+
+def as_patch(asked, pair: Pair, gap, notes: tuple, seconds: dict, how: tuple) -> Patch:
+    """The Patch of a pair pressed on the gap (m,) [m]; how: (Compliance with its skin, Pressure, skin, strips)."""
+    pieces, pressure, skin, strips = how
     giving = pieces.tangential
     if not asked.shear:
         giving = frozen_array(giving - pair.compliance.tangential)

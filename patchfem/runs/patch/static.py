@@ -5,17 +5,19 @@ end once inside it (`contact.many`). What presses otherwise is left to single ru
 """
 
 from itertools import pairwise
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from ...contact.many.anchored import Anchored
+from ...core import Outcome, Pressure, frozen_array
 from ...elasticity.lapack import one_thread
 from ...mesh.tensor import TensorGrid
 from . import measures as one_by_one
 from .condensed import Pair, shared_pairs
 from .measures import Hidden, combined, least_of
-from .press import with_linear_skin
+from .press import as_patch, with_linear_skin
 from .values import peak_pressure, vertex
 
 SOLVED = 1e-12  # largest residual, as `contact.unilateral` has it
@@ -24,19 +26,22 @@ BORDER = 3  # nodes whose means give the pressure at an end
 
 class SolvedPatch(NamedTuple):
     """A patch solved together with others: static measures by name; top [Pa]: largest nodal pressure; approach [m] of
-    the finest mesh; band: sentences on the plane state, as `measures.plane_band` has them; nodes: of the interface."""
+    the finest mesh; band: sentences on the plane state, as `measures.plane_band` has them; nodes: of the interface;
+    patches: the solved Patch on the finest mesh and on the next one, () where nobody asked."""
 
     measures: dict
     top: float
     approach: float
     band: list
     nodes: int
+    patches: tuple = ()
 
 
 class LevelValues(NamedTuple):
     """What q patches have on one level: values: name -> (q,); count: (q,) nodes in contact; cell: (q,) [m] in which the
     contact ends, 0 of full contact; spread, corner: (q,) as `Hidden` has them; top: (q,) largest nodal pressure [Pa];
-    inside: (q,) whether no border of the interface bears as much; good: (q,) whether it was solved."""
+    inside: (q,) whether no border of the interface bears as much; good: (q,) whether it was solved; force (q, m) [N]
+    and opening (q, m) [m] of the nodes."""
 
     values: dict
     count: np.ndarray
@@ -46,6 +51,8 @@ class LevelValues(NamedTuple):
     top: np.ndarray
     inside: np.ndarray
     good: np.ndarray
+    force: np.ndarray
+    opening: np.ndarray
 
 
 def not_together(asked) -> str:
@@ -67,11 +74,12 @@ def pressing_kind(asked) -> tuple:
     return asked.meshes.name, skin, asked.moment is None
 
 
-def pressed_together(patches, tolerance: float) -> list:
+def pressed_together(patches, tolerance: float, moving: bool = False) -> list:
     """Each of `PatchModel`s alike in their pieces and in `pressing_kind` as SolvedPatch; None of those that do not
     press as this module can.
 
-    tolerance: relative error beyond which values are extrapolated.
+    tolerance: relative error beyond which values are extrapolated; moving: the solved patches are wanted as well, by
+    what moves them.
     """
     pairs = shared_pairs(patches[0])
     if any(pair.closing.any() for pair in pairs):
@@ -100,8 +108,22 @@ def pressed_together(patches, tolerance: float) -> list:
         found = combined([rows[k] for rows in series], least_of(hidden, mine), nested, stated, alike)
         found = one_by_one.reaching(found, float(fine.top[k])) if fine.inside[k] else found
         band = one_by_one.band_words(patches[k], series[-2][k], theirs[k]) if theirs is not None else []
-        out.append(SolvedPatch(found, float(fine.top[k]), mine["approach"], band, pair.compliance.interface.x.size))
+        solved = tuple(_patch_of(patches[k], *one, k) for one in zip(pairs[:2], levels)) if moving else ()
+        out.append(SolvedPatch(found, float(fine.top[k]), mine["approach"], band, pair.compliance.interface.x.size,
+                               solved))
     return out
+
+
+def _patch_of(asked, pair: Pair, level: LevelValues, k: int):
+    """The k-th patch of a level, of the PatchModel `asked`, as `press.pressed` gives it by itself."""
+    x, weight, bare = pair.compliance.interface.x, pair.compliance.interface.weight, pair.compliance
+    gap, notes, seconds = asked.gap.at(x)
+    value = {name: float(column[k]) for name, column in level.values.items()}
+    pressure = Pressure(frozen_array(level.force[k] / weight), frozen_array(level.opening[k]), value["approach"],
+                        value["rotation"], value["normal_load"], value["moment"], Outcome.DONE, 1,
+                        MappingProxyType({}))
+    pieces = bare if asked.skin is None else with_linear_skin(asked.skin, bare)
+    return as_patch(asked, pair, gap + pair.rise, notes, seconds, (pieces, pressure, None, None))
 
 
 def _in_other_plane(patches) -> LevelValues | None:
@@ -167,7 +189,8 @@ def _from_one_end(patches, pair: Pair, gaps, way: int) -> LevelValues:
     cell = np.where(count < m, cells[np.minimum(count, m - 1) - 1], 0.0)
     top = sigma.max(axis=1)
     inside = (sigma[:, 0] < top) & (sigma[:, -1] < top)
-    return LevelValues(values, count, cell, np.ptp(g, axis=1) + moved, corner, top, inside, good)
+    return LevelValues(values, count, cell, np.ptp(g, axis=1) + moved, corner, top, inside, good,
+                       found.force[:, turned], found.opening[:, turned])
 
 
 def corner_layers(pair: Pair, sigma, cells):

@@ -1,7 +1,8 @@
 """Patches that slip part by part, on one mode under a sine, many together.
 
-Each patch is pressed and measured as its run does it. Its elements, and those of its coarser mesh for the error, then
-move without histories, as `pieces` has it. A case that sticks, or rings in its sticks, is run by itself.
+Patches that share their pieces are pressed together (`runs.patch.static`), others as their own runs do it. Their
+elements, and those of the coarser mesh for the error, then move without histories, as `pieces` has it. A case that
+sticks, or rings in its sticks, is run by itself.
 """
 
 from collections.abc import Sequence
@@ -17,13 +18,14 @@ from ....model.model import Model
 from ....model.source import placed
 from ....response.errors import pieces_error
 from ...patch import result as of_patch
+from ...patch import static
 from ...remedies import Finding, beyond_tolerance
 from ...results.result import without_folders
 from ...results.travel import outcome_on_piece, travelled
 from ...rig.engines import PIECES, engine_of
 from ...rig.numerics import choose
 from ...rig.pieces import YieldingElements
-from .. import one_by_one
+from .. import one_by_one, patches
 from ..answers import Answers
 from . import pieces
 from .columns import batch_answers, known_of
@@ -76,7 +78,7 @@ def solve(models: Sequence[Model], say=None) -> Answers:
 
 def _solved(models, say) -> Answers:
     begin, out = perf_counter(), Answers.blank(len(models))
-    held = [_pressed(model) for model in models]
+    held = [_pressed(model, one) for model, one in zip(models, _together(models))]
     moves = [case for case, one in enumerate(held) if one is not None]
     alone = set(range(len(models))) - set(moves)
     if moves:
@@ -92,18 +94,39 @@ def _solved(models, say) -> Answers:
     return out
 
 
-def _pressed(model: Model) -> _Pressed | None:
-    """A case with its patch pressed; None of one that is run by itself."""
+def _together(models) -> list:
+    """Each case as the SolvedPatch of `runs.patch.static`, None of those that press by themselves."""
+    out, groups = [None] * len(models), {}
+    for case, model in enumerate(models):
+        if not static.not_together(model.patch):
+            groups.setdefault((patches.group(model), model.patch.shear), []).append(case)
+    for cases in groups.values():
+        asked = [models[case].patch for case in cases]
+        for case, one in zip(cases, static.pressed_together(asked, models[cases[0]].accuracy.tolerance, True)):
+            out[case] = one
+    return out
+
+
+def _pressed(model: Model, one) -> _Pressed | None:
+    """A case with its patch pressed, together with others as the SolvedPatch `one` or by itself; None of one that is
+    run by itself."""
     try:
         with placed(model.source):
-            patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
-            if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT:
-                return None
-            warnings = [*model.source.remarks, *of_patch.strained(model.patch, patch), *patch.notes]
+            if one is not None:
+                patch, *coarse = one.patches
+                measures, said = of_patch.floored(model, one.measures), of_patch.strained_by(
+                    model.patch, one.top, one.approach)
+                area = patch.pieces.interface.weight.sum()
+                notes = [*of_patch.slender(model.patch, patch.pressure.load / area), *one.band]
+            else:
+                patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
+                if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT:
+                    return None
+                measures, said = of_patch.measured(model, patch, coarse), of_patch.strained(model.patch, patch)
+                notes = of_patch.left_out(model, patch, coarse)
             numerics = choose(model)
             return _Pressed(YieldingElements(model, numerics, patch), YieldingElements(model, numerics, coarse[0]),
-                            of_patch.measured(model, patch, coarse), warnings,
-                            of_patch.left_out(model, patch, coarse), patch)
+                            measures, [*model.source.remarks, *said, *patch.notes], notes, patch)
     except Exception:  # what is wrong is told by its own run
         return None
 
