@@ -512,8 +512,8 @@ class Run:
     def strained(self) -> float:
         """Energy stored in what rubs, in springs and in the contact that presses [J]."""
         n, rows = 2 * self.modes.omega.size, np.zeros((1, self.width))
-        self.loops.march(self.model, 0, 0, self.state, self.plant, np.zeros((1, 1)), self.contact, self.faces,
-                         self._load(0), np.inf, np.zeros(9), rows)
+        self.loops.march(self.model, 0, 0, self.state, self.plant, np.zeros((1, 4 * n + 3)), self.contact,
+                         self.faces, self._load(0), np.inf, np.zeros(9), rows)
         springs = [one.potential(part[0]) for one, part in zip(self.model.joints, self._elements(rows)[0])
                    if one.potential is not None]
         normal = rows[0, -3] if self.model.loading else 0.0  # of the preloaded contact

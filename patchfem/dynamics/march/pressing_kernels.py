@@ -18,10 +18,11 @@ from ..contacts import element_kernels as contact
 from ..modal_kernels import free_rate, free_slide
 from . import faces_kernels as faces
 from . import parts_kernels as parts
-from .stops_kernels import BESIDE, FREE, GAMMA, PULL, RATE, STEP
+from .stops_kernels import BESIDE, FREE, GAMMA, KNOWN, PULL, RATE, STEP
 
 STOPS, POINTED = parts.STOPS, parts.POINTED
 TIGHT = 0.01  # of the goal, to which friction and normal contact agree
+MOST = 80  # guesses of the force that friction and normal contact agree on; the bracket of the secant shuts within 60
 
 
 @njit(error_model="numpy", **INNER)
@@ -128,9 +129,9 @@ def pushed(n, mass, accel):
 
 
 @njit(error_model="numpy", **INNER)
-def rubbed(q, v, force, motion, plant, table, at, c, j, n):
+def rubbed(q, v, force, whole, motion, plant, table, at, c, j, n):
     """(slide dq [m], mean friction force [N], iterations) of a step under the mean forces force (2,) on heave and
-    pitch; iterations < 0 where it failed."""
+    pitch; iterations < 0 where it failed. whole: no stop or release inside the step."""
     free = free_slide(motion, plant.reach, 0, table, at) - n.beta[0, 1] * force[0] - n.beta[0, 2] * force[1]
     if STOPS:
         pushes(force[0], force[1], plant.mass, n, j.modal[BESIDE])
@@ -139,7 +140,11 @@ def rubbed(q, v, force, motion, plant, table, at, c, j, n):
             return faces.slid(0.0, j), 0.0, 1
         j.port[RATE, 0] = free_rate(motion, plant.slide, plant.free, plant.dense, table, at) \
             - j.gives[GAMMA, 0, 1] * force[0] - j.gives[GAMMA, 0, 2] * force[1]
-        _, count = faces.solved(q, v, motion, plant, table, at, c, j)
+        if whole:
+            _, count = faces.agreed(q, v, plant, c, j)
+            j.own[KNOWN] = 0.0
+        else:
+            _, count = faces.solved(q, v, motion, plant, table, at, c, j)
         return j.each[STEP, 0], j.each[PULL, 0], count
     else:
         return contact.solve(free, n.beta[0, 0], q, v, plant.dt, c, TIGHT * n.goal[0])
@@ -152,6 +157,8 @@ def agreed(i, q, v, motion, plant, table, at, c, j, n):
     heave and pitch stand in n.few[3:5].
 
     Where friction moves heave and pitch too the secant, kept inside its bracket, finds the force that both agree on.
+    The force jumps where a stop inside the step comes or goes with the guess; where none is its own answer, the mean
+    force of the whole step, which does not jump between stick and slip at one coefficient, is sought in turn.
     """
     few, beta, load, goal = n.few, n.beta, n.few[0], n.goal[0]
     force, turn, out, begin = few[3:5], few[6:8], few[8:17], few[17:22]
@@ -160,14 +167,14 @@ def agreed(i, q, v, motion, plant, table, at, c, j, n):
     heave, pitch = free_slide(motion, plant.reach, 1, table, at), free_slide(motion, plant.reach, 2, table, at)
     guess, count, wrong, end, bad = n.mean[0], 0, 0.0, n.slot[0], False
     low, high, last_f, last_r = -np.inf, np.inf, 0.0, np.inf
-    dq, used, after = 0.0, 0.0, load
+    dq, used, after, whole, last = 0.0, 0.0, load, False, MOST
     if given:
         after = n.loads[i + 1]
         n.now[0] = after
     if POINTED:
         for k in range(n.now.size):
             c.before[k] = c.now[k]
-    for outer in range(1, 81):
+    for outer in range(1, 2 * MOST + 1):
         if moves:
             end, its, wrong = press_step(n, n.slot[0], begin, heave - beta[1, 0] * guess, pitch - beta[2, 0] * guess,
                                          turn, out)
@@ -180,19 +187,22 @@ def agreed(i, q, v, motion, plant, table, at, c, j, n):
             if POINTED:
                 press_state(n.sets, end, -(begin[0] + turn[0]), begin[1] + turn[1], n.now)
         weigh(load, after, c, j, n)
-        dq, used, its = rubbed(q, v, force, motion, plant, table, at, c, j, n)
+        dq, used, its = rubbed(q, v, force, whole, motion, plant, table, at, c, j, n)
         count += abs(its)
         bad = its < 0 or wrong > goal
         miss = used - guess
         if not (moves and coupled) or abs(miss) <= TIGHT * goal:
             break
-        if outer == 80 or (high < np.inf and low > -np.inf and high - low <= 4e-16 * (abs(low) + abs(high))):
+        if outer == last or (high < np.inf and low > -np.inf and high - low <= 4e-16 * (abs(low) + abs(high))):
             if STOPS:
-                mean = 0.5 * (load + after)
+                mean = 0.5 * (load + max(after, 0.0))
                 if n.force[1] * mean <= abs(guess) <= n.force[0] * mean:
                     used = guess  # between kinetic and static friction the step starts to slip
                     dq = faces.slid(used, j)
                     break
+                if not whole:
+                    whole, last, low, high, last_r = True, outer + MOST, -np.inf, np.inf, np.inf
+                    continue
             bad = bad or abs(miss) > goal
             break
         if miss > 0:
