@@ -42,24 +42,6 @@ class ContactSet:
         """Nodal forces (m,) [N], >= 0, at a motion d [m], t [rad] beyond the reference; round-off is cut off."""
         return np.where(self.on, np.maximum(self.values(d, t), 0.0), 0.0)
 
-    @property
-    def tangent(self) -> np.ndarray:
-        """Stiffness (2, 2) of the set: change of N [N] and M [N m] (rows) per approach [m] and rotation [rad].
-
-        It is exact as long as the contact set stays.
-        """
-        _, _, _, dd, dt, tt = self.energy
-        return np.array([[dd, dt], [-dt, -tt]])
-
-    def share(self, d: float, t: float, dd: float, dt: float) -> float:
-        """Share [1] of an increment after which the contact set changes, inf where it never does.
-
-        d [m], t [rad]: where the increment starts; dd [m], dt [rad]: the increment.
-        """
-        here, rate = self.values(d, t), dd * self.rows[1] + dt * self.rows[2]
-        falls = rate < 0
-        return float((np.maximum(here[falls], 0.0) / -rate[falls]).min(initial=np.inf))
-
 
 class ContactSets:
     """Contact sets of a pair of bodies around a solved state; each is worked out when first met and kept.
@@ -145,16 +127,6 @@ class ContactSets:
         size = self.size + abs(d) + abs(t) * np.abs(self.x[[0, -1]]).max()
         pulls = max(-force.min(initial=0.0), 0.0) / max(np.abs(force).sum(), 1e-300)
         return float(max(np.abs(opening[touching.on]).max(initial=0.0) / size, -opening.min(initial=0.0) / size, pulls))
-
-    def resultant(self, d: float, t: float, start: ContactSet | None = None) -> tuple:
-        """Load N [N], moment M [N m] and energy [J] of the preloaded contact at a motion beyond the reference.
-
-        d [m], t [rad]: the motion; start: set to search from. The energy is E - E0 - N0 d + M0 t.
-        """
-        q = self.at(d, t, start).energy
-        by_d, by_t = q[3] * d + q[4] * t, q[4] * d + q[5] * t
-        return (float(self.load + q[1] + by_d), float(self.moment - q[2] - by_t),
-                float(q[0] + d * (q[1] + by_d / 2) + t * (q[2] + by_t / 2)))
 
     def arrays(self, room: float = ROOM) -> dict:
         """The sets as arrays of `press_kernels.SetArrays`, nothing in it yet but the reference set in `wanted`.

@@ -146,19 +146,12 @@ def displacement(piece: Piece, shear: np.ndarray, normal: np.ndarray) -> np.ndar
     return out.reshape(-1, nx * ny, 2)
 
 
-def cell_stress(piece: Piece, u: np.ndarray) -> tuple:
-    """Stress at the middles of the cells, tension > 0.
-
-    Returns (frames, t, 4) as xx, yy, zz, xy [Pa] and von Mises (frames, t) [Pa]. u: (frames, nodes, 2) [m]. The inward
-    axis is kept, so xy changes sign for the piece drawn at y < 0. The middle of a bilinear quad is its superconvergent
-    point.
-    """
-    stress = middle_stress(piece, u)
-    return stress, von_mises(stress)
-
-
 def middle_stress(piece: Piece, u: np.ndarray) -> np.ndarray:
-    """The stress (frames, t, 4) [Pa] of `cell_stress` alone."""
+    """Stress (frames, t, 4) at the middles of the cells as xx, yy, zz, xy [Pa], tension > 0.
+
+    u: (frames, nodes, 2) [m]. The inward axis is kept, so xy changes sign for the piece drawn at y < 0. The middle of a
+    bilinear quad is its superconvergent point.
+    """
     place = piece.nodes[piece.cells]
     grid = u.reshape(len(u), piece.x.size, -1, 2)
     rise, fall = grid[:, 1:, 1:] - grid[:, :-1, :-1], grid[:, 1:, :-1] - grid[:, :-1, 1:]

@@ -1,4 +1,4 @@
-"""Stress inside a pressed piece, recovered node by node, with an estimate of its error and the place of its peak.
+"""Stress inside a pressed piece, recovered node by node, with an estimate of its error.
 
 Recovery: a plane is fitted to the stresses at the cell middles around a node (Zienkiewicz and Zhu, Int. J. Numer. Meth.
 Eng. 33, 1992, 1331), coating and substrate apart, because stress jumps between them. The recovered field less the
@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core import frozen_array
 from ..mesh.around import Gathered, Patches, patches
-from .elasticity import Layers, hooke, lame, von_mises
+from .elasticity import Layers, hooke, lame
 
 SPREAD = 0.1  # determinant of the correlations of (1, x, y) over a patch below which it takes in its neighbours
 GAUSS = 1 / np.sqrt(3)
@@ -190,11 +190,6 @@ class Indicator:
     error: np.ndarray
     energy: np.ndarray
 
-    @property
-    def relative(self) -> np.ndarray:
-        """Estimated error (frames,) over the whole piece, both in energy norm [1]; 0 where nothing is loaded."""
-        return self.shares()[1]
-
     def shares(self, *others) -> tuple:
         """Estimated errors over the energy norm of the whole [1]: (frames, t) of each cell, (frames,) of all of them.
 
@@ -299,51 +294,3 @@ def _complementary(stress, lam, mu) -> np.ndarray:
     xx, yy, xy = np.moveaxis(stress, -1, 0)
     lam, mu = lam[:, None], mu[:, None]
     return (xx**2 + yy**2 + 2 * xy**2 - lam / (2 * (lam + mu)) * (xx + yy)**2) / (2 * mu)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Peak:
-    """The largest value inside a piece, and its place x, depth [m]."""
-
-    value: float
-    x: float
-    depth: float
-    coating: bool
-
-
-def peak(found: Recovery, stress, of=von_mises, least_depth: float = 0.0) -> Peak:
-    """Largest value of `of` (von Mises) in one frame of cell stresses (t, 4) [Pa] deeper than `least_depth` [m].
-
-    It is the top of the paraboloid through the recovered values around the largest of them, if there is one.
-    """
-    value = of(found(stress))
-    at = found.cells.points[found.node]
-    top = int(np.argmax(np.where(at[:, 1] >= least_depth, value, -np.inf)))
-    owner = found.cells.owner()
-    near = owner[np.isin(found.place, found.place[np.isin(owner, owner[found.place == top])])]
-    around = np.unique(found.place[np.isin(owner, near)])
-    around = around[found.coating[around] == found.coating[top]]
-    found_at, best = _vertex(at[around] - at[top], value[around])
-    if best is None or (at[top] + found_at)[1] < least_depth:
-        found_at, best = np.zeros(2), value[top]
-    x, depth = at[top] + found_at
-    return Peak(float(best), float(x), float(depth), bool(found.coating[top]))
-
-
-def _vertex(offset, value) -> tuple:
-    """Place and value of the top of the paraboloid through values (k,) at offsets (k, 2).
-
-    (zero, None) where no top lies in the middle half of the points.
-    """
-    reach = np.abs(offset).max(axis=0)
-    if len(value) < 6 or not reach.all():  # a paraboloid has six numbers
-        return np.zeros(2), None
-    x, y = (offset / reach).T
-    c = np.linalg.lstsq(np.column_stack([np.ones(x.size), x, y, x * x, x * y, y * y]), value, rcond=None)[0]
-    bend = np.array([[2 * c[3], c[4]], [c[4], 2 * c[5]]])
-    if np.linalg.eigvalsh(bend).max() >= 0:
-        return np.zeros(2), None
-    top = np.linalg.solve(bend, -c[1:3])
-    if np.abs(top).max() > 0.5:  # a top near the border is an extrapolation
-        return np.zeros(2), None
-    return top * reach, float(c[0] + c[1:3] @ top / 2)

@@ -15,7 +15,7 @@ from ..core import NotConverged, frozen_array
 from ..mesh.anymesh import cell_edges
 from .condense import CORRECTION, RESIDUAL, rough
 from .dissect import dissection
-from .elasticity import Layers, hooke, lame, remedy, von_mises
+from .elasticity import Layers, hooke, lame, remedy
 from .fronts import factorise
 from .lapack import one_thread
 
@@ -178,18 +178,11 @@ def _gradients(corner) -> np.ndarray:
     return np.einsum("ni,cji->cnj", local, np.linalg.inv(jacobian))
 
 
-def cell_stress(piece: Substructure, u: np.ndarray) -> tuple:
-    """Stress at the middles of the cells, tension > 0; triangles first.
-
-    Returns (frames, t + q, 4) as xx, yy, zz, xy [Pa] and von Mises (frames, t + q). u: (frames, N, 2) [m]. The inward
-    axis is kept, so xy changes sign for the piece drawn at y < 0.
-    """
-    stress = middle_stress(piece, u)
-    return stress, von_mises(stress)
-
-
 def middle_stress(piece: Substructure, u: np.ndarray) -> np.ndarray:
-    """The stress (frames, t + q, 4) [Pa] of `cell_stress` alone."""
+    """Stress (frames, t + q, 4) at the middles of the cells as xx, yy, zz, xy [Pa], tension > 0; triangles first.
+
+    u: (frames, N, 2) [m]. The inward axis is kept, so xy changes sign for the piece drawn at y < 0.
+    """
     mesh = piece.mesh
     slope = np.concatenate([np.einsum("cnj,fcni->fcij", _gradients(mesh.points[cells]), u[:, cells])
                             for cells in (mesh.triangles, mesh.quads) if len(cells)], axis=1)

@@ -166,31 +166,6 @@ def half_swing(time, place, rate) -> float:
     return float(every.max() - every.min()) / 2
 
 
-def swing(window: Response) -> float:
-    """Half peak-to-peak of the output [m] over samples that hold both sides of every jump of its acceleration.
-
-    Between samples by the quintic through values, rates and accelerations: h^6 / 46080 of its sixth derivative.
-    """
-    y, step, gain = window.output, np.diff(window.time), window.acceleration - window.base_acceleration
-    k = np.flatnonzero(window.output_rate[:-1] * window.output_rate[1:] < 0)
-    h = step[k]
-    p, q = window.output_rate[k] * h, window.output_rate[k + 1] * h
-    a, b, rise = gain[k] * h**2 / 2, gain[k + 1] * h**2 / 2, y[k + 1] - y[k]
-    one, two, three = rise - p - a, q - p - 2 * a, 2 * b - 2 * a
-    c = np.array([y[k], p, a, 10 * one - 4 * two + three / 2, -15 * one + 7 * two - three,
-                  6 * one - 3 * two + three / 2])
-    slope = np.arange(1, 6)[:, None] * c[1:]
-    bend = np.arange(1, 5)[:, None] * slope[1:]
-    s = p / (p - q)
-    for _ in range(6):  # Newton's method from the straight line doubles its digits each time
-        power = s[None] ** np.arange(5)[:, None]
-        curve = (bend * power[:-1]).sum(axis=0)
-        s = np.clip(s - (slope * power).sum(axis=0) / np.where(curve == 0, np.inf, curve), 0.0, 1.0)
-    turns = (c * s[None] ** np.arange(6)[:, None]).sum(axis=0)
-    every = np.concatenate([y, turns])
-    return float(every.max() - every.min()) / 2
-
-
 def window_amplitudes(extremes, window: int) -> np.ndarray:
     """Half peak-to-peak [m] of the output per window of `window` cycles, oldest first.
 

@@ -24,8 +24,9 @@ from .rig import engines
 from .wear import evolve, measures
 
 __all__ = ["KeptState", "Plan", "Result", "plan", "run"]
+# kind of a scene -> "module function" of this folder that runs it: imported and called by `_run`, and nowhere by name
 KINDS = {"patch": "patch.result static", "bench": "bench.result prescribed", "rig": "rig.rig coupled",
-         "linear": "rig.rig coupled"}  # the function that runs it, imported when it is wanted
+         "linear": "rig.rig coupled"}
 
 AT_REST = "the measures are those of the pressed patch at rest; the motion was not found"
 

@@ -33,8 +33,7 @@ class JenkinsSet:
 
     stiffness: (t,) [N/m]; yield_slide: (t,) [m]; sum stiffness * yield_slide = friction limit. points: (a,) nodes of
     the contact set; limit: (a,) their yield forces [N]; share: (a, t) [N/m], the force of a point is share @ stretch
-    for any history. reluctant: nodes that at first carry the wrong sign. error: largest error of the resultant over the
-    histories it was `merged` for, relative to the friction limit.
+    for any history. reluctant: nodes that at first carry the wrong sign.
     """
 
     stiffness: np.ndarray
@@ -43,7 +42,6 @@ class JenkinsSet:
     limit: np.ndarray
     share: np.ndarray
     reluctant: int
-    error: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,72 +141,7 @@ def inverse_of(c: np.ndarray) -> np.ndarray:
 def scaled(group: JenkinsSet, factor: float) -> JenkinsSet:
     """The elements of points that yield at `factor` > 0 times the force: the same springs, each that much further."""
     return JenkinsSet(group.stiffness, frozen_array(factor * group.yield_slide), group.points,
-                      frozen_array(factor * group.limit), group.share, group.reluctant, group.error)
-
-
-def merged(group: JenkinsSet, tolerance: float, nested: bool = True) -> JenkinsSet:
-    """The fewest elements whose resultant stays within `tolerance` (relative to the friction limit) of `group`.
-
-    Neighbours in yield slide become one element of their total stiffness and mean yield slide, so the friction limit,
-    the initial stiffness and the limit of every point stay exact. The virgin stroke of a merged run of elements then
-    lies above theirs by one hump of height h at the mean. By Masing a history with turning points adds d(q_1) - 2
-    d(z_1) + 2 d(z_2) - ... at falling strokes z, with d the sum of the humps. One hump gives at most 2h, whatever the
-    history. A cycle without a smaller cycle inside gives at most 2 max(h). Turning points inside one another, one for
-    each hump, give at most 2 sum(h).
-
-    nested: keep the last of these bounds within the tolerance; without it the one before. PatchfemError unless
-    tolerance > 0.
-    """
-    if not tolerance > 0:
-        raise PatchfemError(f"accuracy.tolerance: merging elements wants a tolerance > 0, got {tolerance}")
-    hump = _humps(group.stiffness, group.yield_slide) * (2 / group.limit.sum())
-    ends = _cheapest_runs(hump, tolerance) if nested else _longest_runs(hump, tolerance)
-    first = np.concatenate([[0], ends[:-1]])
-    stiffness = np.add.reduceat(group.stiffness, first)
-    reach = np.add.reduceat(group.stiffness * group.yield_slide, first) / stiffness
-    share = np.add.reduceat(group.share * group.yield_slide, first, axis=1) / reach
-    heights = hump[first, ends]
-    error = float(heights.sum() if nested else heights.max())
-    return JenkinsSet(frozen_array(stiffness), frozen_array(reach), group.points, group.limit, frozen_array(share),
-                      group.reluctant, group.error + error)
-
-
-def _humps(stiffness, reach) -> np.ndarray:
-    """Largest error [N] of the virgin stroke of elements i to j - 1 as one, (t, t + 1); inf where j <= i."""
-    count = reach.size
-    stiff = np.concatenate([[0.0], np.cumsum(stiffness)])
-    bound = np.concatenate([[0.0], np.cumsum(stiffness * reach)])
-    out = np.full((count, count + 1), np.inf)
-    for i in range(count):
-        total, full = stiff[i + 1:] - stiff[i], bound[i + 1:] - bound[i]
-        mean = full / total
-        below = np.searchsorted(reach, mean, side="left")
-        out[i, i + 1:] = np.maximum(mean * (stiff[below] - stiff[i]) - (bound[below] - bound[i]), 0.0)
-    return out
-
-
-def _longest_runs(hump, most: float) -> np.ndarray:
-    """Ends of the fewest runs with every hump <= most: each as long as it can be."""
-    ends = [0]
-    while ends[-1] < hump.shape[0]:
-        row = hump[ends[-1]]
-        ends.append(max(int(np.flatnonzero(row <= most)[-1]), ends[-1] + 1))
-    return np.array(ends[1:])
-
-
-def _cheapest_runs(hump, most: float) -> np.ndarray:
-    """Ends of the fewest runs whose humps add up to <= most: the least sum for 1, 2, ... runs in turn."""
-    count = hump.shape[0]
-    best, back = hump[0].copy(), []
-    while best[count] > most and len(back) < count:
-        longer = best[:count, None] + hump
-        pick = longer.argmin(axis=0)
-        best = longer[pick, np.arange(count + 1)]
-        back.append(pick)
-    ends = [count]
-    for pick in back[::-1]:
-        ends.append(int(pick[ends[-1]]))
-    return np.array(ends[::-1])
+                      frozen_array(factor * group.limit), group.share, group.reluctant)
 
 
 def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, count: int,

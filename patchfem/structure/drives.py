@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import PatchfemError, Segment
-from .drive_series import chirp, steady
 from .drive_sizes import DriveKeys, level_cycles
 
 
@@ -94,10 +93,6 @@ class Sweep:
         haste = max(1.0, abs(np.log(self.high / self.low))) if self.logarithmic else 1.0
         return max(2 * np.pi * max(self.low, self.high), 40 * haste / self.duration)
 
-    def series(self, number: int, time: float, unit: float, terms: int) -> np.ndarray:
-        """Drive (terms,) [m s-2] as a series in (t - time)/unit; number: 0 during the sweep, 1 after it."""
-        return (steady if number else chirp)(self, time, unit, terms)
-
     @property
     def period(self) -> float:
         """Period [s] of the frequency at the end of the sweep."""
@@ -174,16 +169,6 @@ class Recorded:
     def phase(self, t):
         """Phase 2 pi t/period [rad] in the cycle of the rig at times t (k,) [s]."""
         return 2 * np.pi * np.asarray(t, float) / self.period
-
-    def series(self, number: int, time: float, unit: float, terms: int) -> np.ndarray:
-        """Drive (terms,) [m s-2] as a series in (t - time)/unit, between row `number` and the next; 0 after the last.
-        """
-        out = np.zeros(terms)
-        if number < len(self.time) - 1:
-            low, high = float(self.value[number]), float(self.value[number + 1])
-            slope = (high - low) / float(self.time[number + 1] - self.time[number])
-            out[0], out[1] = low + slope * (time - float(self.time[number])), slope * unit
-        return out
 
     @property
     def largest(self) -> float:

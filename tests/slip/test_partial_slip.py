@@ -14,12 +14,10 @@ from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.unilateral import press
 from patchfem.core import PatchfemError
 from patchfem.slip.shear_modes import (
-    JenkinsSet,
     enough_modes,
     gathered,
     gauss,
     jenkins_set,
-    merged,
     normal_stiffness,
     scaled,
     shear_modes,
@@ -354,78 +352,6 @@ def test_exact_one_node_is_one_element():
     group = jenkins_set(pair.tangential, limit)
     assert group.stiffness == pytest.approx([1 / pair.tangential[7, 7]], rel=1e-13)
     assert group.yield_slide == pytest.approx([2.0 * pair.tangential[7, 7]], rel=1e-13)
-
-
-# ---- merged elements
-
-@pytest.mark.parametrize("nested", [True, False])
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
-@pytest.mark.parametrize("angle", [0.0, 1e-4])
-def test_exact_merged_elements_keep_limit_and_stiffness_and_their_error(angle, tolerance, nested):
-    pair, limit = coated_pair(100), friction_limit(100, angle)
-    group = jenkins_set(pair.tangential, limit)
-    few = merged(group, tolerance, nested)
-    assert few.stiffness.size < group.stiffness.size and few.error <= tolerance
-    assert few.stiffness.sum() == pytest.approx(group.stiffness.sum(), rel=1e-13)
-    assert few.stiffness @ few.yield_slide == pytest.approx(limit.sum(), rel=1e-13)
-    assert few.share @ few.yield_slide == pytest.approx(group.limit, rel=1e-11)
-    assert few.share.sum(axis=0) == pytest.approx(few.stiffness, rel=1e-12)
-    if nested:
-        paths = histories(20, group.yield_slide[-1])
-    else:  # loops without loops inside: one amplitude each, from rest to its end and around
-        paths = (q * np.concatenate([[1], np.linspace(1, -1, 41), np.linspace(-1, 1, 41)])
-                 for q in group.yield_slide[-1] * np.linspace(0.05, 1.2, 20))
-    worst = max(np.abs(elements(group, path) - elements(few, path)).max() for path in paths)
-    assert worst <= few.error * limit.sum() * (1 + 1e-9)
-
-
-def test_exact_turning_points_inside_one_another_reach_the_whole_bound():
-    """The bound of nested histories is met: falling strokes that end on a hump and on the border after it in turn."""
-    pair, limit = coated_pair(100), friction_limit(100, 1e-4)
-    group = jenkins_set(pair.tangential, limit)
-    few = merged(group, 3e-3)
-    size = np.cumsum(few.stiffness)
-    ends = np.searchsorted(np.cumsum(group.stiffness), size * (1 - 1e-12)) + 1
-    first = np.concatenate([[0], ends[:-1]])
-    strokes = np.concatenate([[group.yield_slide[e - 1] * (1 + 1e-12), q] for e, q in
-                              zip(ends[::-1], few.yield_slide[::-1], strict=True)])
-    path = strokes[0] + np.concatenate([[0.0], -2 * np.cumsum(strokes * (-1.0) ** np.arange(strokes.size))])
-    gone = np.abs(elements(group, path) - elements(few, path)).max() / limit.sum()
-    assert first.size == few.stiffness.size
-    assert gone == pytest.approx(few.error, rel=1e-6)
-    assert merged(group, 3e-3, nested=False).stiffness.size < few.stiffness.size
-
-
-@given(seed=st.integers(0, 2**32 - 1), tolerance=st.floats(1e-4, 0.3))
-def test_always_no_fewer_runs_would_do(seed, tolerance):
-    """Fewest elements, by trying every division of a small set."""
-    rng = np.random.default_rng(seed)
-    count = int(rng.integers(2, 9))
-    stiffness, reach = rng.uniform(0.1, 1, count), np.sort(rng.uniform(0.1, 1, count))
-    share = np.diag(stiffness)
-    group = JenkinsSet(stiffness, reach, np.arange(count), stiffness * reach, share, 0)
-    total = stiffness @ reach
-
-    def height(i, j):
-        k, x = stiffness[i:j], reach[i:j]
-        mean = k @ x / k.sum()
-        return 2 * (k.sum() * mean - k @ np.minimum(mean, x)) / total
-
-    best = {True: count, False: count}
-    for cuts in range(2 ** (count - 1)):
-        ends = [j + 1 for j in range(count - 1) if cuts >> j & 1] + [count]
-        humps = [height(i, j) for i, j in zip([0, *ends[:-1]], ends, strict=True)]
-        for nested, error in ((True, sum(humps)), (False, max(humps))):
-            if error <= tolerance:
-                best[nested] = min(best[nested], len(ends))
-    for nested in (True, False):
-        assert merged(group, tolerance, nested).stiffness.size == best[nested]
-
-
-@pytest.mark.parametrize("tolerance", [0.0, -1e-3, float("nan")])
-def test_refuses_to_merge_without_a_tolerance(tolerance):
-    with pytest.raises(PatchfemError, match=r"accuracy\.tolerance"):
-        merged(jenkins_set(coated_pair(40).tangential, np.ones(41)), tolerance)
 
 
 @pytest.mark.slow

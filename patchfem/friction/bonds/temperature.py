@@ -42,15 +42,6 @@ def _scaled(name: str, value: float, exponent, key: str):
     return float(out) if np.ndim(out) == 0 else out
 
 
-def critical_speed(rest, slip):
-    """Critical speed v_c = sqrt(a_s l_k) [m/s], at which the bond length lies half way between eps_0 and eps_k (2.11).
-
-    rest: a_s [m s-2], slip: l_k [m], numbers or (m,). The root of each is taken first, so that the product cannot
-    overflow.
-    """
-    return np.sqrt(rest) * np.sqrt(slip)
-
-
 def surface_rise(flux: float, time: float, conductivity: float, capacity: float) -> float:
     """Rise [K] of the face of a half-space that takes the heat `flux` [W/m2] from time 0 on: 2 q sqrt(t/(pi k rho c)).
 

@@ -1,6 +1,7 @@
 """The event engine under drives that give their local series: sweeps and recorded signals, against mpmath, DOP853 with
 events, the sine engine and the conservation of energy."""
 
+import drive_series
 import mpmath
 import numpy as np
 import pytest
@@ -45,7 +46,7 @@ def test_exact_series_of_a_sweep(sweep):
     unit = REACH / sweep.rate
     with mpmath.workdps(40):
         for start, number in ((0.0, 0), (0.37 * sweep.duration, 0), (sweep.duration - unit, 0), (sweep.duration, 1)):
-            series = sweep.series(number, start, unit, TERMS)
+            series = drive_series.series(sweep, number, start, unit, TERMS)
             for u in (0.0, 0.4, 0.99):
                 wanted = float(truth_of(sweep, start + u * unit))
                 grown = 2e-14 * sweep.largest * max(1, start * sweep.rate / 9)  # round-off of the phase
@@ -56,9 +57,9 @@ def test_exact_series_of_a_record_is_what_it_gives_at_any_time():
     drive = record(5)
     for number, (t0, t1) in enumerate(zip(drive.time, drive.time[1:])):
         t, u = t0 + 0.3 * (t1 - t0), np.array([0.0, 0.5, 1.0])
-        series = drive.series(number, t, t1 - t, 5)
+        series = drive_series.series(drive, number, t, t1 - t, 5)
         np.testing.assert_allclose(np.polyval(series[::-1], u[:2]), drive.values(t + u[:2] * (t1 - t)), atol=1e-14)
-    assert not drive.series(len(drive.time) - 1, 31.0, 1.0, 5).any()
+    assert not drive_series.series(drive, len(drive.time) - 1, 31.0, 1.0, 5).any()
 
 
 # the motion

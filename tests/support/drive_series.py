@@ -1,4 +1,5 @@
-"""Local series of drives: the Taylor coefficients of sines whose phase is itself a series, by their recurrence."""
+"""Local series of drives in NumPy, whose compiled form is `dynamics.events.drive_kernels`: the Taylor coefficients of
+sines whose phase is itself a series, by their recurrence, and a record between its rows."""
 
 from math import cos, sin, tau
 
@@ -55,3 +56,18 @@ def steady(sweep, time: float, unit: float, terms: int) -> np.ndarray:
     speed = tau * sweep.high
     size = sweep.acceleration if sweep.displacement is None else sweep.displacement * speed**2
     return size * waves([float(sweep.phase(time)) % tau, speed * unit], terms)[0]
+
+
+def series(drive, number: int, time: float, unit: float, terms: int) -> np.ndarray:
+    """Drive (terms,) [m s-2] as a series in (t - time)/unit.
+
+    number: of a Sweep 0 during it and 1 after it; of a Recorded that of the row before, 0 after the last.
+    """
+    if not hasattr(drive, "value"):
+        return (steady if number else chirp)(drive, time, unit, terms)
+    out = np.zeros(terms)
+    if number < len(drive.time) - 1:
+        low, high = drive.value[number:number + 2]
+        slope = (high - low) / (drive.time[number + 1] - drive.time[number])
+        out[:2] = low + slope * (time - drive.time[number]), slope * unit
+    return out
