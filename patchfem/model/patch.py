@@ -69,7 +69,8 @@ class PatchModel:
     roll is held); shear: the pieces are compliant tangentially; gives_way: the effect that lets the patch slip part by
     part, as the scene writes it; mesh_tolerance: relative error that a chosen mesh is to meet, None: the tolerance of
     the run. meshes: those that serve all cases of a sweep, None: the patch has its own. gathers: fields of its motion
-    are not asked for, so that few points may stand for it.
+    are not asked for, so that few points may stand for it. solved: how it was pressed together with others, a
+    `runs.patch.static.SolvedPatch`, None: its run presses it; never kept where another value changes.
     """
 
     length: float
@@ -99,6 +100,7 @@ class PatchModel:
     mesh_tolerance: float | None = None
     meshes: Meshes | None = None
     gathers: bool = False
+    solved: object = None
 
     @property
     def alike(self) -> bool:

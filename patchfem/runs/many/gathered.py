@@ -1,4 +1,5 @@
-"""Patches with bonds behind shear, of a study of many: each runs by itself, a few points in place of all its nodes.
+"""Patches with bonds behind shear, of a study of many: pressed together, each runs by itself, a few points in place of
+all its nodes.
 
 Nobody sees the fields of such a run. What its points and modes each leave out of the backbone is a thousandth of the
 tolerance (`rig.interface.FEWER`), far below the bars, so no further run tells the error of the modes.
@@ -10,8 +11,10 @@ from dataclasses import replace
 from ...effects import has, listed
 from ...model.model import Model
 from ..rig.engines import MARCH, engine_of
-from . import one_by_one
+from . import one_by_one, patches
 from .answers import Answers
+
+TOGETHER = 64  # cases that are pressed at once
 
 
 def refuses(model: Model) -> str:
@@ -31,4 +34,9 @@ def group(model: Model) -> Hashable:
 
 def solve(models: Sequence[Model], say=None) -> Answers:
     """Answers of models."""
-    return one_by_one.solve([replace(model, patch=replace(model.patch, gathers=True)) for model in models], say)
+    out, few = Answers.blank(len(models)), [replace(model, patch=replace(model.patch, gathers=True))
+                                            for model in models]
+    for first in range(0, len(few), TOGETHER):
+        part = patches.solved_together(few[first:first + TOGETHER])
+        out.place(range(first, first + len(part)), one_by_one.solve(part, say))
+    return out

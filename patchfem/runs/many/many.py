@@ -60,7 +60,7 @@ BATCHES: tuple[Batch, ...] = (_batch("patches", "patch", together=512),
                               _batch("lumped.lanes", "rig", compile=6.0, least=64, columns=True, together=64),
                               _batch("lumped.lumped", "rig", compile=12.0),
                               _batch("lumped.sheared", "rig", 0.4, 12.0, together=64),
-                              _batch("gathered", "rig", 0.2, least=32))
+                              _batch("gathered", "rig", 0.2, least=32, together=8))
 
 
 def batch_compile_seconds(batch: Batch, model: Model) -> float:

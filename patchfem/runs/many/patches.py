@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
 from time import perf_counter
 from typing import NamedTuple
 
@@ -33,6 +34,21 @@ def refuses(model: Model) -> str:
 def group(model: Model) -> Hashable:
     """Equal for models whose patches are pressed together."""
     return geometry_of(model.patch), static.pressing_kind(model.patch), model.accuracy.tolerance
+
+
+def solved_together(models: Sequence[Model]) -> list[Model]:
+    """The models in their order, those whose patches press together with how they do, for what moves them then."""
+    out, groups = list(models), {}
+    for case, model in enumerate(models):
+        if not static.not_together(model.patch):
+            groups.setdefault(group(model), []).append(case)
+    for cases in groups.values():
+        found = static.pressed_together([models[case].patch for case in cases], models[cases[0]].accuracy.tolerance,
+                                        True)
+        for case, one in zip(cases, found):
+            if one is not None:
+                out[case] = replace(models[case], patch=replace(models[case].patch, solved=one))
+    return out
 
 
 def solve(models: Sequence[Model], say: Callable | None = None) -> Answers:

@@ -32,6 +32,8 @@ def shares(asked) -> bool:
 
 def measured(asked, patch: Patch, coarse, tolerance: float | None) -> dict:
     """`measures` of a patch and of its coarser ones."""
+    if asked.solved is not None:
+        return asked.solved.measures
     found = _measures if shares(asked) else _measures.__wrapped__
     return found(patch, tuple(coarse), tolerance)
 
@@ -43,6 +45,8 @@ def _measures(patch: Patch, coarse: tuple, tolerance: float | None) -> dict:
 
 def band(asked, patch: Patch) -> list:
     """`plane_band` of a patch."""
+    if asked.solved is not None:
+        return asked.solved.band
     return _band(by_content(asked), patch) if shares(asked) else plane_band(asked, patch)
 
 

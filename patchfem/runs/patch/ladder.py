@@ -41,6 +41,8 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
     has no coarser one: its second patch is on the mesh with every edge halved. Where it shares meshes they are those.
     fresh: condense anew, whatever is kept on disk.
     """
+    if asked.solved is not None and not fresh:
+        return asked.solved.patches
     if asked.meshes is not None:
         if fresh:
             return on_pairs(asked, [condensed(asked, *level, fresh=True) for level in asked.meshes.levels], estimate)

@@ -18,7 +18,6 @@ from ....model.model import Model
 from ....model.source import placed
 from ....response.errors import pieces_error
 from ...patch import result as of_patch
-from ...patch import static
 from ...remedies import Finding, beyond_tolerance
 from ...results.result import without_folders
 from ...results.travel import outcome_on_piece, travelled
@@ -78,7 +77,8 @@ def solve(models: Sequence[Model], say=None) -> Answers:
 
 def _solved(models, say) -> Answers:
     begin, out = perf_counter(), Answers.blank(len(models))
-    held = [_pressed(model, one) for model, one in zip(models, _together(models))]
+    models = patches.solved_together(models)
+    held = [_pressed(model) for model in models]
     moves = [case for case, one in enumerate(held) if one is not None]
     alone = set(range(len(models))) - set(moves)
     if moves:
@@ -94,39 +94,18 @@ def _solved(models, say) -> Answers:
     return out
 
 
-def _together(models) -> list:
-    """Each case as the SolvedPatch of `runs.patch.static`, None of those that press by themselves."""
-    out, groups = [None] * len(models), {}
-    for case, model in enumerate(models):
-        if not static.not_together(model.patch):
-            groups.setdefault((patches.group(model), model.patch.shear), []).append(case)
-    for cases in groups.values():
-        asked = [models[case].patch for case in cases]
-        for case, one in zip(cases, static.pressed_together(asked, models[cases[0]].accuracy.tolerance, True)):
-            out[case] = one
-    return out
-
-
-def _pressed(model: Model, one) -> _Pressed | None:
-    """A case with its patch pressed, together with others as the SolvedPatch `one` or by itself; None of one that is
-    run by itself."""
+def _pressed(model: Model) -> _Pressed | None:
+    """A case with its patch pressed; None of one that is run by itself."""
     try:
         with placed(model.source):
-            if one is not None:
-                patch, *coarse = one.patches
-                measures, said = of_patch.floored(model, one.measures), of_patch.strained_by(
-                    model.patch, one.top, one.approach)
-                area = patch.pieces.interface.weight.sum()
-                notes = [*of_patch.slender(model.patch, patch.pressure.load / area), *one.band]
-            else:
-                patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
-                if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT:
-                    return None
-                measures, said = of_patch.measured(model, patch, coarse), of_patch.strained(model.patch, patch)
-                notes = of_patch.left_out(model, patch, coarse)
+            patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
+            if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT:
+                return None
+            warnings = [*model.source.remarks, *of_patch.strained(model.patch, patch), *patch.notes]
             numerics = choose(model)
             return _Pressed(YieldingElements(model, numerics, patch), YieldingElements(model, numerics, coarse[0]),
-                            measures, [*model.source.remarks, *said, *patch.notes], notes, patch)
+                            of_patch.measured(model, patch, coarse), warnings,
+                            of_patch.left_out(model, patch, coarse), patch)
     except Exception:  # what is wrong is told by its own run
         return None
 
