@@ -65,7 +65,7 @@ def _as_one_point(model, patch, numerics) -> list:
     if patch is None or f is None or has(f.law, "averaged") or model.soft or numerics.per_point or moves:
         return []
     return ["nothing spatial acts on the motion: with a rigid slide, constant load and the pressure on the upper piece "
-            "the patch moves exactly as one point under the same load; add [contact.shear]"]
+            "the patch moves exactly as one point under the same load; to slip part by part it needs [contact.shear]"]
 
 
 def _of_bonds(model, patch, raw) -> list:
