@@ -18,6 +18,7 @@ ALIKE = 0.95  # correlation of the unworn heights of both scans, from which on t
 LIKELY = 0.98  # the same where the search is no clearer than chance, as on a lay that repeats itself
 SPIKE, WIDEST = (10.0, 40.0, 160.0), 12  # scatters off the medians of 5 x 5 heights; heights of a spike at most
 SPECK = 12.0, 48.0, 192.0  # noises that a speck of the depths jumps by
+SEEN = 0.1  # of the worn part without heights, from which on this is told
 DIGITS = 4
 WORN, NONE = "worn", "no wear shown"
 GREW = "material grew, or the files are in the wrong order"
@@ -190,6 +191,7 @@ def sentences(one: Change) -> list:
         out.append(f"Worn: {_volume(worn)} over {100 * values['worn_share'].value:.3g} % of the region that both scans "
                    f"show, {_length(values['worn_depth_mean'])} in the mean over that region, "
                    f"{_length(values['worn_depth_max'])} at the deepest place.")
+        out += _unseen(one)
     elif one.volumes.open:
         out.append(f"Which part is unworn stays open: {EITHER}. If it is one of them, up to {_most(worn)} wore off the "
                    f"other; if it is the other, up to {_most(grown)} grew on the first. A scan that reaches farther "
@@ -208,6 +210,14 @@ def sentences(one: Change) -> list:
         out.append("Another part of the scans may be the unworn one as well, as where two planes meet in an edge; the "
                    "intervals hold what either gives.")
     return out
+
+
+def _unseen(one: Change) -> list:
+    """How much of the worn part has no heights, as a sentence."""
+    worn = one.volumes.worn
+    share = float((worn & ~np.isfinite(one.found.depth)).sum()) / max(float(worn.sum()), 1.0)
+    return [f"{100 * share:.0f} % of the worn part has no heights in one scan or stands beside a hole of it: its depth "
+            "there is that of the nearest ones, and a deeper place may be among them."] if share > SEEN else []
 
 
 def _track(one: ScanTrack) -> str:

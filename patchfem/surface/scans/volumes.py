@@ -17,6 +17,8 @@ ALONE = 1.6  # times as far must a single height lie, as noise is larger beside 
 SHARE = 0.3  # of the mean depth of a square that the smaller ones inside it have, at least
 EDGE = 0.25  # of the height at its border, how well the volume of a worn part is known
 LEAK = 0.005  # of what wore, how well what grew is known, and the other way round: a shift makes both
+AWAY, ENOUGH = 0.15, 0.4  # of the shorter side that heights stand away from what changed; of the unworn ones, at least
+WALL = 0.5  # of the depth of a worn part beside it, how well a missing height at its border is known, all alike
 UNDER = 0.7  # of the slow errors of the scans beside a worn part, what they are in its mean
 TOGETHER = 3.0  # the noise of a volume over that of independent heights
 FEW = 0.25  # of a square, at least, is known
@@ -24,7 +26,7 @@ WORN = {"worn_volume": "volume that went, over the region that both scans show",
         "grown_volume": "volume that stands above the scan before: pile-up, deposits",
         "worn_share": "share of the common region that wore",
         "worn_depth_mean": "worn volume over the common region",
-        "worn_depth_max": "largest worn depth, of the median of 3 x 3 heights"}
+        "worn_depth_max": "largest worn depth, of the median of 3 x 3 heights, where any were measured"}
 BOTH = "worn_volume", "grown_volume"
 
 
@@ -52,8 +54,10 @@ def measured(found: Laid, x, y) -> Volumes:
     """Measures of a map of depths at x (n,) and y (m,) [m].
 
     Volumes are sums over the worn heights. Their standard deviation is that of the plane (`Laid.covariance`), of slow
-    errors of the scans and of the noise; what the heights that do not count as worn hold, above
-    zero, widens the interval. Where another part may be the unworn one, the interval reaches to what that gives.
+    errors of the scans and of the noise; what the heights that do not count as worn hold, above zero, widens the
+    interval; below zero, shallow wear has drawn the plane down, and it is raised to their mean there. So do missing
+    heights at the border of a worn part, of which all may be as deep as the part or none, as an instrument misses steep
+    walls. Where another part may be the unworn one, the interval reaches to what that gives.
     """
     first = _measured(found, x, y)
     if found.other is None:
@@ -70,25 +74,30 @@ def _measured(found: Laid, x, y) -> Volumes:
 
     place, cell, inside = _nearest(found.depth), _cells(x, y), found.region
     depth = np.where(inside, found.depth[place], np.nan)
-    heights, area, values = np.where(inside, depth, 0.0), float(cell[inside].sum()), {}
+    heights, area, values, hidden = np.where(inside, depth, 0.0), float(cell[inside].sum()), {}, {}
     many = np.bincount(np.ravel_multi_index(place, cell.shape)[inside], minlength=cell.size).reshape(cell.shape)
     squares = _squares(found)
     worn, grown = (_beyond(squares, sign)[place] & inside for sign in (1.0, -1.0))
     grown &= ~worn
-    bent = _bent(found, worn | grown)
+    rest, bent, away = inside & ~worn & ~grown, _bent(found, worn | grown), _away(found, worn | grown, x, y)
     for name, mask, sign, beside in (("worn_volume", worn, 1.0, grown), ("grown_volume", grown, -1.0, worn)):
         volume = float((sign * cell * heights)[mask].sum())
         noise = found.noise * float(np.sqrt((cell[mask]**2 * many[place][mask]).sum())) * TOGETHER
         edge = EDGE * float((cell * np.abs(heights))[mask & ~binary_erosion(mask)].sum())
         slow = UNDER * bent * float(cell[mask].sum())
         reach = SIDE * float(np.hypot(np.hypot(_of_plane(found, mask, cell, x, y), slow), noise)) + edge
-        reach += LEAK * float((cell * np.abs(heights))[beside].sum())
-        left = max(sign * float((cell * heights)[inside & ~worn & ~grown].sum()), 0.0)
-        values[name] = Quantity(max(volume, 0.0), max(volume - reach, 0.0), max(volume + reach + left, 0.0), "m3",
-                                WORN[name])
+        walls, deep = _walls(found, mask)
+        reach += WALL * float((cell * deep)[walls].sum()) + LEAK * float((cell * np.abs(heights))[beside].sum())
+        left = sign * float((cell * heights)[rest].sum())
+        left = max(left, -left * (1 + float(cell[mask].sum()) / max(float(cell[rest].sum()), 1e-300)))
+        more = -sign * float(_pull(mask, cell, x, y) @ away)
+        values[name] = Quantity(max(volume, 0.0), max(volume - reach + min(more, 0.0), 0.0),
+                                max(volume + reach + left + max(more, 0.0), 0.0), "m3", WORN[name])
+        hidden[name] = WALL * float(cell[walls].sum()) / area
     share = [float(cell[_beyond(squares, 1.0, *rule)[place] & inside].sum()) / area
              for rule in ((CLEAR, 0.0), (2 * CLEAR, 0.0), (CLEAR, 2.0), (CLEAR / 1.8, 2.0))]
-    values["worn_share"] = Quantity((share[0] + share[2]) / 2, min(share), max(share), "1", WORN["worn_share"])
+    values["worn_share"] = Quantity((share[0] + share[2]) / 2, max(min(share) - hidden["worn_volume"], 0.0),
+                                    min(max(share) + hidden["worn_volume"], 1.0), "1", WORN["worn_share"])
     mean = (one / area for one in values["worn_volume"][:3])
     values["worn_depth_mean"] = Quantity(*mean, "m", WORN["worn_depth_mean"])
     values["worn_depth_max"] = _largest(found, worn)
@@ -107,6 +116,21 @@ def _nearest(depth) -> tuple:
     from scipy.ndimage import distance_transform_edt
 
     return tuple(distance_transform_edt(~np.isfinite(depth), return_distances=False, return_indices=True))
+
+
+def _walls(found: Laid, mask) -> tuple:
+    """Missing heights (m, n) about as far from a deep one in the mask as from one beside it, less than twice as far;
+    and the size [m] of the nearest deep one, above half of their median."""
+    from scipy.ndimage import distance_transform_edt
+
+    known = np.isfinite(found.depth)
+    missing = found.region & ~known
+    if not missing.any() or not (mask & known).any() or not (known & ~mask).any():
+        return np.zeros(mask.shape, bool), np.zeros(mask.shape)
+    size = np.where(mask & known, np.abs(found.depth), 0.0)
+    near, place = distance_transform_edt(size <= 0.5 * np.median(size[size > 0]), return_indices=True)
+    far = distance_transform_edt(~(known & ~mask))
+    return missing & (near < 2 * far) & (far < 2 * near), size[tuple(place)]
 
 
 def _means(depth, side: int, even: bool = True) -> np.ndarray:
@@ -177,10 +201,29 @@ def _bent(found: Laid, changed) -> float:
 
 def _of_plane(found: Laid, mask, cell, x, y) -> float:
     """Standard deviation of the volume under a mask [m3] that the plane leaves open."""
+    pull = _pull(mask, cell, x, y)
+    return float(np.sqrt(pull @ found.covariance[3:, 3:] @ pull))
+
+
+def _pull(mask, cell, x, y) -> np.ndarray:
+    """Volume [m3] under a mask of a plane of level 1, of slope 1 along x, of slope 1 along y, about the middle (3,)."""
     x, y = x - (x[0] + x[-1]) / 2, y - (y[0] + y[-1]) / 2
     weight = np.where(mask, cell, 0.0)
-    pull = np.array([weight.sum(), weight.sum(axis=0) @ x, weight.sum(axis=1) @ y])
-    return float(np.sqrt(pull @ found.covariance[3:, 3:] @ pull))
+    return np.array([weight.sum(), weight.sum(axis=0) @ x, weight.sum(axis=1) @ y])
+
+
+def _away(found: Laid, changed, x, y) -> np.ndarray:
+    """Least-squares plane (3,) as in `_pull` of the unworn depths that stand well away from what changed: beside a
+    shallow slope the noise hides where it begins, and the plane leans into it. Zero where too few stand away."""
+    from scipy.ndimage import uniform_filter
+
+    side = 2 * int(AWAY * min(changed.shape)) + 1
+    far = found.used & (uniform_filter(changed.astype(np.float32), side) < 0.5 / side**2)
+    if not changed.any() or far.sum() < ENOUGH * found.used.sum():
+        return np.zeros(3)
+    normal = np.array([_pull(far, one, x, y) for one in
+                       np.broadcast_arrays(1.0, x - (x[0] + x[-1]) / 2, (y - (y[0] + y[-1]) / 2)[:, None])])
+    return np.linalg.lstsq(normal, _pull(far, found.depth, x, y), rcond=1e-12)[0]
 
 
 def _largest(found: Laid, worn) -> Quantity:
