@@ -20,6 +20,7 @@ from . import grids, ladder
 from .condensed import condensed
 from .measures import measures, missed
 from .press import pressed
+from .static import patches_on
 
 CASES = 48  # cases that a mesh is chosen by; of more, those that lie farthest apart
 ROUNDS = 4  # of the search for the contacts
@@ -113,7 +114,8 @@ def _layout(cases: list, between: bool) -> Layout | None:
     layout = grids.search_layout(first)
     for _ in range(ROUNDS):
         pair = condensed(first, *grids.grids_of(first, layout))
-        seen = [(one, found) for one in cases if (found := _loaded(one, pair)) is not None]
+        known = patches_on(cases, pair)
+        seen = [(one, found) for one, patch in zip(cases, known) if (found := _loaded(one, pair, patch)) is not None]
         if not seen:
             return None
         layout = _merged([grids.layout_of(one, [found]) for one, found in seen], between)
@@ -122,10 +124,11 @@ def _layout(cases: list, between: bool) -> Layout | None:
     return layout
 
 
-def _loaded(asked, pair):
-    """The contact of a case, None of one that cannot be pressed: its own run says why."""
+def _loaded(asked, pair, patch):
+    """The contact of a case, pressed with others as `patch` or by itself; None of one that cannot be pressed: its own
+    run says why."""
     try:
-        return grids.contact_extent(pressed(asked, pair))
+        return grids.contact_extent(patch or pressed(asked, pair))
     except PatchfemError:
         return None
 

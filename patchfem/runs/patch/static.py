@@ -61,17 +61,43 @@ def not_together(asked) -> str:
         return "its mesh is its own"
     if not all(isinstance(body, TensorGrid) or body is None for level in asked.meshes.levels for body in level):
         return "its pieces are no plain grids"
+    return _not_anchored(asked) or ("" if len(asked.meshes.levels) > 2 else "its mesh has no coarser ones")
+
+
+def _not_anchored(asked) -> str:
+    """Why no contacts of `contact.many` press a `PatchModel` on plain grids; "" where they may."""
     if asked.strips is not None or (asked.skin is not None and asked.skin.law != "linear"):
         return "strips or a smooth skin lie between the pieces"
-    if not asked.load or len(asked.meshes.levels) < 3:
-        return "no load presses it, or its mesh has no coarser ones"
+    if not asked.load:
+        return "no load presses it"
     return "its pressure may have no bound" if asked.singular_ends or asked.gap.jumps else ""
 
 
 def pressing_kind(asked) -> tuple:
     """What patches pressed together have in common beside their pieces."""
+    return asked.meshes.name, *_kind(asked)
+
+
+def _kind(asked) -> tuple:
     skin = None if asked.skin is None else (asked.skin.normal_stiffness, asked.skin.tangential_ratio)
-    return asked.meshes.name, skin, asked.moment is None
+    return skin, asked.moment is None
+
+
+def patches_on(patches, pair: Pair) -> list:
+    """Each of `PatchModel`s of one geometry as a solved Patch on a Pair; None of those that do not press as this module
+    can."""
+    out, groups = [None] * len(patches), {}
+    grids = isinstance(pair.grid, TensorGrid) and isinstance(pair.upper_grid, TensorGrid) and not pair.closing.any()
+    for k, asked in enumerate(patches if grids else ()):
+        if not _not_anchored(asked):
+            groups.setdefault(_kind(asked), []).append(k)
+    for cases in groups.values():
+        with one_thread():
+            level = pressed_on([patches[k] for k in cases], pair)
+        for place, k in enumerate(cases):
+            if level.good[place] and level.count[place] > one_by_one.POINT:
+                out[k] = _patch_of(patches[k], pair, level, place)
+    return out
 
 
 def pressed_together(patches, tolerance: float, moving: bool = False) -> list:

@@ -7,6 +7,8 @@ from scene_texts import COATING, PIECE
 from patchfem.model.model import build
 from patchfem.runs.many import many, one_by_one, patches
 from patchfem.runs.many.meshes import meshed
+from patchfem.runs.patch.grids import contact_extent
+from patchfem.runs.patch.ladder import solve_all
 from patchfem.scene import scene
 
 TEXT = PIECE + '{}load = "{} N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING + "{}\n[accuracy]\ntolerance = 1e-2\n"
@@ -71,6 +73,24 @@ def test_exact_each_tolerance_has_meshes_of_its_own():
     texts = [TEXT.format(PINNED, load, "").replace("1e-2", size) for size in ("1e-2", "1e-3") for load in (100, 200)]
     one, other, finer, finest = (model.patch.meshes for model in meshed([build(scene.loads(text)) for text in texts]))
     assert one is other and finer is finest and one is not finer
+
+
+@pytest.mark.parametrize("tables", [TILT, TILT + SKIN])
+def test_exact_patches_solved_together_are_those_of_their_own(tables):
+    """What moves a patch takes of it: pressure, gap, compliance, and the rest that the pressed patch carries."""
+    models = family(tables, -1e-4, 1e-5, 3e-4)
+    for model, other in zip(models, patches.solved_together(models)):
+        assert model.patch.solved is None and other.patch.solved is not None
+        for mine, own in zip(other.patch.solved.patches, solve_all(model.patch, 1e-2)):
+            top = own.pressure.sigma_n.max()
+            assert np.abs(mine.pressure.sigma_n - own.pressure.sigma_n).max() < 1e-11 * top
+            np.testing.assert_array_equal(mine.active, own.active)
+            np.testing.assert_array_equal(mine.gap, own.gap)
+            np.testing.assert_array_equal(mine.giving, own.giving)
+            assert mine.pressure.gap == pytest.approx(own.pressure.gap, rel=1e-9, abs=1e-9 * np.ptp(own.gap))
+            for name in ("approach", "rotation", "load", "moment"):
+                assert getattr(mine.pressure, name) == pytest.approx(getattr(own.pressure, name), rel=1e-11)
+            assert contact_extent(mine).places == pytest.approx(contact_extent(own).places, rel=1e-9)
 
 
 def test_exact_contacts_inside_the_interface_are_run_by_themselves():
