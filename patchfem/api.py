@@ -35,7 +35,7 @@ from .model.model import build as build_model
 from .runs.many import many, meshes
 from .runs.plan import Plan
 from .runs.plan import plan as plan_model
-from .runs.results import result as found
+from .runs.results import result as run_result
 from .runs.run import run as run_plan
 from .scene import starting
 from .scene.changed import Base
@@ -323,7 +323,7 @@ class Plots:
         raise PatchfemError(f"plot.{names[0]}: nothing to draw: {lack}")
 
 
-class Result(found.Result):
+class Result(run_result.Result):
     """A finished run: `outcome`, `measures`, `warnings`, `notes`, `seconds`, the kept histories in `response`.
 
     `outcome.sentence` says how it ended; `measures[name]` has `value`, `error`, `unit` and `text`, in SI.

@@ -111,6 +111,7 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
     is not finite (not_converged, `message` says what); Missing when a bond list overflows.
     """
 
+    # samples: what is kept so far, `last` of it the cycles of the window; marks may be those of an interrupted march
     run = _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(say), start)
     total = round(cycles * steps_per_cycle)
     samples = Samples(deque(maxlen=max(window, 2)))
@@ -124,6 +125,7 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
         run = fresh(modes, drive, model, steps_per_cycle, travel, start)  # it ends before: once more, cycle by cycle
         samples.again = True
     extremes, phasors = samples.extremes, samples.phasors
+    # room: for how many more samples of cycles before the window; picked: first step of a cycle -> those worth keeping
     room, whole, picked = samples.room, whole or bool(asked), {}
     # a fraction of a cycle comes first, the window is whole
     size = (total - run.done) % steps_per_cycle or steps_per_cycle

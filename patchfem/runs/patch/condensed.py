@@ -62,19 +62,14 @@ def finite_elements(body, layers: Layers):
     """The assembled piece of a tensor grid (Piece) or of any mesh (Substructure)."""
     if isinstance(body, TensorGrid):
         return assemble(body.x, body.depth, body.coating_rows, layers)
-    return _any_cells().Substructure(body, layers)
-
-
-def _any_cells():
-    """elasticity.substructure, for meshes of any cells alone."""
-    return substructure
+    return substructure.Substructure(body, layers)
 
 
 def compliance_of(body, piece, fresh: bool) -> tuple:
     """Compliances (nn, tt, nt) of one piece; those of a large one come from the cache on disk unless `fresh`."""
     condense, large = interface_compliance, body.x.size >= LEAST_CACHED
     if not isinstance(body, TensorGrid):
-        condense, large = _any_cells().condense, len(body.points) >= LEAST_CACHED * LEAST_CACHED
+        condense, large = substructure.condense, len(body.points) >= LEAST_CACHED * LEAST_CACHED
     if not large:
         return condense(piece)
     key = cache.key_of(body.x, body.depth, body.coating_rows, piece.layers) if isinstance(body, TensorGrid) else \
