@@ -14,6 +14,7 @@ ALWAYS = {"grammar": 0.001, "bytes": 0.001, "words": 0.003, "energy": 0.003, "pr
           "msh": 0.001, "msh-binary": 0.001, "vtu": 0.001, "inp": 0.001, "unv": 0.001, "hostile": 0.008, "hard": 0.05,
           "wear": 0.01}
 SEED = 4
+SEEDS = {"energy": 25}  # tanh, elastic-plastic and bonds: no loop that no other test compiles
 
 
 def held(names, share, seed):
@@ -34,7 +35,7 @@ def warm_once(tmp_path_factory):
 
 @pytest.mark.parametrize("name", ALWAYS)
 def test_always_holds_a_share(name):
-    (row,) = held([name], ALWAYS[name], SEED)
+    (row,) = held([name], ALWAYS[name], SEEDS.get(name, SEED))
     assert row.tried == max(1, round(ALWAYS[name] * CAMPAIGNS[name].size))
 
 

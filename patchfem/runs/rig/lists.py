@@ -175,6 +175,14 @@ def crowded(model: Model, numerics: Numerics, book: dict) -> bool:
     return lists_grow(model) if form_of(model.bonds) == AGED else strips > TURNING * numerics.cycles * numerics.steps
 
 
+def in_vain(book: dict, bars: list) -> bool:
+    """Whether a motion on a list of bonds is known no better after two doublings of its steps than before them; bars
+    [m]: its errors, one doubling after the other. A released block that turns back in almost every step has another
+    list at any step (errors of 71, 509, 139, 39 and 97 times the tolerance): the next doublings cost four and eight
+    times as much."""
+    return book.get("strips", 0.0) > 0 and len(bars) > 2 and bars[-1] >= bars[-3]
+
+
 def held_cost(model: Model, numerics: Numerics) -> tuple:
     """Strips at the end of the list of a block that the printed law holds, and the seconds of the run with it: of one
     that was released the most of both."""

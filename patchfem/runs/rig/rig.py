@@ -158,6 +158,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
 
     meshed = engine.in_space(model, numerics, patch, coarse, found)
     space, spent = estimate(solve, found.values, meshed, made)
+    bars = []  # errors of the displacement, of one doubling of the steps after the other
     while True:
         ways = engine.in_time(model, numerics, patch)
         time, more = estimate(solve, found.values, ways, made)
@@ -170,7 +171,8 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
             found = replace(found, levels=levels.levels_with_errors(found.levels, apart, made),
                             coarser=tuple((made[one.runs[0]], one.beside and made[one.beside]) for one in apart
                                           if one.runs and one.runs[0].numerics.choice is None))  # a list has its bound
-        if _enough(model, numerics, found, measures) or not time:
+        bars.append(measures["relative_displacement_amplitude"].error or 0.0)
+        if _enough(model, numerics, found, measures, bars) or not time:
             if spent:
                 seconds["error"] = spent
             runs = [found.values, *(made[one].values for one in _halved(engine, model, numerics, patch))]
@@ -207,11 +209,11 @@ def _whole_period(model, numerics, found) -> int:
     return cycles if 2 * cycles <= numerics.cycles else 0
 
 
-def _enough(model, numerics, found, measures) -> bool:
+def _enough(model, numerics, found, measures, bars) -> bool:
     """Whether the error of the displacement is met, or the steps a cycle cannot be doubled again."""
     main, again = measures["relative_displacement_amplitude"], numerics.steps * 2
     met = main.beyond(model.accuracy.tolerance) <= 1
     if numerics.local:
         return met or numerics.local < FINEST
     return met or "steps_per_cycle" in numerics.pinned or again > MOST_STEPS or again * numerics.cycles > 1e7 \
-        or lists.crowded(model, numerics, found.book) or found.outcome in ENDED
+        or lists.crowded(model, numerics, found.book) or lists.in_vain(found.book, bars) or found.outcome in ENDED

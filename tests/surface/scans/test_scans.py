@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -181,27 +182,32 @@ def test_always_a_refused_place_names_the_likeness_that_it_wants(grooved, worn, 
     assert f"of {least - 0.004:.3f}, and only above {least:g} " in why
 
 
+@cache
+def independent(seed):
+    """(kind, result, truth, spacing [m]) of a pair made by an independent program, which is laid once."""
+    kind, *sides, truth = make(seed)
+    return kind, change.changed(*(Areal(*map(np.asarray, one), "a scan") for one in sides)), truth, sides[0][0][1]
+
+
 @pytest.mark.share(1)
 @pytest.mark.parametrize("seed", [0, 18, 25, 7])
 def test_always_the_place_of_an_independent_pair_lies_in_its_interval(seed):
     """A deep groove, two lays that repeat themselves, and slow errors of an unworn scan."""
-    _, *sides, truth = make(seed)
-    found = change.changed(*(Areal(*map(np.asarray, one), "a scan") for one in sides)).registration
+    _, found, truth, pixel = independent(seed)
+    found = found.registration
     assert all(one.low <= truth[name] <= one.high for name, one in found.items())
-    pixel = sides[0][0][1]
     assert all(one.high - one.low < 0.3 * pixel for name, one in found.items() if name != "rotation")
 
 
-@pytest.mark.share(1)
-@pytest.mark.parametrize("seed", [1, 6, 4, 8, 13, 19, 22, 26])
+@pytest.mark.share(0)  # the pair whose place is looked at always
+@pytest.mark.parametrize("seed", [18, 1, 6, 4, 8, 13, 19, 22, 26])
 def test_always_a_pair_made_by_an_independent_program_has_its_volume(seed):
-    kind, *sides, truth = make(seed)
-    found = change.changed(*(Areal(*map(np.asarray, one), "a scan") for one in sides))
+    kind, found, truth, _ = independent(seed)
     name = "grown_volume" if kind == "deposits" else "worn_volume"
     assert found.values[name].value == pytest.approx(truth[name], rel=0.05)
 
 
-def test_always_the_verb_tells_volumes_and_draws_maps(grooved, tmp_path, capsys):
+def test_always_the_verb_tells_volumes_and_draws_maps(grooved, worn, tmp_path, capsys):
     paths = []
     for name, scan in zip(("before", "after"), grooved):
         x, y = np.meshgrid(scan.x, scan.y)
@@ -216,7 +222,7 @@ def test_always_the_verb_tells_volumes_and_draws_maps(grooved, tmp_path, capsys)
     assert data["removed"] == {"before": 0, "after": 0} and data["hidden_wear"]["reason"].startswith("unworn parts")
     page = (tmp_path / "out" / "report.html").read_text()
     assert "laid on it" in page and 'id="line"' in page and '"scans":' in page
-    found = change.changed(*grooved)
+    found = worn
     files = [read_surface(tmp_path / "out" / f"difference.{end}") for end in ("x3p", "csv")]
     for one in files:
         there = np.isfinite(found.found.depth)
