@@ -209,10 +209,10 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
     dust stay in. In the dict `verdict` and `sentences` are words; `shift`, `worn_depth_mean`, `amplitude_ratio` and so
     on have `value`, `low`, `high`, `unit`, and a `reason` where the value is None. Two scans have `worn_volume`,
     `grown_volume`, `worn_share` and the `registration` by x, y and rotation. pairs: in place of files a table of
-    them with the columns before and after: `pairs` then has the dict of each pair, `means` mean, interval and scatter
-    over them; a pair that fails has its reason as `message`. Two results folders, the second of a run with [wear]: what
-    wore off between them, over the whole patch, with the measures of both under `runs`. PatchfemError for files that
-    do not fit together.
+    them, or of results folders, with the columns before and after: `pairs` then has the dict of each pair, `means`
+    mean, interval and scatter over them; a pair that fails has its reason as `message`. Two results folders, the second
+    of a run with [wear]: what wore off between them, over the whole patch, with the measures of both under `runs`.
+    PatchfemError for files that do not fit together.
     """
     how = {"units": units, "shift": shift, "keep_spikes": keep_spikes}
     if pairs is None and len(files) > 1 and any(Path(one).is_dir() for one in files):

@@ -38,8 +38,8 @@ from .streams import plain
 
 
 def compare(before: Path | None = None, after: Path | None = None, /, *other: Path,
-            pairs: Annotated[Path | None, Parameter(help="in place of files a table of them, a pair in each line, such "
-                             "as pairs.csv with the columns before and after")] = None,
+            pairs: Annotated[Path | None, Parameter(help="in place of files a table of them or of results folders, a "
+                             "pair in each line, such as pairs.csv with the columns before and after")] = None,
             direction: word("x or y, along which the traces run; an areal scan has both") = "",
             units: Units = "",
             shift: word("known shift: what stands at x before stands at x + shift after, such as \"0 mm\" for traces "

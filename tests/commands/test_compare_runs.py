@@ -156,3 +156,26 @@ def test_refuses_what_belongs_to_traces_and_damaged_results(runs, tmp_path):
     (tmp_path / "bad" / "result.nc").write_bytes(b"no netCDF")
     answer = cli("compare", runs / "new", tmp_path / "bad", "-o", tmp_path / "out")
     assert answer.code == 2 and "bad/result.nc: cannot be read" in answer.err and "Traceback" not in answer.err
+
+
+def test_exact_a_table_of_results_folders_beside_traces(runs, tmp_path):
+    """Each pair of folders as `compare` gives it alone, means of their own, and reasons for what cannot be compared."""
+    (tmp_path / "a.csv").write_text("x [um],z [um]\n" + "".join(f"{k},{np.sin(k):.3f}\n" for k in range(400)))
+    names = [("new", "half"), ("new", "worn"), ("worn", "new")]
+    rows = ["before,after,direction", *(f"{runs / one},{runs / other}," for one, other in names),
+            f"{runs / 'new'},{runs / 'pressed'},x", f"{runs / 'new'},a.csv,", f"a.csv,{tmp_path / 'a.csv'},"]
+    (tmp_path / "pairs.csv").write_text("\n".join(rows) + "\n")
+    answer = cli("compare", "--pairs", tmp_path / "pairs.csv", "-o", tmp_path / "out", "--json")
+    found = json.loads(answer.out)
+    assert answer.code == 3 and [one["outcome"] for one in found] == ["done"] * 2 + ["failed"] * 3 + ["done"]
+    for (before, after), row in zip(names, found[:2]):
+        alone = json.loads(json.dumps(pf.compare(runs / before, runs / after)))
+        assert {name: row[name] for name in alone if name not in ("before", "after")} == \
+            {name: one for name, one in alone.items() if name not in ("before", "after")}
+    says = ("without [wear]", "a direction belongs to traces", "a file, while")
+    assert all(text in row["message"] for text, row in zip(says, found[2:5]))
+    means = json.loads((tmp_path / "out" / "pairs.json").read_text())["means"]
+    assert len(means) == 2 and means[0]["kind"] == "run" and means[0]["pairs"] == 2
+    volumes = [row["worn_volume"]["value"] for row in found[:2]]
+    assert means[0]["worn_volume"]["value"] == pytest.approx(np.mean(volumes), rel=1e-12)
+    assert "Results folders: mean of 2 pairs" in (tmp_path / "out" / "report.html").read_text()

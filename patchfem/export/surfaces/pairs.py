@@ -4,12 +4,13 @@ from html import escape
 from pathlib import Path
 
 from ... import __version__
+from ...core import PatchfemError
 from ...disk.whole import write_rows, write_text
 from ...scales import LADDERS, plain
 from ...surface.compare import pairs, verdict
 from ...surface.quantity import Mean
 from ..pages.document import Section, document, figure, table, warned
-from . import compare, pictures
+from . import compare, pictures, worn
 
 TRACES, SCANS = ("worn_depth_mean", "amplitude_ratio"), ("worn_volume", "worn_depth_mean")  # the main numbers
 ABOUT = ("Mean over the pairs that have the number, each with equal weight. Interval: 95 % of the mean, by Student's t "
@@ -18,10 +19,17 @@ ABOUT = ("Mean over the pairs that have the number, each with equal weight. Inte
 
 
 def answers(asked: list, direction: str = "", done=None, **how) -> list[dict]:
-    """The answer of each pair as `compare` gives it (`pairs.each_pair`); how: units, shift, keep_spikes of all of them,
-    direction: of those that tell none."""
-    return pairs.each_pair(asked, lambda paths, own: compare.data_of(*verdict.judged(paths, own or direction, **how)),
-                           done)
+    """The answer of each pair, of files or of results folders, as `compare` gives it (`pairs.each_pair`); how: units,
+    shift, keep_spikes of all files, direction: of the traces that tell none."""
+    def answer(paths: tuple, own: str) -> dict:
+        if not any(one.is_dir() for one in paths):
+            return compare.data_of(*verdict.judged(paths, own or direction, **how))
+        if own or how.get("shift") is not None:
+            raise PatchfemError(f"{'a direction' if own else 'a shift'} belongs to traces, not to results folders")
+        lost = worn.lost(*paths)
+        return worn.data_of(lost, worn.verdict(lost))
+
+    return pairs.each_pair(asked, answer, done)
 
 
 def data_of(rows: list) -> dict:
@@ -113,7 +121,7 @@ def _leading(row: dict) -> tuple:
 
 
 def _along(row: dict) -> str:
-    return f", along {row['direction']}" if row["direction"] and "worn_volume" not in row else ""
+    return f", along {row['direction']}" if row["direction"] and _leading(row) == TRACES else ""
 
 
 def _lead(row: dict) -> list:

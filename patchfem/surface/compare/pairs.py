@@ -1,4 +1,4 @@
-"""A table of pairs of files, before and after, and what the answers of several pairs have in the mean."""
+"""A table of pairs of surfaces, before and after, and what the answers of several pairs have in the mean."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -9,8 +9,8 @@ from ...inputs.cells import cells_of, header_of, text_of
 from ..quantity import Quantity, mean_of
 
 HEADER = "before,after"
-KINDS = {"scans": "areal scans", "place": "traces laid on each other", "flanks": "traces with a track below its flanks",
-         "nothing": "traces without a common place"}
+KINDS = {"scans": "areal scans", "run": "results folders", "place": "traces laid on each other",
+         "flanks": "traces with a track below its flanks", "nothing": "traces without a common place"}
 AVERAGED = ("worn_volume", "grown_volume", "worn_share", "worn_depth_mean", "worn_depth_within", "worn_depth_max",
             "worn_area", "track_width", "track_depth", "track_depth_floor", "track_step", "track_area_gross",
             "track_area_net", "track_pile_up", "track_pile_up_left", "track_pile_up_right", "track_length",
@@ -28,7 +28,7 @@ class Asked(NamedTuple):
 
 
 def read_pairs(path) -> list[Asked]:
-    """The pairs of a table with the columns before and after; files count from its folder.
+    """The pairs of a table with the columns before and after, files or results folders; they count from its folder.
 
     A column direction (x, y or empty) tells along which the traces of a pair run; other columns are kept as text, and a
     column group parts the means. PatchfemError for a table that is none, with file and line; Missing where it is not
@@ -109,6 +109,6 @@ def means_of(rows: list) -> list[tuple]:
 
 def group_of(row: dict) -> tuple:
     """(cell of the column group, direction, kind of `KINDS`) of the answer of a pair: depths that count from a place,
-    from flanks, or over an area are means of different things."""
-    kind = "scans" if "worn_volume" in row else row["reference"] or "nothing"
-    return row["labels"].get("group", ""), "" if kind == "scans" else row["direction"] or "", kind
+    from flanks, or over an area are means of different things, and so are measured and computed ones."""
+    kind = row["reference"] or ("scans" if "worn_volume" in row else "nothing")
+    return row["labels"].get("group", ""), "" if "worn_volume" in row else row["direction"] or "", kind
