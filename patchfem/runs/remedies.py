@@ -89,8 +89,7 @@ def _finer_mesh(seen, wide: dict, coarse) -> str:
     if asked.mesh is not None:
         return "split the elements of contact.mesh"
     nodes, wider = seen.patch.x.size, f"accuracy.tolerance = {_up(tolerance * times):g} would be met"
-    if asked.strips is not None and asked.strips[0] > 1 and (
-            seen.model.kind == "patch" or seen.model.wear is not None):  # of bars
+    if asked.strips is not None and asked.strips[0] > 1:
         return f"the mesh ({nodes} interface nodes) and the strips share it; {_more_strips(asked, wide)}"
     if not asked.chosen:
         return f"leave out {SIZE}"

@@ -13,7 +13,7 @@ from test_compare_verb import NAMES
 
 import patchfem as pf
 from patchfem.export.surfaces import worn
-from patchfem.export.surfaces.worn import hidden_line
+from patchfem.export.surfaces.worn import hidden_line, hidden_plane
 
 ROOT = Path(__file__).parents[2]
 GUIDE = ROOT / "patchfem" / "scene" / "GUIDE.md"
@@ -28,12 +28,14 @@ substrate = "Ti-8Al-1Mo-1V"
 [contact.tilt]
 angle = "0.1 mrad"
 """
+ROLLED = TILTED.replace("0.2 mm", "0.5 mm") + '[contact.strips]\ncount = 4\nroll = "0.05 mrad"\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
 WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\njumps = 8\ncycles = '
 PER_CYCLE = 1e-14 * 100.0 * 40e-6  # m^3: coefficient, load, path
 MANY = 4e6
 SCENES = {"new": TILTED + COULOMB + SINE, "pressed": TILTED, "half": TILTED + COULOMB + SINE + WEAR + "1e5\n",
           "worn": TILTED + COULOMB + SINE + WEAR + f"{MANY:g}\n", "point": POINT + COULOMB + SINE + WEAR + "1e5\n",
+          "rolled": ROLLED + COULOMB + SINE, "rolled_worn": ROLLED + COULOMB + SINE + WEAR + f"{MANY:g}\n",
           "other": TILTED.replace("0.1 mrad", "0.2 mrad") + COULOMB + SINE + WEAR + "1e5\n"}
 
 
@@ -179,3 +181,25 @@ def test_exact_a_table_of_results_folders_beside_traces(runs, tmp_path):
     volumes = [row["worn_volume"]["value"] for row in found[:2]]
     assert means[0]["worn_volume"]["value"] == pytest.approx(np.mean(volumes), rel=1e-12)
     assert "Results folders: mean of 2 pairs" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_exact_strips_before_and_after_are_compared_over_x_and_the_width(runs):
+    found, one = pf.compare(runs / "rolled", runs / "rolled_worn"), worn.lost(runs / "rolled", runs / "rolled_worn")
+    volume = found["worn_volume"]
+    assert volume["value"] == pytest.approx(PER_CYCLE * MANY, rel=1e-11)
+    assert float((one.depth * one.after.area).sum()) == pytest.approx(volume["value"], rel=1e-11)
+    assert one.depth.shape == (4, one.after.x.size) and one.depth.max() == found["worn_depth_max"]["value"]
+    assert found["track"] is None and "y = -3.75 mm" in found["sentences"][0]
+    hidden = found["hidden_wear"]["value"]
+    assert "that a scan alone could not show" in found["verdict"] and 0 < hidden < found["worn_depth_mean"]["value"]
+
+
+def test_exact_the_hidden_plane_lies_below_every_depth_and_is_the_highest():
+    x, y = np.array([-3.0, -2.0, 0.0, 1.0, 3.0]), np.array([-1.0, 0.0, 1.0])
+    plane = 5 + 0.5 * x + 2 * y[:, None]
+    corners = (1.5, 4.5, 5.5, 8.5)
+    assert hidden_plane(x, y, plane) == pytest.approx(corners, rel=1e-9)
+    bumps = plane + np.array([[0, 3, 1, 2, 0], [1, 2, 9, 2, 1], [0, 1, 2, 1, 0]])
+    assert hidden_plane(x, y, bumps) == pytest.approx(corners, rel=1e-9)
+    assert hidden_plane(x, y, 0 * plane) == (0, 0, 0, 0)
+    assert hidden_plane(x, y[:1], 0 * x[None] + 2.0) == pytest.approx((2, 2, 2, 2))

@@ -22,12 +22,12 @@ from ..pages.sweep import label
 from ..pages.words import pair
 from ..readback import numeric, readable, variables, wanted
 from .compare import WORDS, plain_of, shown
-from .pictures import SIDES, pressures
+from .pictures import SIDES, maps, pressures
 
 LOADING = ("load", "approach", "holder", "shear", "element_size", "load_line", "plane")  # of [contact]; no surface
 BESIDE = ("pressure_peak", "contact_fraction", "normal_stiffness", "tangential_stiffness", "approach", "rotation",
           "groove_amplitude", "slip_amplitude", "relative_displacement_amplitude", "loop_area", "friction_force_peak")
-NEEDED = {"x": 1, "weight": 1, "unloaded_gap": 1, "normal_stress": 2}  # variables of a patch, their dimensions
+NEEDED = {"x": (1,), "weight": (1,), "unloaded_gap": (1, 2), "normal_stress": (2,)}  # of a patch, their dimensions
 SAME = 1e-2  # of the largest difference of a gap, by which the gaps of one patch on two meshes may differ
 FLOOR = 5  # parts of a track, the deepest of which is its floor
 FLAT = 1e-12  # m, below which a new surface has no waves
@@ -37,19 +37,23 @@ TEXTS = {"worn_volume": ("m3", "material lost over the whole patch, both pieces 
          "worn_share": ("1", "share of the patch that lost more than the error of the depth"),
          "hidden_wear": ("m", "mean of the highest straight line of wear that no worn depth lies below: even wear and "
                               "a wedge, which a trace of just this part could not show alone")}
+PLANE = "mean of the highest plane of wear that no worn depth lies below: even wear and wedges, which a scan of just " \
+    "this part could not show alone"
 
 
 class Worn(NamedTuple):
     """A run as its folder holds it.
 
-    run: `beside.FinishedRun`; path: as it was named; x (m,) [m], area (m,) [m2] and gap (m,) [m] of the unloaded
-    surfaces, wear included; depth (m,) [m] worn so far; pressure (m,) [Pa]; slide [m] and force [N] (k,) of the last
-    cycle, or None; cycles of wear; wears: whether it has [wear].
+    run: `beside.FinishedRun`; path: as it was named; x (m,) [m]; y (s,) [m] of the middles of strips, None without
+    them; area [m2] and gap [m] of the unloaded surfaces, wear included, and depth [m] worn so far, (m,) or (s, m);
+    pressure (m,) [Pa], of strips their mean; slide [m] and force [N] (k,) of the last cycle, or None; cycles of wear;
+    wears: whether it has [wear].
     """
 
     run: beside.FinishedRun
     path: str
     x: np.ndarray
+    y: np.ndarray | None
     area: np.ndarray
     gap: np.ndarray
     depth: np.ndarray
@@ -65,8 +69,8 @@ class Worn(NamedTuple):
 
 
 class Lost(NamedTuple):
-    """What wore off between two runs: x (m,) [m], the gaps (m,) [m] of the surfaces before and after, depth (m,) [m]
-    between them; values: `Quantity` by name; track: those of the worn part; notes: sentences."""
+    """What wore off between two runs: the gaps [m] of the surfaces before and after and the depth [m] between them,
+    (m,) or (s, m) each; values: `Quantity` by name; track: those of the worn part, {} of strips; notes: sentences."""
 
     before: Worn
     after: Worn
@@ -104,20 +108,26 @@ def read(path: Path) -> Worn:
     file = path / "result.nc"
     if not file.is_file():
         raise PatchfemError(f"{path}: no results folder of a run: it has no result.nc")
-    names = {*NEEDED, "worn_depth", "time", "slide", "relative_displacement", "friction_force", "wear_cycle"}
+    names = {*NEEDED, "strip_offset", "worn_depth", "time", "slide", "relative_displacement", "friction_force",
+             "wear_cycle"}
     held = {name: one.values for name, one in variables(file, names)[1].items()}
     with readable(file, "results of a patch"):
         for name, dimensions in NEEDED.items():
             wanted(name in held, f"no {name} in it; run the scene again")
-            wanted(numeric(held[name]) and held[name].ndim == dimensions and np.isfinite(held[name]).all(),
+            wanted(numeric(held[name]) and held[name].ndim in dimensions and np.isfinite(held[name]).all(),
                    f"{name} is no field along the patch")
         size = held["x"].size
         wanted(size > 1 and all(held[name].shape[-1] == size for name in (*NEEDED, "worn_depth") if name in held),
                "its fields are of unlike length")
         wanted((np.diff(held["x"]) > 0).all() and held["weight"].sum() > 0, "x is no row of places")
-    depth = held["worn_depth"][-1] if "worn_depth" in held else np.zeros(size)
+        y = held.get("strip_offset")
+        shape = (size,) if y is None else (y.size, size)
+        depth = held["worn_depth"][-1] if "worn_depth" in held else np.zeros(size)
+        wanted(all(one.shape in ((size,), shape) for one in (depth, held["unloaded_gap"])),
+               "its fields are not of its strips")
+    area, gap, depth = (np.broadcast_to(one, shape) for one in (held["weight"], held["unloaded_gap"], depth))
     cycles = float(held["wear_cycle"][-1]) if "wear_cycle" in held else 0.0
-    return Worn(run, str(path), held["x"], held["weight"], held["unloaded_gap"], depth,
+    return Worn(run, str(path), held["x"], y, area if y is None else area / y.size, gap, depth,
                 held["normal_stress"][-1], _last_loop(run, held), cycles, "wear" in run.resolved)
 
 
@@ -150,7 +160,8 @@ def _one_patch(first: Worn, second: Worn) -> None:
 
 
 def _at(x, own, values) -> np.ndarray:
-    return np.interp(x, own, values)
+    """Values at x (m,) of those at own (k,), (k,) or (s, k)."""
+    return np.apply_along_axis(lambda row: np.interp(x, own, row), -1, values)
 
 
 def _between(first: Worn, second: Worn) -> Lost:
@@ -162,20 +173,50 @@ def _between(first: Worn, second: Worn) -> Lost:
     deep_error = None if deep_error is None else deep_error + _between_nodes(first, x)
     off = deep_error or 0.0
     share = float(second.area[depth > max(off, 1e-3 * depth.max())].sum()) / area if depth.max() > 0 else 0.0
-    line_under = hidden_line(x, depth)
+    under = hidden(second, depth)
     found = {"worn_volume": (volume, volume_error), "worn_depth_max": (float(depth.max()), deep_error),
              "worn_depth_mean": (volume / area, volume_error and volume_error / area),
              "worn_area": (volume / area * length, volume_error and volume_error / area * length),
-             "hidden_wear": (max(float(np.mean(line_under)), 0.0), deep_error)}
+             "hidden_wear": (max(float(np.mean(under)), 0.0), deep_error)}
     values = {name: _with(value, error, *TEXTS[name]) for name, (value, error) in found.items()}
+    if second.y is not None:
+        values["hidden_wear"] = values["hidden_wear"]._replace(text=PLANE)
     values["worn_share"] = Quantity(share, share, share, *TEXTS["worn_share"])
     values |= _waves(x, gaps)
     notes = [f"{name}: {text}" for name, one in (("before", first), ("after", second))
              for text in one.run.summary.get("warnings", ())]
     if float(depth.min()) < -off:
-        notes.append(f"at x = {say(float(x[np.argmin(depth)]), 3)} the later run is worn less by "
+        notes.append(f"at {place_of(second, np.argmin(depth))} the later run is worn less by "
                      f"{say(-float(depth.min()), 3)}: it does not go on from the earlier one")
-    return Lost(first, second, gaps, depth, values, _track(x, depth, off, length * volume / area), notes)
+    track = _track(x, depth, off, length * volume / area) if second.y is None else {}  # strips have a map
+    return Lost(first, second, gaps, depth, values, track, notes)
+
+
+def place_of(one: Worn, number: int) -> str:
+    """The place of a node by its number in the flat depth of a run."""
+    strip, node = divmod(int(number), one.x.size)
+    return f"x = {say(float(one.x[node]), 3)}" + ("" if one.y is None else f", y = {say(float(one.y[strip]), 3)}")
+
+
+def hidden(one: Worn, depth) -> tuple:
+    """Depths [m] of what a trace or a scan alone could not show of a depth, at the ends or corners of the patch."""
+    return hidden_line(one.x, depth) if one.y is None else hidden_plane(one.x, one.y, depth)
+
+
+def hidden_plane(x, y, depth) -> tuple:
+    """Depths [m] at the four corners of the strips' middles, none below zero, of the plane of the highest mean that no
+    depth (s, m) [m] over x (m,) and y (s,) [m] lies below: a linear programme of three numbers."""
+    from scipy.optimize import linprog
+
+    scale = float(depth.max())
+    if not scale > 0:
+        return 0.0, 0.0, 0.0, 0.0
+    along, over = (np.interp(one, (one[0], one[-1]), (-1, 1)) if one.size > 1 else np.zeros(1) for one in (x, y))
+    places = np.array([(1.0, a, b) for b in over for a in along])
+    corners = np.array([(1.0, a, b) for b in (over[0], over[-1]) for a in (-1, 1)])
+    found = linprog((-1.0, 0.0, 0.0), np.concatenate([places, -corners]),
+                    np.concatenate([np.maximum(depth, 0.0).ravel() / scale, np.zeros(4)]), bounds=(None, None))
+    return tuple(np.maximum(corners @ found.x * scale, 0.0).tolist())
 
 
 def _between_nodes(first: Worn, x) -> float:
@@ -184,7 +225,7 @@ def _between_nodes(first: Worn, x) -> float:
     if np.array_equal(first.x, x) or not first.depth.any():
         return 0.0
     every = np.unique([*range(0, first.x.size, 2), first.x.size - 1])
-    return float(np.abs(first.depth - _at(first.x, first.x[every], first.depth[every])).max()) / 4
+    return float(np.abs(first.depth - _at(first.x, first.x[every], first.depth[..., every])).max()) / 4
 
 
 def _less(first: Worn, second: Worn, name: str) -> tuple:
@@ -230,6 +271,8 @@ def _right(one, two, three) -> float:
 def _waves(x, gaps: tuple) -> dict:
     """Ratios of amplitude and slope of the surfaces, after over before, None where the nodes do not show the waves."""
     pairs = (("amplitude", AMPLITUDE), ("slope", SLOPE))
+    if gaps[0].ndim == 2:
+        return {f"{part}_ratio": refused("1", text, "the patch is in strips") for part, text in pairs}
     sides = [Profile(frozen_array(x), frozen_array(gap), "the patch") for gap in gaps]
     why = "the new surfaces are flat" if level(sides[0]).z.std() < FLAT else ""
     if not why:
@@ -269,20 +312,21 @@ def _track(x, depth, off: float, area: float) -> dict:
 
 def verdict(one: Lost) -> tuple:
     """(headline, sentences)."""
-    mean, hidden, track = one.values["worn_depth_mean"], one.values["hidden_wear"], one.track
+    mean, unseen, track = one.values["worn_depth_mean"], one.values["hidden_wear"], one.track
     if not mean.value > 0:
         return "nothing was worn between the two runs", []
-    head, where, inside = f"worn by {say(mean.value, 3)} in the mean over the patch", "", np.ones(one.depth.size, bool)
+    head, x = f"worn by {say(mean.value, 3)} in the mean over the patch", one.after.x
+    seen, ends = "trace" if one.after.y is None else "scan", hidden(one.after, one.depth)
     if track and one.values["worn_share"].value < 0.999:
-        mean, hidden, where = track["depth_mean"], track["hidden_wear"], " within this part"
-        inside = (one.after.x >= track["from"].value) & (one.after.x <= track["to"].value)
+        mean, unseen, seen = track["depth_mean"], track["hidden_wear"], "trace within this part"
+        inside = (x >= track["from"].value) & (x <= track["to"].value)
+        ends = hidden_line(x[inside], one.depth[inside])
         head += f", by {say(mean.value, 3)} from x = {say(track['from'].value, 3)} to {say(track['to'].value, 3)}"
-    if hidden.value > 0.01 * mean.value:
-        head += f", of which {say(hidden.value, 3)} is {_kind(hidden_line(one.after.x[inside], one.depth[inside]))} " \
-                f"that a trace{where} alone could not show"
-    place, volume = one.after.x[int(np.argmax(one.depth))], one.values["worn_volume"]
+    if unseen.value > 0.01 * mean.value:
+        head += f", of which {say(unseen.value, 3)} is {_kind(ends)} that a {seen} alone could not show"
+    place, volume = place_of(one.after, np.argmax(one.depth)), one.values["worn_volume"]
     told = [f"Worn volume {' '.join(shown(volume)[::2])}; {say(float(one.depth.max()), 3)} at the deepest place, "
-            f"x = {say(float(place), 3)}; both pieces together; {one.after.cycles:.6g} cycles of wear"
+            f"{place}; both pieces together; {one.after.cycles:.6g} cycles of wear"
             f"{f', {one.before.cycles:.6g} before' if one.before.cycles else ''}."]
     for name in ("contact_fraction", "pressure_peak", "loop_area"):
         sides = [each.measure(name) for each in (one.before, one.after)]
@@ -293,8 +337,9 @@ def verdict(one: Lost) -> tuple:
 
 
 def _kind(ends: tuple) -> str:
-    """What wear along a straight line with these depths at both ends is."""
-    low, high = sorted(ends)
+    """What wear along a straight line with these depths at both ends, or along a plane with
+    these at its corners, is."""
+    low, high = min(ends), max(ends)
     return "a wedge" if low < 0.2 * high else "even wear" if low > 0.8 * high else "even wear with a wedge"
 
 
@@ -361,7 +406,8 @@ def write_page(path: Path, one: Lost, found: tuple) -> None:
     body.append(table(("quantity", ">value", ">interval", "unit", "meaning"), rows))
     body.append("<p class=soft>Interval: the numerical errors of the runs, which hold in 19 of 20 scenes.</p>")
     runs = [figure("p", pressures([(each.x, each.pressure, name) for each, (_, name) in
-                                   zip((one.before, one.after), SIDES)]), "Normal stress of the pressed patch.",
+                                   zip((one.before, one.after), SIDES)]), "Normal stress of the pressed patch"
+                   f"{'' if one.after.y is None else ', mean over the width'}.",
                    "Pressure along the patch before and after")]
     if one.before.loop is not None and one.after.loop is not None:
         made = [part for each, (_, name) in zip((one.before, one.after), SIDES)
@@ -376,6 +422,11 @@ def write_page(path: Path, one: Lost, found: tuple) -> None:
 
 def _figures(one: Lost) -> list:
     """Pictures (svg, caption, alternative text): the surfaces with the wear on, and the worn depth."""
+    if one.after.y is not None:
+        return [(maps(one.after.x, one.after.y, (*one.gaps, one.depth)), "Left and middle: gap between the unloaded "
+                 "surfaces before and after, with the wear on. Right: depth that both pieces lost together between the "
+                 "two runs; each strip at its middle.",
+                 f"Maps of the gaps and of the worn depth: mean {say(one.values['worn_depth_mean'].value, 3)}")]
     x, under = one.after.x, hidden_line(one.after.x, one.depth)
     (along, mm), (up, um) = axis_unit(x, "m"), axis_unit(np.concatenate(one.gaps), "m")
     place = axis("x", along) | {"range": [x[0] * mm, x[-1] * mm]}

@@ -50,7 +50,10 @@ def measured(model, patch, coarse) -> dict:
     times half the length, of the centre of pressure half the length, of the moment the load times that.
     """
     tolerance = model.patch.mesh_tolerance or model.accuracy.tolerance
-    return floored(model, kept.measured(model.patch, patch, coarse, tolerance if model.patch.chosen else None))
+    found = floored(model, kept.measured(model.patch, patch, coarse, tolerance if model.patch.chosen else None))
+    if patch.strips is None or coarse[0] is None or model.wear is not None:  # `wear.measures` adds that of worn strips
+        return found
+    return strip_error(model.patch, coarse[0], found)
 
 
 def floored(model, found: dict) -> dict:
@@ -68,8 +71,6 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
     if p.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
     found = measured(what.model, patch, coarse)
-    if patch.strips is not None and coarse[0] is not None:
-        found = strip_error(what.model.patch, coarse[0], found)
     return Result(what, p.outcome, found, None, None, patch, at_rest(patch), seconds, warnings, extra)
 
 
