@@ -100,6 +100,8 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
     bounds, target = _bounds(free), measured_of(to)
     if model.patch is None:
         raise PatchfemError(f"--to {target.name}: one point under [normal] has no depth; name [contact]", "normal")
+    if model.wear.start is not None:
+        raise PatchfemError(f"fit {KEY}: the depth of new pieces is fitted; leave it out", "wear.start")
 
     patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]  # no coefficient changes it
     curve, most = _curve(model, patch, bounds.high, target.name, progress)

@@ -12,7 +12,7 @@ from ..inputs import measured
 from ..mesh import files
 from ..scene.rules import limits
 from ..scene.scene import files_of, is_there
-from . import drive, patch, profile, slide, structure_files
+from . import drive, patch, profile, slide, structure_files, worn
 
 WHOLE = 2 * 2**20  # bytes of a mesh that is read whole
 STARTS = {".msh": (b"$MeshFormat",), ".vtu": (b"<?xml", b"<VTKFile"), ".inp": (b"*",), ".unv": (b"-1", b"    -1")}
@@ -91,5 +91,11 @@ def _measured(path: Path, tables, whole: bool) -> None:
     measured.read_table(path)
 
 
+def _worn(path: Path, tables, whole: bool) -> tuple:
+    """The end of a run of the same pieces; what goes on from it."""
+    found = worn.of_pieces(path, tables) if whole else worn.read(path)
+    return (found.sentence,)
+
+
 READERS = {"contact.mesh": _mesh, "contact.profile.file": _profile, "slide.file": _slide, "drive.file": _drive,
-           "structure.file": _structure, "measured.file": _measured}
+           "structure.file": _structure, "measured.file": _measured, "wear.start": _worn}

@@ -144,7 +144,7 @@ def _wear(scene: Scene) -> WearModel | None:
     if scene.wear is None:
         return None
 
-    return of_wear.wear_asked(scene.wear)
+    return of_wear.wear_asked(scene)
 
 
 def _law(scene: Scene) -> tuple:

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..scene.keys.tables import Friction, Wear
+from ..scene.keys.tables import Friction
+from ..scene.scene import Scene
+from . import worn
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +37,7 @@ class WearModel:
 
     coefficient [m2/N]: volume worn off both pieces per load and slip path, or per friction work where `energy`; cycles;
     jumps: how many equal ones, None for automatic ones; upper_share: of the depth; explicit: forward Euler; friction:
-    how it changes with wear, or None.
+    how it changes with wear, or None; start: what was worn before, None of new pieces.
     """
 
     coefficient: float
@@ -45,13 +47,20 @@ class WearModel:
     energy: bool
     explicit: bool
     friction: WornFriction | None = None
+    start: worn.WornBefore | None = None
+
+    def depth_before(self, x, area) -> np.ndarray:
+        """Worn depth [m] of the shape of the areas [m2] of all points, at x (m,) [m], before the first cycle."""
+        return np.zeros(np.shape(area)) if self.start is None else self.start.on(x)
 
 
-def wear_asked(wear: Wear | None) -> WearModel | None:
+def wear_asked(scene: Scene) -> WearModel | None:
     """The wear of a scene, None where it names none."""
+    wear = scene.wear
     if wear is None:
         return None
     change = wear.friction
     return WearModel(wear.coefficient, wear.cycles, None if wear.jumps == "auto" else wear.jumps, wear.upper_share,
                      wear.form == "energy", wear.scheme == "explicit", None if change is None else
-                     WornFriction(change.depth, change.coefficient_factor, change.bond_length_factor))
+                     WornFriction(change.depth, change.coefficient_factor, change.bond_length_factor),
+                     None if wear.start is None else worn.of_pieces(scene.beside(wear.start), scene.tables()))

@@ -135,6 +135,8 @@ def state_key(model, patch, version: str) -> str:
     """What a kept state belongs to: the scene in SI, the unworn gap on its nodes, a slide from a file, the version."""
     corners = () if model.slide is None or model.slide.corners is None else model.slide.corners
     of_patch = () if patch is None else (patch.x, patch.gap)
+    if model.wear is not None and model.wear.start is not None:
+        of_patch = *of_patch, model.wear.start.x, model.wear.start.depth
     parts = (f"{version}\n{model.source.resolved}".encode(), *of_patch, *corners)
     return hashlib.sha256(b"".join(one if isinstance(one, bytes) else np.asarray(one).tobytes()
                                    for one in parts)).hexdigest()

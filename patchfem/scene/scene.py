@@ -153,7 +153,8 @@ def files_of(found: tables.Tables | Scene) -> list[tuple[str, str]]:
     named = [("contact.mesh", found.contact and found.contact.mesh), ("contact.profile.file", profile and profile.file),
              ("slide.file", found.slide and found.slide.file), ("drive.file", found.drive and found.drive.file),
              ("structure.file", found.structure and found.structure.file),
-             ("measured.file", found.measured and found.measured.file)]
+             ("measured.file", found.measured and found.measured.file),
+             ("wear.start", found.wear and found.wear.start)]
     return [(key, file) for key, file in named if file]
 
 

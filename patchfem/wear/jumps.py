@@ -56,10 +56,11 @@ class Worn:
         return float(np.abs(self.depth - self.rough).max()) + self.strayed
 
 
-def start(asked: Wearing) -> Worn:
-    """The state before any wear."""
+def start(asked: Wearing, depth=None) -> Worn:
+    """The state before any wear but the depth (m,) [m] that was worn before."""
     zero = np.zeros_like(asked.area)
-    return Worn(0.0, zero, asked.press(zero, zero), asked.path(zero), zero, FIRST * asked.cycles, zero, 0.0, zero)
+    depth = zero if depth is None else depth
+    return Worn(0.0, depth, asked.press(depth, zero), asked.path(depth), zero, FIRST * asked.cycles, depth, 0.0, zero)
 
 
 def after(asked: Wearing, state: Worn, tolerance: float, count: int | None = None, until: float = np.inf) -> Worn:
@@ -123,12 +124,12 @@ def _allowed(found: Worn, tolerance: float) -> float:
     return tolerance * max(float(found.depth.max()), 1e-300)
 
 
-def replayed(press: Callable, area, coefficient: float, legs) -> np.ndarray:
+def replayed(press: Callable, area, coefficient: float, legs, depth) -> np.ndarray:
     """Worn depth (m,) [m] on other nodes by the jumps of an earlier run.
 
-    press and area (m,) [m2] as in `Wearing`; legs: (cycles, slip path (m,) [m] on these nodes) of every jump.
+    press and area (m,) [m2] as in `Wearing`; legs: (cycles, slip path (m,) [m] on these nodes) of every jump; depth
+    (m,) [m]: worn before.
     """
-    depth = np.zeros_like(area)
     for cycles, path in legs:
         rate = rates(coefficient, path, area)
         for _ in range(2):

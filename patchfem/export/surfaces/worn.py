@@ -9,6 +9,7 @@ import numpy as np
 from ... import __version__
 from ...core import Missing, PatchfemError, frozen_array, say
 from ...disk.whole import write_text
+from ...model.worn import LOADING, SAME
 from ...scales import axis_unit
 from ...surface.compare import ratios
 from ...surface.compare.compare import AMPLITUDE, SLOPE
@@ -24,11 +25,9 @@ from ..readback import numeric, readable, variables, wanted
 from .compare import WORDS, plain_of, shown
 from .pictures import SIDES, maps, pressures
 
-LOADING = ("load", "approach", "holder", "shear", "element_size", "load_line", "plane")  # of [contact]; no surface
 BESIDE = ("pressure_peak", "contact_fraction", "normal_stiffness", "tangential_stiffness", "approach", "rotation",
           "groove_amplitude", "slip_amplitude", "relative_displacement_amplitude", "loop_area", "friction_force_peak")
 NEEDED = {"x": (1,), "weight": (1,), "unloaded_gap": (1, 2), "normal_stress": (2,)}  # of a patch, their dimensions
-SAME = 1e-2  # of the largest difference of a gap, by which the gaps of one patch on two meshes may differ
 FLOOR = 5  # parts of a track, the deepest of which is its floor
 FLAT = 1e-12  # m, below which a new surface has no waves
 TEXTS = {"worn_volume": ("m3", "material lost over the whole patch, both pieces together"),
@@ -327,6 +326,7 @@ def verdict(one: Lost) -> tuple:
     place, volume = place_of(one.after, np.argmax(one.depth)), one.values["worn_volume"]
     told = [f"Worn volume {' '.join(shown(volume)[::2])}; {say(float(one.depth.max()), 3)} at the deepest place, "
             f"{place}; both pieces together; {one.after.cycles:.6g} cycles of wear"
+            f"{_since(one.after)}"
             f"{f', {one.before.cycles:.6g} before' if one.before.cycles else ''}."]
     for name in ("contact_fraction", "pressure_peak", "loop_area"):
         sides = [each.measure(name) for each in (one.before, one.after)]
@@ -334,6 +334,12 @@ def verdict(one: Lost) -> tuple:
             first, second = (pair(name, side) for side in sides)
             told.append(f"{label(name)}: {first} before, {second} after.")
     return head, told
+
+
+def _since(one: Worn) -> str:
+    """What the cycles of a run that goes on from another come after."""
+    start = one.run.resolved["wear"].get("start")
+    return f" since {start}" if start else ""
 
 
 def _kind(ends: tuple) -> str:

@@ -127,13 +127,14 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
     clock, wear, motion, stopped = perf_counter(), model.wear, _Motion(model, patch), ""
     asked = Wearing(presser(model.patch, patch.pair), motion, areas(model.patch, patch.pieces.interface),
                     wear.coefficient, wear.cycles, wear.explicit)
+    patch = _before(model, patch, asked.area) if begin is None else pressed(
+        model.patch, patch.pair, frozen_array(begin[0].depth))
     try:
         state, moments = begin or _first(model, patch, asked, motion)
     except _Unbounded as why:
+        coarse = (one and _before(model, one, areas(model.patch, one.pieces.interface)) for one in coarse)
         return Evolved(patch, tuple(coarse), None, (), (), None, 0.0, perf_counter() - clock,
                        f"nothing was worn: {why}")
-    if begin is not None:
-        patch = pressed(model.patch, patch.pair, frozen_array(state.depth))
     while state.cycle < wear.cycles and worn_through(model, state.depth) is None:
         try:
             state = _jumped(model, asked, state)
@@ -207,9 +208,23 @@ def next_row(wear, asked: Wearing, state: Worn) -> float:
     return state.cycle + (ahead[near] - mean) / rate if rate > 0 else np.inf
 
 
+def _before(model, patch, area):
+    """The pressed patch with what was worn before the first cycle; itself where that is nothing. PatchfemError where it
+    was worn on other surfaces, or through a coating."""
+    begun = model.wear.start
+    if begun is None:
+        return patch
+    begun.refuse_others(patch.x, patch.gap)
+    depth = frozen_array(model.wear.depth_before(patch.x, area))
+    if (gone := worn_through(model, depth)) is not None:
+        raise PatchfemError(f"{begun.path}: the coating of the {gone[0]} piece was worn through there; name a run in "
+                            "which it was not", "wear.start")
+    return pressed(model.patch, patch.pair, depth)
+
+
 def _first(model, patch, asked: Wearing, motion: _Motion) -> tuple:
-    """(state, moments) before any wear; an explicit jump that is too long is refused here."""
-    state = start(asked)
+    """(state, moments) before any wear but that of `_before`; an explicit jump that is too long is refused here."""
+    state = start(asked, model.wear.depth_before(patch.x, asked.area))
     if asked.explicit:
         refuse_explicit(asked.cycles / model.wear.jumps, _critical(model, patch, state))
     return state, (_moment(patch, state, motion),)
@@ -242,7 +257,8 @@ def _on(asked, model, patch, other, moments) -> tuple:
         return np.array([np.interp(y, own, column) for column in rows.T]).T
 
     legs = [(two.cycle - one.cycle, path(two.used)) for one, two in pairwise(moments)]
-    depth = replayed(presser(asked, other.pair), area, model.wear.coefficient, legs)
+    depth = replayed(presser(asked, other.pair), area, model.wear.coefficient, legs,
+                     model.wear.depth_before(other.x, area))
     return pressed(asked, other.pair, frozen_array(depth)), depth
 
 

@@ -42,7 +42,7 @@ def worn(result, found, estimate: bool = True):
     return replace(result, outcome=outcome, measures=result.measures | static | lost | gone, fields=fields,
                    seconds=seconds, warnings=[*warnings, *_deep(model, found), *_beyond_table(model, found)],
                    extra=result.extra | {"wear": history(found), "wear_shown": shown,
-                                         "notes": [*notes, *_ended(model, found, gone)]})
+                                         "notes": [*notes, *_begun(model), *_ended(model, found, gone)]})
 
 
 def _gone(model, found, error: float | None) -> dict:
@@ -55,6 +55,11 @@ def _gone(model, found, error: float | None) -> dict:
     off = None if error is None else (error + THIN * float(last.depth.flat[deepest])) / rate
     row = TABLE["worn_through_cycle"]
     return {row.name: Measure(last.cycle, row.unit, off, row.floor)}
+
+
+def _begun(model) -> list:
+    """A note on the run from which this one goes on."""
+    return [] if model.wear.start is None else [model.wear.start.sentence]
 
 
 def _ended(model, found, gone: dict) -> list:
@@ -115,7 +120,8 @@ def slip_miss(measures: dict) -> float:
 
 
 def of_patch(model, found, motion: dict, estimate: bool = True) -> dict:
-    """worn_volume and worn_depth_max of an `Evolved`; motion: measures of the run on the worn patch."""
+    """worn_volume and worn_depth_max of an `Evolved`, with the errors of both before its first cycle; motion: measures
+    of the run on the worn patch."""
     state, area = found.state, areas(model.patch, found.patch.pieces.interface)
     share = found.miss + slip_miss(motion) + _coarser(found, motion)
     mine, *others = [_lost(model.patch, *one) for one in [(found.patch, state.depth),
@@ -124,13 +130,13 @@ def of_patch(model, found, motion: dict, estimate: bool = True) -> dict:
     strips = _lost(asked, *found.stripped) if found.stripped else mine
     jumps = {"worn_volume": float(np.vdot(np.abs(state.depth - state.rough), area)) + state.strayed * float(area.sum()),
              "worn_depth_max": state.error}
-    out = {}
+    out, before, first = {}, found.moments[0].values, model.wear.start
     for name, value in mine.items():
-        error = None
-        if others and estimate:
+        error, more = None, 0.0 if first is None else first.missing(name, before[name])
+        if others and estimate and more is not None:
             meshes = limit([*(one[name] for one in reversed(others)), value])
-            error = jumps[name] + share * value + meshes.error + 1e-12 * value + STRIPS * times * abs(strips[name]
-                                                                                                      - value)
+            error = jumps[name] + share * max(value - before[name], 0.0) + meshes.error + 1e-12 * value + more + \
+                STRIPS * times * abs(strips[name] - value)
         out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor)
     left = found.moments[-1].values.get("groove_amplitude")
     if left is not None:

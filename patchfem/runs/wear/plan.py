@@ -41,7 +41,7 @@ def jumps_about(model) -> int:
 
     slides = changing if wear.energy and wear.friction is not None else lambda worn: path
     row = Wearing(press, slides, area, wear.coefficient, wear.cycles)
-    state, count = start(row), 0
+    state, count = start(row, wear.depth_before(x, area)), 0
     while state.cycle < wear.cycles and count < MOST:
         state, count = after(row, state, model.accuracy.tolerance, until=next_row(wear, row, state)), count + 1
     least = min(count, 6)

@@ -277,6 +277,8 @@ class Wear(Table):
               "per area") = "archard"
     scheme: key(Literal["implicit", "explicit"], "'explicit' takes the pressure from the start of a step and is "
                 "refused beyond its critical length") = "implicit"
+    start: key(Text | None, "result.nc of a run with [wear], such as out/before/result.nc, whose worn depth this run "
+               "goes on from; new pieces unless given") = None
     friction: WornFriction | None = None
 
 

@@ -25,6 +25,9 @@ def check_wear(draft: Draft, kind: str) -> None:
     if tables.wear.friction is not None:
         _friction(draft, tables.wear.friction)
     if tables.normal is not None:
+        if draft.given("wear.start"):
+            draft.say("wear.start", "a point has no worn depth to go on from: use [contact], or add the volumes "
+                                    "of both runs")
         for key in ("jumps", "upper_share", "scheme"):
             if draft.given(f"wear.{key}"):
                 draft.remark(f"wear.{key} has no meaning without [contact] and is not used")
@@ -84,6 +87,8 @@ def _beside_strips(draft: Draft, contact):
         yield f"contact.strips with {contact.gives_way}", LATER.format("either")
     if any(shape.on == "lower" for shape in contact.shapes.values()):
         yield "contact.strips with a shape on the lower piece", LATER.format("put all shapes on the upper piece")
+    if draft.given("wear.start"):
+        yield "contact.strips with wear.start", LATER.format("leave out wear.start")
     if draft.given("wear.scheme") and draft.tables.wear.scheme == "explicit":
         yield "contact.strips with scheme 'explicit'", LATER.format("leave out wear.scheme")
 

@@ -1,0 +1,105 @@
+"""The worn depth at the end of an earlier run, from which a run with [wear] goes on."""
+
+import json
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..core import PatchfemError, say
+from ..scene.keys.tables import Tables
+from ..scene.text import toml
+
+KEY = "wear.start"
+LOADING = ("load", "approach", "holder", "shear", "element_size", "load_line", "plane")  # of [contact]; no surface
+SURFACES = ("tilt", "profile", "mesh")  # of [contact]: put together anew or read from a file, and seen in the gap
+SAME = 1e-2  # of the largest difference of a gap, by which the gaps of one patch on two meshes may differ
+FLAT = 1e-12  # m, below which gaps do not differ
+UNREADABLE = OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError, AttributeError
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class WornBefore:
+    """The end of an earlier run.
+
+    depth (k,) [m] worn off both pieces and gap (k,) [m] of their new surfaces at x (k,) [m]; cycles: how many wore
+    them; scene: of that run, as tables; measures: of that run, name -> value, error and more.
+    """
+
+    path: Path
+    x: np.ndarray
+    depth: np.ndarray
+    gap: np.ndarray
+    cycles: float
+    scene: dict
+    measures: dict
+
+    @property
+    def sentence(self) -> str:
+        """What the run goes on from."""
+        asked, cycles = float(self.scene["wear"]["cycles"]), f"{self.cycles:.6g}"
+        if self.cycles < asked * (1 - 1e-9):
+            cycles += f" of {asked:.6g}"
+        return (f"goes on from {self.path.parent.name}/{self.path.name}, up to {say(float(self.depth.max()), 3)} worn "
+                f"off in {cycles} cycles; cycles count from there, worn_volume and worn_depth_max from new pieces")
+
+    def on(self, x) -> np.ndarray:
+        """Worn depth (m,) [m] at x (m,) [m] of an interface; PatchfemError unless it is as long."""
+        self._as_long(x[0], x[-1])
+        return np.interp(x, self.x, self.depth)
+
+    def refuse_others(self, x, gap) -> None:
+        """PatchfemError unless the new surfaces leave the gap (m,) [m] at x (m,) [m], up to a straight line."""
+        self._as_long(x[0], x[-1])
+        off = np.interp(x, self.x, self.gap) - gap
+        off = float(np.abs(off - np.polyval(np.polyfit(x, off, 1), x)).max())
+        if off > SAME * float(np.ptp(gap)) + FLAT:
+            raise PatchfemError(f"{self.path}: its new surfaces differ from those of this scene by {say(off, 3)}; name "
+                                "a run of the same pieces, with as long elements where they are rough", KEY)
+
+    def missing(self, name: str, value: float) -> float | None:
+        """Error of a measure of wear at the end of that run, and how far `value`, found of its depth on another mesh,
+        is off; None where that run has no error."""
+        found = self.measures.get(name, {"error": None})
+        return None if found["error"] is None else found["error"] + abs(found["value"] - value)
+
+    def _as_long(self, first: float, last: float) -> None:
+        if not np.allclose(self.x[[0, -1]], (first, last), rtol=1e-6, atol=0):
+            raise PatchfemError(f"{self.path}: worn on an interface of {say(float(np.ptp(self.x)))}, and this one has "
+                                f"{say(last - first)}; name a run of the same pieces", KEY)
+
+
+def read(path: Path) -> WornBefore:
+    """The end of the run in a result.nc; PatchfemError where it is none with [wear] over a patch."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            x, gap, cycles = (np.array(file[name], float) for name in ("x", "unloaded_gap", "wear_cycle"))
+            depth = np.array(file["worn_depth"][-1], float)
+            scene, measures = tomllib.loads(file.attrs["scene"]), json.loads(file.attrs["summary"])["measures"]
+        strips = "strips" in scene["contact"]
+        row = all(one.ndim == 1 and one.shape == x.shape and np.isfinite(one).all() for one in (x, depth, gap))
+        found = WornBefore(path, x, depth, gap - depth, float(cycles[-1]), scene, measures)
+        right = row and x.size > 1 and (np.diff(x) > 0).all() and depth.min() >= 0 and bool(found.sentence)
+    except UNREADABLE:
+        raise PatchfemError(f"{path}: not the result.nc of a run with [wear] over a patch; name one", KEY) from None
+    if strips:
+        raise PatchfemError(f"{path}: worn strip by strip, from which no run can go on yet; name a run without "
+                            "[contact.strips]", KEY)
+    if not right:
+        raise PatchfemError(f"{path}: its worn depth is no row of depths along a patch; run that scene again", KEY)
+    return found
+
+
+def of_pieces(path: Path, tables: Tables) -> WornBefore:
+    """The end of the run in a result.nc; PatchfemError unless it wore the pieces of a scene's tables."""
+    found, here = read(path), tomllib.loads(toml(tables))
+    one, two = ({key: value for key, value in each["contact"].items() if key not in (*LOADING, *SURFACES)} |
+                {"wear.upper_share": each["wear"]["upper_share"]} for each in (found.scene, here))
+    unlike = [key if "." in key else f"contact.{key}" for key in {**one, **two} if one.get(key) != two.get(key)]
+    if unlike:
+        raise PatchfemError(f"{path}: worn on other pieces: {', '.join(unlike)} differ; name a run of the same "
+                            "pieces", KEY)
+    return found
