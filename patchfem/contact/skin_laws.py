@@ -4,7 +4,7 @@ P >= 0 falls with s. The linear skin carries nothing beyond s = 0. The smooth la
 the logarithm of P, which neither overflows nor vanishes.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,7 +32,7 @@ class LinearSkin:
 class Smooth:
     """Base of the skin laws with P > 0 everywhere, which gives P and -dP/ds from the logarithm of P.
 
-    Each law has `log_pressure`, `separation` and `softened`.
+    Each law has `log_pressure` and `separation`.
     """
 
     __slots__ = ()
@@ -64,10 +64,6 @@ class ExponentialSkin(Smooth):
     def separation(self, pressure: np.ndarray) -> np.ndarray:
         """Separation s = -u0 log(P/reference) [m] that carries `pressure` [Pa] > 0."""
         return -self.u0 * np.log(pressure / self.reference)
-
-    def softened(self, factor: float) -> "ExponentialSkin":
-        """The law P(s/factor), `factor` times as long; `skin` comes to a hard law by way of such ones."""
-        return replace(self, u0=self.u0 * factor)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -106,10 +102,6 @@ class HertzSkin(Smooth):
             if np.all(np.abs(log - wanted) <= 1e-14 * (1 + np.abs(wanted))):
                 break
         return h * self.deviation
-
-    def softened(self, factor: float) -> "HertzSkin":
-        """The law P(s/factor), `factor` times as long: wider heights and fewer peaks; see ExponentialSkin.softened."""
-        return replace(self, deviation=self.deviation * factor, density=self.density * factor**-1.5)
 
 
 def peak_integral(h: np.ndarray) -> tuple:

@@ -5,7 +5,7 @@ feel each other: the shear between them is neglected. The motion q = (delta, -th
 as much of it as is free, so the answer minimises the convex dual sum_j Phi_j(R_j q - g_j) + q.S q/2 - q.target, with
 R_j = (1, x, y_j) and S the spring of the rotation.
 
-Every answer of `strips_solve` is checked again by `residuals` from the definitions alone.
+Every answer of `strips_solve` is checked again by `skin.residuals` from the definitions alone.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, frozen_array
 from ..elasticity.lapack import one_thread
-from .skin import _refuse
+from .skin import refuse, residuals
 from .skin_laws import ExponentialSkin, LinearSkin
 from .strips_solve import (
     Slices,
@@ -90,33 +90,6 @@ def one_strip(pieces: Compliance, count: int) -> tuple:
     return pieces.normal * count, pieces.tangential * count, pieces.interface.weight / count
 
 
-def residuals(skin, c: Slices, x, weight, gap, force, delta: float, free: float, load=None, moment=None,
-              spring: float = 0.0) -> MappingProxyType:
-    """Relative residuals of pressed strips, recomputed from the definitions alone.
-
-    Keys: the worst strip's penetration, tension and complementarity (bare) or law and tension (skin); force_balance and
-    moment_balance of all strips, where prescribed. free: rotation [rad] beyond that in the gap.
-    """
-    bent = c.bends(force)
-    opening = gap + free * x - delta + bent
-    depth = np.ptp(gap, axis=1) + np.abs(bent).max() + abs(free) * np.ptp(x) + 1e-150
-    most, total = max(force.max(), 1e-150), max(force.sum(), 1e-150)
-    out = {"tension": max(0.0, -force.min()) / most}
-    if skin is None:
-        out["penetration"] = np.max(np.maximum(0.0, -opening.min(axis=1)) / depth)
-        out["complementarity"] = np.max(np.abs(force * opening).sum(axis=1) / (total * depth))
-    else:
-        rate = np.full(gap.shape, skin.k) if isinstance(skin, LinearSkin) else 1e-5 * skin.stiffness(opening)
-        gain = depth * (weight * rate).max(axis=1)
-        out["law"] = np.max(np.abs(force - weight * skin.pressure(opening)).max(axis=1) / (most + gain))
-    if load is not None:
-        out["force_balance"] = abs(force.sum() - load) / load
-    if moment is not None:
-        turned = spring * free
-        out["moment_balance"] = abs((force @ x).sum() - moment - turned) / (load * np.ptp(x) + abs(turned))
-    return MappingProxyType({key: float(value) for key, value in out.items()})
-
-
 def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.ndarray, gap: np.ndarray,
                  roll: float = 0.0, load: float | None = None, moment: float | None = None,
                  approach: float | None = None, rotation: float = 0.0, spring: float = 0.0, skin=None,
@@ -136,7 +109,7 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
     """
     offsets, c = np.atleast_1d(np.asarray(offsets, float)), Slices(c, own)
     gap = np.broadcast_to(gap, (offsets.size, x.size)) + roll * offsets[:, None]
-    _refuse(skin, x, gap, load, None if spring and load is not None else moment, approach)
+    refuse(skin, x, gap, load, None if spring and load is not None else moment, approach)
     _refuse_roll(offsets, load, lateral)
     if isinstance(skin, ExponentialSkin) and skin.reference is None and load:
         skin = replace(skin, reference=load / (weight.sum() * offsets.size))

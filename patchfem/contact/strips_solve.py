@@ -1,8 +1,12 @@
-"""Solvers of strips under one holder: strips and holder together by Newton, or the holder alone along its dual.
+"""Solvers of strips under one holder, of which a patch is one: strips and holder together by Newton, or the holder
+alone along its dual.
 
-Newton's method takes a step of all strips and of the holder's motion q together: an active set for bare strips and the
-linear skin, the law's tangent for the smooth skins, strips eliminated one by one. Where that repeats itself or wanders,
-q alone is led down the dual, its slope bracketed along each direction, with every strip solved under its own approach.
+Newton's method takes a step of all strips and of the holder's motion q together, strips eliminated one by one: an
+active set for bare strips and the linear skin; for the smooth skins Newton on (s, q) in the symmetric form
+I + D^1/2 C D^1/2, D = -A P'. A node that gains force moves along log P, one that loses force along s, and one with a
+negligible force may rise at once to 1 % of the mean pressure: of P's tangent each step keeps the side that cannot
+overshoot. Where that repeats itself or wanders, q alone is led down the dual, its slope bracketed along each direction,
+with every strip solved under its own approach.
 """
 
 from dataclasses import dataclass
@@ -10,11 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from ..core import PatchfemError
-from .skin import STEPS
-from .skin import solve as solve_skin
+from ..core import NotConverged, PatchfemError
 from .skin_laws import LinearSkin
 from .unilateral import solve_forces
+
+STEPS = 60  # of Newton's method, before the dual is gone down
+FLOOR = -300.0  # log pressure below which an approach does not reach the skin
 
 
 def smooth(skin) -> bool:
@@ -110,9 +115,9 @@ def holder_motions(x, offsets, turns: bool, rolls: bool, spring: float = 0.0) ->
     return Motions(base, shares, stiff, scale)
 
 
-def closing_alone(size: int, count: int) -> Motions:
-    """The common closing of `count` strips of `size` nodes."""
-    return Motions(np.ones((size, 1)), np.ones((count, 1, 1)), np.zeros((1, 1)), np.ones(1))
+def closing_alone(size: int, count: int, free: int = 1) -> Motions:
+    """The common closing of `count` strips of `size` nodes; no motion at all with `free` 0."""
+    return Motions(np.ones((size, free)), np.ones((count, free, free)), np.zeros((free, free)), np.ones(free))
 
 
 def bare_parts(c, motions, active, gap=None) -> tuple:
@@ -201,16 +206,16 @@ def _tangent_step(c, motions, slope, missing, lack) -> tuple:
     gain, size = np.zeros(slope.shape), motions.base.shape[1]
     for strip, nodes, root, answer in parts:
         gain[strip, nodes] = root * answer[:, size]
-    motion = np.linalg.lstsq(system + motions.spring, lack + motions.resultant(gain), rcond=1e-14)[0]
+    lack = lack + motions.resultant(gain)
+    motion = np.linalg.lstsq(system + motions.spring, lack, rcond=1e-14)[0] if lack.size else lack
     for strip, nodes, root, answer in parts:
         gain[strip, nodes] = root * (answer[:, :size] @ (motions.shares[strip] @ motion) - answer[:, size])
     return gain, motion, missing - motions.closing(motion) + c.bends(gain)
 
 
 def _newton(skin, c, weight, gap, motions, target, s, q) -> tuple | None:
-    """Forces, separations, motion, steps of a smooth skin from (s, q) by the steps of `skin`; None: not settled."""
-    mean = target[0] / (weight.sum() * len(gap))
-    faint = skin.separation(np.array(0.01 * mean))
+    """Forces, separations, motion and steps of a smooth skin from the start (s, q); None where STEPS of them do not
+    settle."""
     for count in range(1, STEPS + 1):
         log, fall = skin.log_pressure(s)
         log = log + np.log(weight)
@@ -225,32 +230,62 @@ def _newton(skin, c, weight, gap, motions, target, s, q) -> tuple | None:
         q, folds = q + motion, -change * fall
         share = np.exp(np.minimum(0.0, np.maximum(log, log + folds) - log.max()))
         depth = np.ptp(gap) + np.abs(c.bends(force)).max() + 2 * np.abs(q[1:]).sum()
+        # the goal, and the last digit of a separation as a change of log P at the nodes that carry
         noise = 1e-12 + 1e-15 * depth * fall[force > 1e-6 * force.max()].max()
-        if max(np.abs(lack).max() / target[0], np.max(share * np.abs(folds))) <= noise:
+        missing = np.abs(lack).max() / target[0] if target.size else 0.0
+        if max(missing, np.max(share * np.abs(folds))) <= noise:
             follow = np.exp(np.minimum(log + folds, 600.0))  # what carries next to nothing takes its law
             return np.where(share < 1e-15, follow, np.maximum(force + gain, 0.0)), s + change, q, count
         careful = np.where(folds > 0, -np.log1p(np.maximum(folds, 0.0)) / fall, change)
-        s = s + np.maximum(change, np.minimum(careful, faint - s))
+        mean = (target[0] if target.size else force.sum()) / (weight.sum() * len(gap))
+        s = s + np.maximum(change, np.minimum(careful, skin.separation(np.array(0.01 * mean)) - s))
     return None
 
 
-def by_strip(skin, c, x, weight, gap) -> tuple:
-    """Every strip solved by itself: forces (s, m) [N], where they give way, and steps.
+def _reach(skin, c, weight, gap) -> np.ndarray | None:
+    """First separations (m,) of one strip of compliance c (m, m) under its approach; None where the skin is not
+    reached.
 
-    gap: (s, m) [m] with all motion in it. Second: of a smooth skin the slope -A P' (s, m) [N/m], else which nodes carry
-    (s, m) bool. PatchfemError and NotConverged as in `skin.solve` and `unilateral.solve_forces`.
+    No node can carry more than what flattens its overlap, -gap (m,) [m].
     """
-    force, steps = np.zeros(gap.shape), 0
+    s, diagonal = gap, np.diag(c)
+    if skin.log_pressure(s)[0].max() <= FLOOR:
+        return None
+    if (diagonal > 0).all():
+        s = np.maximum(s, skin.separation(np.maximum(-gap, np.abs(gap).max() * 1e-3) / (diagonal * weight)))
+    if skin.log_pressure(s)[0].max() > -FLOOR:
+        raise PatchfemError("contact.approach: the skin would carry more than any number; lower the distance")
+    return s
+
+
+def _held(skin, c, weight, gap) -> tuple:
+    """Forces (m,), separations (m,) and steps of one strip of compliance c (m, m) with a smooth skin that is held at
+    the gap (m,) [m]."""
+    if (s := _reach(skin, c, weight, gap)) is None:
+        return np.zeros(gap.size), gap, 0
+    none = np.zeros(0)
+    found = _newton(skin, Slices(c), weight, gap[None], closing_alone(gap.size, 1, 0), none, s[None], none)
+    if found is None:
+        raise NotConverged("contact.asperities: the skin did not settle; raise the decay length or the height "
+                           "deviation, or take law = \"linear\"")
+    return found[0][0], found[1][0], found[3]
+
+
+def by_strip(skin, c, x, weight, gap) -> tuple:
+    """Every strip solved by itself: forces (s, m) [N], separations (s, m) [m] of a smooth skin, else None, and steps.
+
+    gap: (s, m) [m] with all motion in it. PatchfemError and NotConverged where a smooth skin carries more than any
+    number or does not settle, and as in `unilateral.solve_forces`.
+    """
+    every = np.arange(x.size)
     if smooth(skin):
-        every = np.arange(x.size)
-        states = [solve_skin(skin, c.among(strip, every), x, weight, row, approach=0.0)
-                  for strip, row in enumerate(gap)]
-        force, slope = (np.array([getattr(state, name) for state in states]) for name in ("force", "stiffness"))
-        return force, slope * weight, sum(state.iterations for state in states)
+        force, s, steps = zip(*(_held(skin, c.among(strip, every), weight, row) for strip, row in enumerate(gap)))
+        return np.array(force), np.array(s), sum(steps)
+    force, steps = np.zeros(gap.shape), 0
     for strip in np.flatnonzero(gap.min(axis=1) < 0):
-        force[strip], _, count = solve_forces(c.among(strip, np.arange(x.size)), x, gap[strip], np.zeros(0))
+        force[strip], _, count = solve_forces(c.among(strip, every), x, gap[strip], np.zeros(0))
         steps += count
-    return force, force > 0, steps
+    return force, None, steps
 
 
 def _downhill(skin, c, x, weight, gap, motions, target, sink: float, span: float) -> tuple:
@@ -261,18 +296,23 @@ def _downhill(skin, c, x, weight, gap, motions, target, sink: float, span: float
 
     def at(q) -> tuple:
         try:
-            force, slope, steps = by_strip(skin, c, x, weight, gap - motions.closing(q))
+            force, s, steps = by_strip(skin, c, x, weight, gap - motions.closing(q))
         except PatchfemError:  # deeper than any number
             return None, None, None, 0
-        return force, slope, target - motions.resultant(force) - motions.spring @ q, steps
+        return force, s, target - motions.resultant(force) - motions.spring @ q, steps
 
-    (force, slope, lack, total), record = at(q), np.inf
+    def tangent(force, s):
+        if s is None:
+            return bare_parts(c, motions, force > 0)[1]
+        slope = weight * skin.stiffness(s) * (force > 0)
+        return skin_parts(c, motions, slope, slope)[1]
+
+    (force, s, lack, total), record = at(q), np.inf
     for _ in range(60):
         if force is None or (size := np.abs(lack).max()) <= 1e-12 * target[0]:
             break
         record = min(record, size)
-        system = (skin_parts(c, motions, slope, slope) if smooth(skin) else bare_parts(c, motions, slope))[1]
-        way = np.linalg.solve(system + motions.spring + soft, lack)
+        way = np.linalg.solve(tangent(force, s) + motions.spring + soft, lack)
         low, high, length, best = 0.0, np.inf, 1.0, None
         for _ in range(60):
             *trial, steps = at(q + length * way)
@@ -289,7 +329,7 @@ def _downhill(skin, c, x, weight, gap, motions, target, sink: float, span: float
             length = 2 * low if high == np.inf else (low + high) / 2
         if best is None:  # round-off
             break
-        force, slope, lack, q = best
+        force, s, lack, q = best
     return np.zeros(gap.shape) if force is None else force, q, total
 
 
@@ -321,7 +361,10 @@ def _linearised(skin, c, x, weight, gap, motions, target) -> tuple:
     rest = skin.separation(np.array([mean]))
     k = mean * skin.log_pressure(rest)[1][0]
     edge = rest[0] + mean / k  # where the tangent is zero
-    force, q, _ = _bare_loaded(c.plus(1 / (k * weight)), x, gap - edge, motions, target)
+    try:
+        force, q, _ = _bare_loaded(c.plus(1 / (k * weight)), x, gap - edge, motions, target)
+    except (np.linalg.LinAlgError, NotConverged):  # a start is all that is lost
+        return np.full(gap.shape, rest[0]), (gap.mean() - rest[0]) * np.eye(1, target.size)[0]
     stress = force / weight
     low = np.where(force > 0, edge - stress / k, gap - motions.closing(q) + c.bends(force))
     return np.where(stress > mean, skin.separation(np.maximum(stress, mean)), low), q

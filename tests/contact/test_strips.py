@@ -319,7 +319,8 @@ def test_exact_going_down_the_dual_alone_finds_the_same(skin, control, monkeypat
     first = strips_solve._linearised(*_smooth_case(skin, Slices(c), x, weight, gap + 1e-4 * y[:, None], control)) \
         if isinstance(skin, ExponentialSkin | HertzSkin) else None
     monkeypatch.setattr(strips_solve, "_active_set", lambda *a: None)
-    monkeypatch.setattr(strips_solve, "_newton", lambda *a: None)
+    newton = strips_solve._newton  # each strip under its own approach alone
+    monkeypatch.setattr(strips_solve, "_newton", lambda *a: None if a[5].size else newton(*a))
     monkeypatch.setattr(strips_solve, "_linearised", lambda *a: first)
     other = press_strips(c, x, weight, y, gap, 1e-4, LOAD, skin=skin, **control)
     assert np.abs(other.force - state.force).max() <= 1e-10 * LOAD

@@ -1,10 +1,12 @@
 """A skin between two pieces as a run presses it: the smooth laws by `contact.skin`, the linear one as softer pieces."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from patchfem.contact import skin as smooth
-from patchfem.contact.skin_laws import LinearSkin
+from patchfem.contact.skin_laws import ExponentialSkin, LinearSkin
 from patchfem.contact.unilateral import press, press_by
 from patchfem.core import Compliance, Interface
 
@@ -21,6 +23,13 @@ def solve(skin, c, x, weight, gap, load=None, moment=None, approach=None, rotati
     return smooth.SkinState(force, found.sigma_n, np.where(force > 0, -found.sigma_n / skin.k, free),
                             np.where(force > 0, skin.k, 0.0), found.approach, found.rotation, found.load, found.moment,
                             found.iterations, found.outcome, found.residuals)
+
+
+def longer(skin, factor: float):
+    """The law P(s/factor), `factor` times as long: of peaks with wider heights, and fewer of them."""
+    if isinstance(skin, ExponentialSkin):
+        return replace(skin, u0=skin.u0 * factor)
+    return replace(skin, deviation=skin.deviation * factor, density=skin.density * factor**-1.5)
 
 
 def tangent(c, weight, stiffness) -> float:
