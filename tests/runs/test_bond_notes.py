@@ -37,8 +37,8 @@ def test_exact_a_stretch_that_exceeds_mu_n_is_noted():
 @pytest.mark.parametrize("order", [0.0, 1.0])
 def test_always_growing_stretch_of_order_up_to_one_keeps_to_mu_n(order):
     """z' = m - z/eps with eps <= eps_0 and m <= 1: nothing to note."""
-    path = np.concatenate([np.linspace(0, 5, 201), [5.0] * 3, 5 - np.linspace(0, 3, 201)[1:], np.linspace(2, 6, 201)])
-    times = np.concatenate([np.full(200, 2.5e-4), [5.0] * 3, np.full(401, 2.5e-4)])[:path.size - 1]
+    path = np.concatenate([np.linspace(0, 5, 81), [5.0] * 3, 5 - np.linspace(0, 3, 81)[1:], np.linspace(2, 6, 81)])
+    times = np.concatenate([np.full(80, 6e-4), [5.0] * 3, np.full(161, 6e-4)])[:path.size - 1]
     law = Bonds(1.0, 1.0, order, "stretch", 0.2, 1.0, 0.05, 1e-2)
     assert np.abs(follow_list(law, path, times).after).max() <= 1 + 1e-9
 

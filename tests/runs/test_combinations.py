@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from comparison_cases import share_one_loop
 from scene_texts import COATED, DRIVE, MODE, SLIDE, only
 from scipy.integrate import solve_ivp
 
@@ -111,7 +110,6 @@ def walked(name: str, law: str, every: int = 1) -> None:
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("name", RUNS)
 def test_always_a_share_of_what_check_lets_through_runs(monkeypatch, name, law):
-    share_one_loop(monkeypatch)
     monkeypatch.setattr(march, "warm_up", reached)
     walked(name, law, 9)
 

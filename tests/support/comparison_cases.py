@@ -5,21 +5,10 @@ from scipy.linalg import expm
 from scipy.optimize import root
 
 from patchfem.core import BaseSine, ModalBasis, Segment
-from patchfem.dynamics.comparison import point_laws
 from patchfem.dynamics.comparison.point_laws import Coulomb, Smooth
-from patchfem.dynamics.contacts.dispatch import COULOMB
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.tanh import Rate
 from patchfem.structure.drives import Piecewise
-
-# laws of the one compiled loop of the comparison methods that most tests share
-ALL = tuple(sorted((COULOMB, *(f"friction.laws.{law}_kernels" for law in ("elastic_plastic", "tanh")))))
-
-
-def share_one_loop(monkeypatch) -> None:
-    """Whatever laws a comparison method has, it runs in the loop of ALL, as a rig of mixed laws does."""
-    own = point_laws.kernels_of
-    monkeypatch.setattr(point_laws, "kernels_of", lambda laws: tuple(sorted({*ALL, *own(laws)})))
 
 
 def basis(omega, zeta, faces, base, damping=None, mass=1.0) -> ModalBasis:

@@ -80,7 +80,7 @@ def grid(modes: ModalBasis, drive, laws, over: tuple, start: Start | None, stick
     an interface that slides in no mode.
     """
     (duration, steps_per_cycle), n, i = over, modes.omega.size, len(modes.interfaces)
-    table, compiled = rows(laws, i, stick_speed), loops(laws)
+    table, compiled = rows(laws, i, stick_speed), loops()
     if steps_per_cycle < 4:
         raise PatchfemError(f"accuracy.steps_per_cycle = {steps_per_cycle}: at least 4 steps per cycle are wanted")
     h = drive.period / steps_per_cycle

@@ -10,6 +10,7 @@ from ...friction.protocol import Element
 from ..contacts.dispatch import COULOMB, law_of, number_of
 
 HEAD = 4  # numbers of a row before those of its law
+SMOOTH = tuple(f"friction.laws.{law}_kernels" for law in ("elastic_plastic", "tanh"))  # what has a force at the end
 RAISED = 0.005  # of a static friction, by which a stick speed that is proposed raises it
 
 
@@ -86,7 +87,7 @@ def rows(laws, interfaces: int, stick_speed: float | None = None) -> np.ndarray:
     """
     if len(laws) != interfaces:
         raise PatchfemError(f"{len(laws)} friction laws for {interfaces} interfaces: give each interface its own")
-    found, number = [law.row(stick_speed) for law in laws], number_of(kernels_of(laws))
+    found, number = [law.row(stick_speed) for law in laws], number_of(SMOOTH)
     out = np.zeros((len(laws), max([HEAD + 1, *(len(row) for row in found)])))
     for k, (law, row) in enumerate(zip(laws, found)):
         smooth = row[0] > 0
@@ -99,16 +100,9 @@ def rows(laws, interfaces: int, stick_speed: float | None = None) -> np.ndarray:
     return out
 
 
-def kernels_of(laws) -> tuple:
-    """Modules of the compiled laws, each once."""
-    return tuple(sorted({law.kernels for law in laws}))
-
-
-def loops(laws):
-    """The compiled loops of the comparison methods for these laws, an instance of `comparison_kernels`."""
-    smooth = tuple(name for name in kernels_of(laws) if name != COULOMB)
-    law = law_of(smooth or (COULOMB,), ("at_end",))
-    return compiled.instance("dynamics.comparison.comparison_kernels", {"law": law})
+def loops():
+    """The compiled loops of the comparison methods, one instance of `comparison_kernels` for all their laws."""
+    return compiled.instance("dynamics.comparison.comparison_kernels", {"law": law_of(SMOOTH, ("at_end",))})
 
 
 def added_static(modes: ModalBasis, face, stick_speed: float, h: float) -> float:
