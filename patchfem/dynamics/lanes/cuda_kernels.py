@@ -41,24 +41,23 @@ def kernels(law: str) -> SimpleNamespace:
             one_march(cases, order[i:i + 1], motion, table, until, history, ended, room[i], marked[i])
 
     @cuda.jit
-    def read(cases, order, motion, table, cycles, history, ended, shown, room):
+    def read(cases, order, motion, table, cycles, history, ended, shown, room, marked):
         i = cuda.grid(1)
         if i < order.size:
-            one_read(cases, order[i:i + 1], motion, table, cycles, history, ended, shown, room[i])
+            one_read(cases, order[i:i + 1], motion, table, cycles, history, ended, shown, room[i], marked[i])
 
     def marched(cases, order, motion, table, until, history, ended, room, _):
-        _run(march, (cases, order), (motion, table), until, (history, ended),
-             (_rooms(order, room), np.zeros((order.size, 2), np.int64)))
+        _run(march, (cases, order), (motion, table), until, (history, ended), _rooms(order, room))
 
-    def seen(cases, order, motion, table, cycles, history, ended, shown, room):
-        _run(read, (cases, order), (motion, table), cycles, (history, ended, shown), (_rooms(order, room),))
+    def seen(cases, order, motion, table, cycles, history, ended, shown, room, _):
+        _run(read, (cases, order), (motion, table), cycles, (history, ended, shown), _rooms(order, room))
 
     return SimpleNamespace(march=marched, read=seen)
 
 
-def _rooms(order, room) -> np.ndarray:
-    """A room of one lane for each case, as long as a lane of `room`."""
-    return np.zeros((order.size, room.size // at.LANES))
+def _rooms(order, room) -> tuple:
+    """A room of one lane for each case, as long as a lane of `room`, and one for its mark."""
+    return np.zeros((order.size, room.size // at.LANES)), np.zeros((order.size, 2), np.int64)
 
 
 def _run(kernel, given: tuple, moving: tuple, count: int, found: tuple, rooms: tuple) -> None:

@@ -105,12 +105,20 @@ def begun(room, i):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def ahead(room, i, s0, c0, s1, c1):
-    """(x, x', place after a step; whether the slide turns or the law has a kink in it)."""
+def sticking(v, way, place, room, i):
+    """1 where less than SHARE of the slide is irreversible, 0 where it is not."""
+    return 1.0 if abs(1 - friction.flowing(numbers(room, i), place, v, way)[1]) < SHARE else 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def ahead(room, i, s0, c0, s1, c1, reads):
+    """(x, x', place after a step; whether the slide turns or the law has a kink in it); reads: whether what the step
+    shows is read, so that the begin or end of a stick and a stretch that turns over count too."""
     way, state = room[WAY * LANES + i], begun(room, i)
     (x1, v1, f1, z1, q1), work = run(room, i, state, way, (s0, room[MIDDLE * LANES + i] * (s0 + s1), s1),
                                      room[H * LANES + i])
-    event = way * v1 < 0.0 or (friction.BENDS and state[3] * z1 < 0.0)
+    event = way * v1 < 0.0 or ((reads or friction.BENDS) and state[3] * z1 < 0.0) or (reads and (
+        v1 == 0.0 or sticking(state[1], way, state[3], room, i) != sticking(v1, way, z1, room, i)))
     room[FELT * LANES + i], room[SQUARE * LANES + i] = state[2] if event else f1, state[4] if event else q1
     room[WORK * LANES + i] = work
     return x1, v1, z1, event

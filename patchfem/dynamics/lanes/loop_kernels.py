@@ -96,7 +96,7 @@ def step(room, i, s0, c0, s1, c1, h):
 def glide(room, i, s0, c0, s1, c1):
     """Move a lane over a step in which nothing happens; in another one it is left where it is and marked."""
     x, v, place = room[X * LANES + i], room[V * LANES + i], room[PLACE * LANES + i]
-    x1, v1, place1, event = law.ahead(room, i, s0, c0, s1, c1)
+    x1, v1, place1, event = law.ahead(room, i, s0, c0, s1, c1, False)
     on = 0.0 if event else 1.0
     room[EVENT * LANES + i] = 1.0 - on
     room[X * LANES + i], room[V * LANES + i] = x if event else x1, v if event else v1
@@ -113,6 +113,16 @@ def glide(room, i, s0, c0, s1, c1):
     room[SIN * LANES + i] += on * (x1 * s1)
 
 
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def happens(room, marked):
+    """Number of lanes in which a step holds an event; writes which into `marked` (LANES + 1,)."""
+    count = 0
+    for i in range(LANES):
+        marked[count] = i
+        count += 1 if room[EVENT * LANES + i] > 0.0 else 0
+    return count
+
+
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def cycle(room, marked, table, h):
     """Move all lanes over a cycle of the drive; table (2, n + 1): sine and cosine at the steps."""
@@ -120,11 +130,7 @@ def cycle(room, marked, table, h):
         s0, c0, s1, c1 = table[0, k], table[1, k], table[0, k + 1], table[1, k + 1]
         for i in range(LANES):
             glide(room, i, s0, c0, s1, c1)
-        count = 0
-        for i in range(LANES):
-            marked[count] = i
-            count += 1 if room[EVENT * LANES + i] > 0.0 else 0
-        for j in range(count):
+        for j in range(happens(room, marked)):
             step(room, marked[j], s0, c0, s1, c1, h)
 
 
@@ -140,8 +146,61 @@ def highest(g0, g1, m0, m1):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def watch(room, i, s0, c0, s1, c1, h):
+    """Move a lane over a step of the last cycles in which nothing happens and fold what it shows, as `look` does; in
+    another one it is left as it is and marked."""
+    x, v, way, place = room[X * LANES + i], room[V * LANES + i], room[WAY * LANES + i], room[PLACE * LANES + i]
+    f0, stick = law.felt(x, v, way, place, s0, room, i), law.sticking(v, way, place, room, i)
+    x1, v1, place1, event = law.ahead(room, i, s0, c0, s1, c1, True)
+    f1, on = law.felt(x1, v1, way, place1, s1, room, i), 0.0 if event else 1.0
+    slipped, friction_work = law.slid(x1, place1, room, i), law.path(place, place1, place1, v1, room, i)
+    out, base = room[OUT * LANES + i], room[BASE * LANES + i]
+    damp, push, square = room[D * LANES + i], room[P * LANES + i], room[W * LANES + i]
+    a0, a1 = push * s0 - damp * v - square * x - f0, push * s1 - damp * v1 - square * x1 - f1
+    r0, r1 = h * law.rise(v, a0, way, place, room, i, 0), h * law.rise(v1, a1, way, place1, room, i, 3)
+    moves = 0.0 if law.RESTS and way == 0.0 else out
+    best = highest(out * a0 + base * s0, out * a1 + base * s1,
+                   h * (moves * (push * c0 - damp * a0 - square * v) + base * c0) - moves * r0,
+                   h * (moves * (push * c1 - damp * a1 - square * v1) + base * c1) - moves * r1)
+    peak, one = highest(f0, f1, r0, r1), on * 0.5 * (f0 + f1) * (x1 - x)
+    power, run = on * (s1 * v1), room[STICK * LANES + i] + h * stick
+    high, low, longest = room[HIGH * LANES + i], room[LOW * LANES + i], room[LONGEST * LANES + i]
+    far, near = room[SLIP_HIGH * LANES + i], room[SLIP_LOW * LANES + i]
+    pull_high, pull_low = room[PULL_HIGH * LANES + i], room[PULL_LOW * LANES + i]
+    largest, force, stuck = room[ACCELERATION * LANES + i], room[FORCE * LANES + i], room[STICK * LANES + i]
+    room[EVENT * LANES + i] = 1.0 - on
+    room[X * LANES + i], room[V * LANES + i] = x if event else x1, v if event else v1
+    room[PLACE * LANES + i] = place if event else place1
+    room[PATH * LANES + i] += on * friction_work
+    room[IN * LANES + i] += power
+    room[LOST * LANES + i] += on * (v1 * v1)
+    room[POWER * LANES + i] += abs(power)
+    room[HIGH * LANES + i] = high if event else max(high, x1)
+    room[LOW * LANES + i] = low if event else min(low, x1)
+    room[COS * LANES + i] += on * (x1 * c1)
+    room[SIN * LANES + i] += on * (x1 * s1)
+    room[ACCELERATION * LANES + i] = largest if event else max(largest, best)
+    room[STUCK * LANES + i] += on * h * stick
+    room[LONGEST * LANES + i] = longest if event else max(longest, run)
+    room[STICK * LANES + i] = stuck if event else stick * run
+    room[FORCE * LANES + i] = force if event else max(force, peak)
+    room[SLIP_HIGH * LANES + i] = far if event else max(far, slipped)
+    room[SLIP_LOW * LANES + i] = near if event else min(near, slipped)
+    room[TURNED * LANES + i] += one
+    room[PASSED * LANES + i] += abs(one)
+    room[C1 * LANES + i] += on * (x1 * c1)
+    room[S1 * LANES + i] += on * (x1 * s1)
+    room[C3 * LANES + i] += on * (x1 * (c1 * (4 * c1 * c1 - 3)))
+    room[S3 * LANES + i] += on * (x1 * (s1 * (3 - 4 * s1 * s1)))
+    room[MEAN * LANES + i] += on * x1
+    room[PULL * LANES + i] += on * f1
+    room[PULL_HIGH * LANES + i] = pull_high if event or not x1 > high else nan
+    room[PULL_LOW * LANES + i] = pull_low if event or not x1 < low else nan
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def look(room, i, s0, c0, s1, c1, h):
-    """Move a lane over a step of the last cycles and fold what they show."""
+    """Move a lane over a step of the last cycles in which something happens and fold what it shows."""
     high, low = room[HIGH * LANES + i], room[LOW * LANES + i]
     x, v, way, place, done = step(room, i, s0, c0, s1, c1, h)
     x1, v1, way1, place1, u, xe, ve, pe, turn, _ = done
@@ -312,7 +371,7 @@ def close_cycle(i, room, first, cycles, h):
 
 
 @njit(error_model="numpy", cache=True, nogil=True, fastmath=FAST, **LEAN)
-def read(cases, order, motion, table, cycles, history, ended, shown, room):
+def read(cases, order, motion, table, cycles, history, ended, shown, room, marked):
     """March cases over their last `cycles` and read what they show; arguments as of `march`.
 
     ended: the cycle at which a case goes on; shown (n, SHOWN): numbers by their places.
@@ -332,7 +391,9 @@ def read(cases, order, motion, table, cycles, history, ended, shown, room):
             for j in range(steps):
                 s0, c0, s1, c1 = table[0, j], table[1, j], table[0, j + 1], table[1, j + 1]
                 for i in range(LANES):
-                    look(room, i, s0, c0, s1, c1, h)
+                    watch(room, i, s0, c0, s1, c1, h)
+                for i in range(happens(room, marked)):
+                    look(room, marked[i], s0, c0, s1, c1, h)
             for i in range(LANES):
                 close_cycle(i, room, k == 0, cycles, h)
                 case = int(room[CASE * LANES + i])

@@ -15,9 +15,10 @@ import numpy as np
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from .names_kernels import FIRST_OF_LAW, GK, LANES, LENGTH, OWN, PLACE, WAY, D, H, K, P, V, W, X
-from .rigid_kernels import begin
+from .rigid_kernels import begin, sticking
 
-__all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "held", "path", "rise", "slid"]
+__all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "held", "path", "rise", "slid",
+           "sticking"]
 
 RESTS = False  # it never holds
 TURNS_HELD = True  # an event may leave a stick as it is
@@ -146,12 +147,15 @@ def flow(x, v, f, k, s0, c0, s1, c1, h, room, i):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def ahead(room, i, s0, c0, s1, c1):
-    """(x, x', friction after a step without a turn or a closing in it; whether there is one)."""
+def ahead(room, i, s0, c0, s1, c1, reads):
+    """(x, x', friction after a step without a turn or a closing in it; whether there is one); reads: as of
+    `rigid_kernels`."""
     x, v, f, k = room[X * LANES + i], room[V * LANES + i], room[PLACE * LANES + i], room[STIFF * LANES + i]
     side = room[SIDE * LANES + i]
     x1, v1, f1, k1 = flow(x, v, f, k, s0, c0, s1, c1, room[H * LANES + i], room, i)
-    event = side * v1 < 0.0 or side * (x1 - room[NEXT * LANES + i]) > 0.0
+    event = side * v1 < 0.0 or side * (x1 - room[NEXT * LANES + i]) > 0.0 or (reads and v1 == 0.0)
+    if reads:
+        room[STIFF_0 * LANES + i], room[STIFF_3 * LANES + i] = k, k1
     room[STIFF * LANES + i] = k if event else k1
     room[GONE * LANES + i] = side * (slid(x1, f1, room, i) - slid(x, f, room, i))
     return x1, v1, f1, event

@@ -58,6 +58,12 @@ def at_turn(x, way, place, turned, room, i):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def sticking(v, way, place, room, i):
+    """1 where the contact sticks, 0 where it does not."""
+    return 1.0 if way == 0.0 else 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def held(begin, end, way, room, i, h):
     """(share of a part of a step in which the contact sticks; share inside it at which it begins to slip, 2: nowhere;
     irreversible part of the slide where that turns inside it, that of its end without)."""
@@ -92,13 +98,14 @@ def linear(room, i, s0, c0):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def ahead(room, i, s0, c0, s1, c1):
-    """(x, x', place after a step without a stop, a release or a turn in it; whether there is one)."""
+def ahead(room, i, s0, c0, s1, c1, reads):
+    """(x, x', place after a step without a stop, a release or a turn in it; whether there is one); reads: whether what
+    the step shows is read, so that a speed that ends at 0 counts as a turn."""
     x, way = room[X * LANES + i], room[WAY * LANES + i]
     xs, vs = linear(room, i, s0, c0)
     held = way == 0.0
     n1 = room[P * LANES + i] * s1 - room[W * LANES + i] * x
-    event = abs(n1) > room[GS * LANES + i] if held else way * vs < 0.0
+    event = abs(n1) > room[GS * LANES + i] if held else way * vs < 0.0 or (reads and vs == 0.0)
     x1, v1 = x if held else xs, 0.0 if held else vs
     return x1, v1, x1, event
 

@@ -194,7 +194,7 @@ def march(law: str, cases: Cases, cycles: int, window: int, steps: int, device: 
     loop.march(numbers, order, motion, table, cycles - window, history, ended, room, marked)
     begun, read = motion.copy(), np.where(ended < cycles - window, min(ONCE, window), window)
     for count in np.unique(read).tolist():
-        loop.read(numbers, order[read == count], motion, table, count, history, ended, shown, room)
+        loop.read(numbers, order[read == count], motion, table, count, history, ended, shown, room, marked)
     done = ended + read
     for case in np.flatnonzero(done < cycles):  # a motion that repeats goes on as it is
         history[case, done[case]:] = history[case, done[case] - 1]

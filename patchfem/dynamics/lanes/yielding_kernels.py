@@ -40,9 +40,10 @@ from .names_kernels import (
     W,
     X,
 )
-from .rigid_kernels import begin, crossing, held, path, slid
+from .rigid_kernels import begin, crossing, held, path, slid, sticking
 
-__all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "held", "path", "rise", "slid"]
+__all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "held", "path", "rise", "slid",
+           "sticking"]
 
 RESTS = False  # a stick moves its spring
 TURNS_HELD = False
@@ -83,13 +84,14 @@ def linear(room, i, s0, c0):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def ahead(room, i, s0, c0, s1, c1):
-    """(x, x', place after a step without a stop, a yield or a turn in it; whether there is one)."""
+def ahead(room, i, s0, c0, s1, c1, reads):
+    """(x, x', place after a step without a stop, a yield or a turn in it; whether there is one); reads: as of
+    `rigid_kernels`."""
     v, way, place = room[V * LANES + i], room[WAY * LANES + i], room[PLACE * LANES + i]
     x1, v1 = linear(room, i, s0, c0)
     length, held = room[LENGTH * LANES + i], way == 0.0
     yields = held and abs(x1 - place) > length
-    return x1, v1, place if held else x1 - way * length, yields or v * v1 < 0.0
+    return x1, v1, place if held else x1 - way * length, yields or v * v1 < 0.0 or (reads and v1 == 0.0)
 
 
 @njit(error_model="numpy", **LEAN)
