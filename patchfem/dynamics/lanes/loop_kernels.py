@@ -346,10 +346,17 @@ def march(cases, order, motion, table, until, history, ended, room, marked):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def pulled(i, room):
+    """Friction of a lane at the end of a cycle [m]."""
+    return law.felt(room[X * LANES + i], room[V * LANES + i], room[WAY * LANES + i], room[PLACE * LANES + i], 0.0, room,
+                    i)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def open_cycle(i, room):
     """Begin a cycle of what a lane shows."""
     room[BEGUN * LANES + i] = room[X * LANES + i]
-    room[MEAN * LANES + i] = room[PULL * LANES + i] = 0.0
+    room[MEAN * LANES + i], room[PULL * LANES + i] = 0.0, 0.5 * pulled(i, room)
     rests = law.RESTS and room[WAY * LANES + i] == 0.0
     room[PULL_HIGH * LANES + i] = room[PULL_LOW * LANES + i] = 0.0 if rests else nan
 
@@ -364,7 +371,7 @@ def close_cycle(i, room, first, cycles, h):
         room[SEEN * LANES + i] += 1.0
         room[SECANT * LANES + i] += secant
     mean = h * (room[MEAN * LANES + i] + 0.5 * (begun - room[X * LANES + i]))
-    pull = h * room[PULL * LANES + i]
+    pull = h * (room[PULL * LANES + i] - 0.5 * pulled(i, room))
     if first:
         room[FIRST * LANES + i], room[F_FIRST * LANES + i] = mean, pull
     room[LAST * LANES + i], room[F_LAST * LANES + i] = mean, pull

@@ -66,7 +66,7 @@ def reading_of(law: str, cases: Cases, found: Marched, energy, omega, outward) -
         "ACCELERATION", "STARTS", "START_COS", "START_SIN", "SLIP_HIGH", "SLIP_LOW", "FORCE", "STUCK", "TURNED",
         "PASSED", "FIRST", "LAST", "F_FIRST", "F_LAST", "RANGE", "SECANT", "SEEN")}
     run, face, angle = np.zeros((n, of.OF_RUN)), np.zeros((n, of.OF_FACE)), 2 * np.pi * found.cycles
-    slide, push, pull, third = harmonics(cases, found, angle)
+    slide, push, pull, third = harmonics(law, cases, found, angle)
     run[:, of.OUT_LOW], run[:, of.OUT_HIGH] = outward[:, :, 0].min(axis=1), outward[:, :, 1].max(axis=1)
     run[:, of.REACH] = np.abs(outward).max(axis=(1, 2))
     run[:, [of.A_COS, of.A_SIN, of.A3_COS, of.A3_SIN]] = np.array([*push, *third]).T / omega[:, None]
@@ -89,19 +89,34 @@ def reading_of(law: str, cases: Cases, found: Marched, energy, omega, outward) -
     return Reading(run, face[:, None], angle / omega, 2 * np.pi / omega)
 
 
-def harmonics(cases: Cases, found: Marched, angle) -> tuple:
+def harmonics(law: str, cases: Cases, found: Marched, angle) -> tuple:
     """Integrals with cosine and sine over the last cycles: of the slide, of the acceleration of the output, of the
     friction, which the equation leaves, and of the acceleration with those of three times the angle.
 
-    Those of x'' follow from those of x by parts; the sums of x have their ends by Euler and Maclaurin.
+    Those of x'' follow from those of x by parts; the sums of x have their ends by Euler and Maclaurin, to the sixth
+    order but for laws of a stretch.
     """
     h, b, e = found.step, found.begun, found.motion
     x, v = b[:, at.X] - e[:, at.X], b[:, at.V] - e[:, at.V]
+    a, j = _bends(law, cases, b, e)
     c, s, c3, s3 = (h * found.shown[:, k - at.SHOW] for k in (at.C1, at.S1, at.C3, at.S3))
-    c, c3 = c + h / 2 * x + h * h / 12 * v, c3 + h / 2 * x + h * h / 12 * v
-    s, s3 = s + h * h / 12 * x, s3 + h * h / 4 * x
+    two, four = h * h / 12, h**4 / 720
+    c, c3 = c + h / 2 * x + two * v - four * (j - 3 * v), c3 + h / 2 * x + two * v - four * (j - 27 * v)
+    s, s3 = s + two * x - four * (3 * a - x), s3 + 3 * two * x - four * (9 * a - 27 * x)
     gain, side = -v - c, x - s
     push = cases.out * gain, cases.out * side + cases.base * angle / 2
     pull = -gain - cases.damp * (s - x) - cases.square * c, \
         cases.push * angle / 2 - side + cases.damp * c - cases.square * s
     return (c, s), push, pull, (cases.out * (-v - 9 * c3), cases.out * (3 * x - 9 * s3))
+
+
+def _bends(law: str, cases: Cases, begun, motion) -> tuple:
+    """Differences of x'' and of x''' between two motions where the drive passes 0; as if the friction stayed under a
+    law of a stretch, whose steps are finer."""
+    x, v = (begun[:, k] - motion[:, k] for k in (at.X, at.V))
+    if flows(law):
+        return -cases.damp * v - cases.square * x, 0 * v
+    a = -cases.damp * v - cases.square * x - _held(law, cases, begun) + _held(law, cases, motion)
+    one, other = (m[:, at.V] * (own_of(law, m, "STIFF") if law == "masing" else cases.spring * (m[:, at.WAY] == 0))
+                  for m in (begun, motion))
+    return a, -cases.damp * a - cases.square * v - one + other

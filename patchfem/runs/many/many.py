@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import compiled
 from ...core import PatchfemError
-from ...model.alike import Alike, some
+from ...model.alike import some
 from ...model.model import Model
 from . import one_by_one
 from .answers import Answers
@@ -24,7 +24,7 @@ class Batch(NamedTuple):
     say) -> Answers of a group, equal to single runs to 1e-12, bars too, whatever else is in the group; share: seconds
     of a case over those of its own run, 0 where they are next to nothing; compile: CPU seconds of the first group;
     least: fewest cases of a study that it serves: such a batch gives answers with bars of their own, each the same
-    whatever else is in the group; parts(Alike) -> {group: places} of those that it takes, where it reads columns;
+    whatever else is in the group; parts(models) -> {group: places} of those that it takes, where it reads columns;
     together: fewest cases of a chunk of a sweep, where what they share is worth so many.
     """
 
@@ -92,7 +92,7 @@ def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = Non
     """
     found, groups = Answers.blank(len(models)), {}
     left, study = np.arange(len(models)), study or len(models)
-    if isinstance(models, Alike) and keep is None:
+    if keep is None:
         left, groups = _by_columns(models, study)
     for case in left.tolist():
         model = models[case]
@@ -106,10 +106,13 @@ def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = Non
     return found
 
 
-def _by_columns(models: Alike, study: int) -> tuple[np.ndarray, dict]:
+def _by_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
     """(places of the models that no batch takes as columns, {(batch, group): places} of those that one does)."""
     batch = next((one for one in BATCHES if one.parts is not None and study >= one.least), None)
-    parts = batch.parts(models) if batch is not None else {}
+    try:
+        parts = batch.parts(models) if batch is not None else {}
+    except Exception:  # what is odd about a model is told by its own run
+        parts = {}
     return np.setdiff1d(np.arange(len(models)), [case for cases in parts.values() for case in cases]), \
         {(batch, group): cases for group, cases in parts.items()}
 

@@ -8,7 +8,7 @@ import pytest
 from lane_bars import LAWS, SCENE, drawn, rows
 from lane_bars import held as within
 
-from patchfem.api import build, load
+from patchfem.api import base_of, build, load
 from patchfem.runs.many import many, one_by_one
 from patchfem.runs.many.lumped import lanes, lumped
 
@@ -94,9 +94,19 @@ def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
     np.testing.assert_array_equal(found.values["loop_area"], ones.values["loop_area"])
 
 
-def test_always_what_sticks_or_misses_its_tolerance_is_exact(monkeypatch):
-    cases = [*models("coulomb", 6, 70), build(load(SCENE.format(law=LAWS["coulomb"]).replace("30 N", "3000 N")))]
-    found = many.answers(cases)
-    assert found.outcome[-1] == "stuck" and found.numerics[70]["engine"] == "exact"
+@pytest.mark.parametrize("law", EXACT[:3])
+def test_exact_what_sticks_is_told_by_lanes(law):
+    """Cases that end stuck, with their rings: the answers of the exact batch within the bars, and no measure less."""
+    base = base_of(load(SCENE.format(law=LAWS[law])))
+    cases = [build(base.changed([f"normal.load={load} N", f"structure.mode.axial.damping={damping}"]))
+             for load in (300, 1000, 3000) for damping in (0.003, 0.03)]
+    found, ones = many.answers(cases, study=64), lumped_answers(cases)
+    assert np.sum(found.outcome == "stuck") > 2 and all(one["engine"] == "lanes" for one in found.numerics.values())
+    assert missed(found, ones) == 0
+    assert ("ring_frequency" in found.values) == (law == "elastic-plastic")
+
+
+def test_always_what_misses_its_tolerance_is_exact(monkeypatch):
+    cases = models("coulomb", 6, 70)
     monkeypatch.setattr(lanes, "bars", lambda values, changes, law: {name: np.abs(one) for name, one in values.items()})
     assert all(one["engine"] == "exact" for one in many.answers(cases).numerics.values())

@@ -1,11 +1,12 @@
 """The batch of lanes: lumped cases of one law side by side, with bars from half the steps.
 
 A case of a law of a stretch (tanh, Bouc-Wen, LuGre, bonds of a constant length) marches by a quarter of the steps too,
-which shows how its errors fall. Such a case and one of Iwan march by finer steps where their bars miss the tolerance;
-an Iwan case that has not settled marches on. A case goes to the exact batch `lumped`, or under a law of a stretch to a
-run of its own, where a bar still misses its tolerance, where nothing slips (but of Iwan, and of a law of a stretch that
-has settled), rings are to be told (but of Iwan in a stick that lasts all the time) or a motion still has to settle. So
-does every case of a batch of which these contradict one of a few.
+which shows how its errors fall. Such a case and one of Iwan march by finer steps where their bars miss the tolerance,
+with those that ask for these steps from the start; a case of Iwan or of the elastic-plastic law that has not settled
+marches on. What rings in a stick that lasts all the time is told in closed form behind one spring, else by a fit. A
+case goes to the exact batch `lumped`, or under a law of a stretch to a run of its own, where a bar still misses its
+tolerance, rings in shorter sticks are to be told, or a motion grows. So does every case of a batch of which these
+contradict one of a few.
 """
 
 from collections.abc import Sequence
@@ -25,7 +26,7 @@ from ....model.alike import Alike, columns_of, some
 from ....model.model import Model
 from ....response.errors import APART, GAPS, MAIN, ROUND
 from ....response.measures import energy_balance
-from ....response.ringing import FAINT, ringing
+from ....response.ringing import FAINT, WIDEST, ringing
 from ....response.rows import TABLE, first_harmonic
 from ....response.settling import steady_amplitudes, windows_of
 from ....scene.rules.draft import pinned
@@ -45,12 +46,15 @@ TOGETHER = 4096  # cases of one compiled call
 KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "iwan": "masing", "tanh": "friction.laws.tanh_kernels",
          "bouc-wen": "friction.laws.bouc_wen_kernels", "lugre": "friction.laws.lugre_kernels",
          "nonlocal": "friction.laws.stretch_kernels"}
+MARCH_ON = "yielding", "masing"  # whose motions march on until they settle
 SMOOTH, CALM = (128, 256, 512, 1024, 2048), 0.5  # steps of a cycle under a law of a stretch, its rate in a step then
 FINER = 4  # times as many steps has a case of Iwan or of a law of a stretch whose bars miss its tolerance
 RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
 # of the change at half the steps, of that of the main measures, and of the measure itself, as both marches can miss an
 # event alike: 2 of 4077 random cases had an error beyond
 OF_CHANGE, OF_TYPICAL, OF_SIZE = 2.0, 1.0, 2e-5
+HELD = 1e-12  # relative change of a force that its limit holds
+OF_LOOP = 4e-10  # least error of the area of a loop over its largest force and slide, what round-off leaves of none
 OF_MIDDLE = 1e-6  # of the amplitude, by which its middle errs behind sliders or a stretch, of which no event is missed
 ORDERLY, SHOWN = 6.0, 0.25  # a change at half the steps that falls by this shows a high order, and is so much of itself
 MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; change over a tenth of these that is left
@@ -150,14 +154,20 @@ def _contact(model: Model) -> tuple:
 
 def group(model: Model) -> tuple:
     """Equal for models of one compiled call."""
-    return int(model.rig.cycles), model.friction.law, int(steps_of([model])[0])
+    return int(model.rig.cycles), model.friction.law
 
 
-def parts(models: Alike) -> dict[tuple, list]:
+def parts(models: Sequence) -> dict[tuple, list]:
     """Places of the models that lanes take, by group."""
-    steps = np.zeros(len(models), int) if no_lanes(models.first) else steps_of(models)
-    cycles, law, _ = group(models.first)
-    return {(cycles, law, one): np.flatnonzero(steps == one).tolist() for one in sorted(set(steps.tolist()) - {0})}
+    places: dict = {}
+    if isinstance(models, Alike):
+        places |= {} if no_lanes(models.first) else {group(models.first): range(len(models))}
+    else:
+        for case, model in enumerate(models):
+            if isinstance(model, Model) and not no_lanes(model):
+                places.setdefault(group(model), []).append(case)
+    steps = {key: steps_of(some(models, cases)) for key, cases in places.items()}
+    return {key: np.array(cases)[steps[key] > 0].tolist() for key, cases in places.items() if steps[key].any()}
 
 
 def solve(models: Sequence[Model], say=None) -> Answers:
@@ -169,38 +179,48 @@ def solve(models: Sequence[Model], say=None) -> Answers:
     return found
 
 
-def _solved(models: Sequence[Model], say, steps: int = 0) -> Answers:
-    begin, (cycles, law, least) = perf_counter(), group(models[0])
-    steps = max(steps, least)
-    window = min(10, cycles // 10)
-    runs, exact, lost, marks = runs_of(models, cycles, window, steps)
-    found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window})
-    # elastic-plastic motions that have not settled have a steady estimate by the map of their yields
-    unsettled = found.outcome == "grows" if law != "elastic-plastic" else found.outcome != "steady"
-    wide = too_wide(models, found) | lost
-    exact |= alone | wide | unsettled
-    chosen = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
-    found.numerics.update(dict.fromkeys(range(len(models)), chosen))
+def _solved(models: Sequence[Model], say) -> Answers:
+    """Answers of models; those that march by the same steps do so together, the fewest first."""
+    begin, law, (cases, c) = perf_counter(), models[0].friction.law, cases_of(models)
+    found, exact, left = Answers.blank(len(models)), np.zeros(len(models), bool), steps_of(models)
+    while (left > 0).any():
+        steps = int(left[left > 0].min())
+        here = np.flatnonzero(left == steps)
+        part, exact[here], finer = _marched(some(models, here), march.Cases(*(one[here] for one in cases)),
+                                            {name: one[here] for name, one in c.items()}, steps)
+        lumped.take_out(found, here)  # what fewer steps said
+        found.place(here, part)
+        left[here] = np.where(finer, FINER * steps, 0)
     for case in range(len(models)) if law == "tanh" else ():
         if notes := creeping_note(models[case].friction):
             found.notes[case] = notes
     found.seconds[:] = (perf_counter() - begin) / len(models)
-    looked = checked(marks, ~exact, FEWEST if steps == least else 0)
+    looked = checked(np.column_stack(cases), ~exact)
     ones = exactly(some(models, looked), say, FINER_CELLS if law == "iwan" else 0) if looked else None
     if wrong := contradicted(found, ones, looked, SHORT if law == "iwan" else 1.0):
         exact[:] = True
         note = f"lanes said {wrong} otherwise than the exact engine in a check of {len(looked)} cases, so all are exact"
-    finer = (wide | alone) & ((law == "iwan" or march.flows(KINDS[law])) and not wrong and FINER * steps <= SMOOTH[-1])
-    exact &= ~finer
-    if cases := np.flatnonzero(finer).tolist():
-        lumped.take_out(found, cases)
-        found.place(cases, _solved(some(models, cases), say, FINER * steps))
-    if cases := np.flatnonzero(exact).tolist():
-        lumped.take_out(found, cases)
-        found.place(cases, exactly(some(models, cases), say))
-        for case in cases if wrong else ():
+    if (places := np.flatnonzero(exact)).size:
+        lumped.take_out(found, places)
+        found.place(places, exactly(some(models, places), say))
+        for case in places.tolist() if wrong else ():
             found.notes[case] = [*found.notes.get(case, ()), note]
     return found
+
+
+def _marched(models: Sequence[Model], cases, c: dict, steps: int) -> tuple:
+    """(Answers of models that march by so many steps a cycle; (n,) which must be run otherwise, and which by finer
+    steps)."""
+    (cycles, law), least = group(models[0]), np.zeros(len(models), bool)
+    window = min(10, cycles // 10)
+    runs, exact, lost = runs_of(models, (cases, c), cycles, window, steps)
+    found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window})
+    chosen = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
+    found.numerics.update(dict.fromkeys(range(len(models)), chosen))
+    wide = too_wide(models, found) | lost | alone
+    serves = law == "iwan" or march.flows(KINDS[law])
+    finer = wide if serves and FINER * steps <= SMOOTH[-1] else least
+    return found, (exact | wide | (found.outcome == "grows")) & ~finer, finer
 
 
 def exactly(models: Sequence[Model], say, finer: int = 0) -> Answers:
@@ -221,19 +241,19 @@ def too_wide(models, found: Answers) -> np.ndarray:
     for name, values in found.values.items():
         if name in RING:  # the fit of a single run knows it no better
             continue
-        if name.endswith("_steady") and march.flows(KINDS[models[0].friction.law]):
-            continue  # an extrapolation errs alike at finer steps
+        if name.endswith("_steady") and KINDS[models[0].friction.law] not in MARCH_ON:
+            continue  # an extrapolation errs alike at finer steps, and in the exact engine
         out |= found.errors[name] > tolerance * np.abs(values) + found.floors[name]
     return out
 
 
-def checked(marks, free, fewest: int) -> list:
-    """Numbers of the cases that the exact engine checks: by a hash of what each is, whatever stands beside it; free:
-    (n,) which may be; fewest: of them."""
+def checked(marks, free) -> list:
+    """Numbers of the cases that the exact engine checks: by a hash of what each is, whatever stands beside it; marks
+    (n, k): numbers that tell each from any other; free: (n,) which may be."""
     hashes = np.array([crc32(row.tobytes()) for row in marks])
     order = [case for case in np.argsort(hashes, kind="stable").tolist() if free[case]]
     few = sum(hashes[case] < 2**32 // CHECKED for case in order)
-    return order[:max(few, fewest)]
+    return order[:max(few, FEWEST)]
 
 
 def contradicted(found: Answers, ones: Answers | None, looked: list, times: float = 1.0) -> str:
@@ -252,42 +272,32 @@ def contradicted(found: Answers, ones: Answers | None, looked: list, times: floa
     return ""
 
 
-def runs_of(models, cycles: int, window: int, steps: int) -> tuple:
-    """(Runs of models of a group, (n,) which must be run otherwise, (n,) which need finer steps at least, (n, k)
-    numbers that tell each from any other)."""
-    law = KINDS[models[0].friction.law]
-    cases, c = cases_of(models)
+def runs_of(models, cases: tuple, cycles: int, window: int, steps: int) -> tuple:
+    """(Runs of models of a group, (n,) which must be run otherwise, (n,) which need finer steps at least); cases: as of
+    `cases_of`."""
+    law, (cases, c) = KINDS[models[0].friction.law], cases
     fine, *coarser = (_measured(law, cases, c, march.march(law, cases, cycles, window, steps // share))
                       for share in ((1, 2, 4) if march.flows(law) else (1, 2)))
     (values, book, found, extremes, rise), coarse = fine, coarser[0]
     errors = bars(values, changed(values, [one[0] for one in coarser]), law)
     slips = found.shown[:, at.SLIP_HIGH - at.SHOW] - found.shown[:, at.SLIP_LOW - at.SHOW]
     stuck = slips / 2 <= np.maximum(c["held"], ROUND * np.abs(found.history[:, :, :2]).max(axis=(1, 2)))
+    stuck &= (cases.spring > 0) | (law == "rigid")
     exact = np.any([np.isnan(values[name]) != np.isnan(coarse[0][name]) for name in values], axis=0)
-    rings = may_ring(cases, found) & (law != "rigid")
-    steady, none = None, {name: np.full(len(models), np.nan) for name in RING}
-    if march.flows(law):
-        stuck &= cases.spring > 0
-        exact |= stays(cases, found) & (stuck | rings)
-    elif law == "masing":
-        rings &= (found.ended >= cycles - window) & (march.own_of(law, found.motion, "EVER") > 0)
-        held = rings & (found.shown[:, at.STUCK - at.SHOW] > 2 * np.pi * (window - 1e-6))
-        exact |= rings & ~held
-        none, told = _rings(law, cases, c, found, np.flatnonzero(held), steps)
-        errors |= told
-        exact |= march.own_of(law, found.motion, "DROPPED") > DROPPED
+    rings, told, untold, faint = _rings(law, cases, c, found, (stuck, window, steps))
+    errors, exact, steady = errors | told, exact | untold, None
+    if law in MARCH_ON:
         steady, open_ones = _settled(law, cases, found, steps, windows_of(extremes, window)[0], ~stuck)
         steady, exact = tuple(np.abs(c["ratio"]) * one for one in steady), exact | open_ones
-    else:
-        exact, stuck = exact | stuck | rings, stuck & False
+    if law == "masing":
+        exact |= march.own_of(law, found.motion, "DROPPED") > DROPPED
     phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
     nowhere = np.zeros(len(models), bool)  # what is lost goes elsewhere
     tolerance, = columns_of(models, lambda model: (model.accuracy.tolerance,))
-    runs = Runs(cycles, window, values | none, book, extremes, phasors[:, ends], stuck, nowhere, errors, 1e-9, np.inf,
+    runs = Runs(cycles, window, values | rings, book, extremes, phasors[:, ends], stuck, nowhere, errors, 1e-9, np.inf,
                 stuck & (rise > tolerance * values["friction_force_peak"]), steady, again=False)
-    lost = ~np.isfinite(found.motion[:, at.X] + coarser[-1][2].motion[:, at.X])
-    return runs, exact, lost, np.column_stack(cases)
+    return runs, exact, faint | ~np.isfinite(found.motion[:, at.X] + coarser[-1][2].motion[:, at.X])
 
 
 def may_ring(cases, found) -> np.ndarray:
@@ -305,22 +315,55 @@ def stays(cases, found) -> np.ndarray:
     return gain > FAINT / 3 * found.shown[:, at.ACCELERATION - at.SHOW]
 
 
-def _rings(law: str, cases, c: dict, found, held, steps: int) -> tuple:
-    """(ring_frequency [Hz] and ring_damping by name, their errors), (n,) each, of what rings in the cases `held`, which
-    stick through all the cycles that were read; NaN in others."""
-    out = tuple({name: np.full(len(found.ended), np.nan) for name in RING} for _ in range(2))
-    if not held.size:
-        return out
-    part = march.Cases(*(one[held] for one in cases))
-    signals = march.accelerations(law, part, found.begun[held], int(found.cycles[held[0]]), steps)
-    angle = 2 * np.pi / steps * np.arange(signals.shape[1])
-    for case, signal in zip(held.tolist(), signals):
+def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
+    """(ring_frequency [Hz] and ring_damping by name, their errors, (n,) whether a run has to tell what rings, and
+    whether finer steps have to); read: (n,) which are stuck, the cycles that are read of what does not repeat, steps of
+    a cycle.
+
+    Told is what rings in a stick that lasts all the time: in closed form behind a spring, else by the fit of a run.
+    """
+    (stuck, window, steps), n, faint = read, len(found.ended), np.zeros(len(found.ended), bool)
+    out = tuple({name: np.full(n, np.nan) for name in RING} for _ in range(2))
+    if law == "rigid":  # nothing moves in its sticks
+        return *out, faint, faint
+    rings, marched = may_ring(cases, found), found.ended >= found.history.shape[1] - window
+    held = found.shown[:, at.STUCK - at.SHOW] > 2 * np.pi * (found.cycles - 1e-6)
+    if law == "yielding":
+        _of_springs(cases, c, found, held & rings & marched, out)
+        return *out, rings & ~held, faint
+    # nothing rings in what repeats
+    may = (rings & marched & (march.own_of(law, found.motion, "EVER") > 0)) if law == "masing" else \
+        stays(cases, found) & (stuck | rings)
+    untold, where = may & ~held, np.flatnonzero(may & held)
+    part = march.Cases(*(one[where] for one in cases))
+    signals = march.accelerations(law, part, found.begun[where], window, steps) if where.size else ()
+    angle = 2 * np.pi / steps * np.arange(window * steps + 1)
+    for case, signal in zip(where.tolist(), signals):
         omega = float(c["omega"][case])
-        told = ringing(angle / omega, signal, [(0.0, angle[-1] / omega)], omega)
-        for columns, ones in zip(out, told):
-            for name, value in ones.items():
-                columns[name][case] = value
-    return out
+        values, apart = ringing(angle / omega, signal, [(0.0, angle[-1] / omega)], omega)
+        faint[case] = not values and march.flows(law) and steps < FINER * SMOOTH[0]  # for so few steps, perhaps
+        for name, value in values.items():
+            out[0][name][case], out[1][name][case] = value, OF_CHANGE * apart[name]
+    return *out, untold, faint
+
+
+def _of_springs(cases, c: dict, found, held, out: tuple) -> None:
+    """Write what rings in cases that a spring holds through all cycles that were read, (n,) `held`, in closed form, by
+    the rule of `response.ringing`; out: values and errors by name."""
+    beta, half, angle = cases.square + cases.spring, cases.damp / 2, 2 * np.pi * found.cycles
+    own, far = np.sqrt(np.maximum(beta - half**2, 0.0)), beta - 1
+    whole = far**2 + cases.damp**2
+    begun, place = found.begun, found.begun[:, at.PLACE]
+    with np.errstate(all="ignore"):  # the motion less that of the sine and of the stretch of the spring
+        z = begun[:, at.X] - cases.spring * place / beta + cases.push * cases.damp / whole
+        other = (begun[:, at.V] - cases.push * far / whole + half * z) / own
+        damping = half / np.sqrt(beta)
+        forced = (angle > 3 * np.pi) & (damping < 1e-3) & (np.abs(own - np.round(own)) < 1e-2)
+        size = np.abs(cases.out) * beta * np.hypot(z, other)
+        told = held & (angle * own >= 3 * np.pi) & (damping < WIDEST) & ~forced & (whole > 1e-18 * beta**2) \
+            & (size > FAINT * found.shown[:, at.ACCELERATION - at.SHOW])
+    for name, value in zip(RING, (own * c["omega"] / (2 * np.pi), damping)):
+        out[0][name][told], out[1][name][told] = value[told], 0.0
 
 
 def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
@@ -418,12 +461,21 @@ def bars(values: dict, changes: dict, law: str = "") -> dict:
     for name, change in changes.items():
         size = first_harmonic(values) if name == "equivalent_stiffness" else 1.0 if TABLE[name].term is not None \
             and name not in GAPS and name != "drift_per_cycle" else np.abs(values[name])
-        if law == "masing" and name == "acceleration_distortion":  # a small part of the acceleration
-            size = np.maximum(size, 1e-3)
+        if name == "acceleration_distortion":  # a small part of the acceleration
+            size = np.maximum(size, 1e-3 if law == "masing" else 1e-4)
         if name == "drift_per_cycle":
             size = np.abs(values[MAIN[0]])
         least = OF_MIDDLE if smooth and name == "drift_per_cycle" else OF_SIZE
-        known = name in ("normal_load", *GAPS) or (name == APART[0] and not smooth)
-        chance = 0.0 if known else (OF_TYPICAL * typical + least) * size
+        chance = 0.0 if name in ("normal_load", *GAPS) else (OF_TYPICAL * typical + least) * size
+        if name == APART[0] and not smooth:  # the limit holds it
+            chance = np.where(change <= HELD * size, 0.0, chance)
         out[name] = np.maximum(OF_CHANGE * np.nan_to_num(change), chance)
-    return out
+    return out | _rounded(values, out)
+
+
+def _rounded(values: dict, errors: dict) -> dict:
+    """Errors of the measures of a loop of no area, which are no smaller than those that round-off leaves."""
+    least, loop = OF_LOOP * values["friction_force_peak"] * np.abs(values[MAIN[0]]), values["loop_area"]
+    share = np.divide(np.abs(values["equivalent_damping"]), np.abs(loop), out=0 * loop, where=loop != 0)
+    return {name: np.fmax(errors[name], least * part) for name, part in (("loop_area", 1.0),
+                                                                         ("equivalent_damping", share))}

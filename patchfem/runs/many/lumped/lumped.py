@@ -73,12 +73,12 @@ def _solved(models, say, pairs: int) -> Answers:
     return found
 
 
-def take_out(found: Answers, cases: list) -> None:
+def take_out(found: Answers, cases: Sequence[int]) -> None:
     """Take out what was found of cases."""
+    for columns in (found.values, found.errors, found.floors):
+        for column in columns.values():
+            column[cases] = np.nan
     for case in cases:
-        for columns in (found.values, found.errors, found.floors):
-            for column in columns.values():
-                column[case] = np.nan
         for kept in (found.warnings, found.notes, found.numerics, *found.reasons.values()):
             kept.pop(case, None)
     empty = [name for name, column in found.values.items() if np.isnan(column).all() and not found.reasons.get(name)]
