@@ -1,5 +1,6 @@
 """Before and after on paper: lines of text, plain data, traces that a scene can press, a page that stands alone."""
 
+from dataclasses import replace
 from html import escape
 from pathlib import Path
 
@@ -38,6 +39,7 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "worn_volume": "worn volume", "grown_volume": "grown volume", "worn_share": "worn share of the region",
          "shift_x": "shift along x", "shift_y": "shift along y", "rotation": "rotation",
          "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
+DRAWN = 1_000_000  # heights that a histogram and an Abbott curve are drawn from, spread over a larger scan
 NOTE = ("Interval: 95 %. Shift, depth and area: of this place, from the noise of the unworn heights. Ratios: of the "
         "surface, as far as one trace before and one after can tell, for Gaussian heights that are alike everywhere; "
         "traces of one place vary together, so theirs are narrower.")
@@ -198,9 +200,9 @@ def page(parts: list, found: tuple, pressing: Pressed | None = None) -> str:
     for number, one in enumerate(parts):
         body = [*(figure(f"{number}{place}", *each) for place, each in enumerate(figures(one))), _table(one),
                 f"<p class=soft>{escape(NOTE)}</p>"]
-        title = "What changed place by place, and the waves" if one.change is not None else \
+        head = "What changed place by place, and the waves" if one.change is not None else \
             "Waves" if one.direction and parts[0].change is not None else "What changed"
-        sections.append(Section(f"changes{number}", f"{title}{one.direction and f' along {one.direction}'}",
+        sections.append(Section(f"changes{number}", f"{head}{one.direction and f' along {one.direction}'}",
                                 "\n".join(body)))
     if pressing is not None:
         sections.append(Section("pressed", f"{pressing.title}, pressed with each surface", _pressing(pressing)))
@@ -254,7 +256,9 @@ def _maps(one: Change) -> list:
             "below the scan before, missing ones from their neighbours; white: beyond the scan after.",
             f"Maps of both scans and of the worn depth: worn volume {' '.join(shown(worn)[::2])}")]
     known = np.isfinite(depth)
-    heights = [first[there := known & np.isfinite(first)], second[there]]
+    there = np.flatnonzero(known & np.isfinite(first))
+    there = there[::-(-there.size // DRAWN)]
+    heights = [each.ravel()[there] for each in (first, second)]
     out.append((pictures.both_heights(heights, [_bearing(z) for z in heights]), "Left: share of the heights in each "
                 "class. Right: Abbott curves. Both over the common region, about the plane of the scan before.",
                 "Histograms and Abbott curves of the heights before and after"))
@@ -270,7 +274,8 @@ def _maps(one: Change) -> list:
 def _abbott(surface) -> tuple:
     if isinstance(surface, Profile):
         return _bearing(level(even(surface)).z)
-    known = level_plane(surface).z
+    every = max(int(np.sqrt(surface.z.size / DRAWN)), 1)
+    known = level_plane(replace(surface, x=surface.x[::every], y=surface.y[::every], z=surface.z[::every, ::every])).z
     return _bearing(known[~np.isnan(known)])
 
 

@@ -16,7 +16,7 @@ from .carried import Carried, carried, hidden_wear, raised
 from .depth import Worn
 from .flanks import Flanks, flanks_of
 from .place import Match
-from .ratios import BEYOND, Size, at_step, likeness, loose, of_noise, ratio, scattered, size_along, size_of
+from .ratios import BEYOND, Size, at_step, bridged, likeness, loose, of_noise, ratio, scattered, size_along, size_of
 from .registration import Registration, gain_of, register
 from .same import Place, found_place
 from .specks import without_specks
@@ -89,24 +89,17 @@ class Comparison:
         return out if self.abbott is None else {**out, "worn_depth_mean_from_abbott": self.abbott}
 
 
-def compared(before: Profile | Areal, after: Profile | Areal, direction: str = "", band: tuple = BAND,
-             shift: float | None = None, keep_spikes: bool = False) -> Comparison:
-    """Compare two traces of a surface, or two areal scans of it in one direction.
+def compared(before: Profile, after: Profile, direction: str = "", band: tuple = BAND, shift: float | None = None,
+             keep_spikes: bool = False) -> Comparison:
+    """Compare two traces of a surface.
 
-    Spikes, dropouts and dust are left out of traces unless keep_spikes. Where valleys or parts of both traces agree
+    Spikes, dropouts and dust are left out unless keep_spikes. Where valleys or parts of both traces agree
     beyond chance (`same`), as they are, mirrored or turned over, they are registered on each other (`registration`) and
     the worn depth is what is missing, where unworn parts or valleys carry that (`carried`). Else the worn depth counts
     from unworn flanks of the trace after (`flanks`), or is refused and the guess from the Abbott curves stands beside
     it. band [m]: waves of the amplitude ratio. shift [m]: where it is known, a place at x of the one is taken to stand
-    at x + shift of the other, give or take half a wave. PatchfemError for a trace beside a scan, a shift of scans, and
-    traces that cannot show the band.
+    at x + shift of the other, give or take half a wave. PatchfemError for traces that cannot show the band.
     """
-    if isinstance(before, Areal) != isinstance(after, Areal):
-        raise PatchfemError(f"{before.source} and {after.source}: a trace and an areal scan; two of a kind are wanted")
-    if isinstance(before, Areal):
-        if shift is not None:
-            raise PatchfemError("compare: a shift is told for traces; areal scans are laid on each other by themselves")
-        return _scans(before, after, direction or "x", band)
     sides = (before, after) if keep_spikes else (despiked(before), despiked(after))
     place = found_place(*sides, shift)
     if place.found is not None and not keep_spikes:
@@ -123,8 +116,9 @@ def _named(track) -> dict:
 
 def identical(before, after) -> bool:
     """Whether two surfaces have the same heights at the same places, as a file has with itself."""
-    return isinstance(before, Profile) and isinstance(after, Profile) and np.array_equal(before.x, after.x) \
-        and np.array_equal(before.z, after.z, equal_nan=True)
+    return type(before) is type(after) and all(
+        np.array_equal(getattr(before, name), getattr(after, name), equal_nan=True) for name in "xyz"
+        if hasattr(before, name))
 
 
 def _without_specks(place: Place) -> Place:
@@ -235,16 +229,25 @@ def _told(found: Registration) -> list:
     return [text + ("; this is taken out" if out else "; calibrate x of the instrument")]
 
 
-def _scans(before: Areal, after: Areal, direction: str, band: tuple) -> Comparison:
+def compared_scans(before: Areal, after: Areal, first: str = "x", keep_spikes: bool = False) -> list[Comparison]:
+    """Compare two areal scans, place by place and by their waves in each direction: two `Comparison`, the first of
+    which has the `Change`."""
+    flat, found = tuple(map(bridged, (before, after))), changed(before, after, keep_spikes)
+    notes = tuple(dict.fromkeys((*found.before.notes, *found.after.notes)))
+    return [replace(_waves(before, after, flat, first), change=found, notes=notes, removed=found.removed),
+            _waves(before, after, flat, "y" if first == "x" else "x")]
+
+
+def _waves(before: Areal, after: Areal, flat: tuple, direction: str) -> Comparison:
+    """The waves of two scans in one direction; flat: both as `bridged`."""
     why = "areal scans are compared place by place in both directions at once"
     try:
-        sizes = tuple(size_along(one, direction, band) for one in (before, after))
+        sizes = tuple(size_along(*one, direction) for one in flat)
         ratios = [ratio(part, text, *sizes[::-1]) for part, text in (("amplitude", AMPLITUDE), ("slope", SLOPE))]
     except PatchfemError as error:  # a scan too short for the waves of the band
         sizes, ratios = (), [refused("1", text, str(error)) for text in (AMPLITUDE, SLOPE)]
     blank = [refused(unit, text, why) for unit, text in (("m", SHIFT), ("1", STRETCH), ("rad", TILT))]
-    return Comparison(before, after, direction, "", None, *blank, worn_depth.nowhere(why), *ratios, None, sizes,
-                      notes=before.notes + after.notes)
+    return Comparison(before, after, direction, "", None, *blank, worn_depth.nowhere(why), *ratios, None, sizes)
 
 
 def directions_of(parts: list) -> list:
@@ -285,13 +288,12 @@ def compared_files(paths: tuple, direction: str = "", units: tuple | None = None
         raise PatchfemError("compare: a shift is that of two traces; compare each direction by itself")
     if len(scans) > 1 or (True in scans and len(files) == 4):
         raise PatchfemError("compare: two or four traces are wanted, or two areal scans")
-    if len(files) == 2 and True not in scans:
+    if shift is not None and True in scans:
+        raise PatchfemError("compare: a shift is told for traces; areal scans are laid on each other by themselves")
+    if True in scans:
+        return compared_scans(*files, direction or "x", keep_spikes)
+    if len(files) == 2:
         return [compared(*files, direction, shift=shift, keep_spikes=keep_spikes)]
     first = direction or "x"
-    parts = [compared(*pair, along, keep_spikes=keep_spikes) for pair, along in
-             ((files[:2], first), (files[-2:], "y" if first == "x" else "x"))]
-    if len(files) == 2:
-        found = changed(*files, keep_spikes)
-        notes = tuple(dict.fromkeys((*found.before.notes, *found.after.notes)))
-        parts = [replace(parts[0], change=found, notes=notes, removed=found.removed), replace(parts[1], notes=())]
-    return parts
+    return [compared(*pair, along, keep_spikes=keep_spikes) for pair, along in
+            ((files[:2], first), (files[2:], "y" if first == "x" else "x"))]

@@ -1,5 +1,6 @@
 """Ratio of two amplitudes or slopes with the interval that single traces allow."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from ..roughness.spectrum import BAND, Spectrum, amplitude_of, refuse_band, spec
 
 BEYOND = 0.004  # standard deviation of a ratio by what noise does not tell: the tip, interpolation, the datum
 BRIDGED = 1 / 3  # of the heights of a trace of a scan, at most, may be missing
+MOST = 256  # traces of a scan in one direction that are read, spread over it: neighbours tell nearly the same
 PLACES = 6  # parts of a trace whose mean squares scatter from place to place
 
 
@@ -56,18 +58,22 @@ def at_step(trace: Profile, step: float) -> tuple:
     return flat.z, step
 
 
-def size_along(scan: Areal, direction: str, band: tuple = BAND) -> Size:
-    """Amplitude and slope of all traces of a scan in one direction, rows for x and columns for y.
-
-    Mean squares are averaged. Missing heights, a third of a trace at most, are bridged by a smooth surface.
-    Neighbouring traces tell nearly the same: the degrees of freedom of one trace count as often as traces are
-    independent, by the correlation of their mean squares across the scan. PatchfemError where no whole trace is left,
-    or the traces cannot show the band.
-    """
+def bridged(scan: Areal) -> tuple:
+    """A scan about its least-squares plane with a smooth surface over missing heights, and which these are (m, n)."""
     flat = level_plane(scan)
-    lost, whole = np.isnan(flat.z), filled(flat.z, np.isnan(flat.z))
-    z, lost, x = (whole, lost, flat.x) if direction == "x" else (whole.T, lost.T, flat.y)
-    z = z[lost.mean(axis=1) <= BRIDGED]
+    return replace(flat, z=filled(flat.z, flat.missing)), flat.missing
+
+
+def size_along(scan: Areal, lost, direction: str, band: tuple = BAND) -> Size:
+    """Amplitude and slope of the traces of a `bridged` scan in one direction, rows for x and columns for y.
+
+    Mean squares are averaged, of traces of which a third at most was missing, `MOST` of them. Neighbouring traces tell
+    nearly the same: the degrees of freedom of one trace count as often as traces are independent, by the correlation of
+    their mean squares across the scan. PatchfemError where no whole trace is left, or the traces cannot show the band.
+    """
+    z, lost, x = (scan.z, lost, scan.x) if direction == "x" else (scan.z.T, lost.T, scan.y)
+    rows = np.flatnonzero(lost.mean(axis=1) <= BRIDGED)
+    z = z[rows[np.linspace(0, rows.size - 1, min(rows.size, MOST)).astype(int)]]
     if not len(z):
         raise PatchfemError(f"{scan.source}: along {direction} more than a third of the heights of every trace are "
                             "missing")

@@ -56,6 +56,8 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     over = _over(parts) if parts[0].change is None else scans.over(parts[0].change)
     headline = f"{headline}; {over}" if over else headline
     out = [] if parts[0].change is None else scans.sentences(parts[0].change)
+    if areal and identical(parts[0].before, parts[0].after):
+        out.insert(0, "The heights of both scans are the same, as of one file given twice.")
     for one, word, name in zip(parts, words, names):
         if not isinstance(one.before, Areal):
             out += [*_variant(one, name), _worn(one, name), *_reference(one)]

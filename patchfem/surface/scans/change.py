@@ -17,6 +17,7 @@ ROTATION = "of the scan after against the scan before, anticlockwise"
 ALIKE = 0.95  # correlation of the unworn heights of both scans, from which on they show the same place
 LIKELY = 0.98  # the same where the search is no clearer than chance, as on a lay that repeats itself
 SPIKE, WIDEST = (10.0, 40.0, 160.0), 12  # scatters off the medians of 5 x 5 heights; heights of a spike at most
+SOME, CHUNK = 100_000, 1 << 17  # heights whose scatter about medians is taken; medians at a time
 SPECK = 12.0, 48.0, 192.0  # noises that a speck of the depths jumps by
 SEEN = 0.1  # of the worn part without heights, from which on this is told
 DIGITS = 4
@@ -126,11 +127,8 @@ def without_spikes(scan: Areal) -> tuple:
 
     A spike is twelve heights at most, all of which stand off all of its neighbours; more are a feature of the surface.
     """
-    from scipy.ndimage import median_filter
-
     missing = scan.missing
-    off = np.abs(scan.z - median_filter(filled(scan.z, missing), 5))
-    scale = 1.4826 * float(np.nanmedian(off))
+    scale, off = _off_median(filled(scan.z, missing), ~missing)
     spikes = np.zeros(off.shape, bool)
     for least in SPIKE if scale > 0 else ():  # a steep place would join a spike to its neighbours at the lowest
         with np.errstate(invalid="ignore"):
@@ -141,6 +139,27 @@ def without_spikes(scan: Areal) -> tuple:
     note = (f"{scan.source}: {spikes.sum()} of {(~missing).sum()} heights are spikes or dropouts and are left out; "
             "--keep-spikes keeps them")
     return replace(scan, z=frozen_array(z), notes=(*scan.notes, note)), int(spikes.sum())
+
+
+def _off_median(z, known) -> tuple:
+    """(scatter of the known heights (m, n) about the medians of 5 x 5 around them, how far each stands off its own (m,
+    n)), 0 where that is less than the least spike: half of its neighbours would be as far below or above it."""
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(z, 2, "symmetric"), (5, 5))
+
+    def distance(places) -> np.ndarray:
+        rows, columns = np.unravel_index(places, z.shape)
+        parts = [slice(k, k + CHUNK) for k in range(0, places.size, CHUNK)]
+        return np.concatenate([np.abs(z[rows[one], columns[one]] - np.median(
+            around[rows[one], columns[one]].reshape(-1, 25), axis=1)) for one in parts] or [np.zeros(0)])
+
+    there = np.flatnonzero(known)
+    scale = 1.4826 * float(np.median(distance(there[::max(there.size // SOME, 1)])))
+    far = np.maximum(z - minimum_filter(z, 5), maximum_filter(z, 5) - z) > SPIKE[0] * scale
+    out, places = np.zeros(z.shape), np.flatnonzero(far & known)
+    out.ravel()[places] = distance(places)
+    return scale, out
 
 
 def _apart(z, far, least: float) -> np.ndarray:

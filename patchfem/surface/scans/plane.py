@@ -30,9 +30,9 @@ class Plane(NamedTuple):
     share: float
 
 
-def unworn_planes(depth, x, y) -> list:
+def unworn_planes(depth, x, y, least: float = 1e-300) -> list:
     """Planes of the unworn parts of a map of depths (m, n) [m] at x (n,) and y (m,) [m]: the likeliest, then another
-    one that is half as likely at least; none where none stands out.
+    one that is half as likely at least; none where none stands out. least [m]: of the noise of a height.
 
     Each block of the map counts with the depth that a tenth of its heights lie above, set back by what noise alone
     makes of it: tops cut off beside valleys do not move it. Of planes through three blocks drawn at random that one is
@@ -43,7 +43,7 @@ def unworn_planes(depth, x, y) -> list:
     tilt = [float(np.nanmedian(np.diff(depth, axis=axis))) / (np.ptp(at) / (at.size - 1))
             for axis, at in ((1, x), (0, y))]
     for _ in range(2):  # a tilt inside the blocks would lower their lower edges
-        found = _planes(depth - tilt[0] * x - tilt[1] * y[:, None], x, y)
+        found = _planes(depth - tilt[0] * x - tilt[1] * y[:, None], x, y, least)
         found = [one._replace(slope=one.slope + tilt[0], pitch=one.pitch + tilt[1]) for one in found]
         if not found:
             break
@@ -51,10 +51,11 @@ def unworn_planes(depth, x, y) -> list:
     return found
 
 
-def _planes(depth, x, y) -> list:
+def _planes(depth, x, y, least: float) -> list:
     """Planes of a map of depths whose unworn parts hardly tilt."""
     side = max(min(depth.shape) // BLOCKS, SMALLEST)
     low, at, noise = _blocks(depth, x, y, side)
+    noise = max(noise, least)
     if low.size < 12:
         return []
     scale = np.abs(at).max(axis=0).clip(1e-300)
@@ -126,7 +127,7 @@ def _blocks(depth, x, y, side: int) -> tuple:
     if not known.any():
         return np.zeros(0), places[known], 0.0
     scatter, low = 1.4826 * _quantile(steps[known], 0.5) / np.sqrt(2), _quantile(cut[known], LOW)
-    noise = max(float(np.nanquantile(scatter, QUIET)), 1e-300)
+    noise = float(np.nanquantile(scatter, QUIET))
     return low + DEVIATIONS * noise, places[known], noise
 
 

@@ -27,6 +27,7 @@ LARGEST = 1000  # pixels along a side of the finest image
 ROUNDS = 20
 AGAIN, NOISY = 2, 1.6  # planes that are sought at most, while heights scatter more than so many times a height's noise
 NARROW = 1.35  # the same of heights that only noise moves, which is alike in neighbours
+EXACT = 1e-9  # of the scatter of the heights, below which noise is rounding
 FEWEST = 400  # unworn heights
 CHUNK = 1 << 20  # heights of a map at a time
 FREE = 1e-5  # least singular value of normal equations over the largest: a shift along a straight lay is not known
@@ -71,7 +72,7 @@ def laid(before: Areal, after: Areal) -> Laid:
     fit = _Fit(before, other, state)
     state = fit.placed(state)
     for _ in range(AGAIN):
-        planes = unworn_planes(fit.map(state, np.zeros(3)), fit.x, fit.y)
+        planes = unworn_planes(fit.map(state, np.zeros(3)), fit.x, fit.y, fit.least)
         if not planes:
             raise PatchfemError("no part of both scans agrees up to a plane")
         settled = [fit.settled(state, np.array(plane[:3]), plane.noise) for plane in planes]
@@ -241,6 +242,7 @@ class _Fit:
         self.centre = middle(before)
         self.x, self.y = before.x - self.centre[0], before.y - self.centre[1]
         self.z = before.z - np.nanmean(before.z)
+        self.least = EXACT * float(np.nanstd(self.z))
         self.after = after
         z = after.z - np.nanmean(after.z)
         missing = np.isnan(z)
@@ -320,7 +322,7 @@ class _Fit:
             rest, slopes, wanted, at = self.rest(state)
             flat = np.column_stack([np.ones(rest.size), at])
             rest = rest - flat @ plane
-            noise = min(_noise(rest, noise if turn == 0 else 0.0), most)
+            noise = max(min(_noise(rest, noise if turn == 0 else 0.0), most), self.least)
             on = np.abs(rest) <= REACH * noise
             if on.sum() < FEWEST:
                 raise PatchfemError("hardly any heights of both scans agree up to a plane")

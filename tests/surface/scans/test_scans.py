@@ -6,9 +6,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from command_line import cli
 from known_scans import make
 
 from patchfem.__main__ import main
+from patchfem.export.results import FILES
+from patchfem.export.surfaces.areal import write_x3p
 from patchfem.surface.areal import Areal, filled
 from patchfem.surface.files.read import read_surface
 from patchfem.surface.scans import change
@@ -172,6 +175,20 @@ def test_always_kept_spikes_count_and_the_others_do_not(grooved, worn):
     grown = [change.changed(grooved[0], replace(scan, z=z), keep).volumes.values["grown_volume"].value
              for keep in (False, True)]
     assert grown[0] < 0.1 * grown[1] and grown[1] == pytest.approx(4 * STEP**2 * 4e-6, rel=0.3)
+
+
+def test_exact_a_scan_beside_itself_shows_no_change(grooved, tmp_path):
+    """Rounding is no wear; a later answer takes the folder, and neither a shift nor a trace goes with scans."""
+    scan = grooved[0]
+    file = write_x3p(tmp_path / "scan.x3p", scan.x, scan.y, scan.z, "a scan")
+    answer = cli("compare", file, file, "-o", tmp_path / "out")
+    assert answer.code == 0 and answer.out.startswith("no wear shown\n  The heights of both scans are the same")
+    assert "Another part" not in answer.out and "<title>scan.x3p and scan.x3p" in \
+        (tmp_path / "out" / "report.html").read_text()
+    assert {one.name for one in (tmp_path / "out").iterdir()} <= set(FILES)
+    assert "a shift is told for traces" in cli("compare", file, file, "--shift", "0 mm").err
+    (tmp_path / "trace.csv").write_text("x [um],z [um]\n" + "".join(f"{k},{k % 7}\n" for k in range(400)))
+    assert "two or four traces are wanted, or two areal scans" in cli("compare", file, tmp_path / "trace.csv").err
 
 
 @pytest.mark.parametrize("clear, least", [(3.0, change.LIKELY), (30.0, change.ALIKE)])
