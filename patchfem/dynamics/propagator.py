@@ -103,7 +103,7 @@ def _made(modes: ModalBasis, period: float, steps_per_cycle: int, rows) -> Propa
     else:
         # two points more for each radian of the fastest motion
         nodes, weight = _gauss(dt, int(np.clip(LEAST + 2 * np.ceil(fastest * dt), LEAST, MOST)))
-        at_end, inside = [part[0] for part in _flow(modes, np.array([dt]))], _flow(modes, nodes)
+        at_end, inside = [part[0] for part in free_motion(modes, np.array([dt]))], free_motion(modes, nodes)
         push = _push(modes, dt, nodes, weight)
         parts, quadratic = _parts(modes, dt, nodes, weight, inside)
     if coupled:
@@ -145,7 +145,7 @@ def _stiff(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tupl
     h, shrink = dt / 2**times, 1 / 2**times
     near, light = nodes * shrink, weight * shrink
     step = doubling.short_step(np.diag(modes.omega**2), modes.dampers, _push(whole, h, near, light),
-                               *_parts(whole, h, near, light, _flow(whole, near)))
+                               *_parts(whole, h, near, light, free_motion(whole, near)))
     halves = _lagrange(nodes, nodes / 2), _lagrange(nodes, (dt + nodes) / 2)
     for _ in range(times):
         step = doubling.doubled(step, halves)
@@ -160,7 +160,7 @@ def _stiff(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tupl
     return (blocks, push, parts, quadratic), nodes
 
 
-def _flow(modes: ModalBasis, times) -> tuple:
+def free_motion(modes: ModalBasis, times) -> tuple:
     """Blocks zz, zv, vz, vv of the free motion after `times` (k,): (k, n) each, (k, n, n) where damping couples."""
     times = np.asarray(times, float)
     if modes.damping is None:
@@ -213,7 +213,7 @@ def _push(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
 
     The first is the integral of zv: of a short step no difference of large numbers.
     """
-    return np.tensordot(weight, _flow(modes, nodes)[1], 1), _flow(modes, np.array([dt]))[1][0]
+    return np.tensordot(weight, free_motion(modes, nodes)[1], 1), free_motion(modes, np.array([dt]))[1][0]
 
 
 def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
@@ -221,7 +221,7 @@ def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
     n, base, mass, m = modes.omega.size, modes.base, modes.mass, nodes.size
     _, zv, vz, vv = inside
     coupled = modes.damping is not None
-    back = _flow(modes, dt - nodes)
+    back = free_motion(modes, dt - nodes)
 
     def times_base(part):
         return part @ base if coupled else part * base
@@ -233,7 +233,7 @@ def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
     inner = np.empty((m, m, n))
     share = (1 + np.polynomial.legendre.leggauss(m)[0]) / 2
     for k, tau in enumerate(nodes):
-        reply = times_base(_flow(modes, tau * (1 - share))[3])
+        reply = times_base(free_motion(modes, tau * (1 - share))[3])
         spread = _lagrange(nodes, tau * share) * (weight * tau / dt)[:, None]
         inner[k] = -spread.T @ reply
     if coupled:

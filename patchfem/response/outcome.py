@@ -16,12 +16,13 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
 
     Under a sine, and under levels in their last one, the amplitudes of successive windows decide (`classify`), and what
     free motion is left in them (`left_over`). A release or a step is steady once it is at rest, to the floor of its
-    amplitude; else the same amplitudes decide, but a release never grows. A motion whose middle moves on is not steady
+    amplitude; else the same amplitudes decide, but a release grows only where a mode
+    gains energy. A motion whose middle moves on is not steady
     (`moves_on`). A sweep or a recorded signal
     changes to the end: unless it leaves the interface stuck it is transient, without a steady estimate. So is an
     interface that holds while what it holds still rises. What rises to a motion that is known to exist, `raw.bounded`,
     does not grow. level_cycles: of each level, 0 without levels; slowest: rate
-    [1/s] at which the slowest mode decays.
+    [1/s] at which the slowest mode decays, below 0 where one gains energy.
     """
     if raw.outcome is Outcome.STUCK and still_loads(raw.window, drive.period, tolerance):
         return Outcome.TRANSIENT, measures
@@ -39,7 +40,7 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
         rests = amplitudes[-1] <= max(floor, measures["relative_displacement_amplitude"].floor)
         outcome = Outcome.STEADY if rests else _held(classify(amplitudes, tolerance, floor), measures, tolerance,
                                                      _middle(extremes, window))
-        outcome = Outcome.TRANSIENT if outcome is Outcome.GROWS and not last.constant else outcome
+        outcome = Outcome.TRANSIENT if outcome is Outcome.GROWS and not last.constant and slowest >= 0 else outcome
         return outcome, without_bars(measures) if outcome is Outcome.GROWS else measures
     number, steady, error = (one[0] for one in settled(
         np.asarray(amplitudes, float)[None], None if extremes is None else np.asarray(extremes)[None], window,

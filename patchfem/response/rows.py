@@ -245,6 +245,9 @@ ROWS = (
     Row("peak_frequency", "Hz", 0.0, "drive frequency of the largest amplitude on a curve of steady motions"),
     Row("friction_ratio_end", "1", 1e-9, "ratio of friction to normal load at the end of the slide", group="friction"),
     Row("friction_ratio_peak", "1", 1e-9, "largest ratio of friction to normal load over the run", group="friction"),
+    Row("flutter_amplitude", "m", 1e-10,
+        "half peak-to-peak of the output in the motion without a drive in which friction just takes what a mode of "
+        "damping below 0 gives, and which does not last: what swings less falls, what swings more grows"),
     Row("work_check", "1", 1e-2,
         "friction work by the trapezoidal rule on the run's own samples against that of its ledger, relative",
         lambda s: s.work_check, group="energy"),

@@ -56,6 +56,12 @@ def slowest(modes: ModalBasis) -> float:
     return np.where(np.isfinite(least), least, 0.0)[()]
 
 
+def decay_rate(modes: ModalBasis) -> float:
+    """`slowest`, or the rate [1/s] < 0 at which the coordinate that gains energy the fastest grows, where one does."""
+    least = float(np.diagonal(modes.dampers).min(initial=0.0)) / 2
+    return least if least < 0 else float(slowest(modes))
+
+
 def largest(drive) -> float:
     """Largest acceleration of a drive [m s-2], >= 0: of its segments, its samples or its sweep.
 

@@ -56,7 +56,7 @@ BAD_VALUES = [
     ("static = 1979-05-27", "friction.static", "a plain number is wanted"),
     ('moving_mass = "-1 kg"', "structure.moving_mass", "must be > 0"),
     ('moving_mass = "1 N"', "structure.moving_mass", "'N' is a unit of force, but this is a mass"),
-    ("damping = -0.003", "structure.mode.axial.damping", "must be >= 0"),
+    ("damping = -1.0", "structure.mode.axial.damping", "must be > -1"),
     ('frequency = "-1 Hz"', "structure.mode.axial.frequency", "must be >= 0"),
     ('kind = "bass"', "drive.kind", "did you mean 'base'? one of base, force, free"),
     ("cycles = 0", "drive.cycles", "must be > 0"),

@@ -13,10 +13,10 @@ from ...response.outcome import settle
 from ...response.rows import judged
 from ...response.run_events import events_of, with_own
 from ...response.settling import slip_period
-from ...structure.drive_sizes import sinusoidal, slowest
+from ...structure.drive_sizes import decay_rate, sinusoidal
 from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_errors
 from ..results.travel import outcome_on_piece
-from . import levels, lists, remarks, start_ring
+from . import flutter, levels, lists, remarks, start_ring
 from .costs import MOST_STEPS
 from .engines import ENGINES, Variant, unbalanced
 from .fields import fields_of
@@ -68,6 +68,9 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     for go in (_levelled, _settled, _started, _reasoned):
         run = go(run)
     warned, notes = remarks.warnings_of(run), remarks.notes_of(run)
+    if decay_rate(rig.modes) < 0 and run.rubs:
+        fluttering, more = flutter.flutter_of(run)
+        run, notes = replace(run, measures=run.measures | fluttering), [*notes, *more]
     run = _judged(run)
     outcome = outcome_on_piece(run.outcome, model.patch, patch, raw.response.slide)
     fields = {} if patch is None else fields_of(model, numerics, patch, raw)
@@ -89,7 +92,7 @@ def _settled(run: Coupled) -> Coupled:
     found = without_errors(with_own(run.measures, run.raw.own), run.estimated)
     rig = run.model.rig
     outcome, found = settle(run.raw, found, run.model.accuracy.tolerance, run.drive, rig.level_cycles,
-                            slowest(rig.modes))
+                            decay_rate(rig.modes))
     return replace(run, outcome=outcome, measures=found)
 
 

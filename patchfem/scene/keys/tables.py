@@ -120,7 +120,7 @@ class Mode(Table):
 
     name: key(Text, "name of the mode, unique")
     frequency: key(quantity("frequency", ge=0), "natural frequency; 0 Hz for a rigid mode")
-    damping: key(NotNegative, "damping ratio")
+    damping: key(number(gt=-1), "damping ratio; below 0, energy that friction has to take (flutter)")
     slide: key(Number, "motion of the patch along x per unit of the modal coordinate")
     normal: key(Number, "motion of the patch away from the contact per unit of the modal coordinate") = 0.0
     pitch: key(PerMetre, "rotation of the patch in the plane of the model per unit of the modal coordinate") = 0.0

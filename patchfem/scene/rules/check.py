@@ -14,7 +14,7 @@ from .draft import SLIDES, Draft, _needs
 from .drive import check_drive, check_length
 from .friction import _frictions
 from .grooves import check_grooves
-from .structure import check_structure, modes_instead
+from .structure import check_gains, check_structure, modes_instead
 from .wear import check_wear
 
 
@@ -23,7 +23,7 @@ def check(draft: Draft) -> str:
     for rule in (_contact, _load_line, _normal, _frictions, _slide, check_structure, check_drive, _measured):
         rule(draft)
     kind = _kind(draft)
-    for rule in (_quadrature, _knobs, _idle, _sliding, check_length, check_wear, check_grooves):
+    for rule in (_quadrature, _knobs, _idle, _sliding, check_length, check_wear, check_grooves, check_gains):
         rule(draft, kind)
     return kind
 

@@ -88,6 +88,15 @@ def _modes(draft: Draft) -> None:
                        "the base motion; the first mode's is its slide unless given)")  # fmt: skip
 
 
+def check_gains(draft: Draft, kind: str) -> None:
+    """A mode that gains energy stands beside friction, which takes it."""
+    structure = draft.tables.structure
+    for index, mode in enumerate((structure.mode or ()) if structure is not None and kind == "linear" else ()):
+        if mode.damping is not None and mode.damping < 0:
+            draft.say(f"structure.mode.{index}.damping", f"{mode.damping:g} gives the mode energy that nothing takes, "
+                      "so the motion would grow for ever; give [friction], or a damping >= 0")
+
+
 def unseen(structure, driven: bool) -> list:
     """Sentences on modes that slide and, by a default, do not move the output; driven: the base drives the rig."""
     out = []

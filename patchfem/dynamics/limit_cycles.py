@@ -1,0 +1,181 @@
+"""Motions that keep themselves up: modes of negative damping beside friction, without a drive.
+
+Friction limited by F takes up to 4 F A of a cycle of slide A, a damping c < 0 gives pi |c| omega A^2. Where both are
+equal a motion repeats: one mode under Coulomb friction at A = 4 F/(pi |c| omega), to the first order of the damping
+(den Hartog's balance; `of_relay` has all orders). Beyond the largest of these amplitudes friction no longer holds the
+motion: flutter. Below it the motion falls, to rest or to a smaller limit cycle that lasts.
+
+`of_relay` is exact for rigid friction, which is a relay of the slide's speed (Tsypkin 1984, ch. 6); `of_balance` serves
+every law of a harmonic balance: the motion of `harmonic.backbone` whose damping is 0.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ..core import ModalBasis, NotConverged
+from . import propagator
+from .harmonic.backbone import Free, FreeBalance, stuck_mode, trace
+from .harmonic.forces import Group
+from .harmonic.harmonic import pack
+from .harmonic.point import balance_of
+
+SAMPLES = 4096  # of a cycle, that its largest motion is read from
+PLACES = 48  # amplitudes at which the damping of a free motion is looked at
+LOW, HIGH = 1e-6, 4.0  # the first and the last of them, over 4 F/(pi |c| omega)
+FEW = 9  # harmonics of the first answer; the second, of twice as many, shows its error
+
+
+class Cycle(NamedTuple):
+    """A limit cycle: amplitude [m], half peak-to-peak at the output, and its error; omega [rad/s]; whether it lasts."""
+
+    amplitude: float
+    error: float
+    omega: float
+    lasts: bool
+
+
+def unstable_modes(modes: ModalBasis) -> np.ndarray:
+    """Numbers (k,) of the coordinates whose damping gives energy."""
+    return np.flatnonzero(np.diagonal(modes.dampers) < 0)
+
+
+def balanced_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float:
+    """4 F s/(pi |d| omega m) [m] of the coordinate `mode`: friction of `limit` F [N] on `row` (n,), damping d < 0."""
+    gives = -modes.dampers[mode, mode] * modes.omega[mode] * modes.mass
+    return 4 * limit * abs(row[mode]) / (np.pi * gives)
+
+
+def of_relay(modes: ModalBasis, row, slides: float, holds: float) -> list:
+    """Limit cycles under rigid friction on one interface that slides from turn to turn; [] where there is none.
+
+    row (n,): its slide per coordinate; slides, holds [N]: friction while it slides and the most that it holds. From a
+    turn on the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half period T/2, and that in which the
+    slide comes to rest there is a cycle, if it goes one way all the time and what would hold it is more than `holds`.
+    """
+    out = []
+    for mode in unstable_modes(modes):
+        half = np.pi / modes.omega[mode] * np.geomspace(0.6, 1.7, 400)
+        rest = np.array([_turn(modes, row, slides, t)[1] for t in half])
+        for k in np.flatnonzero(rest[:-1] * rest[1:] <= 0):
+            t = brentq(lambda t: _turn(modes, row, slides, t)[1], half[k], half[k + 1], xtol=1e-16, rtol=1e-14)
+            if (found := _slides_through(modes, row, (slides, holds), t)) is not None:
+                out.append(found)
+    return sorted(out)
+
+
+def _flow(modes: ModalBasis, t) -> np.ndarray:
+    """Free motion (k, 2n, 2n) of (z, z') over times t (k,)."""
+    blocks = propagator.free_motion(modes, t)
+    if modes.damping is None:
+        blocks = [part[..., None] * np.eye(modes.omega.size) for part in blocks]
+    return np.block([[blocks[0], blocks[1]], [blocks[2], blocks[3]]])
+
+
+def _turn(modes: ModalBasis, row, force: float, t: float) -> tuple:
+    """(state (2n,) at the turn, slide rate there over that of its swing, state of rest under the force) of T/2 = t."""
+    n, eye = modes.omega.size, np.eye(2 * modes.omega.size)
+    rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
+    flow = _flow(modes, [t])[0]
+    y = np.linalg.solve(flow + eye, (flow - eye) @ rest)
+    return y, float(row @ y[n:]) * t / max(float(np.abs(row) @ np.abs(y[:n])), 1e-300), rest
+
+
+def _slides_through(modes: ModalBasis, row, forces: tuple, t: float) -> Cycle | None:
+    """The Cycle of half period t [s], None where the slide turns or holds on the way."""
+    (slides, holds), n = forces, modes.omega.size
+    y, _, rest = _turn(modes, row, slides, t)
+    times = np.linspace(0, t, SAMPLES // 2 + 1)
+    path = rest + _flow(modes, times) @ (y - rest)
+    rate, swing = path[:, n:] @ row, float(np.abs(row) @ np.abs(y[:n]))
+    pull = -modes.mass * (modes.omega**2 * y[:n] + modes.dampers @ y[n:]) @ row / (row @ row)
+    if rate[1:-1].max() > 1e-9 * swing / t or -pull <= holds:
+        return None
+    motion = path[:, :n] @ modes.output
+    found = _highest(np.concatenate([motion, -motion[1:]]))
+    # a turn later or earlier takes part of what is off with it: the map from turn to turn
+    speed = np.concatenate([path[-1, n:], _rates(modes, path[-1], row, slides)])
+    face = np.concatenate([np.zeros(n), row])
+    turned = (np.eye(2 * n) - np.outer(speed, face) / (face @ speed)) @ _flow(modes, [t])[0]
+    return Cycle(found, 1e-9 * found, np.pi / t, bool(np.abs(np.linalg.eigvals(turned)).max() < 1))
+
+
+def _rates(modes: ModalBasis, y, row, force: float) -> np.ndarray:
+    """Accelerations (n,) of the coordinates in state y (2n,) under a force [N] along `row`."""
+    n = modes.omega.size
+    return row * force / modes.mass - modes.omega**2 * y[:n] - modes.dampers @ y[n:]
+
+
+def _highest(samples) -> float:
+    """Largest of samples (k,) of a motion that repeats with its sign turned, between them by a parabola."""
+    k = int(np.argmax(samples))
+    if not 0 < k < samples.size - 1:
+        k = 1 if k == 0 else samples.size - 2
+    a, b, c = samples[k - 1:k + 2]
+    bend = a - 2 * b + c
+    return float(b - (c - a)**2 / (8 * bend)) if bend < 0 else float(samples.max())
+
+
+def of_balance(modes: ModalBasis, group: Group, row, limit: float) -> list:
+    """Limit cycles of the laws of a Group on the interface `row` (n,), whose friction is at most `limit` [N].
+
+    Each is known by harmonics and samples twice as many. NotConverged where no free motion is found on the way.
+    """
+    out = []
+    for mode in unstable_modes(modes):
+        if limit * abs(row[mode]) > 0:
+            out += _of_mode(modes, group, int(mode), balanced_amplitude(modes, row, limit, mode))
+    return sorted(out)
+
+
+def _of_mode(modes: ModalBasis, group: Group, mode: int, size: float) -> list:
+    amplitudes = size * np.geomspace(LOW, HIGH, PLACES)
+    few, many = (_crossings(modes, group, mode, amplitudes, harmonics) for harmonics in (FEW, 2 * FEW + 1))
+    if len(few) != len(many):
+        raise NotConverged(f"flutter_amplitude: {len(few)} limit cycles with {FEW} harmonics, {len(many)} with "
+                           f"{2 * FEW + 1}")
+    return [better._replace(error=2 * abs(one.amplitude - better.amplitude) + 1e-9 * better.amplitude)
+            for one, better in zip(few, many)]
+
+
+def _crossings(modes: ModalBasis, group: Group, mode: int, amplitudes, harmonics: int) -> list:
+    """Cycles along the free motions of a mode over its amplitudes (k,) [m], where their damping changes its sign."""
+    omega, shape = stuck_mode(modes, group.rows, group.stiffness(), mode)
+    slides = np.abs(group.rows @ shape) * amplitudes[-1]
+    balance = balance_of(modes, group, group.samples_for(harmonics, slides))
+    equations = FreeBalance(balance, mode, harmonics, omega)
+    path = trace(equations, amplitudes, omega, shape)
+    zeta = np.array([one.zeta for one in path])
+    out = []
+    for k in np.flatnonzero(np.sign(zeta[:-1]) * np.sign(zeta[1:]) < 0):
+        found = _between(equations, path[k], path[k + 1])
+        wave = np.exp(1j * np.outer(np.linspace(0, 2 * np.pi, SAMPLES + 1), np.arange(len(found.modal))))
+        motion = (wave @ (found.modal @ modes.output)).real
+        half = (_highest(motion) + _highest(-motion)) / 2
+        out.append(Cycle(half, 0.0, found.omega, bool(zeta[k + 1] > 0)))
+    return out
+
+
+def _unknowns(equations: FreeBalance, one: Free) -> np.ndarray:
+    """Unknowns of `FreeBalance.solve` at a free motion."""
+    y = equations.balance.lift.T @ one.slides[:, :equations.h + 1]
+    return np.append(pack(y) / one.amplitude, [one.omega / equations.scale, one.zeta])
+
+
+def _between(equations: FreeBalance, low: Free, high: Free) -> Free:
+    """The free motion without damping between two of unlike sign, by the secant kept between them (Illinois)."""
+    ends, last = [(np.log(one.amplitude), one.zeta, one) for one in (low, high)], 0
+    for _ in range(60):
+        (a, below, start), (b, above, _) = ends
+        at = (a * above - b * below) / (above - below)
+        _, found = equations.solve(_unknowns(equations, start), float(np.exp(at)))
+        if abs(found.zeta) < 1e-13 or abs(b - a) < 1e-13:
+            return found
+        side = int(np.sign(found.zeta) == np.sign(above))
+        ends[side] = (at, found.zeta, found)
+        if side == last:  # the other end stays: half its weight
+            k = 1 - side
+            ends[k] = (ends[k][0], ends[k][1] / 2, ends[k][2])
+        last = side
+    return found

@@ -1,0 +1,58 @@
+"""Where friction no longer holds a mode that gains energy: `flutter_amplitude`, by `dynamics.limit_cycles`."""
+
+from ...core import Measure, NotConverged, PatchfemError, say
+from ...dynamics import limit_cycles
+from ...response.rows import TABLE
+from .engines import ENGINES
+from .interface import contact_model
+from .steady.balance import BalanceFinder
+
+NAME = "flutter_amplitude"
+ALONE = "a mode that gains energy moves no interface, so friction takes none of it"
+NONE = (f"no limit cycle that does not last was found between {limit_cycles.LOW:g} and {limit_cycles.HIGH:g} times the "
+        "4 F/(pi |c| omega) of friction F and damping c")
+UNBALANCED = "limit cycles are known for bonds of constant length, the stretch reading, order 1 and no breakaway alone"
+SLIDES = "no motion was found in which the interface slides from turn to turn and friction takes what the mode gives"
+
+
+def flutter_of(run) -> tuple:
+    """(measures by name, notes) of a `rig.Coupled` with a mode of damping < 0: the amplitude of the largest limit cycle
+    that does not last, with its error, or the reason why it is not known."""
+    model, unit, floor = run.model, TABLE[NAME].unit, TABLE[NAME].floor
+    found, reason = _cycles(model, run.numerics, run.patch)
+    edges = [one for one in found if not one.lasts]
+    if not edges:
+        return {NAME: Measure(None, unit, None, floor, reason=reason)}, []
+    edge = edges[-1]
+    below = [one for one in found if one.lasts and one.amplitude < edge.amplitude]
+    falls = f"to the limit cycle of {say(below[-1].amplitude, 3)}, which lasts" if below else "to rest"
+    return {NAME: Measure(edge.amplitude, unit, edge.error, floor)}, [
+        f"a mode of damping below 0 gains energy: without a drive a swing of {say(edge.amplitude, 4)} at the output "
+        f"repeats at {edge.omega / 6.283185307179586:.4g} Hz and does not last; a free swing of this mode that is "
+        f"smaller falls {falls}, a larger one grows"]
+
+
+def _cycles(model, numerics, patch) -> tuple:
+    """(list of `limit_cycles.Cycle`, the sentence where it holds none that does not last)."""
+    rig, f = model.rig, model.friction
+    if len(rig.interfaces) != 1 or f is None:
+        return [], "limit cycles are known beside one interface alone"
+    modes, row = rig.modes, rig.modes.interfaces[0]
+    if not row[limit_cycles.unstable_modes(modes)].any():
+        return [], ALONE
+    load = patch.pressure.load if patch is not None else model.point.load
+    if reason := ENGINES["harmonic"].lacks(model, steady=True):
+        return [], f"limit cycles are not known {reason}"
+    contact = contact_model(model, numerics, patch)
+    try:
+        if contact.set_valued:
+            if rig.bends:
+                return [], "limit cycles of rigid friction are not known beside a spring that bends"
+            static, kinetic = contact.element.numbers[1:3]
+            return limit_cycles.of_relay(modes, row, kinetic, static), SLIDES
+        finder = BalanceFinder(model, numerics, patch)
+        return limit_cycles.of_balance(modes, finder.group, row, f.static * load), NONE
+    except NotConverged as missing:
+        return [], str(missing)
+    except PatchfemError:
+        return [], UNBALANCED

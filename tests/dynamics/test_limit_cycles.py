@@ -1,0 +1,92 @@
+"""Limit cycles of modes of negative damping beside friction: closed forms, and integration in time by scipy."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from patchfem.core import ModalBasis
+from patchfem.dynamics import limit_cycles
+from patchfem.dynamics.harmonic.forces import Group
+from patchfem.dynamics.harmonic.laws import Jenkins
+
+
+def modes_of(omega, zeta, slide, output) -> ModalBasis:
+    one = [np.array(part, float) for part in (omega, zeta, slide, np.ones(len(omega)), output)]
+    return ModalBasis(tuple("abc"[:len(omega)]), *one, 0.5)
+
+
+def rates(modes: ModalBasis, y, force: float):
+    """z'' of the modes under friction `force` [N] against the slide."""
+    n = modes.omega.size
+    return -modes.omega**2 * y[:n] - modes.dampers @ y[n:] - modes.slide * force / modes.mass
+
+
+@pytest.mark.parametrize("zeta", [-1e-4, -0.002, -0.05, -0.3])
+def test_a_block_on_rigid_friction_has_its_closed_form(zeta):
+    """Every half swing loses 2 F/k and gains by exp(pi |zeta|/sqrt(1 - zeta^2)); to the first order 4 F/(pi |c| w)."""
+    modes, force = modes_of([750.0], [zeta], [1.0], [2.0]), 9.0
+    [found] = limit_cycles.of_relay(modes, modes.slide, force, force)
+    gain, half = np.exp(np.pi * abs(zeta) / np.sqrt(1 - zeta**2)), force / (0.5 * 750.0**2)
+    assert found.amplitude == pytest.approx(2 * half * (gain + 1) / (gain - 1), rel=1e-9)
+    assert not found.lasts and found.omega == pytest.approx(750.0 * np.sqrt(1 - zeta**2), rel=1e-10)
+    assert 2 * limit_cycles.balanced_amplitude(modes, modes.slide, force, 0) == pytest.approx(
+        found.amplitude, rel=(np.pi * zeta)**2)
+
+
+def test_a_second_mode_rings_with_the_cycle():
+    """The motion from the turn of the found cycle comes back with its sign turned, by DOP853 to its stop."""
+    modes = modes_of([750.0, 2600.0], [-0.01, 0.02], [1.0, 0.7], [1.0, -0.4])
+    [found] = limit_cycles.of_relay(modes, modes.slide, 9.0, 10.0)
+    start = limit_cycles._turn(modes, modes.slide, 9.0, np.pi / found.omega)[0]
+
+    def stops(t, y):
+        return y[2:] @ modes.slide
+
+    stops.terminal, stops.direction = True, 1.0  # it slides down
+    run = solve_ivp(lambda t, y: np.concatenate([y[2:], rates(modes, y, -9.0)]), (0.0, 0.02), start, "DOP853",
+                    events=[stops], rtol=1e-12, atol=1e-15)
+    assert run.t[-1] == pytest.approx(np.pi / found.omega, rel=1e-9)
+    assert run.y[:, -1] == pytest.approx(-start, rel=1e-8, abs=1e-9 * np.abs(start).max())
+    output = run.y[:2].T @ modes.output
+    assert found.amplitude == pytest.approx(np.abs(output).max(), rel=1e-4)
+
+
+def test_a_cycle_that_would_hold_on_the_way_is_none():
+    modes = modes_of([750.0], [-0.3], [1.0], [1.0])
+    assert limit_cycles.of_relay(modes, modes.slide, 9.0, 30.0) == []
+
+
+def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not():
+    """A cycle of DOP853 from both amplitudes repeats; around them the swing is drawn to one and away from the other."""
+    stiffness, yields = np.array([2e4, 1e4, 3e4]), np.array([1e-4, 2e-4, 4e-4])
+    modes, limit = modes_of([750.0], [-0.01], [1.0], [1.0]), float(stiffness @ yields)
+    low, high = limit_cycles.of_balance(modes, Group(modes, Jenkins(stiffness, yields)), modes.slide, limit)
+    assert low.lasts and not high.lasts and low.amplitude < high.amplitude
+    assert high.error < 1e-3 * high.amplitude and low.error < 1e-3 * low.amplitude
+
+    def swing(amplitude: float) -> float:
+        """The next largest displacement of a swing that has slid from -amplitude to amplitude."""
+        slid = np.minimum(yields, amplitude)
+
+        def along(t, y):
+            held = (np.abs(y[2:]) < yields) | (y[2:] * y[1] < 0)
+            force = float(stiffness @ np.clip(y[2:], -yields, yields))
+            return [y[1], *rates(modes, y[:2], force), *(held * y[1])]
+
+        def stops(t, y):
+            return y[1]
+
+        stops.terminal, state, at = True, np.array([amplitude, 0.0, *slid]), 0.0
+        for direction in (1.0, -1.0):
+            stops.direction = direction
+            state[1] = -direction * 1e-12
+            run = solve_ivp(along, (at, at + 0.1), state, "DOP853", events=[stops], rtol=1e-9, atol=1e-13,
+                            max_step=2e-5)
+            state, at = run.y[:, -1].copy(), run.t[-1]
+        return state[0]
+
+    for cycle in (low, high):
+        bar = 3 * cycle.error / cycle.amplitude + 1e-4  # the cycle gives back a few percent of what it is off by
+        above, below = (swing(cycle.amplitude * (1 + way * bar)) / (cycle.amplitude * (1 + way * bar)) - 1
+                        for way in (1, -1))
+        assert (above < 0 < below) if cycle.lasts else (below < 0 < above)

@@ -1,0 +1,99 @@
+"""Rigs with a mode of negative damping: what holds, what grows, and the amplitude between."""
+
+import numpy as np
+import pytest
+
+import patchfem as pf
+from patchfem.runs.many import many
+from patchfem.runs.many.lumped import lumped
+
+SCENE = """
+[normal]
+load = "30 N"
+[friction]
+law = "{law}"
+static = 0.3
+{more}
+[structure]
+moving_mass = "0.5 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "120 Hz"
+damping = {damping}
+slide = 1.0
+[structure.start]
+displacement = ["{start} mm"]
+[drive]
+kind = "free"
+cycles = {cycles}
+"""
+# mm: half swings lose 2 F/k and gain by exp(pi zeta/sqrt(1 - zeta^2))
+EDGE = 1e3 * 9 / (0.5 * (240 * np.pi)**2) / np.tanh(np.pi * 0.02 / np.sqrt(1 - 0.02**2) / 2)
+
+
+def text(**keys):
+    given = {"law": "coulomb", "more": "", "damping": -0.02, "start": EDGE, "cycles": 60}
+    return SCENE.format(**given | keys)
+
+
+@pytest.mark.parametrize("share, outcome", [(0.9, "stuck"), (0.999, "transient"), (1.001, "grows"), (1.1, "grows")])
+def test_a_release_below_the_flutter_amplitude_comes_to_rest_and_one_above_it_grows(share, outcome):
+    found = pf.run(pf.load(text(start=share * EDGE)))
+    assert found.outcome == outcome
+    edge = found.measures["flutter_amplitude"]
+    assert edge.value == pytest.approx(1e-3 * EDGE, rel=1e-9) and edge.error <= 1e-8 * edge.value
+    if outcome != "stuck":
+        swing = found.measures["relative_displacement_amplitude"].value
+        assert (swing < edge.value) == (share < 1)
+    assert "10.08" not in "".join(found.notes) and "falls to rest" in found.notes[-1]
+
+
+def test_a_spring_before_the_slip_keeps_a_small_swing_up():
+    """Nothing is lost before the elements yield: a small release rises to the limit cycle that lasts."""
+    law = {"law": "elastic-plastic", "more": 'bond_length = "20 um"'}
+    small, large = (pf.run(pf.load(text(**law, start=start, cycles=200))) for start in (0.001, 0.5))
+    assert small.outcome == large.outcome == "steady"
+    swings = [one.measures["relative_displacement_amplitude"].value for one in (small, large)]
+    assert swings[0] == pytest.approx(swings[1], rel=2e-3)
+    [note] = [one for one in small.notes if "which lasts" in one]
+    assert f"{1e6 * swings[0]:.1f} um" in note
+    edge = small.measures["flutter_amplitude"]
+    for way in (-1, 1):
+        start = 1e3 * edge.value + way * (1e3 * edge.error + 0.02 * EDGE)
+        swing = pf.run(pf.load(text(**law, start=start, cycles=20))).measures["relative_displacement_amplitude"].value
+        assert (swing > edge.value) == (way > 0)
+
+
+def test_without_friction_negative_damping_is_refused():
+    lone = text().replace('[friction]\nlaw = "coulomb"\nstatic = 0.3\n', "").replace('[normal]\nload = "30 N"\n', "")
+    with pytest.raises(pf.SceneError, match=r"damping: -0\.02 gives the mode energy that nothing takes"):
+        pf.load(lone)
+    with pytest.raises(pf.SceneError, match="damping: must be > -1"):
+        pf.load(text(damping=-1.5))
+
+
+def test_a_rig_without_such_a_mode_does_not_load_its_limit_cycles(monkeypatch):
+    from patchfem.runs.rig import flutter
+
+    monkeypatch.setattr(flutter, "flutter_of", None)
+    found = pf.run(pf.load(text(damping=0.02, start=0.1, cycles=20)))
+    assert "flutter_amplitude" not in found.measures
+
+
+def test_what_is_not_known_has_its_reason():
+    still = text(law="nonlocal", more='bond_length = "20 um"\nreading = "report"', start=0.01, cycles=3)
+    edge = pf.run(pf.load(still)).measures["flutter_amplitude"]
+    assert edge.value is None and edge.reason
+
+
+def test_cases_with_such_a_mode_run_by_themselves():
+    driven = text(cycles=40).replace("[structure.start]\ndisplacement", "#").replace(
+        '"free"', '"base"\nfrequency = "110 Hz"\nacceleration = "3 g"')
+    scenes = [pf.load(driven.replace("-0.02", damping)) for damping in ("-0.02", "0.02")]
+    gains, loses = (pf.build(one) for one in scenes)
+    assert lumped.refuses(gains) == "its mode gains energy" and not lumped.refuses(loses)
+    both, single = many.answers([gains, loses]), pf.run(scenes[0])
+    assert both.outcome[0] == single.outcome
+    for name in ("relative_displacement_amplitude", "flutter_amplitude"):
+        assert both.values[name][0] == single.measures[name].value
+    assert np.isnan(both.values["flutter_amplitude"][1])
