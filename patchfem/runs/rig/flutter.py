@@ -11,7 +11,8 @@ NAME = "flutter_amplitude"
 ALONE = "a mode that gains energy moves no interface, so friction takes none of it"
 NONE = (f"no limit cycle that does not last was found between {limit_cycles.LOW:g} and {limit_cycles.HIGH:g} times the "
         "4 F/(pi |c| omega) of friction F and damping c")
-UNBALANCED = "limit cycles are known for bonds of constant length, the stretch reading, order 1 and no breakaway alone"
+UNBALANCED = ("limit cycles of bonds are known for the stretch reading of order 1, a constant length, no breakaway and "
+              "pieces that do not give way alone")
 SLIDES = "no motion was found in which the interface slides from turn to turn and friction takes what the mode gives"
 
 
