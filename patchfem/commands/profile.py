@@ -21,9 +21,10 @@ def profile(file: Path, /, *more: Path,
             window: word('the part between two cursors, such as "468 um,733 um"') = "",
             tip: word('radius of the stylus, against which the valleys are checked, such as "12.5 um"') = "",
             units: Units = "",
-            out: out_in("folder for a page and its numbers, such as out/trace") = None, json_: Json = False,
+            out: out_in("folder for a page, its numbers, a table of them and the levelled heights, such as "
+                        "out/trace") = None, json_: Json = False,
             verbose: flag("the definition of each parameter", "-v", "--verbose") = False):
-    """Print roughness parameters of each FILE with the intervals that one trace allows.
+    """Print roughness parameters of each FILE with the intervals that one trace allows, and of several their means.
 
     Example: patchfem profile trace.csv --cutoff "0.25 mm"
     """
@@ -40,11 +41,16 @@ def profile(file: Path, /, *more: Path,
             print("\n".join(roughness.lines_of(report, verbose)))
         for text in report.notes:
             note(text)
-    answer = {"patchfem": __version__, "profiles": [roughness.data_of(one) for one in reports]}
+    if not json_ and len(reports) > 1:
+        print("\n".join(roughness.means_lines(reports)))
+    answer = {"patchfem": __version__, "profiles": [roughness.data_of(one) for one in reports],
+              "means": roughness.means_data(reports)}
     if out is not None:
         with results.Folder(out) as folder:
             roughness.write_page(folder.path / "report.html", reports)
             summary.write_json(answer, folder.path / "profile.json")
+            roughness.write_csv(folder.path / "profile.csv", reports)
+            roughness.write_surfaces(folder.path, reports)
     if json_:
         print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
     elif out is not None:

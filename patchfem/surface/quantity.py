@@ -59,6 +59,7 @@ def mean_of(each: list, text: str) -> Mean | None:
     own = np.array([(one.high - one.low) / 2 if one.high is not None else 0.0 for one in each])
     scatter, middle = float(values.std(ddof=1)), float(values.mean())
     side = max(float(stdtrit(values.size - 1, (1 + LEVEL) / 2)) * scatter, float(np.sqrt((own**2).mean())))
-    side, least = side / np.sqrt(values.size), 0.0 if min(one.low for one in each) >= 0 else -np.inf
+    side = side / np.sqrt(values.size)
+    least = 0.0 if all(one.low is not None and one.low >= 0 for one in each) else -np.inf
     return Mean(Quantity(middle, float(max(middle - side, least)), float(middle + side), each[0].unit, text), scatter,
                 values.size)

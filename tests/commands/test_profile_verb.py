@@ -9,6 +9,8 @@ import pytest
 from command_line import ALWAYS, FROM_SHELL, cli, loaded
 from synthetic import sine
 
+from patchfem.export.results import FILES
+from patchfem.surface.files.read import read_surface
 from patchfem.surface.roughness.report import report_of
 from patchfem.surface.roughness.rows import AREAL, TABLE
 
@@ -80,6 +82,28 @@ def test_exact_the_page_and_its_numbers(trace, tmp_path):
     assert data["profiles"][0]["tip"]["radius"] == pytest.approx(12.5 * UM)
     assert all(f"<td>{name}</td>" in page for name in data["profiles"][0]["measures"])
     assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_path, scan):
+    """Three sines of other heights and a scan: Student's t by the table of 4.302653 for two degrees of freedom."""
+    heights, names, out = (4.0, 5.0, 6.5), [], tmp_path / "out"
+    for k, high in enumerate(heights):
+        names.append(tmp_path / f"{k}.csv")
+        z = high * np.sin(2 * np.pi * np.arange(800) / 8) + 0.01 * np.arange(800)
+        names[-1].write_text("x [um],z [um]\n" + "".join(f"{a},{b:.17g}\n" for a, b in enumerate(z)))
+    assert cli("profile", *names, scan, "-o", out).code == 0
+    data, rows = json.loads((out / "profile.json").read_text()), (out / "profile.csv").read_text().splitlines()
+    assert [(one["kind"], one["files"], one["notes"]) for one in data["means"]] == [("profile", 3, [])]
+    found, off = data["means"][0]["measures"]["Pq"], 4.302653 * np.std(heights, ddof=1) / np.sqrt(6)
+    assert found["value"] == pytest.approx(np.mean(heights) * UM / np.sqrt(2), rel=2e-3)
+    assert found["high"] - found["value"] == pytest.approx(off * UM, rel=5e-3)
+    assert "<h2>Mean of 3 traces</h2>" in (out / "report.html").read_text()
+    assert len(rows) == 5 and rows[0].startswith("file,Pa [m],Pa_low [m],Pa_high [m],") and rows[1].endswith(",,")
+    assert {one.name for one in out.iterdir()} <= set(FILES)  # so that the next run may replace them
+    for k, name, parameter in ((1, "primary-2.csv", "Pq"), (3, "surface-4.csv", "Sz"), (3, "surface-4.x3p", "Sz")):
+        again = report_of(read_surface(out / "surfaces" / name))[parameter].value
+        assert again == pytest.approx(data["profiles"][k]["measures"][parameter]["value"], rel=1e-7)
+    assert "counts twice" in cli("profile", names[0], names[0]).out
 
 
 @pytest.mark.parametrize("words, says", [

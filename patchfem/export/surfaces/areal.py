@@ -1,4 +1,4 @@
-"""Areal heights as files that other programs read: X3P of ISO 5436-2 (ISO 25178-72), and text in columns."""
+"""Heights as files that other programs read: X3P of ISO 5436-2 (ISO 25178-72), and text in columns."""
 
 import hashlib
 from datetime import UTC, datetime
@@ -20,7 +20,7 @@ MAIN = """<?xml version="1.0" encoding="UTF-8"?>
 <CY><AxisType>I</AxisType><DataType>D</DataType><Increment>{dy!r}</Increment><Offset>{y!r}</Offset></CY>
 <CZ><AxisType>A</AxisType><DataType>D</DataType><Increment>1</Increment><Offset>0</Offset></CZ>
 </Axes></Record1>
-<Record2><Date>{date}</Date><Instrument><Manufacturer>patchfem</Manufacturer><Model>compare</Model><Serial>-</Serial>\
+<Record2><Date>{date}</Date><Instrument><Manufacturer>patchfem</Manufacturer><Model>-</Model><Serial>-</Serial>\
 <Version>{version}</Version></Instrument><CalibrationDate>{date}</CalibrationDate>
 <ProbingSystem><Type>Software</Type><Identification>{text}</Identification></ProbingSystem>
 <Comment>{text}</Comment></Record2>
@@ -53,6 +53,17 @@ def write_columns(path: Path, x, y, z) -> Path | None:
     rows, columns = np.nonzero(np.isfinite(z))
     if rows.size > ROWS:
         return None
-    table = np.column_stack([x[columns], y[rows], z[rows, columns]]) * 1e6
-    write_text(path, "x [um],y [um],z [um]\n" + "%.10g,%.10g,%.10g\n" * rows.size % tuple(table.ravel().tolist()))
+    return _columns(path, "xyz", (x[columns], y[rows], z[rows, columns]))
+
+
+def write_profile(path: Path, x, z) -> Path:
+    """Write the heights z (n,) [m] of a trace that are there, over x (n,) [m], as columns x, z [um]."""
+    there = np.isfinite(z)
+    return _columns(path, "xz", (x[there], z[there]))
+
+
+def _columns(path: Path, names: str, columns: tuple) -> Path:
+    table = np.column_stack(columns) * 1e6
+    head, row = ",".join(f"{name} [um]" for name in names), ",".join(["%.10g"] * len(names))
+    write_text(path, f"{head}\n" + f"{row}\n" * len(table) % tuple(table.ravel().tolist()))
     return path

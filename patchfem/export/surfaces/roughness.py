@@ -7,17 +7,21 @@ import numpy as np
 
 from ... import __version__
 from ...core import say
-from ...disk.whole import write_text
+from ...disk.whole import write_rows, write_text
 from ...scales import LADDERS, plain, step_of
-from ...surface.quantity import Quantity
+from ...surface.quantity import Mean, Quantity
+from ...surface.roughness import means
 from ...surface.roughness.report import RoughnessReport, fitting_cutoff
 from ..pages.document import Section, document, figure, table, warned
 from . import pictures
+from .areal import write_columns, write_profile, write_x3p
 
 ALONG = ("PSm", "RSm", "dominant_wavelength", "Sal")  # lengths along the surface; all others are heights
 AREAL = ("Interval: 5 to 95 %, of the mean over all scans of this size on a surface with Gaussian heights and the "
          "spectrum of this scan, wider where the kurtosis is above 3. It does not know a surface that differs from "
          "place to place, nor waves longer than the scan.")
+MEANS = ("Interval: 95 % of the mean, by Student's t from the scatter of the files, each with equal weight; an error "
+         "that all share, as of the calibration, is not in it. Scatter: standard deviation of one file.")
 INTERVAL = ("Interval: 5 to 95 %, of the mean over all traces of this length on a surface with Gaussian heights and "
             "the spectrum of this trace, wider where the kurtosis is above 3. It does not know a surface that differs "
             "from place to place.")
@@ -93,6 +97,67 @@ def lines_of(report: RoughnessReport, verbose: bool = False) -> list:
     return out
 
 
+def means_lines(reports: list) -> list:
+    """The means over several files as lines; () without any."""
+    out = []
+    for each in means.means_of(reports):
+        out += ["", _of_many(each), f"  {'':<20} {'mean':>10}  {'95 %: from .. to':<20} {'scatter':<10} unit"]
+        out += [f"  {name:<20} {value:>10}  {interval:<20} {scatter:<10} {unit}".rstrip()
+                for name, value, interval, scatter, unit in _means(each)]
+        out += [f"  {each.doubt}"] * bool(each.doubt)
+    return out
+
+
+def _of_many(each: means.Means) -> str:
+    return f"Mean of {each.count} {means.KINDS[each.kind]}"
+
+
+def _means(each: means.Means) -> list:
+    """Name, mean, interval, scatter and unit of each mean, as texts."""
+    out = []
+    for name, one in each.values.items():
+        unit = ("", 1.0) if one.mean.unit == "1" else step_of(LADDERS[one.mean.unit], one.mean.value)
+        value, interval, _ = shown(one.mean, unit)
+        out.append([name, value, interval, plain(one.scatter * unit[1], 3), unit[0]])
+    return out
+
+
+def means_data(reports: list) -> list:
+    """The means over several files as plain data in SI."""
+    def data(one: Mean) -> dict:
+        value, low, high, unit = one.mean[:4]
+        return {"value": value, "low": low, "high": high, "unit": unit, "scatter": one.scatter}
+    return [{"kind": each.kind, "files": each.count, "confidence": 0.95, "notes": [each.doubt] * bool(each.doubt),
+             "measures": {name: data(one) for name, one in each.values.items()}} for each in means.means_of(reports)]
+
+
+def write_csv(path: Path, reports: list) -> None:
+    """Write a row for each file: its parameters with the ends of their intervals in SI, "" for what it has not."""
+    names = {one.name: one.unit for report in reports for one in report.values}
+    rows = [["file", *(f"{name}{end} [{unit}]" for name, unit in names.items() for end in ("", "_low", "_high"))]]
+    for report in reports:
+        own = {one.name: one[:3] for one in report.values}
+        rows.append([report.source, *("" if value is None else repr(value) for name in names
+                                      for value in own.get(name, (None, None, None)))])
+    write_rows(path, rows)
+
+
+def write_surfaces(folder: Path, reports: list) -> None:
+    """Write the heights that the parameters are read from into `surfaces`: of a trace `primary.csv`, with a cut-off
+    also `roughness.csv`, of a scan `surface.x3p` and `surface.csv`; of several files with its number behind the name.
+    """
+    folder = folder / "surfaces"
+    folder.mkdir()
+    for number, one in enumerate(reports, 1):
+        tail = f"-{number}" * (len(reports) > 1)
+        for name in ("primary", "roughness"):
+            if (trace := getattr(one, name)) is not None:
+                write_profile(folder / f"{name}{tail}.csv", trace.x, trace.z)
+        if (scan := one.scan) is not None:
+            write_x3p(folder / f"surface{tail}.x3p", scan.x, scan.y, scan.z, f"{Path(one.source).name}: {heading(one)}")
+            write_columns(folder / f"surface{tail}.csv", scan.x, scan.y, scan.z)
+
+
 def _untold(report: RoughnessReport) -> dict:
     """The parameters without an interval, by the reason."""
     out: dict = {}
@@ -133,13 +198,20 @@ def data_of(report: RoughnessReport) -> dict:
 def page(reports: list) -> str:
     """The page of one or several surfaces, nothing fetched."""
     title = "Roughness of " + ", ".join(Path(one.source).name for one in reports)
-    sections = [_section(number, one) for number, one in enumerate(reports)]
+    sections = [_mean_section(one) for one in means.means_of(reports)]
+    sections += [_section(number, one) for number, one in enumerate(reports)]
     return document(title, f"<p class=soft>patchfem {escape(__version__)}</p>", sections, paper=True)
 
 
 def write_page(path: Path, reports: list) -> None:
     """Write the page."""
     write_text(path, page(reports))
+
+
+def _mean_section(each: means.Means) -> Section:
+    rows = table(("parameter", ">mean", ">95 %: from .. to", ">scatter", "unit"), _means(each))
+    doubt = warned([f"{each.doubt[0].upper()}{each.doubt[1:]}."]) if each.doubt else ""
+    return Section(f"mean-{each.kind}", _of_many(each), f"{doubt}{rows}<p class=soft>{escape(MEANS)}</p>")
 
 
 def _section(number: int, report: RoughnessReport) -> Section:
