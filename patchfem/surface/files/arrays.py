@@ -16,7 +16,7 @@ from ..profile import Profile
 from ..samples import GIVEN, checked
 from .raster import areal, raster
 from .raw import POINTS, Raw, shown
-from .units import GIVE, LISTED, factor_of
+from .units import GIVE, LISTED, PIXEL, factor_of, pixel_of
 
 _HEADER = 10_000  # bytes of the header of an .npy
 _HEADERS = {(1, 0): npy_format.read_array_header_1_0, (2, 0): npy_format.read_array_header_2_0}
@@ -26,13 +26,19 @@ HEIGHTS = ("z", "gap", "height", "heights")
 
 
 def npy(raw: Raw, units: tuple | None) -> Profile | Areal:
-    """The surface in an .npy file of two or three columns; PatchfemError for objects, other shapes, absent units."""
+    """The surface in an .npy file of two or three columns, or the matrix of heights for which a pixel is given;
+    PatchfemError for objects, other shapes, absent units."""
     path, table = raw.path, _npy(raw)
+    pixel = None if units is None else pixel_of(units[0])
+    if pixel is not None and table.ndim == 2 and min(table.shape) > 1:
+        factor = lengths(raw, units[1:] * 2)[1]
+        return areal(path, *(np.arange(count) * pixel for count in table.shape[::-1]), table * factor, GIVEN)
     factors = lengths(raw, units)
     if table.ndim == 2 and table.shape[0] in (2, 3) and table.shape[1] > 3:
         table = table.T
     if table.ndim != 2 or table.shape[1] not in (2, 3):
-        raise PatchfemError(f"{path}: an array of shape {table.shape}; columns x, z or x, y, z are wanted: {TABLE}")
+        raise PatchfemError(f"{path}: an array of shape {table.shape}; columns x, z or x, y, z are wanted: {TABLE}; of "
+                            f"a matrix of heights {PIXEL}")
     return _table(path, table, factors)
 
 

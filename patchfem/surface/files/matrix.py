@@ -11,10 +11,10 @@ from ..samples import GIVEN, checked
 from .head import COMMA, COMMENT, VOID, Head, is_number, named, trimmed
 from .raster import areal
 from .raw import shown
-from .units import GIVE, factor_of
+from .units import GIVE, PIXEL, factor_of, pixel_of
 
 SIZE = "`# Width: 1.2 mm` and `# Height: 0.8 mm`"
-ABOVE = f"write {SIZE}, those of the scan, and `# Value units: um` above its rows"
+ABOVE = f"write {SIZE}, those of the scan, and `# Value units: um` above its rows, or {PIXEL}"
 
 
 def is_matrix(count: int, names: list, facts: dict) -> bool:
@@ -86,6 +86,9 @@ def _height(path, facts: dict, given: tuple | None) -> tuple:
 def _step(path, axis: str, count: int, facts: dict, given: tuple | None) -> tuple:
     """Step along x or y [m]; notes."""
     size, step = ("width", "step_x") if axis == "x" else ("height", "step_y")
+    if given is not None and (pixel := pixel_of(given[0])) is not None:
+        told = f"{path}: its head tells its size along {axis}; the pixel that was given, {given[0]}, is taken"
+        return pixel, () if {size, step}.isdisjoint(facts) else (told,)
     if axis == "y" and step not in facts and size not in facts:
         step = "step_x"  # square pixels by a size of one number
     number, unit = facts.get(step, facts.get(size, (None, "")))

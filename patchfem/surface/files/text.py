@@ -23,7 +23,7 @@ from .head import COMMA, COMMENT, EXAMPLE, LOST, SIGNS, WIDEST, Head, head_of, i
 from .matrix import is_matrix, matrix
 from .raster import raster
 from .raw import Raw, shown
-from .units import GIVE, LISTED, factor_of
+from .units import GIVE, LISTED, factor_of, pixel_of
 
 _QUOTED = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
 _WIDE = re.compile(rf"\n[^\n]{{{WIDEST + 1}}}")
@@ -38,7 +38,8 @@ def columns(raw: Raw, given: tuple | None = None) -> Profile | Areal:
     a note; an x that turns back is refused. A million samples: 0.3 s. PatchfemError names the line.
     """
     path, text = raw.path, text_of(raw)
-    for unit in given or ():
+    pixel = given is not None and pixel_of(given[0]) is not None
+    for unit in (given or ())[pixel:]:
         if factor_of(unit) is None:
             raise PatchfemError(f"{path}: unknown unit '{shown(unit)}'; use one of {LISTED}")
     head = head_of(path, text)
@@ -46,6 +47,9 @@ def columns(raw: Raw, given: tuple | None = None) -> Profile | Areal:
     at, names, units = _above(head)
     if not head.named and is_matrix(len(head.row), names, facts):
         return matrix(path, head, facts, given, text[head.start:])
+    if pixel:
+        raise PatchfemError(f"{path}: '{shown(given[0])}' is the pixel of a matrix of heights, and this file has "
+                            "columns; give their unit")
     if len(head.named or head.row) < 2:
         raise PatchfemError(f"{path}:{head.number + 1}: one column, '{shown(head.row[0])}', where x and z are wanted; "
                             f"{EXAMPLE}")

@@ -1,5 +1,7 @@
 """Names of units of length as files, instruments and users write them."""
 
+import numpy as np
+
 UNITS = {"m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9,
          "in": 0.0254, "ft": 0.3048, "mil": 25.4e-6}
 _WORDS = {"pm": 1e-12, "å": 1e-10, "angstrom": 1e-10, "ångström": 1e-10, "mils": 25.4e-6, "inch": 0.0254,
@@ -9,6 +11,7 @@ _WORDS |= {f"{prefix}{end}": factor for prefix, factor in (
     for end in ("meter", "meters", "metre", "metres")}
 LISTED = ", ".join(UNITS)
 GIVE = 'give profile or compare the units, --units "mm,um" (in Python units=("mm", "um"))'
+PIXEL = 'give its pixel in place of the unit of x, --units "0.8 um,um"'
 
 ASIDE = "the file itself tells its units; those that were given are left aside"
 
@@ -17,3 +20,13 @@ def factor_of(word: str) -> float | None:
     """Factor to metres of a unit as it is written, such as um, µm, [mm] or Mikrometer; None for any other word."""
     word = word.strip().strip("[]()").strip().replace("µ", "u").replace("μ", "u")
     return UNITS.get(word) or _WORDS.get(word.lower())
+
+
+def pixel_of(word: str) -> float | None:
+    """Size of a pixel [m] that stands in place of the unit of x, such as 0.8 um; None for anything else."""
+    number, _, unit = word.strip().partition(" ")
+    try:
+        size = float(number) * (factor_of(unit) or np.nan)
+    except ValueError:
+        return None
+    return size if 0 < size < np.inf else None

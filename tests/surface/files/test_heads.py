@@ -173,6 +173,23 @@ def test_exact_units_that_are_given_overrule_the_header_and_it_is_told(tmp_path)
     assert sdf.x == pytest.approx(np.arange(3) * 1e-6)
 
 
+def test_exact_a_matrix_of_which_only_the_pixel_is_known(tmp_path):
+    """As text and as .npy, missing heights too; a size in the head gives way with a note, columns have no pixel."""
+    z = np.where(np.arange(Z.size).reshape(Z.shape) == 5, np.nan, Z)
+    rows = "\n".join(" ".join(repr(float(one)) for one in row) for row in z) + "\n"
+    is_scan(read(tmp_path, rows, ("0.8 um", "nm")), (0.8e-6, 0.8e-6), z * 1e-9)
+    np.save(tmp_path / "scan.npy", z)
+    found = read_surface(tmp_path / "scan.npy", ("0.8 um", "nm"))
+    is_scan(found, (0.8e-6, 0.8e-6), z * 1e-9)
+    sized = read(tmp_path, f"# Width: 4 um\n# Height: 3 um\n{rows}", ("0.8 um", "nm"))
+    is_scan(sized, (0.8e-6, 0.8e-6), z * 1e-9)
+    assert len(sized.notes) == 2 and "the pixel that was given, 0.8 um, is taken" in sized.notes[0]
+    for text, units, said in ((PAIRS, ("0.8 um", "nm"), "is the pixel of a matrix"),
+                              (rows, ("-1 um", "nm"), "unknown unit '-1 um'"), (rows, ("0.8 um", "2 nm"), "unknown")):
+        with pytest.raises(PatchfemError, match=said):
+            read(tmp_path, text, units)
+
+
 CURES = {  # what is refused, what is said, the same text after the remedy, the units given
     "a bare matrix": (ROWS, "its width is not told; write `# Width: 1.2 mm` and `# Height: 0.8 mm`, those of the scan, "
                       "and `# Value units: um` above its rows",
