@@ -243,15 +243,17 @@ class VaryingLoadRun(Run):
         return self.load._replace(sets=self.sets, loads=loads)
 
     def _parts(self, rows) -> np.ndarray:
-        """As of a Run; the noise is that of the largest force, of the slide's last digit (a sum over the modes) and of
-        the stored energy."""
+        """As of a Run; the noise is that of the largest force, of the mean force, which is read off the slide that it
+        takes (2e-16 of it over `beta`, much where the modes hardly slide), of the slide's last digit (a sum over the
+        modes) and of the stored energy."""
         n = 2 * self.modes.omega.size
         work = self._works(rows)
         lost = work - np.diff(rows[:, n + 5])
         size = np.maximum(self.model.limit, np.abs(rows[:-1, n + 4]))
         digit = np.abs(rows[:, :n // 2]) @ np.abs(self.modes.slide)
-        digit = np.maximum(digit[1:], digit[:-1]) + self.prop.beta[0, 0] * size
-        noise = size * (1e-12 * np.abs(np.diff(rows[:, n])) + 2e-15 * digit) \
+        slid, beta = np.abs(np.diff(rows[:, n])), self.prop.beta[0, 0]
+        digit = np.maximum(digit[1:], digit[:-1]) + beta * size
+        noise = size * (1e-12 * slid + 2e-15 * digit) + 2e-16 * slid**2 / (beta or np.inf) \
             + 1e-14 * np.maximum(rows[:-1, n + 5], rows[1:, n + 5])
         return np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])
 
