@@ -63,10 +63,10 @@ EFFECTS = {
     "contact.holder": Effect("", "sum f x = N offset + K theta, slide_i = q - F/K_t"),
     "contact.step": Effect(GAPS, "g += height H(x - at)"),
     "contact.asperities.law=linear": Effect("", "C += diag(1/(k_n A)), C_tt += diag(1/(k_t A))"),
-    "contact.asperities.law=exponential": Effect("patchfem.contact.skin", "f = A p_0 exp(-s/u_0), s = g + theta x - "
-                                                 "delta + C f"),
-    "contact.asperities.law=hertz": Effect("patchfem.contact.skin", "f = A 4/3 E* sqrt(R) eta int_s (z - s)^3/2 phi(z) "
-                                           "dz"),
+    "contact.asperities.law=exponential": Effect("patchfem.contact.skin_laws", "f = A p_0 exp(-s/u_0), s = g + "
+                                                 "theta x - delta + C f"),
+    "contact.asperities.law=hertz": Effect("patchfem.contact.skin_laws", "f = A 4/3 E* sqrt(R) eta int_s (z - s)^3/2 "
+                                           "phi(z) dz"),
     "contact.tilt": Effect(GAPS, "g += angle x"),
     "contact.load_line": Effect("", "sum f x = N offset, rotation free"),
     "contact.crown": Effect(GAPS, "g += x^2/(2 radius)"),

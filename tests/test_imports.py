@@ -38,7 +38,7 @@ def test_exact_a_patch_needs_no_motion():
     modules = run_of(PATCH)
     absent(modules, "friction", "structure", "dynamics", "response", "inputs", "wear", "identify", "runs.bench",
            "runs.rig", "runs.wear", "model.slide", "model.structure", "closed_forms.contact", "compiled", "surface",
-           "contact.skin", "contact.skin_laws", "contact.strips", "contact.gradients", "elasticity.mortar",
+           "contact.skin_laws", "contact.strips", "contact.gradients", "elasticity.mortar",
            "elasticity.substructure", "elasticity.fronts", "elasticity.recovery", "mesh.anymesh",
            "export", "skfem", "scipy")
     assert {"patchfem.contact.unilateral", "patchfem.mesh.tensor"} <= modules
@@ -54,7 +54,7 @@ def test_exact_little_is_loaded_before_the_command_line_answers_an_interrupt():
 
 
 @pytest.mark.parametrize("table, module", [
-    ('[contact.asperities]\nlaw = "exponential"\ndecay_length = "1 um"\n', "contact.skin"),
+    ('[contact.asperities]\nlaw = "exponential"\ndecay_length = "1 um"\n', "contact.skin_laws"),
     ("[contact.strips]\ncount = 2\n", "contact.strips"),
 ], ids=["skin", "strips"])
 def test_exact_an_effect_brings_its_own_module(table, module):

@@ -50,8 +50,8 @@ class Smooth:
 class ExponentialSkin(Smooth):
     """An exponential skin: P = reference exp(-s/u0), u0 [m] > 0, reference [Pa] the pressure at s = 0.
 
-    Without a reference `solve` takes the mean pressure of the given load, so that flat aligned pieces have s = 0 and
-    the approach is the closing of the bodies alone. The choice shifts the approach and nothing else.
+    Without a reference `strips.press_strips` takes the mean pressure of the given load, so that flat aligned pieces
+    have s = 0 and the approach is the closing of the bodies alone. The choice shifts the approach and nothing else.
     """
 
     u0: float

@@ -1,11 +1,15 @@
-"""Strips side by side over the width: one condensed slice, repeated under one rigid holder that may roll.
+"""Strips side by side over the width, one condensed slice repeated under one rigid holder that may roll; and a patch
+behind smooth asperities, which is one strip.
 
 Strip j, at y_j from the middle, has the gap g(x) + roll y_j (or one of its own) and the compliance C. Strips do not
 feel each other: the shear between them is neglected. The motion q = (delta, -theta, -roll) of the holder is common, or
 as much of it as is free, so the answer minimises the convex dual sum_j Phi_j(R_j q - g_j) + q.S q/2 - q.target, with
 R_j = (1, x, y_j) and S the spring of the rotation.
 
-Every answer of `strips_solve` is checked again by `skin.residuals` from the definitions alone.
+Asperities are a skin, a local law P(s) in series with the bodies: a node of area A_i carries f_i = A_i P(s_i), with
+the mean planes s_i = g_i + theta x_i - delta + (C f)_i apart. P >= 0 falls with s, so Phi gains A_i Psi(f_i/A_i), Psi'
+= -P^-1, and the answer is one for every law, gap and control. The linear skin adds 1/(k A_i) to the diagonal of C.
+Every answer of `strips_solve` is checked again by `residuals` from the definitions alone.
 """
 
 from dataclasses import dataclass, replace
@@ -15,9 +19,9 @@ import numpy as np
 
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, frozen_array
 from ..elasticity.lapack import one_thread
-from .skin import refuse, residuals
 from .skin_laws import ExponentialSkin, LinearSkin
 from .strips_solve import (
+    FLOOR,
     Slices,
     bare_parts,
     by_strip,
@@ -90,6 +94,36 @@ def one_strip(pieces: Compliance, count: int) -> tuple:
     return pieces.normal * count, pieces.tangential * count, pieces.interface.weight / count
 
 
+def residuals(skin, c: Slices, x, weight, gap, force, delta: float, free: float, load=None, moment=None,
+              spring: float = 0.0) -> MappingProxyType:
+    """Relative residuals of pressed strips, one of them a patch, recomputed from the definitions alone.
+
+    skin: a law, None for bare strips; gap, force: (s, m); free: rotation [rad] beyond that in the gap. Keys: the worst
+    strip's penetration, tension and complementarity (bare) or law and tension (skin); force_balance and moment_balance
+    of all strips, where prescribed. law: largest mismatch of a force, against the largest force and what the law gains
+    over the depth of the gap, of a smooth law 1e-5 of it; pressures below exp(FLOOR) count as none.
+    """
+    bent = c.bends(force)
+    opening = gap + free * x - delta + bent
+    depth = np.ptp(gap, axis=1) + np.abs(bent).max() + abs(free) * np.ptp(x) + 1e-150
+    most, total = max(force.max(), np.exp(FLOOR)), max(force.sum(), 1e-150)
+    out = {"tension": max(0.0, -force.min()) / most}
+    if skin is None:
+        out["penetration"] = np.max(np.maximum(0.0, -opening.min(axis=1)) / depth)
+        out["complementarity"] = np.max(np.abs(force * opening).sum(axis=1) / (total * depth))
+    else:
+        rate = np.full(gap.shape, skin.k) if isinstance(skin, LinearSkin) else 1e-5 * skin.stiffness(opening)
+        gain = depth * (weight * rate).max(axis=1)
+        miss = np.abs(force - weight * skin.pressure(opening)) - weight * np.exp(FLOOR)
+        out["law"] = np.max(np.maximum(0.0, miss.max(axis=1)) / (most + gain))
+    if load is not None:
+        out["force_balance"] = abs(force.sum() - load) / load
+    if moment is not None:
+        turned = spring * free
+        out["moment_balance"] = abs((force @ x).sum() - moment - turned) / (load * np.ptp(x) + abs(turned))
+    return MappingProxyType({key: float(value) for key, value in out.items()})
+
+
 def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.ndarray, gap: np.ndarray,
                  roll: float = 0.0, load: float | None = None, moment: float | None = None,
                  approach: float | None = None, rotation: float = 0.0, spring: float = 0.0, skin=None,
@@ -109,7 +143,7 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
     """
     offsets, c = np.atleast_1d(np.asarray(offsets, float)), Slices(c, own)
     gap = np.broadcast_to(gap, (offsets.size, x.size)) + roll * offsets[:, None]
-    refuse(skin, x, gap, load, None if spring and load is not None else moment, approach)
+    _refuse(skin, x, gap, load, None if spring and load is not None else moment, approach)
     _refuse_roll(offsets, load, lateral)
     if isinstance(skin, ExponentialSkin) and skin.reference is None and load:
         skin = replace(skin, reference=load / (weight.sum() * offsets.size))
@@ -119,8 +153,8 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
     motions = holder_motions(x, offsets, moment is not None and load is not None, lateral is not None, spring)
     with one_thread():
         if load is None:
-            force, _, count = by_strip(skin, softer(skin, c, weight), x, weight, gap - approach)
-            s, motion = None, np.array([approach])
+            force, s, count = by_strip(skin, softer(skin, c, weight), x, weight, gap - approach)
+            motion = np.array([approach])
         else:
             target = np.array([value for value in (load, moment, lateral) if value is not None])
             force, s, motion, count = loaded(skin, c, x, weight, gap, motions, target)
@@ -139,6 +173,20 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
     elif isinstance(skin, LinearSkin):
         opening = np.where(force > 0, -force / (skin.k * weight), np.maximum(opening, 0.0))
     return _state(skin, weight, x, offsets, force, opening, (delta, rotation + free, roll + rolled), count, checks)
+
+
+def _refuse(skin, x, gap, load, moment, approach) -> None:
+    """Raise PatchfemError for controls without an answer."""
+    if (load is None) == (approach is None) or (moment is not None and load is None):
+        raise PatchfemError("contact: give a load, a load and a moment, or an approach")
+    if not (np.isfinite(gap).all() and np.isfinite(load if approach is None else approach) and (load or 0.0) >= 0):
+        raise PatchfemError("contact.load: the load must be >= 0, load, approach and gap finite")
+    if load and moment is not None and not abs(moment) < load * np.ptp(x) / 2:
+        raise PatchfemError(f"contact.load_line: the line of the load lies {moment / load:.6g} m from the middle, "
+                            f"outside the half length {np.ptp(x) / 2:.6g} m: the piece tips over")
+    if load is None and isinstance(skin, ExponentialSkin) and skin.reference is None:
+        raise PatchfemError("contact.approach with contact.asperities.law = \"exponential\": the law has no first "
+                            "touch to measure from; give contact.load, or another law")
 
 
 def _refuse_roll(offsets, load, lateral) -> None:
@@ -164,8 +212,9 @@ def _refuse_loose(skin, force, checks, free_rotation: bool, free_roll: bool) -> 
                            "prescribe contact.strips.roll")
     if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        raise NotConverged(f"contact.strips: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}; lower contact.strips."
-                           "roll or raise the load")
+        at, cure = ("asperities", "make the skin softer (decay length, height deviation), or leave it out") \
+            if smooth(skin) else ("strips", "lower contact.strips.roll or raise the load")
+        raise NotConverged(f"contact.{at}: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}; {cure}")
 
 
 def _state(skin, weight, x, offsets, force, opening, motion, count, checks) -> StripsState:

@@ -15,8 +15,8 @@ from scipy.stats import norm
 from skins import longer, solve, tangent
 
 from patchfem.contact import strips_solve
-from patchfem.contact.skin import residuals
 from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin, peak_integral
+from patchfem.contact.strips import residuals
 from patchfem.contact.strips_solve import Slices
 from patchfem.contact.unilateral import LIMIT, press
 from patchfem.core import NotConverged, Outcome, PatchfemError
@@ -391,7 +391,7 @@ def test_refuses_an_answer_that_did_not_settle(monkeypatch):
 
 def test_refuses_an_answer_whose_residual_is_too_large_with_a_remedy(monkeypatch):
     c, x, weight = bodies(40)
-    monkeypatch.setattr("patchfem.contact.skin.LIMIT", -1.0)  # below any residual
+    monkeypatch.setattr("patchfem.contact.strips.LIMIT", -1.0)  # below any residual
     with pytest.raises(NotConverged, match=r"contact\.asperities: .* exceeds .*; make the skin softer"):
         solve(PEAKS, c, x, weight, 1e-4 * x, LOAD)
 

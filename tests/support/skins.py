@@ -1,28 +1,49 @@
-"""A skin between two pieces as a run presses it: the smooth laws by `contact.skin`, the linear one as softer pieces."""
+"""A skin between two pieces as a run presses it: the smooth laws as one strip, the linear one as softer
+pieces."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from patchfem.contact import skin as smooth
 from patchfem.contact.skin_laws import ExponentialSkin, LinearSkin
+from patchfem.contact.strips import press_strips
 from patchfem.contact.unilateral import press, press_by
-from patchfem.core import Compliance, Interface
+from patchfem.core import Compliance, Interface, Outcome
+
+
+class State(NamedTuple):
+    """A pressed skin: arrays (m,) and numbers as `strips.StripsState` has them of strips, separation its gap."""
+
+    force: np.ndarray
+    pressure: np.ndarray
+    separation: np.ndarray
+    stiffness: np.ndarray
+    delta: float
+    theta: float
+    load: float
+    moment: float
+    iterations: int
+    outcome: Outcome
+    residuals: dict
 
 
 def solve(skin, c, x, weight, gap, load=None, moment=None, approach=None, rotation=0.0, spring=0.0):
-    """`contact.skin.solve` for any law."""
+    """The State of two bodies pressed through a skin of any law."""
     if not isinstance(skin, LinearSkin):
-        return smooth.solve(skin, c, x, weight, gap, load, moment, approach, rotation, spring)
+        one = press_strips(c, x, weight, np.zeros(1), gap, load=load, moment=moment, approach=approach,
+                           rotation=rotation, spring=spring, skin=skin)
+        return State(one.force[0], one.pressure[0], one.gap[0], one.stiffness[0], one.delta, one.theta, one.load,
+                     one.moment, one.iterations, one.outcome, one.residuals)
     soft = Compliance(Interface(x, weight, 1.0), c + np.diag(1 / (skin.k * weight)), c)
     found = press(soft, gap, load, moment, rotation, spring=spring) if approach is None else \
         press_by(soft, gap, approach, rotation)
     force = found.sigma_n * weight
     free = gap + (found.rotation - rotation) * x - found.approach + c @ force
-    return smooth.SkinState(force, found.sigma_n, np.where(force > 0, -found.sigma_n / skin.k, free),
-                            np.where(force > 0, skin.k, 0.0), found.approach, found.rotation, found.load, found.moment,
-                            found.iterations, found.outcome, found.residuals)
+    return State(force, found.sigma_n, np.where(force > 0, -found.sigma_n / skin.k, free),
+                 np.where(force > 0, skin.k, 0.0), found.approach, found.rotation, found.load, found.moment,
+                 found.iterations, found.outcome, found.residuals)
 
 
 def longer(skin, factor: float):

@@ -24,14 +24,14 @@ class Patch:
     pieces: compliance of the pieces and of their skin, linearised at the operating point where the skin is smooth;
     giving: (m, m) [m/N] the tangential compliance that lets the patch slip in part: of the skin, of the pieces with
     [contact.shear], and of the holder's spring, which is the same on every entry; gap: (m,) [m] of the unloaded
-    surfaces; skin: SkinState of a smooth skin, else None; strips: StripsState of a patch in strips, whose means over
-    the width then stand in `pressure`, else None; tangential_ratio: k_t/k_n of the skin, None where it is rigid in
-    shear; skinned: a skin of asperities lies between the pieces; jumps: places [m] where the gap steps; sharp: an end
-    of the interface is a corner that meets a face which goes on; notes: sentences for the warnings; sharper: static
-    measures by name as (value, error) that cells of order 4 or points of a trace gave in addition, {} without any;
-    averaging [m]: the length that a profile is averaged over where it bears, None without one;
-    either: a step of the gap ends at a node, half of which lies below it and half above: (weight, Patch) with the whole
-    node below, and the same with it above; () without such a node.
+    surfaces; skin: StripsState, of one strip, of a smooth skin, else None; strips: StripsState of a patch in strips,
+    whose means over the width then stand in `pressure`, else None; tangential_ratio: k_t/k_n of the skin, None where it
+    is rigid in shear; skinned: a skin of asperities lies between the pieces; jumps: places [m] where the gap steps;
+    sharp: an end of the interface is a corner that meets a face which goes on; notes: sentences for the warnings;
+    sharper: static measures by name as (value, error) that cells of order 4 or points of a trace gave in addition, {}
+    without any; averaging [m]: the length that a profile is averaged over where it bears, None without one; either: a
+    step of the gap ends at a node, half of which lies below it and half above: (weight, Patch) with the whole node
+    below, and the same with it above; () without such a node.
     """
 
     pair: Pair

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from ...contact import skin, skin_laws
+from ...contact import skin_laws
 from ...contact.edges import BEARING
+from ...contact.strips import press_strips
 from ...core import Compliance, Pressure, frozen_array
 
 
@@ -39,18 +40,19 @@ def borne(pressure) -> np.ndarray:
 
 def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
     """Press a pair through a smooth skin: (Compliance with the skin linearised at the operating point, Pressure,
-    SkinState).
+    StripsState of one strip).
 
     The gap of the Pressure is the separation of the mean planes, below zero where the skin is crushed.
     """
     interface = pieces.interface
     by = asked.approach
     load = asked.load if by is None else None
-    state = skin.solve(skin_law(asked), pieces.normal, interface.x, interface.weight, gap, load,
-                       moment if by is None else None, by, angle, spring=spring if by is None else 0.0)
-    answer = Pressure(frozen_array(borne(state.pressure)), state.separation, state.delta, state.theta, state.load,
+    state = press_strips(pieces.normal, interface.x, interface.weight, np.zeros(1), gap, load=load,
+                         moment=moment if by is None else None, approach=by, rotation=angle,
+                         spring=spring if by is None else 0.0, skin=skin_law(asked))
+    answer = Pressure(frozen_array(borne(state.pressure[0])), state.gap[0], state.delta, state.theta, state.load,
                       state.moment, state.outcome, state.iterations, state.residuals)
-    stiff = np.maximum(state.stiffness * interface.weight, 1e-300)
+    stiff = np.maximum(state.stiffness[0] * interface.weight, 1e-300)
     crush = np.diag(1 / np.maximum(stiff, BEARING * stiff.max()))  # nodes that carry nothing stay finite
     ratio = asked.skin.tangential_ratio
     tangential = pieces.tangential + crush / ratio if ratio is not None else pieces.tangential
