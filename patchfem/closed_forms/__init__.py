@@ -12,112 +12,29 @@ from typing import TYPE_CHECKING
 from ..later import modules_of
 
 if TYPE_CHECKING:
-    from .contact import (
-        cattaneo_shear,
-        cattaneo_stick_half_width,
-        combined_modulus,
-        hertz_half_width,
-        hertz_peak,
-        hertz_pressure,
-        kern_fraction,
-        layered_compliance,
-        punch_contact,
-        punch_pressure,
-        punch_rotation,
-        rounded_corner,
-        rounded_punch_half_width,
-        rounded_punch_pressure,
-        wedge_linear,
-        wedge_loop,
-        wedge_opening,
-        wedge_skin,
-        westergaard_approach,
-        westergaard_full_pressure,
-        westergaard_half_width,
-        westergaard_pressure,
-        westergaard_stiffness,
-    )
-    from .dynamics import (
-        COULOMB_RESONANCE,
-        bounded_input,
-        decay,
-        decay_half_cycles,
-        decay_rest,
-        sliding_amplitude,
-        two_stop_amplitude,
-        two_stop_relation,
-    )
-    from .friction import (
-        coulomb_loop_area,
-        dither_drift,
-        growth_factor,
-        jenkins_loop,
-        report_loop,
-        reversal_force,
-        steady_bond_length,
-        steady_shear,
-        stretch_loop,
-        virgin_force,
-        weight_across,
-        weight_along,
-    )
-    from .wear import even_wear_pressure, worn_crown_half_width, worn_pad_fraction, worn_volume
+    from .contact import *  # noqa: F403
+    from .dynamics import *  # noqa: F403
+    from .friction import *  # noqa: F403
+    from .wear import *  # noqa: F403
 
-__all__ = [
-    "COULOMB_RESONANCE",
-    "bounded_input",
-    "cattaneo_shear",
-    "cattaneo_stick_half_width",
-    "combined_modulus",
-    "coulomb_loop_area",
-    "decay",
-    "decay_half_cycles",
-    "decay_rest",
-    "dither_drift",
-    "even_wear_pressure",
-    "growth_factor",
-    "hertz_half_width",
-    "hertz_peak",
-    "hertz_pressure",
-    "jenkins_loop",
-    "kern_fraction",
-    "layered_compliance",
-    "punch_contact",
-    "punch_pressure",
-    "punch_rotation",
-    "report_loop",
-    "reversal_force",
-    "rounded_corner",
-    "rounded_punch_half_width",
-    "rounded_punch_pressure",
-    "sliding_amplitude",
-    "steady_bond_length",
-    "steady_shear",
-    "stretch_loop",
-    "two_stop_amplitude",
-    "two_stop_relation",
-    "virgin_force",
-    "wedge_linear",
-    "wedge_loop",
-    "wedge_opening",
-    "wedge_skin",
-    "weight_across",
-    "weight_along",
-    "westergaard_approach",
-    "westergaard_full_pressure",
-    "westergaard_half_width",
-    "westergaard_pressure",
-    "westergaard_stiffness",
-    "worn_crown_half_width",
-    "worn_pad_fraction",
-    "worn_volume",
-]
+HOMES = {  # the module of every closed form
+    "contact": "cattaneo_shear cattaneo_stick_half_width combined_modulus hertz_half_width hertz_peak hertz_pressure "
+               "kern_fraction layered_compliance punch_contact punch_pressure punch_rotation rounded_corner "
+               "rounded_punch_half_width rounded_punch_pressure wedge_linear wedge_loop wedge_opening wedge_skin "
+               "westergaard_approach westergaard_full_pressure westergaard_half_width westergaard_pressure "
+               "westergaard_stiffness",
+    "dynamics": "COULOMB_RESONANCE bounded_input decay decay_half_cycles decay_rest sliding_amplitude "
+               "two_stop_amplitude two_stop_relation",
+    "friction": "coulomb_loop_area dither_drift growth_factor jenkins_loop report_loop reversal_force "
+               "steady_bond_length steady_shear stretch_loop virgin_force weight_across weight_along",
+    "wear": "even_wear_pressure worn_crown_half_width worn_pad_fraction worn_volume",
+}
+__all__ = [*(name for names in HOMES.values() for name in names.split())]
 
 
 def __getattr__(name: str):
     """A closed form by its name; the module that has it is loaded now, and with it what it takes from SciPy."""
-    for home in ("contact", "dynamics", "wear", "friction") if name in __all__ else ():
-        found = getattr(import_module(f"{__name__}.{home}"), name, None)
-        if found is not None:
-            return found
-    return modules_of(__name__, __path__)(name)
+    home = next((home for home, names in HOMES.items() if name in names.split()), None)
+    if home is None:
+        return modules_of(__name__, __path__)(name)  # noqa: F405
+    return getattr(import_module(f"{__name__}.{home}"), name)
