@@ -17,7 +17,10 @@ class Later(ModuleType):
     __dict__ = property(lambda self: vars(import_module(self.__name__)))
 
     def __getattr__(self, name: str):
-        return getattr(import_module(self.__name__), name)
+        module = sys.modules.get(self.__name__)  # at once where it is there: importing it again takes 20 us
+        if module is None or module.__spec__._initializing:  # by another thread, which is waited for
+            module = import_module(self.__name__)
+        return getattr(module, name)
 
     def __setattr__(self, name: str, value) -> None:
         setattr(import_module(self.__name__), name, value)
