@@ -5,7 +5,7 @@ import pytest
 from scene_texts import BLOCK, KEYS
 
 import patchfem as pf
-from patchfem.core import Outcome
+from patchfem.core import NotConverged, Outcome
 from patchfem.dynamics.march.march import march
 from patchfem.model.model import build
 from patchfem.runs.rig import interface
@@ -69,11 +69,17 @@ def test_always_the_steady_motion_is_that_of_a_march(law, frequency):
 @pytest.mark.parametrize("law", KEYS)
 @pytest.mark.parametrize("frequency", [130, 139, 143, 150, 165])
 def test_always_the_steady_motion_with_a_lifted_mass_is_that_of_a_march(law, frequency):
+    """Of elements side by side, which slip a little further in every cycle, a march does not repeat in 600 cycles."""
     asked = scene(law, f"drive.frequency={frequency} Hz", "normal.grooves.lifted_mass=0.3 kg")
-    found = pf.run(asked)
+    try:
+        found = pf.run(asked)
+    except NotConverged:
+        assert law == "elastic-plastic"
+        return
+    assert found.outcome is Outcome.STEADY or law == "elastic-plastic"
     for name, true in zip(SHOWN, marched(asked, 200, 1600)):
         one = found.measures[name]
-        assert abs(one.value - true) <= one.error + 1.5e-3 * abs(true), name
+        assert abs(one.value - true) <= (one.error or 0.0) + 1.5e-3 * abs(true), name
 
 
 def test_exact_coulombs_steady_motion_closes_to_round_off():

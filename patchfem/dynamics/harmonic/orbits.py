@@ -2,7 +2,8 @@
 
 A motion is marched until it settles, and every few cycles the limit of its states is guessed from their differences:
 reduced rank extrapolation, which is exact where a disturbance dies out linearly (Sidi, J. Comput. Appl. Math. 36, 305,
-1991). What the contact remembers follows by itself in the cycles between.
+1991). What the contact remembers follows by itself in the cycles between. Elements that slip a little further in every
+cycle come to rest by themselves and start anew after every guess: one that did not help has the next one wait.
 """
 
 import numpy as np
@@ -12,6 +13,7 @@ from ..march.march import ends_of, mark_of
 LEAD = 6  # cycles from the start to the first guess
 REST = 2  # cycles after a guess that the memory of the contact takes
 MOST = 600  # cycles
+HELPED = 0.1  # of the change of the state before a guess: where it is more after it, twice the cycles pass to the next
 CLOSE = 1e-8  # of the largest state, to which a motion repeats
 STILL = 1e-9  # of what the drive moves a free mass by: a smaller motion is none
 NUDGE = 1e-6  # of the largest state: a small disturbance
@@ -28,7 +30,7 @@ def settled(run) -> float:
     size, done, before = 2 * run.state.shape[1] + 2, 0, _state(run)
     least = STILL * float(np.abs(run.drive.values(np.linspace(0, run.drive.period, 9))).max()) / _pace(run)**2
     least = max(least * _size(run.modes.base), 1e-300)
-    change = np.inf
+    change, misses, still = np.inf, 0, 0
     while done < MOST and run.outcome is None:
         kept = [before]
         for _ in range((LEAD if done == 0 else REST) + size):
@@ -37,10 +39,14 @@ def settled(run) -> float:
             kept.append(_state(run))
             if run.outcome is not None:
                 break
-        change = _size(kept[-1] - kept[-2]) / max(_size(kept[-1]), least)
+        last, change = change, _size(kept[-1] - kept[-2]) / max(_size(kept[-1]), least)
         if change <= CLOSE or run.outcome is not None:
             break
-        before = _limit(kept[-size:])
+        if still == 0:  # the cycles since the last guess
+            misses = 0 if change < HELPED * last else misses + 1
+            still = 2**misses
+        still -= 1
+        before = _limit(kept[-size:]) if still == 0 else None
         if before is None:
             before = kept[-1]
         else:
