@@ -81,15 +81,12 @@ def draw(knob: str, runs: list, tolerance: float, names: list):
         _name_runs(axis, groups)
     axes[0].set_ylabel("relative to the measure")
     stars = "; star: by the scene's tolerance" if any(one.value is None for one in runs) else ""
-    figure.suptitle(f"What accuracy costs, by {_axis_of(knob, runs)}{stars}", fontsize=11)
+    by = "tolerance of the mesh" if runs[0].words.startswith("element size by tolerance") else AXES[knob]
+    figure.suptitle(f"What accuracy costs, by {by}{stars}", fontsize=11)
     labelled = [axis.get_legend_handles_labels() for axis in axes]
     handles = {label: handle for found in labelled for handle, label in zip(*found, strict=True)}
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=9)
     return figure
-
-
-def _axis_of(knob: str, runs: list) -> str:
-    return "tolerance of the mesh" if runs[0].words.startswith("element size by tolerance") else AXES[knob]
 
 
 def _line(axis, runs: list, part: str, name: str, colour: str) -> None:

@@ -52,6 +52,37 @@ class Step(NamedTuple):
     state: object
 
 
+class LastTraction:
+    """Base of the laws in which nothing stretches: their state is the last traction (m,) [Pa].
+
+    Each has `limit(sigma, way)`, `share(dq, dt)` and `step` of its own.
+    """
+
+    __slots__ = ()
+    at_once = True  # a changing load is taken along with the motion
+
+    def start(self, sigma):
+        """State before any motion: no traction, under a pressure sigma (m,) [Pa]."""
+        return np.zeros_like(sigma)
+
+    def press(self, state, s0, s1) -> Step:
+        """The law at rest while the pressure goes from s0 to s1 (m,) [Pa]: the traction is cut to its limit there.
+
+        The mean of the Step is the traction after it; nothing is dissipated.
+        """
+        most = self.limit(s1, 1.0)
+        held = np.clip(state, -most, most)
+        return Step(held, np.zeros_like(held), held)
+
+    def traction(self, state):
+        """Traction (m,) [Pa] at the end of the last step, > 0 against slip towards +x."""
+        return state
+
+    def stored(self, state):
+        """Elastic energy per area (m,) [J/m2]: none, as nothing stretches."""
+        return np.zeros_like(state)
+
+
 class Element(NamedTuple):
     """A law on one contact as compiled code takes it.
 

@@ -124,8 +124,8 @@ def build(scene: Scene) -> Model:
     friction, heat, spread, pad = _law(scene)
     named, measured = tuple(scene.named()), scene.measured
     found = Model(None, scene.kind, patch, point, friction, heat, spread, pad, slide, rig, scene.accuracy,
-                  _measured(scene, measured) if measured else None,
-                  _wear(scene), _absent(named), grooves)
+                  (scene.beside(measured.file), measured.acceleration_gain, measured.reading, measured.reading_cutoff)
+                  if measured else None, of_wear.wear_asked(scene) if scene.wear else None, _absent(named), grooves)
     source = Source(scene.path, scene.title, scene.text, partial(resolved, scene, found), named, tuple(scene.remarks),
                     scene.sets, scene.notes)
     return replace(found, source=source)
@@ -134,17 +134,6 @@ def build(scene: Scene) -> Model:
 @lru_cache(64)
 def _absent(named: tuple) -> tuple:
     return tuple(absent(named))
-
-
-def _measured(scene: Scene, table) -> tuple:
-    return scene.beside(table.file), table.acceleration_gain, table.reading, table.reading_cutoff
-
-
-def _wear(scene: Scene) -> WearModel | None:
-    if scene.wear is None:
-        return None
-
-    return of_wear.wear_asked(scene)
 
 
 def _law(scene: Scene) -> tuple:

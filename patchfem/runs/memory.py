@@ -84,11 +84,6 @@ def _short(model: Model, engine: str) -> bool:
     return _as_python(model) <= compiled.PATIENCE
 
 
-def _loop_is_kept() -> bool:
-    """Whether the loop from event to event is kept compiled, which a short run takes too."""
-    return compiled.is_kept("dynamics.events.march_kernels.march")
-
-
 def _as_python(model: Model) -> float:
     """CPU seconds of a run from event to event as Python, which is not compiled where they are few; of a density all
     its cells, which its error may ask for."""
@@ -115,7 +110,7 @@ def needs(model: Model, engine: str, steps: int, unknowns: dict, numerics=None, 
     """
     points = unknowns.get("interface_points", 0)
     runs = code(model, engine)
-    if _short(model, engine) and not _loop_is_kept():
+    if _short(model, engine) and not compiled.is_kept("dynamics.events.march_kernels.march"):
         runs = NONE
     parts = [Need(PACKAGES, "packages", ""), Need(runs.bytes, CODE_PART if runs.compile else "code", "")]
     if points:

@@ -56,7 +56,7 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         raise SceneError([f"a draw of {request.count} cases with seed {request.seed}: whole numbers from 0 on are "
                           "wanted, and at least one case of Sobol's sequence"])
     if request.file is not None:
-        rows, wrong = _rows(request.file)
+        rows, wrong = table.read(request.file)
         parts += [rows] if rows is not None else []
     axes, mistakes = read(request.over, request.count > 0)
     wrong += [f"--over {one.removeprefix('--over ')}" for one in mistakes]
@@ -84,10 +84,6 @@ def cases_of(asked: Asked, request: Request) -> Cases:
     cases = product(parts)
     _refuse_all(asked, cases)
     return cases
-
-
-def _rows(path: Path) -> tuple:
-    return table.read(path)
 
 
 def _same(asked: Asked, keys: Sequence[str]) -> list[str]:

@@ -91,7 +91,8 @@ class Anchored:
         x, m = self.x, self.x.size
         last, after = count - 1, np.minimum(count, m - 1)
         cell = np.abs(x[last] - x[np.where(last > 0, last - 1, after)])
-        off = (1 - softness[last] / self.c.diagonal()[last]) * _behind(row / np.where(cell > 0, cell, 1.0)) * cell
+        off = (1 - softness[last] / self.c.diagonal()[last]) * np.interp(
+            row / np.where(cell > 0, cell, 1.0), ASPECT, BEHIND) * cell  # `edges.behind` of many
         return np.where(count < m, x[last] + shares * (x[after] - x[last]) - off, x[-1])
 
     def stiffness(self, count, shares, lever: bool = False) -> np.ndarray:
@@ -150,8 +151,3 @@ class Anchored:
             worst.append(lack / (load * np.ptp(self.x) + np.abs(spring * theta)))
         out = np.max(worst, axis=0)
         return np.where(np.isfinite(out), out, np.inf)
-
-
-def _behind(aspect) -> np.ndarray:
-    """`edges.behind` of many aspects (q,)."""
-    return np.interp(aspect, ASPECT, BEHIND)

@@ -128,9 +128,6 @@ class SampledRun(GroovesRun):
         self.ledger[4], self.booked = max(self.ledger[4], motion.kept.tally[STORED]), sums
         return last, status
 
-    def _works(self, rows) -> np.ndarray:
-        return rows[:-1, 2 * self.modes.omega.size + 6]
-
     def _sampled(self, rows) -> np.ndarray:
         n = 2 * self.modes.omega.size
         after = rows[:-1, n + 4] if self.model.set_valued else None

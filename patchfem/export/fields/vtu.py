@@ -26,6 +26,7 @@ from .series import Frame, Series
 BLOCK = 1 << 20  # bytes of a compressed block
 PACKING = {"id": lzma.FILTER_LZMA2, "preset": 0, "lc": 0, "lp": 2, "pb": 2}  # for numbers of four bytes
 TYPES = {"f4": "Float32", "f8": "Float64", "i1": "Int8", "i4": "Int32", "i8": "Int64", "u1": "UInt8"}
+FRAME = re.compile(rf"frame_\d+(\.vtm|(_({'|'.join(PARTS)}))?\.vtu)")  # files of a .pvd
 ENDINGS = (".pvd", ".vtu", ".csv", ".vtkhdf")
 
 
@@ -76,7 +77,7 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
     """
     folder = frames_beside(path)
     old = list(folder.iterdir()) if folder.is_dir() else []
-    strange = sorted(one.name for one in old if not _ours(one.name) and not unfinished(one.name))
+    strange = sorted(one.name for one in old if not FRAME.fullmatch(one.name) and not unfinished(one.name))
     if strange:
         raise PatchfemError(f"{folder}: holds files that are not frames of patchfem ({', '.join(strange[:3])}); "
                             "name another -o")
@@ -116,10 +117,6 @@ def _listing(path: Path, kind: str, version: str, lines: list) -> None:
                       f'<VTKFile type="{kind}" version="{version}" byte_order="LittleEndian">', f"  <{kind}>",
                       *("    " + line for line in lines), f"  </{kind}>", "</VTKFile>", ""])
     write_text(path, text)
-
-
-def _ours(name: str) -> bool:
-    return re.fullmatch(rf"frame_\d+(\.vtm|(_({'|'.join(PARTS)}))?\.vtu)", name) is not None
 
 
 def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> None:

@@ -5,11 +5,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..protocol import Element, Step
+from ..protocol import Element, LastTraction, Step
 
 
 @dataclass(frozen=True, slots=True)
-class Coulomb:
+class Coulomb(LastTraction):
     """Set-valued kinetic friction under prescribed motion; at rest the last traction is kept.
 
     `static` is what the contact carries at the instant a rest ends (`breaking`); it does no work.
@@ -17,7 +17,6 @@ class Coulomb:
 
     kinetic: float
     static: float | None = None
-    at_once: ClassVar[bool] = True  # nothing stretches: a changing load is taken along with the motion
     holds: ClassVar[bool] = True  # the last traction at rest
 
     def element(self, load: float) -> Element:
@@ -25,10 +24,6 @@ class Coulomb:
         has no slope."""
         static = self.kinetic if self.static is None else self.static
         return Element("", np.array([0.0, static * load, self.kinetic * load]), np.zeros(1), static * load)
-
-    def start(self, sigma):
-        """State before any motion: the last traction (m,) [Pa], 0 under a pressure sigma (m,) [Pa]."""
-        return np.zeros_like(sigma)
 
     def share(self, dq, dt):
         """Share [1] of the limit that is carried in increments dq [m] of any duration; 0 at rest."""
@@ -48,26 +43,10 @@ class Coulomb:
         mean = self.kinetic * (s0 + s1) / 2 * np.sign(dq)
         return Step(mean, mean * dq, self.kinetic * s1 * np.sign(dq))
 
-    def press(self, state, s0, s1) -> Step:
-        """The law at rest while the pressure goes from s0 to s1 (m,) [Pa]: the traction is cut to mu_k s1.
-
-        The mean of the Step is the traction after it; nothing is dissipated.
-        """
-        held = np.clip(state, -self.kinetic * s1, self.kinetic * s1)
-        return Step(held, np.zeros_like(held), held)
-
     def breaking(self, sigma, direction: float):
         """Traction mu_s sigma (m,) [Pa] under a pressure sigma (m,) [Pa] at the instant a rest ends; direction: sign of
         the motion."""
         return (self.kinetic if self.static is None else self.static) * sigma * direction
-
-    def traction(self, state):
-        """Traction (m,) [Pa] at the end of the last step, > 0 against slip towards +x."""
-        return state
-
-    def stored(self, state):
-        """Elastic energy per area (m,) [J/m2]: none, as nothing stretches."""
-        return np.zeros_like(state)
 
 
 def from_keys(friction, load: float) -> Coulomb:

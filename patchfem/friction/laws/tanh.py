@@ -5,17 +5,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..protocol import Element, Step
+from ..protocol import Element, LastTraction, Step
 
 
 @dataclass(frozen=True, slots=True)
-class Rate:
+class Rate(LastTraction):
     """Eq. 2.4 per point: tau = mu sigma tanh(v/v_0), taken at the mean speed of a step. It never holds: under a steady
     share f of the limit it creeps at v_0 atanh(f)."""
 
     static: float
     speed: float
-    at_once: ClassVar[bool] = True
     holds: ClassVar[bool] = False
 
     def element(self, load: float) -> Element:
@@ -23,10 +22,6 @@ class Rate:
         "speed"."""
         return Element("friction.laws.tanh_kernels", np.array([0.0, self.static * load, self.speed]), np.zeros(0),
                        self.static * load, form="speed", sizes=())
-
-    def start(self, sigma):
-        """State before any motion: the last traction (m,) [Pa], 0 under a pressure sigma (m,) [Pa]."""
-        return np.zeros_like(sigma)
 
     def share(self, dq, dt):
         """Share [1] of the limit that is carried in increments dq [m] over dt [s]; a jump in no time has no speed
@@ -47,22 +42,6 @@ class Rate:
         part = self.share(dq, dt)
         mean = self.static * (s0 + s1) / 2 * part
         return Step(mean, mean * dq, self.static * s1 * part)
-
-    def press(self, state, s0, s1) -> Step:
-        """The law at rest while the pressure goes from s0 to s1 (m,) [Pa]: the traction is cut to mu s1.
-
-        The mean of the Step is the traction after it; nothing is dissipated.
-        """
-        held = np.clip(state, -self.static * s1, self.static * s1)
-        return Step(held, np.zeros_like(held), held)
-
-    def traction(self, state):
-        """Traction (m,) [Pa] at the end of the last step, > 0 against slip towards +x."""
-        return state
-
-    def stored(self, state):
-        """Elastic energy per area (m,) [J/m2]: none, as nothing stretches."""
-        return np.zeros_like(state)
 
 
 def from_keys(friction, load: float) -> Rate:
