@@ -3,19 +3,13 @@
 The unknowns of a node are (along x, into the piece), so both pieces of a pair obey the same matrix.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..core import NotConverged, frozen_array, say
 from .condense import Condensed, condense
-from .tensor_stiffness import matrix_of, tensor_stencil
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
+from .tensor_stiffness import tensor_stencil
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -60,13 +54,6 @@ class Piece:
     is_coating: np.ndarray
     layers: Layers
     made: dict = field(default_factory=dict)
-
-    @property
-    def matrix(self) -> csr_matrix:
-        """Stiffness of the free unknowns, column by column, row by row, two per node (along x, inward)."""
-        if "matrix" not in self.made:
-            self.made["matrix"] = matrix_of(self.stencil)
-        return self.made["matrix"]
 
     @property
     def mirrored(self) -> bool:

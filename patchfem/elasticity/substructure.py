@@ -38,14 +38,6 @@ class Substructure:
         return self._part("order")
 
     @property
-    def matrix(self) -> csc_matrix:
-        """Stiffness per unit width [N/m per m] in the order of elimination, two unknowns per node (along x, inward).
-
-        Made anew each time: nothing but its factors is needed after them, and it is a tenth of their size.
-        """
-        return _stiffness(self.mesh, self.layers, self.order)
-
-    @property
     def factor(self):
         """Factors of the matrix, with `solve` and `compliance` as `fronts.Fronts` has them."""
         return self._part("factor")

@@ -8,14 +8,7 @@ A stencil (nx, rows, 3, 3, 2, 2) [N/m per m] holds at [c, r, 1 + dc, 1 + dr] the
 dc, r + dr), unknowns (along x, inward); it is zero where there is no such node. rows: those that are free.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
 
 
 def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
@@ -59,35 +52,6 @@ def _bands(first, up, down, last) -> np.ndarray:
     out[:-1, 2] = up
     out[1:, 0] = down
     return out
-
-
-def stencil_of(matrix: csr_matrix, columns: int) -> np.ndarray:
-    """Stencil of an assembled stiffness whose unknowns run column by column, row by row, two per node.
-
-    ValueError where it couples nodes that are not neighbours.
-    """
-    whole = matrix.tocoo()
-    rows = matrix.shape[0] // (2 * columns)
-    (i, a), (j, b) = (np.divmod(part, 2) for part in (whole.row, whole.col))
-    (c, r), (d, s) = np.divmod(i, rows), np.divmod(j, rows)
-    if max(np.abs(d - c).max(initial=0), np.abs(s - r).max(initial=0)) > 1:
-        raise ValueError("the matrix couples nodes that are not neighbours on the grid")
-    out = np.zeros((columns, rows, 3, 3, 2, 2))
-    out[c, r, 1 + d - c, 1 + s - r, a, b] = whole.data
-    return out
-
-
-def matrix_of(stencil) -> csr_matrix:
-    """The stencil as a sparse matrix, unknowns column by column, row by row, two per node (along x, inward)."""
-    from scipy.sparse import bsr_matrix  # a piece that is condensed by its grid needs none
-
-    columns, rows = stencil.shape[:2]
-    c, r, dc, dr = np.ogrid[:columns, :rows, -1:2, -1:2]
-    there = (c + dc >= 0) & (c + dc < columns) & (r + dr >= 0) & (r + dr < rows)
-    neighbour = np.broadcast_to((c + dc) * rows + r + dr, there.shape)
-    pointer = np.append(0, np.cumsum(there.sum(axis=(2, 3))))
-    size = 2 * columns * rows
-    return bsr_matrix((stencil[there], neighbour[there], pointer), shape=(size, size)).tocsr()
 
 
 def applied(stencil, u) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg.lapack import dpotri, dtrtri
 from scipy.sparse import csc_matrix, triu
 from scipy.sparse.linalg import splu
+from stiffness import stiffness_of
 
 from patchfem.core import Missing, NotConverged
 from patchfem.elasticity import fronts
@@ -35,7 +36,7 @@ def assemble(mesh, layers, name: str) -> Substructure:
     order, firsts = elimination(mesh)
     piece = Substructure(mesh, layers, {"order": order, "rounding": 0.0})
     with one_thread():
-        piece.made["factor"] = factorise(piece.matrix, firsts, name)
+        piece.made["factor"] = factorise(stiffness_of(piece), firsts, name)
     return piece
 
 

@@ -9,12 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import diags
+from stiffness import stencil_of, stiffness_of
 
 from patchfem import closed_forms as exact
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, Pressure, frozen_array
 from patchfem.elasticity.elasticity import Layers, Piece, assemble, displacement, interface_compliance
-from patchfem.elasticity.tensor_stiffness import stencil_of
 from patchfem.mesh.tensor import TensorGrid, graded_rows
 
 EVEN = 0.1  # depth of even rows over the wave
@@ -43,8 +43,8 @@ def guided(grid: TensorGrid, layers: Layers) -> Piece:
     held = np.zeros((grid.x.size, grid.depth.size - 1, 2), bool)
     held[[0, -1], :, 0] = True
     free = diags((~held.ravel()).astype(float))
-    size = float(piece.matrix.diagonal().mean())
-    matrix = (free @ piece.matrix @ free + diags(size * held.ravel())).tocsr()
+    whole = stiffness_of(piece)
+    matrix = (free @ whole @ free + diags(float(whole.diagonal().mean()) * held.ravel())).tocsr()
     return replace(piece, stencil=stencil_of(matrix, grid.x.size), made={})
 
 
