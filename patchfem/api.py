@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from .campaigns import cost as cost_curves
 from .campaigns.sweeps import ask, executors
-from .campaigns.sweeps import asked as asking
+from .campaigns.sweeps import asked as case_models
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
 from .export import cost as cost_files
 from .export import folder as results_folder
@@ -158,7 +158,7 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
     jobs: processes; executor: "dask" or "dask:ADDRESS". A case that is refused or fails has outcome "failed" and its
     message; SceneError where no case is valid.
     """
-    asked = asking.Asked(*_text_of(scene))
+    asked = case_models.Asked(*_text_of(scene))
     lines = [one if isinstance(one, str) else ",".join(texts(key, one)) for key, one in (over or {}).items()]
     request = ask.Request([f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed)
     cases, by = ask.cases_of(asked, request), executors.of(executor, jobs)

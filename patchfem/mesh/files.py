@@ -17,20 +17,10 @@ from .anymesh import PairMesh, Tagged, pieces
 from .decks import read_inp, read_unv
 from .pairs import blocks
 from .recognise import grids
-from .tensor import TensorGrid
 
 CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
 LARGEST = 256 * 2**20  # bytes of a file
 EDGE_TAGS = {"upper_interface": 11, "lower_interface": 12, "upper_far": 13, "lower_far": 14}
-
-
-def pair_mesh(grid: TensorGrid) -> dict:
-    """Both pieces of a pair of alike grids as points (2N, 2) [m], quads (t, 4) and edges with their tags.
-
-    Node j*ny + i of a piece is column j, row i; the upper piece follows the lower one.
-    """
-    points, ((_, quads, names), (_, edges, ends)) = blocks(grid, grid)
-    return {"points": points, "quads": quads, "tags": _codes(names), "edges": edges, "edge_tags": _codes(ends)}
 
 
 def _codes(names) -> np.ndarray:

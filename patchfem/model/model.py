@@ -13,7 +13,7 @@ from ..effects import absent
 from ..scene.keys.tables import Accuracy, Friction, Temperature
 from ..scene.scene import Scene
 from . import load as of_load
-from . import patch as of_patch
+from . import patch as patch_model
 from . import rig as of_rig
 from . import slide as of_slide
 from . import wear as of_wear
@@ -112,7 +112,7 @@ def build(scene: Scene) -> Model:
                             "leave [sweep] out")
     patch = point = slide = rig = grooves = None
     if scene.contact is not None:
-        patch = of_patch.patch_asked(scene.contact, scene.kind, scene.beside)
+        patch = patch_model.patch_asked(scene.contact, scene.kind, scene.beside)
     if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
         point, grooves = of_load.point_asked(scene), of_load.grooves_asked(scene)
     if scene.slide is not None:

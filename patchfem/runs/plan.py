@@ -13,7 +13,7 @@ from ..model.source import placed
 from . import memory
 from .bench import engine as of_bench
 from .patch import grids as patch_grids
-from .patch import plan as of_patch
+from .patch import plan as patch_plan
 from .rig import engines
 from .rig import numerics as rig_numerics
 from .rig import plan as of_rig
@@ -97,10 +97,10 @@ def _planned(model: Model, per_point: bool) -> Plan:
     if model.patch is not None:
         tolerance = model.patch.mesh_tolerance or model.accuracy.tolerance
         grids = patch_grids.expected_grids(model.patch, tolerance)
-        unknowns, chain = of_patch.sizes(grids) | unknowns, chain | of_patch.chain(model.patch)
-        seconds, pressed = of_patch.effort(model.patch, grids, tolerance)
-        groups |= of_patch.groups(model)
-        said[1] = of_patch.verdict(groups, model.patch)
+        unknowns, chain = patch_plan.sizes(grids) | unknowns, chain | patch_plan.chain(model.patch)
+        seconds, pressed = patch_plan.effort(model.patch, grids, tolerance)
+        groups |= patch_plan.groups(model)
+        said[1] = patch_plan.verdict(groups, model.patch)
     if model.rig is not None:
         engine, steps, more = of_rig.cost(model, per_point, unknowns)
         seconds, numerics = seconds + more, rig_numerics.choose(model, per_point)

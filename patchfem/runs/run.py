@@ -16,7 +16,7 @@ from ..dynamics import resume
 from ..model.model import Model
 from ..model.source import placed
 from . import memory
-from .patch import result as of_patch
+from .patch import result as patch_result
 from .plan import Plan, plan, refuse_size
 from .remedies import Finding, beyond_tolerance
 from .results.result import Result, with_meanings, without_folders
@@ -62,16 +62,16 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
     if model.rig is not None:
         warnings += engines.knobs_idle(model, what.engine)
     if model.patch is not None:
-        patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance, estimate, fresh)
+        patch, *coarse = patch_result.solve_all(model.patch, model.accuracy.tolerance, estimate, fresh)
         seconds["contact"] = perf_counter() - begin
-        warnings += [*of_patch.strained(model.patch, patch), *patch.notes]
+        warnings += [*patch_result.strained(model.patch, patch), *patch.notes]
         if estimate and coarse[0] is None:
             fewer = "split the elements of contact.mesh" if model.patch.mesh else "leave out contact.element_size"
             warnings.append(f"no error is estimated on {patch.x.size - 1} elements along the interface; {fewer}")
-        notes += of_patch.left_out(model, patch, coarse)
+        notes += patch_result.left_out(model, patch, coarse)
     if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and model.kind != "patch":
         warnings.append("no friction acts and no motion was computed")
-        result = of_patch.static(what, patch, coarse, seconds, warnings)
+        result = patch_result.static(what, patch, coarse, seconds, warnings)
     elif _unloaded(model):
         warnings += [Outcome.NO_CONTACT.sentence, "no friction acts and no motion was computed"]
         result = Result(what, Outcome.NO_CONTACT, {"normal_load": Measure(0.0, "N", 0.0)}, None, None, None, {},
@@ -92,12 +92,12 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
                 result = solve(here, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
         except NotConverged as error:
             if patch is not None and what.kind != "patch":
-                at_rest = of_patch.static(what, patch, coarse, seconds, [*warnings, AT_REST])
+                at_rest = patch_result.static(what, patch, coarse, seconds, [*warnings, AT_REST])
                 error.so_far = _whole(replace(at_rest, outcome=Outcome.NOT_CONVERGED), notes, begin, coarse)
             raise
         if patch is not None and what.kind != "patch":
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
-            result = replace(result, measures=of_patch.measured(model, patch, coarse) | found)
+            result = replace(result, measures=patch_result.measured(model, patch, coarse) | found)
         if model.wear is not None:
             result = measures.worn(replace(result, plan=what), evolved, estimate)
     if what.compile_seconds and estimate:

@@ -10,10 +10,11 @@ import pytest
 from any_mesh_cases import drawn, write_msh22
 from hypothesis import given
 from hypothesis import strategies as st
+from pair_meshes import pair_mesh
 
 from patchfem.core import Missing, PatchfemError
 from patchfem.mesh.anymesh import PieceMesh
-from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh, read_bodies, write_mesh
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, read_bodies, write_mesh
 from patchfem.mesh.tensor import TensorGrid, graded_grid
 
 GRIDS = {

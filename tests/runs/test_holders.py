@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pair_meshes import pair_mesh
 from scene_texts import COATING, PIECE
 
 from patchfem.contact.gaps import step
 from patchfem.core import Outcome, PatchfemError
-from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
 from patchfem.mesh.tensor import graded_grid
 from patchfem.model.model import build
 from patchfem.model.pieces import bodies_of

@@ -6,10 +6,11 @@ from types import SimpleNamespace
 
 import meshio
 import numpy as np
+from pair_meshes import pair_mesh
 from scipy.spatial import Delaunay
 
 from patchfem.mesh.anymesh import PieceMesh
-from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh, read_pieces
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, read_pieces
 from patchfem.mesh.tensor import graded_grid
 
 NO_QUADS = np.empty((0, 4), np.int64)

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from pair_meshes import pair_mesh
 from torture import meshes
 
-from patchfem.mesh.files import pair_mesh, read_bodies
+from patchfem.mesh.files import read_bodies
 
 
 @pytest.mark.parametrize("name, form", [("m.msh", meshes._msh), ("m.inp", meshes._inp), ("m.unv", meshes._unv)])

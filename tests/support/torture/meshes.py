@@ -4,8 +4,9 @@ What leaves no meaning (a group that lacks, a node that is not there or has no p
 """
 
 import numpy as np
+from pair_meshes import pair_mesh
 
-from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh, write_mesh
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, write_mesh
 from patchfem.mesh.tensor import graded_grid
 
 from .results import ran
