@@ -356,7 +356,8 @@ class Run:
         size = self.prop.steps
         while self.done < steps and self.outcome is None:
             look = (until_look(self.done // size) + self.done // size) * size - self.done
-            self._sums(self._moved(min(steps - self.done, AT_ONCE, PIECES * size, look), 0, []))
+            rows = self._moved(min(steps - self.done, AT_ONCE, PIECES * size, look), 0, [])
+            self.totals += self._parts(rows).sum(axis=1)
             left = (steps - self.done) // size
             if self.done % size == 0 and self.outcome is None and self.repeats(left):
                 self.leave_out(left)
@@ -410,7 +411,7 @@ class Run:
                 snapshots.append(self._snapshot(rows[did]))
             if self.outcome is not None:
                 break
-        rows = np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:])
+        rows = np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:]) if len(parts) > 1 else parts[0]
         self.second += self._sampled(rows).sum(), np.abs(self._works(rows)).sum()
         return rows
 
@@ -446,6 +447,9 @@ class Run:
         parts = np.zeros((3, len(rows) - 1))
         parts[0] = self._works(rows)
         lost = parts[0] - np.diff(rows[:, n + 5])
+        if lost.min(initial=0.0) == 0.0:
+            parts[1] = lost
+            return parts
         # of the step solve, and of the slide's last digit
         noise = self.model.limit * (1e-12 * np.abs(np.diff(rows[:, n])) + 1e-15 * np.abs(rows[:-1, n]))
         np.copyto(parts[1], lost, where=lost > -noise)

@@ -1,7 +1,9 @@
 """The shipped rig, Jenkins patches and static patches in batches, held against runs by themselves on random cases.
 
 A case agrees where each of its measures lies inside the sum of both bars and the floor. The seeds of the long campaign
-were drawn before its score was known.
+were drawn before its score was known: of 200 cases of each kind all 6128 measures of rigs and all 2400 of static
+patches lay inside, and 6126 of 6128 of Jenkins patches. The two are a ring that a run by itself fits with bars as wide
+as its frequency, and the batch does not tell.
 """
 
 from pathlib import Path
