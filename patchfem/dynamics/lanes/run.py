@@ -80,7 +80,7 @@ def scales(law: str, force, omega) -> np.ndarray:
     """(n, k) what turns the numbers of a law of a stretch into those of cases; force (n,) [m/N]: of a case over that in
     N; omega (n,) [rad/s]."""
     one = np.ones(np.shape(omega))
-    units = {"1": one, "m": one, "m/s": one / omega, "N": force, "N/m": force, "N_s/m": force * omega}
+    units = {"1": one, "m": one, "m/s": one / omega, "s/m": omega, "N": force, "N/m": force, "N_s/m": force * omega}
     return np.stack([units[unit] for unit in load(law).UNITS.split()], axis=-1)
 
 
@@ -164,20 +164,21 @@ def march_on(law: str, cases: Cases, motion, cycles: int, steps: int) -> np.ndar
     return history
 
 
-def accelerations(law: str, cases: Cases, motion, cycles: int, steps: int) -> np.ndarray:
-    """(n, cycles steps + 1) absolute acceleration of the output [m s-2] at every step from a motion (n, STATE and
-    more) on, by a march of one step after the other."""
+def accelerations(law: str, cases: Cases, motion, cycles: int, steps: int, stride: int = 1) -> np.ndarray:
+    """(n, cycles steps / stride + 1) absolute acceleration of the output [m s-2] at every step, or one of `stride`
+    steps, from a motion (n, STATE and more) on, by a march of so many steps after the other."""
     n, loop, numbers, table, motion = len(cases.damp), kernels(law), numbers_of(law, cases, steps), table_of(steps), \
         motion.copy()
     room, marked = np.zeros((at.OWN + motion.shape[1] - at.STATE) * at.LANES), np.zeros(at.LANES + 1, np.int64)
-    out, order, done = np.empty((n, cycles * steps + 1)), np.arange(n), np.zeros(n, np.int64)
-    for k in range(cycles * steps + 1):
-        sine = table[0, k % steps]
+    out, order, done = np.empty((n, cycles * steps // stride + 1)), np.arange(n), np.zeros(n, np.int64)
+    for k in range(cycles * steps // stride + 1):
+        at_step = k * stride % steps
+        sine = table[0, at_step]
         x, v = motion[:, at.X], motion[:, at.V]
         rate = cases.push * sine - cases.damp * v - cases.square * x - motion[:, at.PLACE]
         out[:, k] = cases.out * rate + cases.base * sine
-        loop.march(numbers, order, motion, table[:, k % steps:k % steps + 2].copy(), 1, np.zeros((n, 1, 4)), done, room,
-                   marked)
+        part = table[:, at_step:at_step + stride + 1].copy()
+        loop.march(numbers, order, motion, part, 1, np.zeros((n, 1, 4)), done, room, marked)
     return out
 
 

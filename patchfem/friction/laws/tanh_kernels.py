@@ -1,7 +1,7 @@
 """Compiled rate law of eq. 2.4. Twin: `tanh.Rate`.
 
 num: limit [N], v_0 [m/s]; no memory. `flowing` is the law as lanes of many cases take it (`dynamics.lanes`), k:
-limit and v_0.
+limit and 1/v_0.
 """
 
 from math import inf, nan, tanh
@@ -24,7 +24,7 @@ from ..flags_kernels import (
 __all__ = ["BENDS", "SET_VALUED", "SPREADS", "at_end", "begin", "closed", "commit", "finish", "flowing", "gives",
            "knee", "longest", "mean", "middle", "rate", "shown", "spreading", "state"]
 
-UNITS = "N m/s"  # of the numbers k of the law in lanes
+UNITS = "N s/m"  # of the numbers k of the law in lanes
 MOST = 18.0  # argument from which tanh is 1 to the last bit
 
 
@@ -48,8 +48,8 @@ def hyperbolic(y):
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def flowing(k, z, v, way):
     """(force, slope 0 of a stretch, that there is not, over the slide, slopes of the force over stretch and speed)."""
-    part = hyperbolic(v / k[1])
-    return k[0] * part, 0.0, 0.0, k[0] / k[1] * (1 - part) * (1 + part)
+    part = hyperbolic(v * k[1])
+    return k[0] * part, 0.0, 0.0, k[0] * k[1] * (1 - part) * (1 + part)
 
 
 @njit(error_model="numpy", **LEAN)

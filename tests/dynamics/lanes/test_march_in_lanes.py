@@ -33,7 +33,7 @@ def cases(law: str, count: int, seed: int = 1) -> run.Cases:
     if law in FLOWS:
         speed, length = slip * r.uniform(0.3, 2, count), (0 if "tanh" in law else 1) * r.uniform(0.6, 2, count)
         spring = np.divide(slip, length, out=0 * slip, where=length > 0)
-        numbers = np.array({"tanh": [slip, speed], "stretch": [spring, length],
+        numbers = np.array({"tanh": [slip, 1 / speed], "stretch": [spring, length],
                             "bouc_wen": [slip, length, r.choice([1, 2, 1.5], count), r.uniform(0.5, 1, count)],
                             "lugre": [spring, slip * r.uniform(0.6, 1, count), slip, speed,
                                       *(r.uniform(0, 0.2, count) * slip / speed for _ in range(2))],
@@ -198,3 +198,11 @@ def test_exact_the_simulator_of_cuda_marches_as_the_processor():
     said = subprocess.run([sys.executable, "-W", "ignore", "-c", SIMULATED.format(paths=paths)], capture_output=True,
                           text=True, env=os.environ | {"NUMBA_ENABLE_CUDASIM": "1"}, check=False)
     assert said.returncode == 0 and said.stdout == "equal\n", said.stderr
+
+
+def test_exact_accelerations_of_some_steps_are_those_of_all():
+    law = "friction.laws.stretch_kernels"
+    some = cases(law, 3)
+    begun = run.begun_at(law, some)
+    every, fourth = (run.accelerations(law, some, begun, 2, 64, stride) for stride in (1, 4))
+    np.testing.assert_array_equal(fourth, every[:, ::4])

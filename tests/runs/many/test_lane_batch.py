@@ -106,6 +106,21 @@ def test_exact_what_sticks_is_told_by_lanes(law):
     assert ("ring_frequency" in found.values) == (law == "elastic-plastic")
 
 
+def test_exact_twice_the_steps_say_what_they_say_from_the_start(monkeypatch):
+    """A case whose bars ask for more steps has its errors from what fewer said before: to the last bit."""
+    base = base_of(load(SCENE.format(law=LAWS["nonlocal"]) + "[accuracy]\ntolerance = 1e-4\n"))
+    cases = [build(base.changed([f"normal.load={load} N"])) for load in range(20, 140, 20)]
+    found = many.answers(cases, study=64)
+    steps = np.array([found.numerics[case]["steps_per_cycle"] for case in range(len(cases))])
+    finer = np.flatnonzero(steps > lanes.steps_of(cases))
+    assert finer.size
+    monkeypatch.setattr(lanes, "steps_of", lambda _: steps)
+    again = many.answers(cases, study=64)
+    for ours, others in ((found.values, again.values), (found.errors, again.errors)):
+        for name, column in ours.items():
+            np.testing.assert_array_equal(column[finer], others[name][finer])
+
+
 def test_always_what_misses_its_tolerance_is_exact(monkeypatch):
     cases = models("coulomb", 6, 70)
     monkeypatch.setattr(lanes, "bars", lambda values, changes, law: {name: np.abs(one) for name, one in values.items()})

@@ -1,11 +1,11 @@
 """The batch of lanes: lumped cases of one law side by side, with bars from half the steps.
 
 A case of a law of a stretch (tanh, Bouc-Wen, LuGre, bonds of a constant length) marches by a quarter of the steps too,
-which shows how its errors fall. Such a case and one of Iwan march by finer steps where their bars miss the tolerance,
-with those that ask for these steps from the start; a case of Iwan or of the elastic-plastic law that has not settled
-marches on. What rings in a stick that lasts all the time is told in closed form behind one spring, else by a fit. A
-case goes to the exact batch `lumped`, or under a law of a stretch to a run of its own, where a bar still misses its
-tolerance, rings in shorter sticks are to be told, or a motion grows. So does every case of a batch of which these
+which shows how its errors fall. Such a case and one of Iwan march by twice the steps where their bars miss the
+tolerance: what they said before tells the errors then. A case of Iwan or of the elastic-plastic law that has not
+settled marches on. What rings in a stick that lasts all the time is told in closed form behind one spring, else by a
+fit. A case goes to the exact batch `lumped`, or under a law of a stretch to a run of its own, where a bar still misses
+its tolerance, rings in shorter sticks are to be told, or a motion grows. So does every case of a batch of which these
 contradict one of a few.
 """
 
@@ -26,8 +26,8 @@ from ....model.alike import Alike, columns_of, some
 from ....model.model import Model
 from ....response.errors import APART, GAPS, MAIN, ROUND
 from ....response.measures import energy_balance
-from ....response.ringing import FAINT, WIDEST, ringing
-from ....response.rows import TABLE, first_harmonic
+from ....response.ringing import FAINT, PER_PERIOD, WIDEST, ringing
+from ....response.rows import TABLE, first_harmonic, larger_term
 from ....response.settling import steady_amplitudes, windows_of
 from ....scene.rules.draft import pinned
 from ....structure.drive_sizes import largest
@@ -48,7 +48,7 @@ KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "iwan": "masing", "t
          "nonlocal": "friction.laws.stretch_kernels"}
 MARCH_ON = "yielding", "masing"  # whose motions march on until they settle
 SMOOTH, CALM = (128, 256, 512, 1024, 2048), 0.5  # steps of a cycle under a law of a stretch, its rate in a step then
-FINER = 4  # times as many steps has a case of Iwan or of a law of a stretch whose bars miss its tolerance
+RINGING = 512  # steps of a cycle under a law of a stretch from which a ring that is not found is none
 RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
 # of the change at half the steps, of that of the main measures, and of the measure itself, as both marches can miss an
 # event alike: 2 of 4077 random cases had an error beyond
@@ -108,7 +108,7 @@ def of_law(model: Model) -> tuple:
     none."""
     f, load, limit = model.friction, model.point.load, model.limits(model.point.load)[0]
     if f.law == "tanh":
-        return limit, f.reference_speed, 0.0
+        return limit, 1 / f.reference_speed, 0.0
     if has(f.law, "bonds"):
         return limit / f.bond_length, f.bond_length, f.bond_length
     if f.law == "bouc-wen":
@@ -180,17 +180,27 @@ def solve(models: Sequence[Model], say=None) -> Answers:
 
 
 def _solved(models: Sequence[Model], say) -> Answers:
-    """Answers of models; those that march by the same steps do so together, the fewest first."""
+    """Answers of models; all that march by the same steps do so together, those for whose errors it is too."""
     begin, law, (cases, c) = perf_counter(), models[0].friction.law, cases_of(models)
-    found, exact, left = Answers.blank(len(models)), np.zeros(len(models), bool), steps_of(models)
-    while (left > 0).any():
-        steps = int(left[left > 0].min())
-        here = np.flatnonzero(left == steps)
-        part, exact[here], finer = _marched(some(models, here), march.Cases(*(one[here] for one in cases)),
-                                            {name: one[here] for name, one in c.items()}, steps)
-        lumped.take_out(found, here)  # what fewer steps said
-        found.place(here, part)
-        left[here] = np.where(finer, FINER * steps, 0)
+    found, exact, steps = Answers.blank(len(models)), np.zeros(len(models), bool), steps_of(models)
+    shares = (2, 4) if march.flows(KINDS[law]) else (2,)
+    fewest, coarser = steps // shares[-1], {}
+    now = int(fewest.min())
+    while (steps >= now).any():
+        here = np.flatnonzero((fewest <= now) & (steps >= now))
+        if here.size:
+            part, ready = (_of(cases, here), _of(c, here)), np.flatnonzero(steps[here] == now)
+            seen, places = _measured(KINDS[law], *part, *group(models[0])[:1], now), here[ready]
+            coarser[now] = here, seen[0]
+        if here.size and ready.size:
+            fewer = [_of(values, np.searchsorted(whose, places)) for whose, values in (
+                coarser[now // share] for share in shares)]
+            answers, exact[places], finer = _marched(some(models, places), _of(part, ready), now, _of(seen, ready),
+                                                     fewer)
+            lumped.take_out(found, places)  # what fewer steps said
+            found.place(places, answers)
+            steps[places[finer]] = 2 * now
+        now *= 2
     for case in range(len(models)) if law == "tanh" else ():
         if notes := creeping_note(models[case].friction):
             found.notes[case] = notes
@@ -208,18 +218,28 @@ def _solved(models: Sequence[Model], say) -> Answers:
     return found
 
 
-def _marched(models: Sequence[Model], cases, c: dict, steps: int) -> tuple:
-    """(Answers of models that march by so many steps a cycle; (n,) which must be run otherwise, and which by finer
-    steps)."""
+def _of(found, places):
+    """The rows of some places of arrays in a dictionary or a tuple; what is no array is of all."""
+    if isinstance(found, dict):
+        return {name: _of(one, places) for name, one in found.items()}
+    if isinstance(found, tuple):
+        parts = [_of(one, places) for one in found]
+        return type(found)(*parts) if hasattr(found, "_fields") else tuple(parts)
+    return found[places] if np.ndim(found) else found
+
+
+def _marched(models: Sequence[Model], cases: tuple, steps: int, seen: tuple, coarser: list) -> tuple:
+    """(Answers of models that marched by so many steps a cycle; (n,) which must be run otherwise, and which by twice
+    the steps); arguments as of `runs_of`."""
     (cycles, law), least = group(models[0]), np.zeros(len(models), bool)
-    window = min(10, cycles // 10)
-    runs, exact, lost = runs_of(models, (cases, c), cycles, window, steps)
+    window = window_of(cycles)
+    runs, exact, lost = runs_of(models, cases, steps, seen, coarser)
     found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window})
     chosen = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
     found.numerics.update(dict.fromkeys(range(len(models)), chosen))
     wide = too_wide(models, found) | lost | alone
     serves = law == "iwan" or march.flows(KINDS[law])
-    finer = wide if serves and FINER * steps <= SMOOTH[-1] else least
+    finer = wide if serves and 2 * steps <= SMOOTH[-1] else least
     return found, (exact | wide | (found.outcome == "grows")) & ~finer, finer
 
 
@@ -236,14 +256,15 @@ def exactly(models: Sequence[Model], say, finer: int = 0) -> Answers:
 
 
 def too_wide(models, found: Answers) -> np.ndarray:
-    """(n,) whether a bar misses the tolerance of a case."""
+    """(n,) whether a bar misses the tolerance of a case: of a measure or of the larger term that it is left of."""
     tolerance, out = columns_of(models, lambda model: (model.accuracy.tolerance,))[0], np.zeros(len(models), bool)
     for name, values in found.values.items():
         if name in RING:  # the fit of a single run knows it no better
             continue
         if name.endswith("_steady") and KINDS[models[0].friction.law] not in MARCH_ON:
             continue  # an extrapolation errs alike at finer steps, and in the exact engine
-        out |= found.errors[name] > tolerance * np.abs(values) + found.floors[name]
+        floors = np.fmax(found.floors[name], tolerance * larger_term(name, found.values))
+        out |= found.errors[name] > tolerance * np.abs(values) + floors
     return out
 
 
@@ -272,18 +293,17 @@ def contradicted(found: Answers, ones: Answers | None, looked: list, times: floa
     return ""
 
 
-def runs_of(models, cases: tuple, cycles: int, window: int, steps: int) -> tuple:
+def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tuple:
     """(Runs of models of a group, (n,) which must be run otherwise, (n,) which need finer steps at least); cases: as of
-    `cases_of`."""
-    law, (cases, c) = KINDS[models[0].friction.law], cases
-    fine, *coarser = (_measured(law, cases, c, march.march(law, cases, cycles, window, steps // share))
-                      for share in ((1, 2, 4) if march.flows(law) else (1, 2)))
-    (values, book, found, extremes, rise), coarse = fine, coarser[0]
-    errors = bars(values, changed(values, [one[0] for one in coarser]), law)
+    `cases_of`; seen: as of `_measured`, by so many steps a cycle; coarser: values by half of them, and by a quarter."""
+    law, cycles, (cases, c), (values, book, found, extremes, rise) = KINDS[models[0].friction.law], \
+        group(models[0])[0], cases, seen
+    window = window_of(cycles)
+    errors = bars(values, changed(values, coarser), law)
     slips = found.shown[:, at.SLIP_HIGH - at.SHOW] - found.shown[:, at.SLIP_LOW - at.SHOW]
     stuck = slips / 2 <= np.maximum(c["held"], ROUND * np.abs(found.history[:, :, :2]).max(axis=(1, 2)))
     stuck &= (cases.spring > 0) | (law == "rigid")
-    exact = np.any([np.isnan(values[name]) != np.isnan(coarse[0][name]) for name in values], axis=0)
+    exact = np.any([np.isnan(values[name]) != np.isnan(coarser[0][name]) for name in values], axis=0)
     rings, told, untold, faint = _rings(law, cases, c, found, (stuck, window, steps))
     errors, exact, steady = errors | told, exact | untold, None
     if law in MARCH_ON:
@@ -297,7 +317,8 @@ def runs_of(models, cases: tuple, cycles: int, window: int, steps: int) -> tuple
     tolerance, = columns_of(models, lambda model: (model.accuracy.tolerance,))
     runs = Runs(cycles, window, values | rings, book, extremes, phasors[:, ends], stuck, nowhere, errors, 1e-9, np.inf,
                 stuck & (rise > tolerance * values["friction_force_peak"]), steady, again=False)
-    return runs, exact, faint | ~np.isfinite(found.motion[:, at.X] + coarser[-1][2].motion[:, at.X])
+    ended = np.isfinite(found.motion[:, at.X] + sum(one["friction_work"] for one in coarser))
+    return runs, exact, faint | ~ended
 
 
 def may_ring(cases, found) -> np.ndarray:
@@ -334,14 +355,19 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
     # nothing rings in what repeats
     may = (rings & marched & (march.own_of(law, found.motion, "EVER") > 0)) if law == "masing" else \
         stays(cases, found) & (stuck | rings)
-    untold, where = may & ~held, np.flatnonzero(may & held)
-    part = march.Cases(*(one[where] for one in cases))
-    signals = march.accelerations(law, part, found.begun[where], window, steps) if where.size else ()
-    angle = 2 * np.pi / steps * np.arange(window * steps + 1)
-    for case, signal in zip(where.tolist(), signals):
+    untold, told = may & ~held, may & held
+    strides = steps / (PER_PERIOD * np.sqrt(np.maximum(cases.square + cases.spring, 1.0)))
+    strides = 2 ** np.log2(np.maximum(strides, 1.0)).astype(int)  # each case by its own, whatever stands beside it
+    signals = {}
+    for stride in np.unique(strides[told]).tolist():
+        where = np.flatnonzero(told & (strides == stride))
+        signals |= zip(where.tolist(), march.accelerations(law, _of(cases, where), found.begun[where], window, steps,
+                                                           stride))
+    for case, signal in sorted(signals.items()):
         omega = float(c["omega"][case])
-        values, apart = ringing(angle / omega, signal, [(0.0, angle[-1] / omega)], omega)
-        faint[case] = not values and march.flows(law) and steps < FINER * SMOOTH[0]  # for so few steps, perhaps
+        time = np.linspace(0, 2 * np.pi * window / omega, len(signal))
+        values, apart = ringing(time, signal, [(0.0, time[-1])], omega)
+        faint[case] = not values and march.flows(law) and steps < RINGING  # for so few steps, perhaps
         for name, value in values.items():
             out[0][name][case], out[1][name][case] = value, OF_CHANGE * apart[name]
     return *out, untold, faint
@@ -416,10 +442,15 @@ def _row(model: Model) -> tuple:
             largest(drive), *_contact(model))
 
 
-def _measured(law: str, cases, c: dict, found) -> tuple:
+def window_of(cycles: int) -> int:
+    """Last cycles that are read."""
+    return min(10, cycles // 10)
+
+
+def _measured(law: str, cases, c: dict, cycles: int, steps: int) -> tuple:
     """(values, books, Marched, extremes of the output (n, c, 2) [m], rise of the force [N]) of a march."""
+    found, window = march.march(law, cases, cycles, window_of(cycles), steps), window_of(cycles)
     extremes = np.sort(found.history[:, :, :2] * c["ratio"][:, None, None], axis=2)
-    window = min(10, extremes.shape[1] // 10)
     book = reading.books(law, cases, found, c["energy"])
     seen = reading.reading_of(law, cases, found, c["energy"], c["omega"], extremes[:, -window:])
     with np.errstate(all="ignore"):
