@@ -56,7 +56,7 @@ OF_CHANGE, OF_TYPICAL, OF_SIZE = 2.0, 1.0, 2e-5
 HELD = 1e-12  # relative change of a force that its limit holds
 OF_LOOP = 4e-10  # least error of the area of a loop over its largest force and slide, what round-off leaves of none
 OF_MIDDLE = 1e-6  # of the amplitude, by which its middle errs behind sliders or a stretch, of which no event is missed
-ORDERLY, SHOWN = 6.0, 0.25  # a change at half the steps that falls by this shows a high order, and is so much of itself
+ORDERLY, SHOWN = 10.0, 0.25  # a change at half the steps that falls by this shows a high order, and is so much of itself
 MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; change over a tenth of these that is left
 # times twice as many cells as a run by itself has in a check of Iwan, and of its bars: 1 of 590 random cases erred more
 # than one, by 1.9
