@@ -53,10 +53,11 @@ RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, 
 # of the change at half the steps, of that of the main measures, and of the measure itself, as both marches can miss an
 # event alike: 2 of 4077 random cases had an error beyond
 OF_CHANGE, OF_TYPICAL, OF_SIZE = 2.0, 1.0, 2e-5
+OF_FIT = 5.0  # of the error of the fit of a ring, whose samples err alike by the steps of the march
 HELD = 1e-12  # relative change of a force that its limit holds
 OF_LOOP = 4e-10  # least error of the area of a loop over its largest force and slide, what round-off leaves of none
 OF_MIDDLE = 1e-6  # of the amplitude, by which its middle errs behind sliders or a stretch, of which no event is missed
-ORDERLY, SHOWN = 10.0, 0.25  # a change at half the steps that falls by this shows a high order, and is so much of itself
+ORDERLY, SHOWN = 10.0, 0.25  # a change at half the steps that falls by this shows a high order, and is so much of it
 MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; change over a tenth of these that is left
 # times twice as many cells as a run by itself has in a check of Iwan, and of its bars: 1 of 590 random cases erred more
 # than one, by 1.9
@@ -369,7 +370,7 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
         values, apart = ringing(time, signal, [(0.0, time[-1])], omega)
         faint[case] = not values and march.flows(law) and steps < RINGING  # for so few steps, perhaps
         for name, value in values.items():
-            out[0][name][case], out[1][name][case] = value, OF_CHANGE * apart[name]
+            out[0][name][case], out[1][name][case] = value, OF_FIT * apart[name]
     return *out, untold, faint
 
 
