@@ -202,9 +202,13 @@ class _Run:
         return np.where((self.table.static > 0) & (np.abs(speeds) > NOISE * sizes), np.sign(speeds), 0.0)
 
     def _march(self, stop, rows) -> tuple:
-        """(code, rows done (k, w)) of the compiled loop."""
+        """(code, rows done (k, w)) of the compiled loop. What it sums is added as a whole: a million cycles of four
+        pieces, added one by one, left the energies 6e-11 apart."""
+        sums = self.books.ledger[:LARGEST]
+        before, sums[:] = sums.copy(), 0.0
         code, used = self.kernels.march(stop, self.motion, self.plant, self.table, self.memory, self.past, self.clock,
                                         self.books, self.room, rows)
+        sums += before
         if code == self.kernels.PILED:
             raise NotConverged(f"dynamics: events pile up at t = {rows[max(used - 1, 0), 0]:.9g} s")
         if code == self.kernels.OPEN:

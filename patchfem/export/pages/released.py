@@ -7,6 +7,7 @@ from ...runs.results.result import Result
 from ...scales import short
 
 RESTS = 1e-2  # of the largest distance from where it ends: within it an output has come to rest
+NOTHING = 1e-9  # of the largest output: an end so near 0 is what is left of a decay to 0
 
 
 def released(result: Result) -> str:
@@ -20,6 +21,7 @@ def released(result: Result) -> str:
 def swung(time, output) -> str:
     """The sentence of `released` from the kept samples (k,) of a motion, turns among them: times [s], output [m]."""
     end, begin = float(output[-1]), float(output[0])
+    end = 0.0 if abs(end) < NOTHING * np.abs(output).max() else end
     far = np.abs(output - end)
     if not np.isfinite(far).all() or not far.max() > 0:
         return f"released at {say(begin, 3)}, the output stays there"

@@ -26,8 +26,9 @@ def both(monkeypatch, *given):
         return long, histories.simulate(*given)
 
 
-def same(one, two, share=2e-12):
-    """share: of a period, by which times may differ; a stop is an ill-conditioned one where the drive is slow."""
+def same(one, two, share=2e-12, fewer=1 / 2):
+    """share: of a period, by which times may differ; a stop is an ill-conditioned one where the drive is slow. fewer:
+    of the pieces that are short alone."""
     size = np.abs(two.amplitudes).max()
     np.testing.assert_allclose(one.amplitudes, two.amplitudes, rtol=0, atol=1e-12 * size)
     np.testing.assert_allclose(one.phasors, two.phasors, rtol=0, atol=1e-11 * size)
@@ -41,14 +42,15 @@ def same(one, two, share=2e-12):
     np.testing.assert_allclose([x.work for x in one.loops], [x.work for x in two.loops], rtol=1e-10,
                                atol=1e-12 * two.ledger["power"])
     assert energy_balance(one.ledger) < 1e-12
-    assert one.events < two.events / 2
+    assert one.events < fewer * two.events
 
 
 @pytest.mark.share(0, 3)
 @pytest.mark.parametrize("ratio, friction", [(1.0, 0.3), (0.7, 0.3), (1.0, 5.0), (1.0, 0.0)])
 def test_exact_long_pieces_are_the_short_ones(monkeypatch, ratio, friction):
+    """Each release below kinetic friction rings, in short pieces."""
     groups = event_run.groups_of(TWO, friction, ratio * friction)
-    same(*both(monkeypatch, TWO, BaseSine(1.0, 0.0005), groups, 2, 1))
+    same(*both(monkeypatch, TWO, BaseSine(1.0, 0.0005), groups, 2, 1), fewer=1 / 2 if ratio == 1 else 2 / 3)
 
 
 @pytest.mark.parametrize("zeta, friction, ratio, constant", [(0.05, 0.8, 1.0, -0.4), (1.0, 0.3, 0.9, 0.7),
