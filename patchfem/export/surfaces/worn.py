@@ -339,7 +339,7 @@ def verdict(one: Lost) -> tuple:
 def _since(one: Worn) -> str:
     """What the cycles of a run that goes on from another come after."""
     start = one.run.resolved["wear"].get("start")
-    return f" since {start}" if start else ""
+    return f" after those of {start}" if start else ""
 
 
 def _kind(ends: tuple) -> str:
