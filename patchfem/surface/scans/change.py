@@ -28,6 +28,7 @@ HIDDEN = "mean depth that even wear or a wedge may hide"
 OPEN = "changed: worn on one part or grown on another"
 EITHER = "two parts of the scans agree each up to a plane of its own, and either may be the unworn one"
 UNSURE = "the scans agree up to a plane: even wear and a wedge would look the same"
+GROWN = "but for what grew, the scans agree up to a plane: even wear and a wedge would look the same"
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ class Change:
         found = self.volumes.values
         if found["worn_volume"].low > 0:
             return found
-        blank = nothing(EITHER if self.volumes.open else UNSURE)
+        blank = nothing(_unshown(self.volumes))
         return blank | {"grown_volume": found["grown_volume"]} if found["grown_volume"].low > 0 else blank
 
 
@@ -143,7 +144,8 @@ def without_spikes(scan: Areal) -> tuple:
 
 def _off_median(z, known) -> tuple:
     """(scatter of the known heights (m, n) about the medians of 5 x 5 around them, how far each stands off its own (m,
-    n)), 0 where that is less than the least spike: half of its neighbours would be as far below or above it."""
+    n)), 0 where that is less than the least spike: half of its neighbours would be as far below or above it. Heights
+    that are the median, as most are on a smooth slope, tell nothing of the scatter."""
     from scipy.ndimage import maximum_filter, minimum_filter
 
     around = np.lib.stride_tricks.sliding_window_view(np.pad(z, 2, "symmetric"), (5, 5))
@@ -155,7 +157,8 @@ def _off_median(z, known) -> tuple:
             around[rows[one], columns[one]].reshape(-1, 25), axis=1)) for one in parts] or [np.zeros(0)])
 
     there = np.flatnonzero(known)
-    scale = 1.4826 * float(np.median(distance(there[::max(there.size // SOME, 1)])))
+    off = distance(there[::max(there.size // SOME, 1)])
+    scale = 1.4826 * float(np.median(off[off > 0])) if off.any() else 0.0
     far = np.maximum(z - minimum_filter(z, 5), maximum_filter(z, 5) - z) > SPIKE[0] * scale
     out, places = np.zeros(z.shape), np.flatnonzero(far & known)
     out.ravel()[places] = distance(places)
@@ -184,8 +187,12 @@ def hidden(one: Change) -> Quantity:
     if one.volumes is None:
         return refused("m", HIDDEN, one.why)
     carried = one.volumes.values["worn_volume"].low > 0
-    return refused("m", HIDDEN, "unworn parts carry the registration" if carried else
-                   EITHER if one.volumes.open else UNSURE)
+    return refused("m", HIDDEN, "unworn parts carry the registration" if carried else _unshown(one.volumes))
+
+
+def _unshown(found: Volumes) -> str:
+    """Why no wear is shown."""
+    return EITHER if found.open else GROWN if found.values["grown_volume"].low > 0 else UNSURE
 
 
 def headline(one: Change) -> str:

@@ -169,6 +169,22 @@ def test_always_spikes_are_left_out_and_pits_are_not(grooved):
     assert np.isfinite(kept.z[110, 110]) == np.isfinite(scan.z[110, 110]) and count <= 8
 
 
+def test_always_what_grew_stands_beside_the_reason_why_no_wear_is_shown():
+    found = change.changed(*scans(lambda x, y, z: -0.4e-6 * np.clip(
+        1 - (np.hypot(x - SIDE / 2, y - SIDE / 2) / 25e-6)**2, 0.0, None)))
+    assert change.headline(found) == change.GREW and found.values["worn_volume"].value is None
+    assert found.values["worn_volume"].reason == change.hidden(found).reason == change.GROWN
+
+
+def test_always_a_spike_on_a_slope_is_left_out():
+    """Each height of a slope is the median of those around it."""
+    axis, draw = STEP * np.arange(60), np.random.default_rng(3)
+    z = 5e-2 * axis + 2e-2 * axis[:, None] + 1e-10 * draw.normal(size=(60, 60))
+    z[30:32, 20:22] += 12e-6
+    kept, count = change.without_spikes(Areal(axis, axis, z, "a scan"))
+    assert count == 4 and np.isnan(kept.z[30:32, 20:22]).all()
+
+
 def test_always_kept_spikes_count_and_the_others_do_not(grooved, worn):
     scan, z = grooved[1], grooved[1].z.copy()
     z[120:122, 20:22] += 4e-6
