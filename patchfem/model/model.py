@@ -153,5 +153,5 @@ def resolved(scene: Scene, model: Model) -> str:
     """
     friction = scene.friction
     if friction is not None and friction.rest_growth is not None and friction.rest_speed is None:
-        friction = friction.model_copy(update={"rest_speed": model.bonds.rest_speed})
+        friction = friction.model_copy(update={"rest_speed": float(model.bonds.rest_speed)})
     return replace(scene, friction=friction).resolved()

@@ -84,7 +84,7 @@ def _lines(table: Table, at: str) -> Iterator[str]:
     without, inner = _unused(table), []
     for key, name in keys(type(table)).items():
         value = getattr(table, name)
-        if value is None or value == () or key in without:
+        if value is None or (isinstance(value, tuple) and not value) or key in without:
             continue
         path = f"{at}.{key}" if at else key
         if isinstance(value, tuple) and isinstance(value[0], Table):

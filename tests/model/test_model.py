@@ -84,6 +84,15 @@ def test_exact_the_resolved_text_has_what_follows_from_other_keys():
     assert loads(model.source.resolved).friction.rest_speed == model.bonds.rest_speed == 1e-3 * model.speed
 
 
+def test_always_the_speed_of_a_released_rig_can_be_written():
+    """Several modes in rest at t = 0: the speed to expect is a number of numpy, which a text does not take."""
+    modes = "".join(f'[[structure.mode]]\nname = "m{k}"\nfrequency = "{f} Hz"\ndamping = 0.01\nslide = {s}\n'
+                    for k, (f, s) in enumerate([(120, 1.0), (300, 0.3)]))
+    model = build(loads(POINT + GROWING + '[structure]\nmoving_mass = "1 kg"\n' + modes + '[structure.start]\n'
+                        'displacement = ["0.4 mm", "0 mm"]\n[drive]\nkind = "free"\ncycles = 3\n'))
+    assert loads(model.source.resolved).friction.rest_speed == model.bonds.rest_speed
+
+
 @pytest.mark.parametrize("text, sets", RUNS.values(), ids=RUNS)
 def test_exact_a_run_makes_nothing_of_the_model_again(text, sets, monkeypatch):
     """Every maker is called at most once, and none once the model stands."""
