@@ -124,24 +124,24 @@ def residuals(skin, c: Slices, x, weight, gap, force, delta: float, free: float,
     return MappingProxyType({key: float(value) for key, value in out.items()})
 
 
-def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.ndarray, gap: np.ndarray,
+def press_strips(c: np.ndarray | Slices, x: np.ndarray, weight: np.ndarray, offsets: np.ndarray, gap: np.ndarray,
                  roll: float = 0.0, load: float | None = None, moment: float | None = None,
                  approach: float | None = None, rotation: float = 0.0, spring: float = 0.0, skin=None,
-                 lateral: float | None = None, own=None) -> StripsState:
+                 lateral: float | None = None) -> StripsState:
     """Press strips by one holder.
 
-    c: closing compliance (m, m) [m/N] of each strip (`one_strip`); x: (m,) [m]; weight: nodal areas (m,) [m2] of one
-    strip; offsets: y (s,) [m] (`strip_offsets`); gap: (m,) or (s, m) [m]; roll [rad] > 0 opens the gap at +y. Controls:
-    `load` [N] of all strips with `rotation` [rad] held (already in the gap, only reported); `load` and `moment` sum f x
-    [N m] with the rotation free, or held by the holder's `spring` [N m/rad] from `rotation` on; `approach` [m] with the
-    rotation held; beside a load `lateral` sum f y [N m] with the roll free, counted from `roll` on. skin: None (bare),
-    or a law of `skin_laws`; rigid bodies (c = 0) need a skin. own: (s, m) [m/N] added to the diagonal of c strip by
-    strip, as wear does. Where nothing touches the outcome is no_contact.
+    c: closing compliance (m, m) [m/N] of each strip (`one_strip`), or with what each adds to it, as wear does; x: (m,)
+    [m]; weight: nodal areas (m,) [m2] of one strip; offsets: y (s,) [m] (`strip_offsets`); gap: (m,) or (s, m) [m];
+    roll [rad] > 0 opens the gap at +y. Controls: `load` [N] of all strips with `rotation` [rad] held (already in the
+    gap, only reported); `load` and `moment` sum f x [N m] with the rotation free, or held by the holder's `spring`
+    [N m/rad] from `rotation` on; `approach` [m] with the rotation held; beside a load `lateral` sum f y [N m] with the
+    roll free, counted from `roll` on. skin: None (bare), or a law of `skin_laws`; rigid bodies (c = 0) need a skin.
+    Where nothing touches the outcome is no_contact.
 
     PatchfemError for other controls, a moment that no pressure carries, an exponential law without reference under an
     approach; NotConverged above a residual of 1e-9.
     """
-    offsets, c = np.atleast_1d(np.asarray(offsets, float)), Slices(c, own)
+    offsets, c = np.atleast_1d(np.asarray(offsets, float)), c if isinstance(c, Slices) else Slices(c)
     gap = np.broadcast_to(gap, (offsets.size, x.size)) + roll * offsets[:, None]
     _refuse(skin, x, gap, load, None if spring and load is not None else moment, approach)
     _refuse_roll(offsets, load, lateral)

@@ -9,7 +9,7 @@ overshoot. Where that repeats itself or wanders, q alone is led down the dual, i
 with every strip solved under its own approach.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -20,6 +20,7 @@ from .unilateral import solve_forces
 
 STEPS = 60  # of Newton's method, before the dual is gone down
 FLOOR = -300.0  # log pressure below which an approach does not reach the skin
+FACTORS = 1e8  # bytes of the factors that pressings share, about, as contact sets are of unlike size
 
 
 def smooth(skin) -> bool:
@@ -27,15 +28,39 @@ def smooth(skin) -> bool:
     return skin is not None and not isinstance(skin, LinearSkin)
 
 
+@dataclass(eq=False, slots=True)
+class Near:
+    """What one pressing of strips leaves to the next, which closes nearly the same nodes of the same strips.
+
+    closed: (s, m) bool contact set to begin with, None before the first; factors: Cholesky factors by the nodes of a
+    strip and what it adds to its diagonal, the latest up to FACTORS.
+    """
+
+    closed: np.ndarray | None = None
+    factors: dict = field(default_factory=dict)
+
+    def factor(self, key: tuple, matrix) -> tuple:
+        """`cho_factor` of what matrix() makes, kept by its key."""
+        found = self.factors.pop(key, None)
+        if found is None:
+            found = cho_factor(matrix(), lower=True, overwrite_a=True)
+        self.factors[key] = found  # the latest stands last
+        while len(self.factors) > max(1, FACTORS // found[0].nbytes):
+            del self.factors[next(iter(self.factors))]
+        return found
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Slices:
     """Compliance of strips: what all of them have, and what each of them adds to its diagonal.
 
-    common: C (m, m) [m/N]; own: (s, m) [m/N], None where nothing is added.
+    common: C (m, m) [m/N]; own: (s, m) [m/N], None where nothing is added; near: of pressings with the same C, None of
+    a single one.
     """
 
     common: np.ndarray
     own: np.ndarray | None = None
+    near: Near | None = None
 
     def among(self, strip: int, nodes) -> np.ndarray:
         """Compliance (k, k) [m/N] of some nodes (k,) of a strip."""
@@ -52,13 +77,20 @@ class Slices:
         """What two strips of the same compliance have in common."""
         return b"" if self.own is None else self.own[strip].tobytes()
 
+    def factor(self, strip: int, active) -> tuple:
+        """`cho_factor` of the compliance of the active nodes (m,) bool of a strip."""
+        def matrix() -> np.ndarray:
+            return self.among(strip, np.flatnonzero(active))
+
+        return (self.near or Near()).factor((active.tobytes(), self.alike(strip)), matrix)
+
     @property
     def largest(self) -> float:
         """Largest entry [m/N]."""
         return float(np.abs(self.common).max() + (0.0 if self.own is None else self.own.max()))
 
     def plus(self, diagonal) -> "Slices":
-        """The strips with (m,) [m/N] more on the diagonal of each."""
+        """The strips with (m,) [m/N] more on the diagonal of each, by themselves."""
         return Slices(self.common + np.diag(diagonal), self.own)
 
 
@@ -67,7 +99,7 @@ def softer(skin, c: Slices, weight) -> Slices:
 
     So bare contact of it is contact through the linear skin. weight: nodal areas A (m,) [m2].
     """
-    return c.plus(1 / (skin.k * weight)) if isinstance(skin, LinearSkin) else c
+    return replace(c.plus(1 / (skin.k * weight)), near=c.near) if isinstance(skin, LinearSkin) else c
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -133,7 +165,7 @@ def bare_parts(c, motions, active, gap=None) -> tuple:
     for strips in map(np.array, groups.values()):
         nodes = np.flatnonzero(active[strips[0]])
         sides = base[nodes] if gap is None else np.column_stack([base[nodes], gap[np.ix_(strips, nodes)].T])
-        answer = cho_solve(cho_factor(c.among(strips[0], nodes), lower=True, overwrite_a=True), sides)
+        answer = cho_solve(c.factor(strips[0], active[strips[0]]), sides)
         parts.append((strips, nodes, *np.split(answer, [base.shape[1]], axis=1)))
         system += motions.folded(strips, base[nodes].T @ parts[-1][2])
     return parts, system
@@ -347,7 +379,13 @@ def _first_set(gap, motions, target) -> np.ndarray:
 
 def _bare_loaded(c, x, gap, motions, target) -> tuple:
     """Forces, motion q, steps of bare strips under a load (and moments), by the active set or down the dual."""
-    if (found := _active_set(c, gap, motions, target, _first_set(gap, motions, target))) is not None:
+    found, near = None, c.near
+    if near is not None and near.closed is not None:
+        found = _active_set(c, gap, motions, target, near.closed)
+    found = found or _active_set(c, gap, motions, target, _first_set(gap, motions, target))
+    if near is not None:
+        near.closed = None if found is None else found[0] > 0
+    if found is not None:
         return found
     depth = c.largest * target[0]
     force, q, steps = _downhill(None, c, x, None, gap, motions, target, depth / len(gap), np.ptp(gap) + depth)

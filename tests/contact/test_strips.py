@@ -531,7 +531,7 @@ def test_exact_strips_with_diagonals_of_their_own_are_one_block_diagonal_operato
     for number, (c, x, weight, y, gap, roll, load, moment, spring) in enumerate(dense_cases(6)):
         own = np.random.default_rng(number).uniform(0, 2, gap.shape) * c.max()
         own[-1] = own[0]  # two strips share a factorisation where they are alike
-        state = press_strips(c, x, weight, y, gap, roll, load, moment, spring=spring, skin=skin, own=own)
+        state = press_strips(Slices(c, own), x, weight, y, gap, roll, load, moment, spring=spring, skin=skin)
         target = np.array([load] if moment is None else [load, moment])
         whole = np.kron(np.eye(y.size), softer(skin, c, weight)) + np.diag(own.ravel())
         force, motion, _ = solve_forces(whole, np.tile(x, y.size), (gap + roll * y[:, None]).ravel(), target,
@@ -543,7 +543,7 @@ def test_exact_strips_with_diagonals_of_their_own_are_one_block_diagonal_operato
 def test_exact_smooth_skins_carry_diagonals_of_the_strips():
     for number, (c, x, weight, y, gap, roll, load, _, _) in enumerate(dense_cases(3)):
         own = np.random.default_rng(number).uniform(0, 2, gap.shape) * c.max()
-        state = press_strips(c, x, weight, y, gap, roll, load, skin=SKINS["hertz"], own=own)
+        state = press_strips(Slices(c, own), x, weight, y, gap, roll, load, skin=SKINS["hertz"])
         other = solve(SKINS["hertz"], np.kron(np.eye(y.size), c) + np.diag(own.ravel()), np.tile(x, y.size),
                       np.tile(weight, y.size), (gap + roll * y[:, None]).ravel(), load)
         assert np.abs(state.force.ravel() - other.force).max() <= 1e-10 * load

@@ -69,6 +69,18 @@ def test_exact_jumps_of_strips_are_those_of_one_block_diagonal_problem():
     assert np.abs(strips.force.ravel() - flat.force).max() < 1e-9 * LOAD
 
 
+def test_exact_strips_pressed_from_the_last_contact_set_have_the_bits_of_those_pressed_alone():
+    model = build(loads(TILTED + ROLLED + COULOMB + SINE + WEAR + LOOSE, "strips.toml"))
+    pair = solve_all(model.patch, 1e-2, False)[0].pair
+    press, area = presser(model.patch, pair), areas(model.patch, pair.compliance.interface)
+    for share in (0.0, 0.1, 0.12, 1.0, 0.12, 0.0):
+        worn = share * 3e-7 * np.linspace(1, 0, area.size).reshape(area.shape)
+        for soft in (0 * area, 2e-13 / area):
+            force = press(worn, soft)
+            assert np.array_equal(force, presser(model.patch, pair)(worn, soft))
+            assert np.array_equal(press.near.closed, force > 0)
+
+
 def test_exact_a_rolled_pad_on_springs_evens_its_pressure_out():
     """Winkler: p = p_mean + (p_0 - p_mean) exp(-kappa s k N) in full contact, on pieces that hardly give way."""
     stiff = PIECE + 'load = "26 lbf"\nelement_size = "4 mm"\nsubstrate = {young = "1e17 Pa", poisson = 0.3, ' \

@@ -53,7 +53,8 @@ def bench_engine(model, slide, points: int = 1, choice: Choice | None = None) ->
         return BenchEngine(PLANE, _stepped_seconds(model, slide, 1))
     if soft and (has(f.law, "bonds") or model.grooves is not None):
         modes = model.accuracy.shear_modes or shear_modes.SHEAR_MODES
-        return BenchEngine(POINTS, rates.behind_modes(points, modes))
+        varies = model.grooves is not None or pressure_changes(model)
+        return BenchEngine(POINTS, rates.behind_modes(points, modes, varies))
     if soft:
         return BenchEngine(ELEMENTS, rates.SLIP_NODE * points + rates.SAMPLE)
     if pressure_changes(model) and model.grooves is None:

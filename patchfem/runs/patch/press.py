@@ -7,6 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from ...contact import edges
+from ...contact.strips_solve import Near
 from ...contact.unilateral import press, press_by
 from ...core import Compliance, Pressure, frozen_array
 from . import skin as skin_press
@@ -154,14 +155,34 @@ def presser(asked, pair: Pair):
     gap, bare = gap + pair.rise, pair.compliance
     how = _how(asked)
     if asked.strips is not None:
-        return lambda worn, softening: _how(asked, partial(_under, own=softening if softening.any() else None))(
-            asked, bare, gap + worn)[3].force
+        return PressedStrips(asked, bare, gap)
 
     def press(worn, softening):
         soft = replace(bare, normal=bare.normal + np.diag(softening)) if softening.any() else bare
         return how(asked, soft, gap + worn)[1].sigma_n * bare.interface.weight
 
     return press
+
+
+@dataclass(eq=False, slots=True)
+class PressedStrips:
+    """The function of `presser` on strips, each pressing begun from the contact set of the one before it.
+
+    gap: (m,) [m]. So that the same presses give the same bits after an interruption, `begin` says where to begin.
+    """
+
+    asked: object
+    bare: Compliance
+    gap: np.ndarray
+    near: Near = field(default_factory=Near)
+
+    def begin(self, force) -> None:
+        """Begin the next pressing from the contact set of forces (s, m) [N]."""
+        self.near.closed = np.asarray(force) > 0
+
+    def __call__(self, worn, softening) -> np.ndarray:
+        how = _how(self.asked, partial(_under, own=softening if softening.any() else None, near=self.near))
+        return how(self.asked, self.bare, self.gap + worn)[3].force
 
 
 def pressure_on(asked, pieces: Compliance, gap) -> Pressure:
@@ -179,13 +200,13 @@ def _how(asked, under=None):
     return lambda asked, pieces, gap: closed_by(asked, pieces, gap, under, bare(asked.skin, pieces))
 
 
-def _under(asked, pieces: Compliance, gap, own=None) -> tuple:
+def _under(asked, pieces: Compliance, gap, own=None, near=None) -> tuple:
     """The pair under its load, or under its approach with the rotation held: (Compliance with its skin, Pressure, skin,
-    strips); own: (s, m) [m/N] that strips add to their diagonals."""
+    strips); own, near: of `strips_solve.Slices`."""
     strips = skin = None
     angle, moment, spring = asked.gap.angle, asked.moment, asked.spring
     if asked.strips is not None:
-        pieces, pressure, skin, strips = strip_press.in_strips(asked, pieces, gap, (angle, moment, spring), own)
+        pieces, pressure, skin, strips = strip_press.in_strips(asked, pieces, gap, (angle, moment, spring), own, near)
     elif asked.skin is not None and asked.skin.law != "linear":
         pieces, pressure, skin = skin_press.behind_skin(asked, pieces, gap, angle, moment, spring)
     else:

@@ -5,28 +5,27 @@ import numpy as np
 from ...contact import edges
 from ...contact.skin_laws import LinearSkin
 from ...contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
-from ...contact.strips_solve import smooth
+from ...contact.strips_solve import Slices, smooth
 from ...core import Compliance, Pressure, frozen_array
 from ...slip import shear_modes
 from .skin import BEARING, borne, skin_law
 
 
-def in_strips(asked, pieces: Compliance, gap, held: tuple, own=None) -> tuple:
+def in_strips(asked, pieces: Compliance, gap, held: tuple, own=None, near=None) -> tuple:
     """Press a pair in strips: (Compliance of all strips, Pressure of their means over the width, skin or None,
     StripsState).
 
-    gap: (m,) or (s, m) [m]; held: rotation [rad], moment or None, spring of the holder; own: (s, m) [m/N] of
-    `press_strips`. The Compliance is what the pieces would have in full contact over the width; stiffnesses are those
-    of the strips.
+    gap: (m,) or (s, m) [m]; held: rotation [rad], moment or None, spring of the holder; own, near: of `Slices`.
+    The Compliance is what the pieces would have in full contact over the width; stiffnesses are those of the strips.
     """
     (count, roll, offset), interface, (angle, moment, spring) = asked.strips, pieces.interface, held
     skin = skin_of(asked)
     by = asked.approach
     one, _, weight = one_strip(pieces, count)
-    state = press_strips(one, interface.x, weight, strip_offsets(asked.width, count), gap, roll,
+    state = press_strips(Slices(one, own, near), interface.x, weight, strip_offsets(asked.width, count), gap, roll,
                          asked.load if by is None else None, moment if by is None else None, by, angle,
                          spring if by is None else 0.0, skin,
-                         lateral=None if offset is None else asked.load * offset, own=own)
+                         lateral=None if offset is None else asked.load * offset)
     mean = (borne(state.pressure) if smooth(skin) else state.pressure).mean(axis=0)
     answer = Pressure(frozen_array(mean), frozen_array(state.gap.min(axis=0)), state.delta, state.theta, state.load,
                       state.moment, state.outcome, state.iterations, state.residuals)

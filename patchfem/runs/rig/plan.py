@@ -35,18 +35,17 @@ def march_cost(model: Model, numerics, unknowns: dict) -> tuple:
     steps = int(numerics.cycles * numerics.steps)
     each, points = _step(rig, f), unknowns.get("interface_points", 1)
     if model.grooves is not None:
-        searched = 4 * _of_modes(numerics, points, unknowns) if soft else 0.0  # for the normal force
-        each = rates.CLIMB + searched
+        each = _of_modes(numerics, points, unknowns, True) if soft else rates.CLIMB
     elif f is not None and has(f.law, "bonds"):
         if lists.quadrature_of(model, numerics).engine != "recursion":
             entries, seconds = lists.bonds_cost(model, numerics)
             each, unknowns["bond_list_about"] = seconds / steps, int(entries)
         elif soft:
-            each = _of_modes(numerics, points, unknowns)
+            each += _of_modes(numerics, points, unknowns, rig.load_varies)
         elif numerics.per_point:
             each = rates.FIELD_NODE * points
     elif soft and rig.load_varies:
-        each = _of_modes(numerics, points, unknowns)
+        each = _of_modes(numerics, points, unknowns, True)
     elif soft:
         each = rates.SLIP_NODE * points + rates.LIST_STEP
     passes = 0.75 + 2**(lists.halvings(model) + 1) - 1  # a half and a quarter of the steps, and each halving of them
@@ -61,10 +60,10 @@ def _step(rig, f) -> float:
         rates.JOINT * faces if faces > 1 else 1.0)
 
 
-def _of_modes(numerics, points: int, unknowns: dict) -> float:
+def _of_modes(numerics, points: int, unknowns: dict, load_varies: bool) -> float:
     """Seconds of a step behind shear modes, whose number goes into `unknowns`."""
     unknowns["shear_modes"] = numerics.shear_modes or shear_modes.SHEAR_MODES
-    return rates.behind_modes(points, unknowns["shear_modes"])
+    return rates.behind_modes(points, unknowns["shear_modes"], load_varies)
 
 
 def groups(model: Model) -> dict:

@@ -174,6 +174,8 @@ def _jumped(model, asked: Wearing, state: Worn) -> Worn:
     def ahead(one: Worn) -> float:
         return max(_taken(model, one.depth), default=(0.0,))[0] - 1
 
+    if model.patch.strips is not None:
+        asked.press.begin(state.force)
     how = asked, state, model.accuracy.tolerance, model.wear.jumps
     found, low, high, last = after(*how, until=next_row(model.wear, asked, state)), state.cycle, np.inf, 0.0
     below, above, end = ahead(state), ahead(found), found.cycle

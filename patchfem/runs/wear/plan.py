@@ -9,6 +9,8 @@ from ...wear.jumps import Wearing, after, start
 from .evolve import next_row
 
 PRESSED = 20  # contact solves in a jump with its corrections
+FEWER = 7  # of those of a strip, each begun from the one before it
+AGAIN = 0.7  # of a motion with its coarser runs is the finest, with more of the patch at work as it wears
 SOLVE = 1.2e-8  # s per squared interface point of one of them, and of the measures after it
 ROW, FINE = 192, 1000  # springs of the row whose jumps are counted, of a pinned mesh at most
 INNER, END = 0.3, 0.44  # thickness of the springs within a patch, over the length in contact, and at an end of it
@@ -90,8 +92,9 @@ def _anew(model) -> bool:
 def cost(model, points: int, motion: float) -> float:
     """Seconds of all jumps on a patch of so many interface points; motion: of the march or the bench with its coarser
     runs, of which a jump takes one."""
-    again = motion / 2 if _anew(model) else 0.0
-    return jumps_about(model) * (PRESSED * SOLVE * points**2 + 5e-3 + again)
+    again, asked = AGAIN * motion if _anew(model) else 0.0, model.patch.strips
+    pressings = PRESSED if asked is None else max(PRESSED, FEWER * asked[0])
+    return jumps_about(model) * (pressings * SOLVE * points**2 + 5e-3 + again)
 
 
 def verdict(model) -> str:
