@@ -12,6 +12,7 @@ from patchfem.contact.unilateral import solve_forces
 from patchfem.model.model import build
 from patchfem.runs.patch.press import areas, presser
 from patchfem.runs.patch.result import solve_all
+from patchfem.runs.rig.strips import across
 from patchfem.runs.wear import evolve
 from patchfem.scene.scene import loads
 from patchfem.wear.jumps import Wearing, after, start
@@ -117,6 +118,13 @@ def test_exact_a_rig_wears_its_strips_by_their_own_slides(yaw):
         expected = np.ptp(slides[last], axis=0) / 2
         assert np.ptp(expected) > 1e-2 * expected.mean()
     assert volumes == pytest.approx(1e-14 * LOAD / 4 * 4 * expected * 1e3, rel=5e-3)
+    said = [note for note in found.extra["notes"] if "across x" in note]
+    assert len(said) == (yaw != "0")
+    if said:  # x is pressed evenly but for its ends: the mean of (20 x)^2/2 is (20 l)^2/24
+        swing, share = across(found.patch, found.window, 1 / 143)
+        assert swing == pytest.approx(20 * 6.35e-3 * found.measures["relative_displacement_amplitude"].value, rel=0.05)
+        assert share == pytest.approx((20 * 12.7e-3)**2 / 24, rel=0.25)
+        assert f"{100 * share:.2g} % longer" in said[0] and "friction and wear leave out" in said[0]
 
 
 def test_exact_files_hold_the_depth_of_every_strip(tmp_path):

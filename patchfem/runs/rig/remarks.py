@@ -12,6 +12,7 @@ from . import pieces
 from .costs import dear_elements
 from .engines import ENGINES, PIECES
 from .solution import borne
+from .strips import across
 
 
 def warnings_of(run) -> list:
@@ -38,7 +39,7 @@ def warnings_of(run) -> list:
 def notes_of(run) -> list:
     """Notes of a `rig.Coupled`: what its law and its engine mean, what its fields leave out, how its motion ended."""
     model, raw, rig = run.model, run.raw, run.model.rig
-    ended = [raw.message] if raw.message and raw.outcome is Outcome.LEAVES_GROOVES else []
+    ended = [*_across(run), *([raw.message] if raw.message and raw.outcome is Outcome.LEAVES_GROOVES else [])]
     if run.patch is not None and run.patch.strips is not None and model.soft:
         return ["strips that slip part by part have no common shear stress: the fields hold the pressure",
                 *run.rings.notes, *ended]
@@ -49,6 +50,16 @@ def notes_of(run) -> list:
         out.append(f"onset_level: a slip amplitude counts from {length(raw.held)} on, a thousandth of the slide over "
                    "which the interface gives way; below it a part of the interface may slip already")
     return [*out, *creeping_note(f), *run.rings.notes, *ended]
+
+
+def _across(run) -> list:
+    """The sentence on what strips that yaw do across x."""
+    if "slides" not in run.raw.window.extra or run.patch.strips.offsets.size < 2 or not run.patch.strips.load:
+        return []
+    swing, share = across(run.patch, run.raw.window, run.drive.period)
+    return [f"the yaw moves the ends of the patch by up to {length(swing)} across x, which friction"
+            f"{' and wear leave' if run.model.wear is not None else ' leaves'} out: the path of the slide in the last "
+            f"cycle is {100 * share:.2g} % longer with it, in the mean under the pressure"] if swing > 0 else []
 
 
 def creeping_note(friction) -> list:

@@ -33,3 +33,20 @@ def as_one(response, loads, offsets):
     slips = extra.get("slips", slides)
     return replace(response, slide=slides @ share, slide_rate=rates @ share, force=forces.sum(axis=1),
                    slip=slips @ share, extra=extra | {"yaw_moment": forces @ np.asarray(offsets)})
+
+
+def across(patch, window, period: float) -> tuple:
+    """What strips that yaw leave out: (amplitude [m] of the ends of the patch across x, share by which the slide path
+    of the last cycle is longer with it, in the mean under the pressure).
+
+    The yaw turns the patch about its middle: a point slides by s_j along x and by its rotation times x across.
+    """
+    last = window.time >= window.time[-1] - period * (1 + 1e-9)
+    slides, y, x = window.extra["slides"][last], patch.strips.offsets, np.abs(patch.x)
+    turned = (slides[:, -1] - slides[:, 0]) / (y[-1] - y[0])
+    steps, turns, along, whole = np.abs(np.diff(slides, axis=0)), np.abs(np.diff(turned)), 0.0, 0.0
+    for step, force in zip(steps.T, patch.strips.force):
+        bears = force > 0
+        along += float(step.sum() * force.sum())
+        whole += float(np.hypot(step[:, None], turns[:, None] * x[bears]).sum(axis=0) @ force[bears])
+    return float(np.ptp(turned)) / 2 * float(x.max()), whole / along - 1 if along > 0 else 0.0
