@@ -6,8 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ...contact import edges
-from ...contact.strips_solve import Near
+from ...contact import edges, strips_solve
 from ...contact.unilateral import press, press_by
 from ...core import Compliance, Pressure, frozen_array
 from . import skin as skin_press
@@ -168,13 +167,14 @@ def presser(asked, pair: Pair):
 class PressedStrips:
     """The function of `presser` on strips, each pressing begun from the contact set of the one before it.
 
-    gap: (m,) [m]. So that the same presses give the same bits after an interruption, `begin` says where to begin.
+    gap: (m,) [m]; near: `strips_solve.Near`. So that the same presses give the same bits after an interruption, `begin`
+    says where to begin.
     """
 
     asked: object
     bare: Compliance
     gap: np.ndarray
-    near: Near = field(default_factory=Near)
+    near: object = field(default_factory=lambda: strips_solve.Near())
 
     def begin(self, force) -> None:
         """Begin the next pressing from the contact set of forces (s, m) [N]."""
