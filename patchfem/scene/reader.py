@@ -386,6 +386,8 @@ def _message(model: type[Table], name: str, error: Any, value: Any) -> str:
         bound = error["ctx"][key]
         bound = str(bound) if isinstance(bound, int) else f"{bound:g}"
         return f"must be {sign} {bound}, not {_show(value)}; {_wanted(model, name)}"
+    if error["type"] == "too_short" and value and error["ctx"]["min_length"] > 1:
+        return f"at least {error['ctx']['min_length']} values are wanted, not {len(value)}"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
     if allowed and isinstance(value, str):

@@ -54,7 +54,7 @@ def notes_of(run) -> list:
 
 def _across(run) -> list:
     """The sentence on what strips that yaw do across x."""
-    if "slides" not in run.raw.window.extra or run.patch.strips.offsets.size < 2 or not run.patch.strips.load:
+    if not run.model.rig.strips_slide_apart or run.patch.strips.offsets.size < 2 or not run.patch.strips.load:
         return []
     swing, share = across(run.patch, run.raw.window, run.drive.period)
     return [f"the yaw moves the ends of the patch by up to {length(swing)} across x, which friction"

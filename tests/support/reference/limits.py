@@ -70,7 +70,7 @@ Damping is viscous; hysteretic damping of a file is taken as viscous. A complex 
 
 **Wear.** Archard's law on the pressure and the slip of each point; debris and heat are left out, and friction
 changes by the table `[wear.friction]` alone, for the patch as a whole. A rig repeats its last cycle between jumps.
-Strips that yaw wear by their slides along x alone.
+Strips that yaw rub and wear by their slides along x alone; a note says how far their ends move across.
 
 **Errors.** Stated errors are estimates from coarser runs, to hold in 19 of 20 scenes; they do not know what the model
 leaves out. A step in the gap makes the peak of the pressure infinite: its number belongs to the mesh.
