@@ -94,6 +94,23 @@ def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
     np.testing.assert_array_equal(found.values["loop_area"], ones.values["loop_area"])
 
 
+def test_always_a_contradicted_law_of_a_stretch_marches_by_twice_the_steps(monkeypatch):
+    """Where that mends what the check found, no case is run by itself."""
+    cases = models("tanh", 5, 64)
+    steps, real = lanes.steps_of(cases), lanes.runs_of
+
+    def wrong(models, marched, now, *given):
+        runs, *rest = real(models, marched, now, *given)
+        runs.values["loop_area"][lanes.steps_of(models) == now] *= 1.1
+        return runs, *rest
+
+    monkeypatch.setattr(lanes, "runs_of", wrong)
+    found = many.answers(cases)
+    marched = np.array([found.numerics[case].get("steps_per_cycle", 0) for case in range(64)])
+    assert {one["engine"] for one in found.numerics.values()} == {"lanes"} and (marched >= 2 * steps).all()
+    assert all("creeps" in notes[-1] and len(notes) == 1 for notes in found.notes.values()) and len(found.notes) == 64
+
+
 @pytest.mark.parametrize("law", EXACT[:3])
 def test_exact_what_sticks_is_told_by_lanes(law):
     """Cases that end stuck, with their rings: the answers of the exact batch within the bars, and no measure less."""
