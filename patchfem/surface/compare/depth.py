@@ -83,7 +83,7 @@ def extent_of(found: Registration, together: float) -> Extent | None:
     together: how many neighbouring heights err alike.
     """
     rest = np.asarray(found.rest)
-    ends = [edge(rest, found.noise, together), edge(rest[::-1], found.noise, together)]
+    ends = [edge(rest, found.loudest, together), edge(rest[::-1], found.loudest, together)]
     if None in ends:
         return None
     x, last = found.x, rest.size - 1

@@ -26,7 +26,7 @@ WIDER = 1.15  # the interval of the stretch, without it, holds 92 of 100
 BENT, GROWN = 0.8, 0.5  # of the noise that a bend, or heights that grew, must leave at most to be taken
 ALL = 0.8  # of the differences, at most, that one factor of the heights leaves
 SIDES = 20  # parts of the trace whose low depths show a bend
-ROUNDS = 100
+ROUNDS, EIGHTHS = 100, 8
 DIGITS = 1e-5  # of the height: least noise that is counted with
 LEVELS, EACH, TAILS, QUIETEST = 8, 64, 4.0, 0.3  # levels of roughness, heights of one, its deviations, least of noise
 
@@ -69,6 +69,15 @@ class Registration:
         """Standard deviation of pull @ (offset, slope, shift): that of the noise, and a doubt beyond twice as much."""
         noise = float(pull @ self.covariance @ pull)
         return float(np.sqrt(noise + max((pull @ self.doubt) ** 2 - 4 * noise, 0.0)))
+
+    @cached_property
+    def loudest(self) -> float:
+        """Largest noise [m] of an eighth of the unworn heights: what ends there must stand out from it.
+
+        Digits of a file are coarser where its heights are larger, as along a tilt.
+        """
+        parts = np.array_split(np.asarray(self.rest)[self.used], EIGHTHS)
+        return max(self.noise, *(float(np.sqrt(np.mean(one**2) / KEPT)) for one in parts if one.size >= EACH), 0.0)
 
     @property
     def middle(self) -> float:

@@ -80,7 +80,7 @@ def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -
         part, places = (one[side] if text is FROM else one[side][::-1] for one in (rest, x))
         deep = np.flatnonzero(part[:max(outside - MEDIAN, 0)] > 2 * REACH * found.noise)
         beside = int(deep[-1]) + 1 if deep.size else 0  # other worn places do not count
-        at = edge_near(part[beside:], outside - beside, found.noise, together)
+        at = edge_near(part[beside:], outside - beside, found.loudest, together)
         half = (places[0] - places[1]) / 2  # an edge lies between the last unworn sample and the first worn one
         value, *ends = (float(places[beside + k] + half) for k in at)
         out.append(Quantity(value, min(ends), max(ends), "m", text))
@@ -115,7 +115,7 @@ def _pile_up(found: Registration, low: float, high: float, together: float, text
     what is raised; where nothing is, the interval holds what a low ridge may hide there."""
     near = np.flatnonzero((found.x > low) & (found.x < high))
     inward = near if text == LEFT else near[::-1]
-    at = edge(-np.asarray(found.rest)[inward], found.noise, together) if near.size > 8 else None
+    at = edge(-np.asarray(found.rest)[inward], found.loudest, together) if near.size > 8 else None
     held = np.isin(np.arange(found.x.size), inward[0 if at is None else at[0]:])
     area, error = summed(found, held, False)[:2] if held.any() else (0.0, 0.0)
     if at is None or area >= 0:

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from pairs import KINDS, UM, pair, track
 
+from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compared
 from patchfem.surface.compare.depth import of_registration
 from patchfem.surface.compare.registration import register
 from patchfem.surface.compare.verdict import verdicts
+from patchfem.surface.profile import Profile
 
 HELD_OUT = 90000
 
@@ -55,6 +57,19 @@ def test_exact_without_noise_the_depth_and_the_place():
     assert [one.value for one in worn.extent.after] == pytest.approx([on[0], on[-1]], abs=1e-12)
     moved = [on[0] - p.shift, on[-1] - p.shift]
     assert [one.value for one in worn.extent.before] == pytest.approx(moved, abs=1e-3 * UM)
+
+
+@pytest.mark.parametrize("seed", [18, 37])
+def test_exact_digits_of_a_tilted_trace_are_no_wear(seed):
+    """Six digits of heights that rise by 4 um along the second trace: their last one is ten times coarser there."""
+    r, x = np.random.default_rng(seed), np.arange(4000) * 0.5
+    first = 0.2 * np.convolve(r.standard_normal(4040), np.ones(20) / 4, "same")[:4000]
+    depth = 3 * np.clip(1 - ((x - 1000) / 200)**2, 0, None)
+    traces = [Profile(frozen_array(x * UM), frozen_array(np.array([float(f"{one:.6g}") for one in z]) * UM), "a trace")
+              for z in (first, first - depth + 0.002 * x)]
+    worn = of_registration(register(*traces, 0.0))
+    for ends in (worn.extent.before, worn.extent.after):
+        assert [one.value for one in ends] == pytest.approx([800 * UM, 1200 * UM], abs=1 * UM)
 
 
 @pytest.mark.share(0, 2)
