@@ -18,7 +18,8 @@ def profile(file: Path, /, *more: Path,
             s_filter: word('wavelength below which waves are left out first, such as "2.5 um"') = "",
             level: word('height over the mean line at which the material ratio is read, such as "0.5 um"') = "0 um",
             ratios: word('material ratios whose heights are set side by side, such as "10,90" in percent') = "10,90",
-            window: word('the part between two cursors, such as "468 um,733 um"') = "",
+            window: word('the part between two cursors, such as "468 um,733 um"; of a scan four, '
+                         'first those of x') = "",
             tip: word('radius of the stylus, against which the valleys are checked, such as "12.5 um"') = "",
             units: Units = "",
             out: out_in("folder for a page, its numbers, a table of them and the levelled heights, such as "
@@ -69,6 +70,6 @@ def _ratios(text: str) -> tuple:
 
 def _window(text: str) -> tuple:
     words = text.split(",")
-    if len(words) != 2 or not all(map(str.strip, words)):
-        raise Refused(f"profile --window '{text}': two places are wanted, such as '468 um,733 um'")
+    if len(words) not in (2, 4) or not all(map(str.strip, words)):
+        raise Refused(f"profile --window '{text}': two places are wanted, such as '468 um,733 um', of a scan four")
     return tuple(quantity(word, "length", "profile --window") for word in words)

@@ -36,18 +36,22 @@ def rough(roughness, ends: tuple, cutoff: float) -> str:
     return draw([chart("", _place("x", along, np.array(ends) * mm), axis("roughness", up), marks)], height=2.4)
 
 
-def statistics(abbott: tuple, core, spectrum, band: tuple, cutoff: float | None) -> str:
-    """The Abbott curve with the straight line of its core, and the spectrum with its 95 % band."""
+def bearing(abbott: tuple, core, names: tuple = ("Mr1", "Mr2")) -> dict:
+    """The Abbott curve with the straight line of its core; names: of the material ratios where the core ends."""
     (ratio, height), (up, um) = abbott, axis_unit(abbott[1], "m")
     marks = [line(100 * ratio, height * um, "accent")]
     if core is not None:
         low = core.top - core.core
         marks.append(line([0, 100], [core.top * um, low * um], "warm", width=1.2, dash="dashed"))
         marks += [mark("dots", "warm", f"{name} {100 * at:.1f} %", x=[100 * at], y=[height * um], shape=shape)
-                  for name, at, height, shape in (("Mr1", core.first, core.top, "circle"),
-                                                  ("Mr2", core.second, low, "square"))]
-    share = _place("material ratio", "%", [0, 100])
-    left, title = chart("Abbott curve", share, axis("height", up), marks), "Power spectral density"
+                  for name, at, height, shape in zip(names, (core.first, core.second), (core.top, low),
+                                                     ("circle", "square"))]
+    return chart("Abbott curve", _place("material ratio", "%", [0, 100]), axis("height", up), marks)
+
+
+def statistics(abbott: tuple, core, spectrum, band: tuple, cutoff: float | None) -> str:
+    """The Abbott curve with the straight line of its core, and the spectrum with its 95 % band."""
+    left, title = bearing(abbott, core), "Power spectral density"
     if not spectrum.density.any():
         return draw([left, chart(f"{title}: the trace is flat", axis("wavelength"), axis("density"), [])])
     name, scale = _wave(spectrum)

@@ -53,7 +53,8 @@ def heading(report: RoughnessReport) -> str:
     shape = " x ".join(str(count) for count in report.shape)
     text = f"{shape} heights, {say(report.length)} long, every {say(report.step)}"
     if report.window is not None:
-        text += f", window {say(report.window[0])} to {say(report.window[1])}"
+        ends = [f"{say(low)} to {say(high)}" for low, high in zip(report.window[::2], report.window[1::2])]
+        text += f", window {' in x, '.join(ends)}{' in y' * (len(ends) > 1)}"
     text += f", about the least-squares {report.form}"
     short = report.settings.short
     if report.kind == "areal":
@@ -248,7 +249,10 @@ def figures(report: RoughnessReport) -> list:
         flat = report.scan
         return [(pictures.scan(flat.x, flat.y, flat.z), "Heights that the parameters are read from and their "
                  "distribution; colours end at all but the outermost 0.2 % of the points.",
-                 f"Map and histogram of the heights of {report.source}: {_said(report['Sq'])} root mean square")]
+                 f"Map and histogram of the heights of {report.source}: {_said(report['Sq'])} root mean square"),
+                (pictures.draw([pictures.bearing(report.abbott, report.core, ("Smr1", "Smr2"))]),
+                 "Abbott curve of these heights; dashed the straight line of its core.",
+                 f"Abbott curve of {report.source}: core height {_said(report['Sk'])}")]
     lines = "the waviness on it" if report.waviness is not None else "no cut-off was given"
     height = report["Pt"]
     out = [(pictures.trace(report.primary, report.waviness), f"Trace about the least-squares {report.form}; {lines}.",

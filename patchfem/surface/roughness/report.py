@@ -9,6 +9,7 @@ from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
 from ..profile import Profile, even, level, spikes
 from ..quantity import Quantity, refused
+from ..spikes import spikes_of
 from . import rows
 from .areal import Surface, lacking
 from .areal_intervals import areal_intervals
@@ -62,9 +63,9 @@ class RoughnessReport:
     values: tuple of Quantity, each with its name; length [m]; shape: samples, along y first; step [m] between samples;
     form: the name of what was subtracted first; cutoff, window [m] or None; band: wavelengths [m] of band_amplitude;
     notes: sentences about the file and what was done to it; tip: the stylus against the valleys, or None; printed:
-    tuple of Reread. Of traces only: primary, the trace without form; waviness, roughness, None without a cut-off;
-    abbott: (ratio, height) of the roughness, of the primary without one, and its core; spectrum of the primary. scan:
-    the areal scan that the parameters are read from.
+    tuple of Reread; abbott: (ratio, height) of the roughness, of the primary without one, of the scan, and its core. Of
+    traces only: primary, the trace without form; waviness, roughness, None without a cut-off; spectrum of the primary.
+    scan: the areal scan that the parameters are read from.
     """
 
     source: str
@@ -99,15 +100,13 @@ def report_of(surface: Profile | Areal, cutoff: float | None = None, window: tup
     """Parameters of a trace or of an areal scan with the intervals that one measurement of its size allows.
 
     cutoff [m]: between waviness and roughness, of a scan the nesting index of its L-filter; without it there is the
-    primary profile or the S-F surface alone. window: (first, last) [m] on the x axis of the file, as cursors
-    (`windowed`). tip [m]: radius of the stylus, by default that of the file. band [m]: wavelengths of band_amplitude.
-    A trace of a million samples: 1.2 s. PatchfemError for fewer than 16 samples, a window beyond the trace, a cut-off
-    that does not fit, or a window for an areal scan.
+    primary profile or the S-F surface alone. window: (first, last) [m] on the x axis of the file, as cursors, of a scan
+    (first, last, first, last) on x and y (`windowed`). tip [m]: radius of the stylus, by default that of the file. band
+    [m]: wavelengths of band_amplitude. A trace of a million samples: 1.2 s. PatchfemError for fewer than 16 samples, a
+    window beyond the trace, a cut-off that does not fit, or a window of a scan with less than four places.
     """
     if isinstance(surface, Areal):
-        if window is not None:
-            raise PatchfemError(f"{surface.source}: an areal scan; a window is for one trace of it")
-        return _of_scan(surface, cutoff, settings)
+        return _of_scan(surface if window is None else windowed(surface, *window), cutoff, settings, window)
     cut = surface if window is None else windowed(surface, *window)
     trace = _enough(even(_enough(cut)))
     primary, form, found = _primary(trace, band, settings)
@@ -138,19 +137,30 @@ def fitting_cutoff(length: float, step: float) -> float | None:
     return max((one for one in CUTOFFS if SECTIONS * one <= length and one >= 4 * step), default=None)
 
 
-def windowed(profile: Profile, first: float, last: float) -> Profile:
-    """The part of a trace between two cursors [m], as an instrument takes it: from the last sample at or before the
-    one to the last at or before the other, both included.
+def windowed(surface: Profile | Areal, *ends: float) -> Profile | Areal:
+    """The part of a trace between two cursors [m], of a scan between two along x and two along y, as an instrument
+    takes it: from the last sample at or before the one to the last at or before the other, both included.
 
-    PatchfemError for a window that turns back or does not lie within the trace.
+    PatchfemError for a window that turns back or does not lie within the trace or scan.
     """
-    x = profile.x
-    near = 1e-6 * profile.length / (x.size - 1)
-    if not first < last or first < x[0] - near or last > x[-1] + near:
-        raise PatchfemError(f"{profile.source}: a window from {say(first)} to {say(last)}; the trace runs from "
-                            f"{say(x[0])} to {say(x[-1])}")
-    low, high = (max(int(np.searchsorted(x, at + near, "right")) - 1, 0) for at in (first, last))
-    return replace(profile, x=x[low:high + 1], z=profile.z[low:high + 1])
+    scan = isinstance(surface, Areal)
+    if len(ends) != (4 if scan else 2):
+        raise PatchfemError(f"{surface.source}: a window of " + (
+            "an areal scan is four places, from and to in x, from and to in y" if scan else "a trace is two places"))
+    parts = [_between(surface.source, axis, *ends[2 * k:2 * k + 2], "xy"[k] if scan else "")
+             for k, axis in enumerate((surface.x, surface.y) if scan else (surface.x,))]
+    axes = {name: getattr(surface, name)[one] for name, one in zip("xy", parts)}
+    return replace(surface, z=surface.z[tuple(parts[::-1])], **axes)
+
+
+def _between(source: str, axis, first: float, last: float, name: str) -> slice:
+    near = 1e-6 * float(axis[-1] - axis[0]) / (axis.size - 1)
+    if not first < last or first < axis[0] - near or last > axis[-1] + near:
+        what = f"scan runs in {name}" if name else "trace runs"
+        raise PatchfemError(f"{source}: a window from {say(first)} to {say(last)}; the {what} from {say(axis[0])} to "
+                            f"{say(axis[-1])}")
+    low, high = (max(int(np.searchsorted(axis, at + near, "right")) - 1, 0) for at in (first, last))
+    return slice(low, high + 1)
 
 
 def interval_of(name: str, profile: Profile, cutoff: float | None = None, band: tuple = BAND) -> Quantity:
@@ -250,17 +260,19 @@ def _ends(trace: Profile) -> float:
     return float(trace.z[-1] - trace.z[0])
 
 
-def _spiky(profile: Profile) -> tuple:
-    found = spikes(profile)
+def _spiky(surface: Profile | Areal) -> tuple:
+    """What is to be said of the spikes of a trace or of a scan, () for nothing."""
+    found = spikes_of(surface) if isinstance(surface, Areal) else spikes(surface)
     if not found.any():
         return ()
-    one, place = found.sum() == 1, say(profile.x[np.argmax(found)])
-    what, counts = (f"is a spike (at x = {place})", "it counts") if one else \
-        (f"are spikes (the first at x = {place})", "they count")
-    return (f"{profile.source}: {found.sum()} of {found.size} heights {what}; {counts} in every parameter",)
+    *row, column = np.argwhere(found)[0]
+    place = f"x = {say(surface.x[column])}" + "".join(f", y = {say(surface.y[k])}" for k in row)
+    what, counts = (f"is a spike (at {place})", "it counts") if found.sum() == 1 else \
+        (f"are spikes (the first at {place})", "they count")
+    return (f"{surface.source}: {found.sum()} of {found.size} heights {what}; {counts} in every parameter",)
 
 
-def _of_scan(scan: Areal, cutoff: float | None, settings: Settings) -> RoughnessReport:
+def _of_scan(scan: Areal, cutoff: float | None, settings: Settings, window=None) -> RoughnessReport:
     flat, form = without_form(scan, settings.form)
     if settings.short is not None:
         flat = without_form(filtered_scan(flat, settings.short)[0], settings.form)[0]
@@ -280,7 +292,9 @@ def _of_scan(scan: Areal, cutoff: float | None, settings: Settings) -> Roughness
                             (UNEVEN if uneven else UNTOLD).replace("trace", "scan"), name)
                    for row in rows.AREAL for name in (row.name,))
     lost = int(np.isnan(flat.z).sum())
-    notes = scan.notes + ((f"{scan.source}: {lost} of {flat.z.size} heights are missing and do not count",) if lost
-                          else ())
+    notes = scan.notes + _spiky(scan)
+    if lost:
+        notes += (f"{scan.source}: {lost} of {flat.z.size} heights are missing and do not count",)
     return RoughnessReport(scan.source, "areal", float(scan.x[-1] - scan.x[0]), scan.z.shape, steps[1], values, notes,
-                           form, settings, cutoff, scan=flat)
+                           form, settings, cutoff, window, abbott=abbott(surface.heights), core=surface.heights.core,
+                           scan=flat)

@@ -13,6 +13,7 @@ import numpy as np
 from .areal import aspect, developed, direction, gradient, shortest
 from .parameters import (
     Heights,
+    height_at,
     material_ratio,
     mean_element,
     mean_spacing,
@@ -161,6 +162,8 @@ AREAL = (
               _all(volume, 0.8, False), ""),
     Parameter("Smr", "1", "material ratio: share of the area above the height {level} over the reference surface",
               _all(material_ratio), ""),
+    Parameter("Sxp", "m", "peak extreme height: from the material ratio 50 % up to the material ratio 2.5 %",
+              _all(lambda heights: height_at(heights, 0.025) - height_at(heights, 0.5)), ""),
     Parameter("Sdc", "m", "height from the material ratio {second} up to the material ratio {first}",
               _all(ratio_heights), ""),
 )

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...core import PatchfemError, frozen_array, say
-from ..areal import Areal, filled
+from ..areal import Areal
 from ..quantity import SIDE, Quantity, refused
+from ..spikes import apart, spikes_of
 from .registration import REACH, Laid, laid
 from .search import CLEAR, variant
 from .track import ScanTrack, track_of
@@ -16,8 +17,6 @@ SHIFT = "a place of the scan before, turned about its middle, stands so far alon
 ROTATION = "of the scan after against the scan before, anticlockwise"
 ALIKE = 0.95  # correlation of the unworn heights of both scans, from which on they show the same place
 LIKELY = 0.98  # the same where the search is no clearer than chance, as on a lay that repeats itself
-SPIKE, WIDEST = (10.0, 40.0, 160.0), 12  # scatters off the medians of 5 x 5 heights; heights of a spike at most
-SOME, CHUNK = 100_000, 1 << 17  # heights whose scatter about medians is taken; medians at a time
 SPECK = 12.0, 48.0, 192.0  # noises that a speck of the depths jumps by
 SEEN = 0.1  # of the worn part without heights, from which on this is told
 DIGITS = 4
@@ -102,7 +101,7 @@ def without_specks(found: Laid) -> tuple:
     specks = np.zeros(found.depth.shape, bool)
     for least in SPECK:
         with np.errstate(invalid="ignore"):
-            specks |= _apart(found.depth, np.abs(found.depth) > least * found.noise, least * found.noise)
+            specks |= apart(found.depth, np.abs(found.depth) > least * found.noise, least * found.noise)
     if not specks.any():
         return found, 0
     other = None if found.other is None else without_specks(found.other)[0]
@@ -124,62 +123,14 @@ def _place(found: Laid | None, why: str) -> dict:
 
 
 def without_spikes(scan: Areal) -> tuple:
-    """A scan without single heights that stand far off the median of 5 x 5 around them, and how many there were.
-
-    A spike is twelve heights at most, all of which stand off all of its neighbours; more are a feature of the surface.
-    """
-    missing = scan.missing
-    scale, off = _off_median(filled(scan.z, missing), ~missing)
-    spikes = np.zeros(off.shape, bool)
-    for least in SPIKE if scale > 0 else ():  # a steep place would join a spike to its neighbours at the lowest
-        with np.errstate(invalid="ignore"):
-            spikes |= _apart(scan.z, off > least * scale, least * scale)
+    """A scan without its spikes (`spikes_of`), and how many there were."""
+    missing, spikes = scan.missing, spikes_of(scan)
     if not spikes.any():
         return scan, 0
     z = np.where(spikes, np.nan, scan.z)
     note = (f"{scan.source}: {spikes.sum()} of {(~missing).sum()} heights are spikes or dropouts and are left out; "
             "--keep-spikes keeps them")
     return replace(scan, z=frozen_array(z), notes=(*scan.notes, note)), int(spikes.sum())
-
-
-def _off_median(z, known) -> tuple:
-    """(scatter of the known heights (m, n) about the medians of 5 x 5 around them, how far each stands off its own (m,
-    n)), 0 where that is less than the least spike: half of its neighbours would be as far below or above it. Heights
-    that are the median, as most are on a smooth slope, tell nothing of the scatter."""
-    from scipy.ndimage import maximum_filter, minimum_filter
-
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(z, 2, "symmetric"), (5, 5))
-
-    def distance(places) -> np.ndarray:
-        rows, columns = np.unravel_index(places, z.shape)
-        parts = [slice(k, k + CHUNK) for k in range(0, places.size, CHUNK)]
-        return np.concatenate([np.abs(z[rows[one], columns[one]] - np.median(
-            around[rows[one], columns[one]].reshape(-1, 25), axis=1)) for one in parts] or [np.zeros(0)])
-
-    there = np.flatnonzero(known)
-    off = distance(there[::max(there.size // SOME, 1)])
-    scale = 1.4826 * float(np.median(off[off > 0])) if off.any() else 0.0
-    far = np.maximum(z - minimum_filter(z, 5), maximum_filter(z, 5) - z) > SPIKE[0] * scale
-    out, places = np.zeros(z.shape), np.flatnonzero(far & known)
-    out.ravel()[places] = distance(places)
-    return scale, out
-
-
-def _apart(z, far, least: float) -> np.ndarray:
-    """Which far heights belong to a small group that stands off all of its neighbours, as no slope does."""
-    from scipy.ndimage import find_objects, label
-
-    names, _ = label(far, np.ones((3, 3)))
-    out, sizes = np.zeros(far.shape, bool), np.bincount(names.ravel())
-    for name, place in enumerate(find_objects(names), 1):
-        if sizes[name] > WIDEST:
-            continue
-        wide = tuple(slice(max(one.start - 1, 0), one.stop + 1) for one in place)
-        own = names[wide] == name
-        rim, top = z[wide][~own & np.isfinite(z[wide])], z[wide][own]
-        if rim.size and (top.min() > rim.max() + least / 2 or top.max() < rim.min() - least / 2):
-            out[wide] |= own
-    return out
 
 
 def hidden(one: Change) -> Quantity:

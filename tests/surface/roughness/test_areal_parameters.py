@@ -66,7 +66,7 @@ def test_exact_a_sine_of_whole_periods():
     assert rows["Sdq"] == pytest.approx(slope * np.sqrt((n - 0.5) / n), rel=3e-4)
     assert rows["Sp"] == pytest.approx(high, rel=1e-4) and rows["Sv"] == pytest.approx(high, rel=1e-4)
     every = Surface(high * np.sin(2 * np.pi * (np.arange(40_000) + 0.25) / 40_000).reshape(200, 200), (1.0, 1.0))
-    rows = {row.name: row.of(every) for row in AREAL if row.name[0] == "V" or row.name in ("Smr", "Sdc")}
+    rows = {row.name: row.of(every) for row in AREAL if row.name[0] == "V" or row.name in ("Smr", "Sdc", "Sxp")}
     # share above c = A sin(phi): 1/2 - phi / pi; volumes by integration of A cos over the phase
     def height(p):
         return high * np.sin(np.pi * (0.5 - p))
@@ -80,6 +80,7 @@ def test_exact_a_sine_of_whole_periods():
     assert rows["Vvc"] == pytest.approx(void[0.1] - void[0.8], rel=1e-3)
     assert rows["Smr"] == pytest.approx(0.5, abs=1e-3)
     assert rows["Sdc"] == pytest.approx(height(0.1) - height(0.9), rel=1e-3)
+    assert rows["Sxp"] == pytest.approx(height(0.025), rel=1e-3)
 
 
 def test_exact_the_flattest_two_fifths_of_a_straight_abbott_curve():

@@ -1,5 +1,6 @@
 """The report of a surface: windows, flat and short traces, spikes, printed results, scans, refusals, its speed."""
 
+from dataclasses import replace
 from time import process_time
 
 import numpy as np
@@ -25,6 +26,21 @@ def made(count=4001, source="made.csv", **more) -> Profile:
 def test_exact_a_window_from_the_samples_at_or_before_its_cursors(first, last, low, high):
     part = windowed(made(), first * UM, last * UM)
     assert part.x == pytest.approx(np.arange(low, high + 1) * UM)
+
+
+def test_exact_a_window_of_a_scan_and_its_spikes():
+    """Heights 20 to 60 in x and 10 to 70 in y of a scan of 120 x 80; two heights far off are spikes."""
+    one = scan()
+    ends = tuple(np.array([20, 60, 10, 70.5]) * UM)
+    part = report_of(one, window=ends)
+    alone = Areal(one.x[20:61], one.y[10:71], one.z[10:71, 20:61], "scan.txt")
+    assert part.shape == (61, 41)
+    assert [row.value for row in part.values] == [row.value for row in report_of(alone).values]
+    z = np.array(one.z)
+    z[[30, 50], [40, 70]] += 40 * UM
+    notes = report_of(replace(one, z=z)).notes
+    assert notes == ("scan.txt: 2 of 9600 heights are spikes (the first at x = 40 um, y = 30 um); they count in every "
+                     "parameter",) and report_of(one).notes == ()
 
 
 def test_exact_a_sine_with_a_little_noise():
@@ -133,7 +149,9 @@ def test_exact_areal_parameters_of_white_noise(lost):
     (made(), {"window": (20 * UM, 10 * UM)}, "a window from 20 um to 10 um; the trace runs from 0 um to 4 mm"),
     (made(), {"window": (20 * UM, 5e-3)}, "a window from 20 um to 5 mm"),
     (made(), {"cutoff": 5e-3}, "the trace is 4 mm long; half a cut-off of 5 mm goes off at each end"),
-    (scan(), {"window": (0.0, 1e-4)}, "scan.txt: an areal scan; a window is for one trace of it"),
+    (scan(), {"window": (0.0, 1e-4)}, "a window of an areal scan is four places"),
+    (scan(), {"window": (0.0, 1e-5, 2e-5, 1e-3)}, "the scan runs in y from 0 um to 79 um"),
+    (made(), {"window": (0.0, 1e-5, 2e-5, 1e-3)}, "a window of a trace is two places"),
     (scan(), {"cutoff": 1e-4}, "scan.txt: the shorter side is 79 um long; half a cut-off of 100 um goes off"),
 ])
 def test_refuses(surface, more, says):
