@@ -76,6 +76,14 @@ def test_exact_chunks_of_a_study_are_its_whole():
         np.testing.assert_array_equal(joined, values)
 
 
+@pytest.mark.filterwarnings("error")
+def test_always_measures_of_nothing_have_the_bar_of_their_change():
+    """A share of a value that is 0 has no end; it is no chance of a change that is small."""
+    zero = {name: np.zeros(2) for name in (*lanes.MAIN, "friction_force_peak", "equivalent_damping")}
+    found = lanes.bars(zero, {name: np.array([0.5, 0.0]) for name in zero})
+    assert all(one[0] == 1.0 and one[1] == 0.0 for one in found.values())
+
+
 def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
     """Where the exact engine finds another motion in a case that it checks, all are its, and say so."""
     cases = models("coulomb", 5, 64)

@@ -517,7 +517,9 @@ def bars(values: dict, changes: dict, law: str = "") -> dict:
         if name == "drift_per_cycle":
             size = np.abs(values[MAIN[0]])
         least = OF_MIDDLE if smooth and name == "drift_per_cycle" else OF_SIZE
-        chance = 0.0 if name in ("normal_load", *GAPS) else (OF_TYPICAL * typical + least) * size
+        with np.errstate(invalid="ignore"):  # a share of nothing is no chance
+            chance = 0.0 if name in ("normal_load", *GAPS) else np.nan_to_num((OF_TYPICAL * typical + least) * size,
+                                                                              posinf=np.inf)
         if name == APART[0] and not smooth:  # the limit holds it
             chance = np.where(change <= HELD * size, 0.0, chance)
         out[name] = np.maximum(OF_CHANGE * np.nan_to_num(change), chance)
