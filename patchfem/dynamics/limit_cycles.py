@@ -24,6 +24,8 @@ from .harmonic.point import balance_of
 SAMPLES = 4096  # of a cycle, that its largest motion is read from
 PLACES = 48  # amplitudes at which the damping of a free motion is looked at
 LOW, HIGH = 1e-6, 4.0  # the first and the last of them, over 4 F/(pi |c| omega)
+ROUND = 1e-9  # of an amplitude, what round-off and the tolerances of the solves leave
+SHUT = 1e-8  # share of the swing in a half period, by which a slide at rest moves on
 FEW = 9  # harmonics of the first answer; the second, of twice as many, shows its error
 
 
@@ -50,7 +52,8 @@ def balanced_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float
 def of_relay(modes: ModalBasis, row, slides: float, holds: float) -> list:
     """Limit cycles under rigid friction on one interface that slides from turn to turn; [] where there is none.
 
-    row (n,): its slide per coordinate; slides, holds [N]: friction while it slides and the most that it holds. From a
+    row (n,): its slide per coordinate; no mode is rigid; slides, holds [N]: friction while it slides and the most that
+    it holds. From a
     turn on the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half period T/2, and that in which the
     slide comes to rest there is a cycle, if it goes one way all the time and what would hold it is more than `holds`.
     """
@@ -60,7 +63,8 @@ def of_relay(modes: ModalBasis, row, slides: float, holds: float) -> list:
         rest = np.array([_turn(modes, row, slides, t)[1] for t in half])
         for k in np.flatnonzero(rest[:-1] * rest[1:] <= 0):
             t = brentq(lambda t: _turn(modes, row, slides, t)[1], half[k], half[k + 1], xtol=1e-16, rtol=1e-14)
-            if (found := _slides_through(modes, row, (slides, holds), t)) is not None:
+            shut = abs(_turn(modes, row, slides, t)[1]) < SHUT  # not so where a mode without damping is in resonance
+            if shut and (found := _slides_through(modes, row, (slides, holds), t)) is not None:
                 out.append(found)
     return sorted(out)
 
@@ -78,7 +82,7 @@ def _turn(modes: ModalBasis, row, force: float, t: float) -> tuple:
     n, eye = modes.omega.size, np.eye(2 * modes.omega.size)
     rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
     flow = _flow(modes, [t])[0]
-    y = np.linalg.solve(flow + eye, (flow - eye) @ rest)
+    y = np.linalg.lstsq(flow + eye, (flow - eye) @ rest, rcond=None)[0]
     return y, float(row @ y[n:]) * t / max(float(np.abs(row) @ np.abs(y[:n])), 1e-300), rest
 
 
@@ -93,12 +97,14 @@ def _slides_through(modes: ModalBasis, row, forces: tuple, t: float) -> Cycle | 
     if rate[1:-1].max() > 1e-9 * swing / t or -pull <= holds:
         return None
     motion = path[:, :n] @ modes.output
-    found = _highest(np.concatenate([motion, -motion[1:]]))
+    cycle = np.concatenate([motion, -motion[1:]])
+    found, coarse = _highest(cycle), _highest(cycle[::2])
     # a turn later or earlier takes part of what is off with it: the map from turn to turn
     speed = np.concatenate([path[-1, n:], _rates(modes, path[-1], row, slides)])
     face = np.concatenate([np.zeros(n), row])
     turned = (np.eye(2 * n) - np.outer(speed, face) / (face @ speed)) @ _flow(modes, [t])[0]
-    return Cycle(found, 1e-9 * found, np.pi / t, bool(np.abs(np.linalg.eigvals(turned)).max() < 1))
+    lasts = bool(np.abs(np.linalg.eigvals(turned)).max() < 1)
+    return Cycle(found, abs(found - coarse) + ROUND * found, np.pi / t, lasts)
 
 
 def _rates(modes: ModalBasis, y, row, force: float) -> np.ndarray:
@@ -135,7 +141,7 @@ def _of_mode(modes: ModalBasis, group: Group, mode: int, size: float) -> list:
     if len(few) != len(many):
         raise NotConverged(f"flutter_amplitude: {len(few)} limit cycles with {FEW} harmonics, {len(many)} with "
                            f"{2 * FEW + 1}")
-    return [better._replace(error=2 * abs(one.amplitude - better.amplitude) + 1e-9 * better.amplitude)
+    return [better._replace(error=2 * abs(one.amplitude - better.amplitude) + ROUND * better.amplitude)
             for one, better in zip(few, many)]
 
 

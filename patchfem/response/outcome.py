@@ -16,13 +16,11 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
 
     Under a sine, and under levels in their last one, the amplitudes of successive windows decide (`classify`), and what
     free motion is left in them (`left_over`). A release or a step is steady once it is at rest, to the floor of its
-    amplitude; else the same amplitudes decide, but a release grows only where a mode
-    gains energy. A motion whose middle moves on is not steady
-    (`moves_on`). A sweep or a recorded signal
-    changes to the end: unless it leaves the interface stuck it is transient, without a steady estimate. So is an
-    interface that holds while what it holds still rises. What rises to a motion that is known to exist, `raw.bounded`,
-    does not grow. level_cycles: of each level, 0 without levels; slowest: rate
-    [1/s] at which the slowest mode decays, below 0 where one gains energy.
+    amplitude; else the same amplitudes decide, but a release grows only where a mode gains energy. A motion whose
+    middle moves on is not steady (`moves_on`). A sweep or a recorded signal changes to the end: unless it leaves the
+    interface stuck it is transient, without a steady estimate. So is an interface that holds while what it holds still
+    rises. What rises to a motion that is known to exist, `raw.bounded`, does not grow. level_cycles: of each level, 0
+    without levels; slowest: rate [1/s] at which the slowest mode decays, below 0 where one gains energy.
     """
     if raw.outcome is Outcome.STUCK and still_loads(raw.window, drive.period, tolerance):
         return Outcome.TRANSIENT, measures
@@ -45,7 +43,7 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
     number, steady, error = (one[0] for one in settled(
         np.asarray(amplitudes, float)[None], None if extremes is None else np.asarray(extremes)[None], window,
         [np.array([np.nan if one is None else one]) for one in raw.steady],
-        (tolerance, floor, slowest * window * drive.period), raw.bounded))
+        (tolerance, floor, max(slowest, 0.0) * window * drive.period), raw.bounded))
     outcome = _held(CLASSES[number], measures, tolerance)
     if outcome is Outcome.GROWS:
         return outcome, without_bars(measures)

@@ -51,6 +51,17 @@ def test_a_second_mode_rings_with_the_cycle():
     assert found.amplitude == pytest.approx(np.abs(output).max(), rel=1e-4)
 
 
+@pytest.mark.parametrize("ratio", [2.999, 3.0001, 5.0])
+def test_resonances_of_a_mode_without_damping_are_no_cycles(ratio):
+    """The equation of the half period changes its sign where an odd harmonic meets such a mode, and has no zero there:
+    one cycle is found, near that of the first mode alone, or none where the second one would hold the slide."""
+    modes = modes_of([750.0, 750.0 * ratio], [-0.01, 0.0], [1.0, 0.02], [1.0, 0.0])
+    alone = limit_cycles.of_relay(modes_of([750.0], [-0.01], [1.0], [1.0]), np.ones(1), 9.0, 9.0)[0]
+    for one in limit_cycles.of_relay(modes, modes.slide, 9.0, 9.0):
+        assert abs(limit_cycles._turn(modes, modes.slide, 9.0, np.pi / one.omega)[1]) < 1e-8
+        assert one.amplitude == pytest.approx(alone.amplitude, rel=0.05)
+
+
 def test_a_cycle_that_would_hold_on_the_way_is_none():
     modes = modes_of([750.0], [-0.3], [1.0], [1.0])
     assert limit_cycles.of_relay(modes, modes.slide, 9.0, 30.0) == []

@@ -64,6 +64,33 @@ def test_a_spring_before_the_slip_keeps_a_small_swing_up():
         assert (swing > edge.value) == (way > 0)
 
 
+SECOND = '[[structure.mode]]\nname = "second"\nfrequency = "{} Hz"\ndamping = 0.02\nslide = 0.3\n[structure.start]\n'
+
+
+@pytest.mark.filterwarnings("error")
+def test_several_modes():
+    """What rings while the interface holds may gain energy: the note promises no rest. A rigid mode has a reason."""
+    two, rigid = (text(start=0.9 * EDGE).replace("[structure.start]\n", SECOND.format(one)).replace(
+        ' mm"]', ' mm", "0 mm"]') for one in (400, 0))
+    found = pf.run(pf.load(two))
+    edge = found.measures["flutter_amplitude"]
+    assert edge.value == pytest.approx(1e-3 * EDGE, rel=0.1) and 0 < edge.error < 1e-6 * edge.value
+    assert "that is smaller falls, a larger one grows" in found.notes[-1]
+    edge = pf.run(pf.load(rigid)).measures["flutter_amplitude"]
+    assert edge.value is None and "a mode of 0 Hz" in edge.reason
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("law", ["coulomb", 'elastic-plastic"\nbond_length = "20 um',
+                                 'tanh"\nreference_speed = "1 mm/s'])
+def test_a_motion_that_grows_past_all_bounds_ends(law):
+    """Ten thousand cycles at exp(0.126) a cycle pass the largest number that there is."""
+    found = pf.run(pf.load(text(law=law, start=1.1 * EDGE, cycles=10000)))
+    assert found.outcome == "grows" and found.measures["flutter_amplitude"].value < 1.1e-3 * EDGE
+    assert found.response.time[-1] < 2 and "where the motion passed 1000 m" in found.notes[-1]
+    assert all(one.error is None for name, one in found.measures.items() if name != "flutter_amplitude")
+
+
 def test_without_friction_negative_damping_is_refused():
     lone = text().replace('[friction]\nlaw = "coulomb"\nstatic = 0.3\n', "").replace('[normal]\nload = "30 N"\n', "")
     with pytest.raises(pf.SceneError, match=r"damping: -0\.02 gives the mode energy that nothing takes"):
@@ -91,7 +118,7 @@ def test_cases_with_such_a_mode_run_by_themselves():
         '"free"', '"base"\nfrequency = "110 Hz"\nacceleration = "3 g"')
     scenes = [pf.load(driven.replace("-0.02", damping)) for damping in ("-0.02", "0.02")]
     gains, loses = (pf.build(one) for one in scenes)
-    assert lumped.refuses(gains) == "its mode gains energy" and not lumped.refuses(loses)
+    assert lumped.refuses(gains) and not lumped.refuses(loses)
     both, single = many.answers([gains, loses]), pf.run(scenes[0])
     assert both.outcome[0] == single.outcome
     for name in ("relative_displacement_amplitude", "flutter_amplitude"):

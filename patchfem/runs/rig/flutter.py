@@ -1,7 +1,9 @@
 """Where friction no longer holds a mode that gains energy: `flutter_amplitude`, by `dynamics.limit_cycles`."""
 
-from ...core import Measure, NotConverged, PatchfemError, say
+from ...core import Measure, NotConverged, Outcome, PatchfemError, say
 from ...dynamics import limit_cycles
+from ...effects import has
+from ...model.rig import BEYOND
 from ...response.rows import TABLE
 from .engines import ENGINES
 from .interface import contact_model
@@ -21,16 +23,19 @@ def flutter_of(run) -> tuple:
     that does not last, with its error, or the reason why it is not known."""
     model, unit, floor = run.model, TABLE[NAME].unit, TABLE[NAME].floor
     found, reason = _cycles(model, run.numerics, run.patch)
+    far = [f"the run ended after {run.raw.response.time[-1]:.4g} s, where the motion passed {BEYOND:g} m"] \
+        if run.raw.outcome is Outcome.EXCEEDS_TRAVEL and model.rig.travel == BEYOND else []
     edges = [one for one in found if not one.lasts]
     if not edges:
-        return {NAME: Measure(None, unit, None, floor, reason=reason)}, []
+        return {NAME: Measure(None, unit, None, floor, reason=reason)}, far
     edge = edges[-1]
     below = [one for one in found if one.lasts and one.amplitude < edge.amplitude]
-    falls = f"to the limit cycle of {say(below[-1].amplitude, 3)}, which lasts" if below else "to rest"
+    alone = has(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1  # nothing rings in a stick
+    falls = f" to the limit cycle of {say(below[-1].amplitude, 3)}, which lasts" if below else " to rest" * alone
     return {NAME: Measure(edge.amplitude, unit, edge.error, floor)}, [
         f"a mode of damping below 0 gains energy: without a drive a swing of {say(edge.amplitude, 4)} at the output "
         f"repeats at {edge.omega / 6.283185307179586:.4g} Hz and does not last; a free swing of this mode that is "
-        f"smaller falls {falls}, a larger one grows"]
+        f"smaller falls{falls}, a larger one grows", *far]
 
 
 def _cycles(model, numerics, patch) -> tuple:
@@ -49,6 +54,8 @@ def _cycles(model, numerics, patch) -> tuple:
         if contact.set_valued:
             if rig.bends:
                 return [], "limit cycles of rigid friction are not known beside a spring that bends"
+            if not modes.omega.all():
+                return [], "limit cycles of rigid friction are not known beside a mode of 0 Hz"
             static, kinetic = contact.element.numbers[1:3]
             return limit_cycles.of_relay(modes, row, kinetic, static), SLIDES
         finder = BalanceFinder(model, numerics, patch)

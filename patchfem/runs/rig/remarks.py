@@ -8,11 +8,10 @@ from ...effects import has
 from ...response.outcome import changing_note
 from ..results.notes import climbing_as_one, creeping, of_growth, unbounded_bonds, unripe, warming, work_check_warning
 from ..results.travel import travelled
-from . import pieces
+from . import pieces, strips
 from .costs import dear_elements
 from .engines import ENGINES, PIECES
 from .solution import borne
-from .strips import across
 
 
 def warnings_of(run) -> list:
@@ -56,7 +55,7 @@ def _across(run) -> list:
     """The sentence on what strips that yaw do across x."""
     if not run.model.rig.strips_slide_apart or run.patch.strips.offsets.size < 2 or not run.patch.strips.load:
         return []
-    swing, share = across(run.patch, run.raw.window, run.drive.period)
+    swing, share = strips.across(run.patch, run.raw.window, run.drive.period)
     return [f"the yaw moves the ends of the patch by up to {length(swing)} across x, which friction"
             f"{' and wear leave' if run.model.wear is not None else ' leaves'} out: the path of the slide in the last "
             f"cycle is {100 * share:.2g} % longer with it, in the mean under the pressure"] if swing > 0 else []

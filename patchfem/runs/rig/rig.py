@@ -6,10 +6,11 @@ from math import ceil
 import numpy as np
 
 from ...core import Outcome, PatchfemError
+from ...model.rig import BEYOND
 from ...response import reasons
 from ...response.coarser import estimate, left_open
 from ...response.errors import with_errors
-from ...response.outcome import settle
+from ...response.outcome import settle, without_bars
 from ...response.rows import judged
 from ...response.run_events import events_of, with_own
 from ...response.settling import slip_period
@@ -93,6 +94,8 @@ def _settled(run: Coupled) -> Coupled:
     rig = run.model.rig
     outcome, found = settle(run.raw, found, run.model.accuracy.tolerance, run.drive, rig.level_cycles,
                             decay_rate(rig.modes))
+    if outcome is Outcome.EXCEEDS_TRAVEL and rig.travel == BEYOND:  # no stop: a mode that gains energy
+        outcome, found = Outcome.GROWS, without_bars(found)
     return replace(run, outcome=outcome, measures=found)
 
 
