@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import __version__
 from ..campaigns.rows import cells as row_cells
+from ..campaigns.rows.asked import READINGS
 from ..campaigns.rows.fit import FittedRows
 from ..campaigns.rows.nulls import NULLS
 from ..core import G_N
@@ -71,12 +72,13 @@ def answer_of(fitted: FittedRows) -> dict:
 
 def _reading(fitted: FittedRows) -> dict:
     read = fitted.asked.read
-    kind, cutoff, gain = ("peak", None, 1.0) if read is None else (read.reading, read.reading_cutoff,
-                                                                    read.acceleration_gain)
-    keys = [one.key for one in fitted.asked.wanted]
-    if "measured.acceleration_gain" in keys:
-        gain = float(fitted.fit.values[keys.index("measured.acceleration_gain")])
-    return {"reading": kind, "reading_cutoff": cutoff, "acceleration_gain": gain}
+    out = {"reading": "peak" if read is None else read.reading,
+           "reading_cutoff": None if read is None else read.reading_cutoff}
+    found = {one.key: float(value) for one, value in zip(fitted.asked.wanted, fitted.fit.values)}
+    for key in READINGS:
+        name = key.partition(".")[2]
+        out[name] = found.get(key, 1.0 if read is None else getattr(read, name))
+    return out
 
 
 def _starts(found, wanted) -> list:

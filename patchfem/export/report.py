@@ -213,11 +213,12 @@ def _measured(data: dict) -> Picture | None:
     if m.get("input") is None or m.get("frequency") is None:
         return None
     points = []
-    for name, gain in (("absolute_acceleration_peak", _factor(m)), ("relative_displacement_amplitude", 1.0)):
+    for name, gain in zip(("absolute_acceleration_peak", "relative_displacement_amplitude"), _factors(m)):
         one = found.get(name, {"value": None})
         points.append(None if one["value"] is None else
                       (one["value"] * gain, None if one["error"] is None else one["error"] * gain))
-    factor = f" (reading factor {m['gain']:g})" if m["gain"] != 1 else ""
+    factor = "".join(f" (reading factor of {name} {gain:g})" for name, gain in
+                     zip(("acceleration", "displacement"), m["gains"]) if gain != 1)
     factor += f" (read as {m['reading']}, {m['share']:.4g} of the peak)" if m.get("reading", "peak") != "peak" else ""
     return Picture(charts.measured, (m["rows"], m["frequency"], m["input"], *points),
                    f"Measured responses at the drive frequency and the computed point{factor}.{_unsettled(data)}")
@@ -228,9 +229,11 @@ PICTURES = {"wear": _wear, "worn": _worn_map, "curve": _curve, "levels": _levels
             "bodies": _bodies, "loop": _loop, "history": _histories, "measured": _measured}
 
 
-def _factor(measured: dict) -> float:
-    """What the accelerometer shows of the largest acceleration: the factor of its reading and the share it reads."""
-    return measured["gain"] * measured.get("share", 1.0)
+def _factors(measured: dict) -> tuple:
+    """What the accelerometer shows of the largest acceleration, the factor of its reading times the share it reads, and
+    the gauge of the displacement."""
+    felt, seen = measured["gains"]
+    return felt * measured.get("share", 1.0), seen
 
 
 def _unsettled(data: dict) -> str:
@@ -247,12 +250,13 @@ def _table_one(data: dict) -> list:
     for r in m["rows"]:
         if abs(r.frequency - m["frequency"]) > 0.5 or abs(r.input - m["input"]) > 0.01 * m["input"]:
             continue
-        for name, key, scale, unit in (("acceleration", "absolute_acceleration_peak", G, "g"),
-                                       ("displacement", "relative_displacement_amplitude", 25.4e-6, "mil")):
+        for (name, key, scale, unit), gain in zip((("acceleration", "absolute_acceleration_peak", G, "g"),
+                                                   ("displacement", "relative_displacement_amplitude", 25.4e-6, "mil")),
+                                                  _factors(m)):
             value, mine = getattr(r, name), found.get(key, {"value": None})["value"]
             if value is None or mine is None:
                 continue
-            mine = mine * (_factor(m) if name == "acceleration" else 1.0)
+            mine = mine * gain
             kind = f"{name}{' (repeat run)' if 'R' in r.flag else ''}"
             ratio = f"{mine / value:.2f}" if value else "&ndash;"
             rows.append([linked(kind, key), f"{value / scale:.3g} {unit}", f"{mine / scale:.3g} {unit}", ratio])

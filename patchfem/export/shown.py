@@ -59,10 +59,10 @@ def report_data(result: Result) -> dict:
                               "base": w.base_acceleration, "force": w.force, "slide": w.slide}
             data["loop"] |= {"period": result.extra["period"]}
     if model.measured is not None:
-        path, gain, kind, cutoff = model.measured
+        path, gains, kind, cutoff = model.measured
         rig = model.rig
         data["measured"] = {"rows": measured.read_table(path), "frequency": rig.frequency if rig is not None else None,
-                            "gain": gain, "reading": "peak", "share": 1.0}
+                            "gains": gains, "reading": "peak", "share": 1.0}
         if rig is not None:
             data["measured"]["input"] = largest(rig.drive)
             if kind != "peak" and isinstance(rig.drive, BaseSine) and "absolute_acceleration_peak" in result.measures:

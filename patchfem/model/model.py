@@ -124,8 +124,9 @@ def build(scene: Scene) -> Model:
     friction, heat, spread, pad = _law(scene)
     named, measured = tuple(scene.named()), scene.measured
     found = Model(None, scene.kind, patch, point, friction, heat, spread, pad, slide, rig, scene.accuracy,
-                  (scene.beside(measured.file), measured.acceleration_gain, measured.reading, measured.reading_cutoff)
-                  if measured else None, of_wear.wear_asked(scene) if scene.wear else None, _absent(named), grooves)
+                  (scene.beside(measured.file), (measured.acceleration_gain, measured.displacement_gain),
+                   measured.reading, measured.reading_cutoff) if measured else None,
+                  of_wear.wear_asked(scene) if scene.wear else None, _absent(named), grooves)
     source = Source(scene.path, scene.title, scene.text, partial(resolved, scene, found), named, tuple(scene.remarks),
                     scene.sets, scene.notes)
     return replace(found, source=source)

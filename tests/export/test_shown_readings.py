@@ -27,7 +27,8 @@ acceleration_gain = 1.5
 
 
 def scene_of(tmp_path, *sets):
-    (tmp_path / "rows.csv").write_text("frequency [Hz],input [g],acceleration [g]\n143,1,10\n", "utf-8")
+    head = "frequency [Hz],input [g],acceleration [g],displacement [mil]\n"
+    (tmp_path / "rows.csv").write_text(f"{head}143,1,10,5\n", "utf-8")
     (tmp_path / "scene.toml").write_text(LINEAR, "utf-8")
     return load(tmp_path / "scene.toml", sets)
 
@@ -41,6 +42,13 @@ def test_exact_a_sine_reads_as_its_effective_value(tmp_path):
     peak = plain.measures["absolute_acceleration_peak"].value / 9.80665
     assert f"{1.5 * np.sqrt(0.5) * peak:.3g} g" in page_of(read, {})
     assert f"{1.5 * peak:.3g} g" in page_of(plain, {})
+
+
+def test_exact_the_gauge_has_a_factor_of_its_own(tmp_path):
+    found = run(scene_of(tmp_path, "measured.displacement_gain=0.8"))
+    seen = found.measures["relative_displacement_amplitude"].value / 25.4e-6
+    assert f"<td>{0.8 * seen:.3g} mil</td>" in page_of(found, {}).replace(" class=n", "")
+    assert "(reading factor of displacement 0.8)" in page_of(found, {})
 
 
 def test_a_reading_is_an_effect_beside_its_rows(tmp_path):

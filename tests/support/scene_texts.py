@@ -146,5 +146,5 @@ FULL = [
     "friction.initial_bonds=0.5", "friction.kinetic=0.25", "structure.travel=5 mm", "structure.mode.second.base=-0.2",
     "accuracy.tail=1e-6", "accuracy.merge=1e-5", "accuracy.shear_modes=12", "accuracy.steps_per_cycle=400",
     'contact.substrate={young = "121.3 GPa", poisson = 0.31, density = "4370 kg/m^3"}',
-    'measured={file = "t.csv", acceleration_gain = 1.1}',
+    'measured={file = "t.csv", acceleration_gain = 1.1, displacement_gain = 0.9}',
 ]  # fmt: skip

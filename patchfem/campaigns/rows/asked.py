@@ -10,7 +10,7 @@ from ...model.model import Model, build
 from ...scene.changed import Base
 from ...scene.scene import Scene, SceneError, loads
 
-READINGS = ("measured.acceleration_gain",)  # of the instruments: never in the model
+READINGS = ("measured.acceleration_gain", "measured.displacement_gain")  # never in the model
 
 
 class Question:

@@ -7,7 +7,7 @@ from ...model.source import placed
 from ...response.spectrum import reading
 from ...runs.many.watched import Watcher
 from ...runs.patch import ladder
-from .asked import Asked
+from .asked import READINGS, Asked
 
 
 class Computed:
@@ -25,9 +25,9 @@ class Computed:
         self.runs = 0
         read_as = asked.read
         self.reading = ("peak", None) if read_as is None else (read_as.reading, read_as.reading_cutoff)
-        self.gain = 1.0 if read_as is None else read_as.acceleration_gain
+        self.gains = (1.0, 1.0) if read_as is None else (read_as.acceleration_gain, read_as.displacement_gain)
         keys = [one.key for one in asked.wanted]
-        self.free_gain = keys.index("measured.acceleration_gain") if "measured.acceleration_gain" in keys else None
+        self.free_gains = [keys.index(key) if key in keys else None for key in READINGS]
         self.warm = True
 
     def forget(self) -> None:
@@ -44,7 +44,8 @@ class Computed:
         out = np.full((2, count), np.nan)
         for k in conditions:
             out[:, k] = known[k]
-        out[0] *= self.gain if self.free_gain is None else values[self.free_gain]
+        for row, gain, free in zip(out, self.gains, self.free_gains):
+            row *= gain if free is None else values[free]
         return out
 
     def _run(self, values, conditions) -> dict:

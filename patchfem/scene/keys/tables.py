@@ -287,6 +287,7 @@ class Measured(Table):
 
     file: key(Text, "table of measured rows: frequency, input, acceleration, displacement, flag")
     acceleration_gain: key(Positive, "factor by which the reading exceeds the true acceleration") = 1.0
+    displacement_gain: key(Positive, "factor by which the reading of the gauge exceeds the true displacement") = 1.0
     reading: key(Literal["peak", "fundamental", "rms", "lowpass"], "what the accelerometer shows: 'peak' the largest "
                  "acceleration, 'fundamental' its part at the drive's frequency, 'rms' its effective value, 'lowpass' "
                  "the largest behind a low pass of second order") = "peak"

@@ -13,7 +13,7 @@ from patchfem.campaigns.rows.computed import Computed
 from patchfem.campaigns.rows.fit import RowsOptions, Search, fit_rows
 from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N, PatchfemError
-from patchfem.export.fit_rows import Starts
+from patchfem.export.fit_rows import Starts, answer_of
 from patchfem.model.model import build
 from patchfem.response.spectrum import reading
 from patchfem.runs.many.watched import Watcher
@@ -102,21 +102,25 @@ def fitted(scene, path, wanted, **beside):
 LINEAR_FREE = ("structure.mode.axial.frequency=120 Hz..160 Hz,structure.mode.axial.damping=0.005..0.2",)
 
 
-def linear_rows(noise=0.0, scale=1.0, seed=1):
+def linear_rows(noise=0.0, scale=1.0, seed=1, seen=1.0):
     draw = np.random.default_rng(seed)
     out = []
     for f in (120.0, 135.0, 143.0, 150.0, 160.0):
         a, y = linear(f, 20.0)
         spread = np.exp(noise * draw.standard_normal(2))
-        out.append((f, 20.0, a * scale * spread[0], y * spread[1], ""))
+        out.append((f, 20.0, a * scale * spread[0], y * seen * spread[1], ""))
     return out
 
 
 def test_exact_a_linear_rig_is_found_from_closed_forms(tmp_path):
-    """Rows of an oscillator in closed form give back its frequency, its damping and the factor of the reading."""
-    found = fitted(scene_of(tmp_path, LINEAR), table(tmp_path, linear_rows(scale=1.3)),
-                   free(*LINEAR_FREE, "measured.acceleration_gain=0.5..2"), starts=3)
-    assert found.fit.values == pytest.approx([141.0, 0.03, 1.3], rel=1e-6)
+    """Rows of an oscillator in closed form give back its frequency, its damping and the factors of both readings."""
+    gains = "measured.acceleration_gain=0.5..2", "measured.displacement_gain=0.5..2"
+    found = fitted(scene_of(tmp_path, LINEAR), table(tmp_path, linear_rows(scale=1.3, seen=0.8)),
+                   free(*LINEAR_FREE, *gains), starts=3)
+    assert found.fit.values == pytest.approx([141.0, 0.03, 1.3, 0.8], rel=1e-6)
+    assert answer_of(found)["reading"] == {"reading": "peak", "reading_cutoff": None,
+                                           "acceleration_gain": found.fit.values[2],
+                                           "displacement_gain": found.fit.values[3]}
     assert found.scored(found.logs, found.left)["fitted"]["all"] < 1e-6
 
 
@@ -359,9 +363,9 @@ def test_refuses_options_that_rows_do_not_have(tmp_path, words, said):
 
 def test_exact_the_reading_and_the_gain_of_the_scene_are_those_of_the_instruments(tmp_path):
     """A root mean square of a sine is its peak over sqrt 2; the seed says where the starts are."""
-    path = table(tmp_path, linear_rows(scale=1.3 / np.sqrt(2)))
+    path = table(tmp_path, linear_rows(scale=1.3 / np.sqrt(2), seen=0.8))
     scene = scene_of(tmp_path, LINEAR, "measured.file=rows.csv", "measured.acceleration_gain=1.3",
-                     "measured.reading=rms")
+                     "measured.reading=rms", "measured.displacement_gain=0.8")
     one, two = (fitted(scene, path, free(*LINEAR_FREE), starts=1, seed=seed) for seed in (0, 1))
     assert one.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)
     assert not np.array_equal(one.found.starts, two.found.starts)
