@@ -2,8 +2,9 @@
 //
 // data.keys:     [{name, label, unit, log, values: [...] per case, texts: [...] per case, words}]
 // data.measures: [{name, label, unit, means, values: [...], errors: [...], over: [...] whether a case misses its
-//                tolerance}]   already in the unit shown
-// data.outcome:  [...] per case; data.settled: outcomes that count as an answer; data.links: [...] per case or null
+//                tolerance, 1 or 0}]   already in the unit shown
+// data.outcome:  [...] per case; data.settled: outcomes that count as an answer; data.links: [...] per case or null;
+// data.whole: whether the cases are all of the sweep
 "use strict";
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
@@ -147,14 +148,22 @@
       groups.get(v).push(i);
     });
     unsettled(fig, cases, x);
-    const cycle = colours(), dots = [];
-    [...groups].sort((a, b) => a[0] - b[0]).forEach(([, group], k) => {
-      const renderer = curve(fig, group, x, m, cycle[k % cycle.length],
-        beside ? `${beside.label} ${beside.texts[group[0]]}` : "");
-      dots.push(renderer);
+    const cycle = colours(), dots = [], sizes = [...groups.keys()].sort((a, b) => a - b);
+    const many = beside && !beside.words && sizes.length > cycle.length;  // a scale of colours in place of their names
+    const level = (v) => beside.log && sizes[0] > 0 ? Math.log(v) : v, span = level(sizes.at(-1)) - level(sizes[0]);
+    const scale = Bokeh.Palettes.cividis(256);
+    sizes.forEach((v, k) => {
+      const group = groups.get(v);
+      const colour = many ? scale[Math.round(255 * (level(v) - level(sizes[0])) / span)] : cycle[k % cycle.length];
+      dots.push(curve(fig, group, x, m, colour, beside && !many ? `${beside.label} ${beside.texts[group[0]]}` : ""));
     });
+    if (many) {
+      const mapper = new Bokeh[beside.log && sizes[0] > 0 ? "LogColorMapper" : "LinearColorMapper"]({
+        palette: scale, low: sizes[0], high: sizes.at(-1)});
+      bar(fig, mapper, named(beside));
+    }
     hover(fig, m, dots);
-    if (beside) legend(fig);
+    if (beside && !many) legend(fig);
     return fig;
   }
 
@@ -219,9 +228,10 @@
     const where = (i) => `${x.label} ${x.texts[i]}` + (beside ? `, ${beside.label} ${beside.texts[i]}` : "");
     const off = cases.filter(bad).length, open = cases.filter((i) => m.over[i]).length;
     const value = (i) => `${within(m.values[i], m.errors[i], m.least)} ${m.unit}`.trim();
+    const some = `${cases.length} ${data.whole ? "" : "drawn "}cases`;
     return `Against ${x.label}: lowest ${value(lowest)} at ${where(lowest)}; highest ` +
-      `${value(highest)} at ${where(highest)}.` + (off ? ` ${off} of ${cases.length} cases did not ` +
-      "settle (shaded or hatched)." : "") + (open ? ` ${open} of ${cases.length} cases miss the tolerance ` +
+      `${value(highest)} at ${where(highest)}.` + (off ? ` ${off} of ${some} did not ` +
+      "settle (shaded or hatched)." : "") + (open ? ` ${open} of ${some} miss the tolerance ` +
       "(hollow or dotted)." : "");
   }
 

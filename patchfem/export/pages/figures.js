@@ -60,11 +60,12 @@ const pictures = (() => {
   }
 
   function legend(fig) {                         // outside the picture, so that it hides no line; a click hides one
-    const few = fig.legend.items.length < 4;
+    const few = fig.legend.items.length < 4, narrow = innerWidth < 600;
     Object.assign(fig.legend, {label_text_font_size: "12px", background_fill_color: ink("--paper"), background_fill_alpha: 0.8,
       label_text_color: ink("--ink"), border_line_color: null, click_policy: "hide"});
-    if (few) fig.legend.orientation = "horizontal";
-    fig.add_layout(fig.legend, few ? "above" : "right");
+    if (few && !narrow) fig.legend.orientation = "horizontal";
+    if (narrow) fig.height += 22 * fig.legend.items.length;
+    fig.add_layout(fig.legend, narrow ? "below" : few ? "above" : "right");
   }
 
   function bar(fig, color_mapper, title) {       // the scale of the colours

@@ -12,10 +12,11 @@ from ..missed import over
 from ..written import NUMBER, brief, label
 from . import allowed, document, peaks, ranked
 from .document import Section
+from .drawn import BAR, SHORT, digits, drawn
 from .lead import FIRST, SETTLED, Lead, columns, lead_of
 from .words import linked, zero_below
 
-DRAWN, LISTED = 20_000, 400  # cases in the pictures and in the table; sweep.csv has them all
+LISTED = 400  # cases in the table; sweep.csv has them all
 
 
 def page(table: dict, told: Lead | None = None) -> str:
@@ -29,17 +30,11 @@ def page(table: dict, told: Lead | None = None) -> str:
     `messages`: {case: why it has no answer}; `folders` (n,): where the cases lie beside the page, or None; `own`: False
     where sweep.csv does not lie beside the page.
     """
-    outcome, number = list(table["outcome"]), len(table["outcome"])
-    drawn = _spread(number, DRAWN)
-    keys = [_key(one, drawn) for one in table["keys"]]
-    measures = [_measure(name, one, drawn, table.get("tolerance", np.nan)) for name, one in table["measures"].items()
-                if np.isfinite(one["values"]).any()]
-    told = told or lead_of(table)
-    first = next((name for name in FIRST if any(m["name"] == name for m in measures)), None)
-    data = {"keys": keys, "measures": measures, "outcome": [outcome[i] for i in drawn], "settled": SETTLED,
-            "grid": bool(table["grid"]), "first": first, "along": _along(keys),
-            "links": None if table["folders"] is None else [table["folders"][i] for i in drawn]}
-    sections = [Section("answers", "What came out", _explorer(number, len(drawn)) if measures else
+    first = next((name for name in FIRST if name in table["measures"]
+                  and np.isfinite(table["measures"][name]["values"]).any()), None)
+    told, part = told or lead_of(table), drawn(table, first, lambda cases, whole: _data(table, first, cases, whole))
+    data = _data(table, first, part.cases, not part.said)
+    sections = [Section("answers", "What came out", _explorer(part.said) if data["measures"] else
                         "<p>No case has a value to draw.</p>"),
                 *_change(table, told.limits),
                 *(Section(*one) for one in (("peaks", "Where the peaks are", peaks.table(told.peaks)),
@@ -50,36 +45,45 @@ def page(table: dict, told: Lead | None = None) -> str:
                 Section("measures", "What the measures mean", _meanings(table)),
                 Section("again", "The same again", _again(table))]
     return document.document(table["title"] or "patchfem sweep", _lead(table, told), sections,
-                             data if measures else None, ("figures.js", "explorer.js") if measures else ())
+                             *((data, ("figures.js", "explorer.js")) if data["measures"] else (None, ())))
 
 
-def _spread(number: int, most: int) -> np.ndarray:
-    """At most `most` of so many cases, evenly spread."""
-    return np.arange(number) if number <= most else np.unique(np.linspace(0, number - 1, most).astype(int))
+def _data(table: dict, first: str | None, cases: np.ndarray, whole: bool) -> dict:
+    """What the scripts draw of some cases; whole: with all digits, as where these are all."""
+    keys = [_key(one, cases) for one in table["keys"]]
+    measures = [_measure(name, one, cases, table.get("tolerance", np.nan)) for name, one in table["measures"].items()
+                if np.isfinite(one["values"]).any()]
+    for one in measures if not whole else ():
+        one |= {"values": digits(one["values"], SHORT), "errors": digits(one["errors"], BAR)}
+    links = table["folders"]
+    return {"keys": keys, "measures": measures, "outcome": [str(table["outcome"][i]) for i in cases.tolist()],
+            "settled": SETTLED, "grid": bool(table["grid"]), "first": first, "along": _along(keys), "whole": whole,
+            "links": None if links is None else [links[i] for i in cases.tolist()]}
 
 
-def _key(one: dict, drawn) -> dict:
+def _key(one: dict, cases) -> dict:
     """A swept key in the unit in which it was written, where all its values are; `words`: (number, text) of its values
     where they are words."""
-    texts = [str(one["texts"][i]) for i in drawn]
+    texts = [str(one["texts"][i]) for i in cases]
     written = [NUMBER.match(text) for text in texts]
     units = {(match[2] or "").strip() if match else None for match in written}
     if len(units) == 1 and None not in units:
         unit, values = units.pop(), [float(match[1]) for match in written]
     else:
-        unit, values = one["unit"], np.asarray(one["values"], float)[drawn]
+        unit, values = one["unit"], np.asarray(one["values"], float)[cases]
     words = None if any(written) else list(dict(zip(values, map(brief, texts))).items())
     return {"name": one["name"], "label": one["name"], "unit": "" if unit == "1" else unit, "values": values,
             "texts": [brief(text) for text in texts], "log": bool(one["log"]), "words": words}
 
 
-def _measure(name: str, one: dict, drawn, tolerance=np.nan) -> dict:
+def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
     """A measure in the unit that suits its largest value; `over`: whether a case misses its tolerance."""
     unit, scale = axis_unit(one["values"], one["unit"]) if one["unit"] in LADDERS else (one["unit"], 1.0)
+    some = {part: np.asarray(one[part], float)[cases] for part in ("values", "errors", "floors") if part in one}
+    missed = over(some, tolerance[cases] if np.ndim(tolerance) else tolerance)
     return {"name": name, "label": label(name), "unit": "" if unit == "1" else unit, "means": one.get("means", ""),
-            "values": np.asarray(one["values"], float)[drawn] * scale,
-            "errors": np.asarray(one["errors"], float)[drawn] * scale, "least": zero_below(name) * scale,
-            "over": over(one, tolerance)[drawn]}
+            "values": some["values"] * scale, "errors": some["errors"] * scale, "least": zero_below(name) * scale,
+            "over": missed.astype(int)}
 
 
 def _along(keys: list) -> str:
@@ -87,9 +91,9 @@ def _along(keys: list) -> str:
     return max(keys, key=lambda one: len(set(np.asarray(one["values"]).tolist())))["name"] if keys else ""
 
 
-def _explorer(number: int, drawn: int) -> str:
-    """The choices and the place of the picture; `explorer.js` fills both."""
-    thinned = f"<p class=soft>Drawn are {drawn} of {number} cases, evenly spread.</p>" if drawn < number else ""
+def _explorer(said: str) -> str:
+    """The choices and the place of the picture; `explorer.js` fills both; said: which cases are drawn, "" for all."""
+    thinned = said and f"<p class=soft>{escape(said)}</p>"
     return ("<div class=choices><label>Measure<select id=measure></select></label>"
             "<label>Along the axis<select id=along></select></label>"
             "<label>Second key<select id=beside></select></label>"

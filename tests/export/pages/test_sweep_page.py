@@ -84,21 +84,45 @@ def test_always_a_sweep_without_a_value_has_a_page_without_pictures(table):
     assert "No case has a value to draw" in text and "<script" not in text
 
 
-def test_always_many_cases_are_thinned_and_it_is_said(table):
-    many = 50_000
+def test_always_many_cases_are_thinned_to_a_page_below_three_megabytes_with_all_extremes(table):
+    many, r = 200_000, np.random.default_rng(3)
     for one in table["keys"]:
-        one["values"], one["texts"] = np.arange(many, dtype=float), [f"{value} N" for value in range(many)]
-    for one in table["measures"].values():
-        one["values"] = one["errors"] = np.linspace(1e-5, 2e-5, many)
-    table |= {"outcome": ["steady" if case % 3 else "grows" for case in range(many)], "messages": {}, "grid": False,
-              "folders": [f"cases/{case}" for case in range(many)]}
+        one["values"] = r.uniform(1, 2, many)
+        one["texts"] = [f"{value} N" for value in one["values"].tolist()]
+    table["measures"] = {f"loop_area{k}": {"unit": "J", "means": "work", "values": r.normal(size=many),
+                                           "errors": r.uniform(0, 1e-4, many)} for k in range(30)}
+    table |= {"outcome": ["stuck" if case == 777 else "steady" if case % 3 else "grows" for case in range(many)],
+              "messages": {}, "grid": False, "folders": [f"cases/{case}" for case in range(many)]}
     text = page(table)
-    assert len(text.encode()) < 3e6 + 40 * 20_000 * 3 and "Drawn are 20000 of 50000 cases" in text
     data = data_of(text)
-    cases = [int(value) for value in data["keys"][0]["values"]]
-    assert len(set(cases)) == 20_000 and (cases[0], cases[-1]) == (0, many - 1)
-    assert data["outcome"] == ["steady" if case % 3 else "grows" for case in cases]
-    assert data["links"] == [f"cases/{case}" for case in cases]
+    assert len(text.encode()) < 3e6 and f"Drawn are {len(data['outcome'])} of {many} cases" in text
+    cases = [int(one.removeprefix("cases/")) for one in data["links"]]
+    assert len(cases) > 1000 and len(set(cases)) == len(cases) and (cases[0], cases[-1]) == (0, many - 1)
+    assert data["outcome"] == [table["outcome"][case] for case in cases] and not data["whole"]
+    for shown, one in zip(data["measures"], table["measures"].values()):
+        assert {np.argmin(one["values"]), np.argmax(one["values"])} <= set(cases)
+        np.testing.assert_allclose(shown["values"], one["values"][cases], rtol=1e-6)
+        np.testing.assert_allclose(shown["errors"], one["errors"][cases], rtol=5e-3)
+    for one in table["keys"]:
+        assert {np.argmin(one["values"]), np.argmax(one["values"])} <= set(cases)
+
+
+@pytest.mark.parametrize("counts", [(1000, 200), (30, 5, 40, 30), (400_000,), (3,) * 11])
+def test_always_a_grid_is_thinned_to_a_grid_with_the_extremes_of_its_first_measure(table, counts):
+    places = [one.ravel() for one in np.meshgrid(*map(np.arange, counts), indexing="ij")]
+    many, r = places[0].size, np.random.default_rng(4)
+    table["keys"] = [{"name": f"key{k}", "unit": "1", "values": 1.0 * one, "log": False, "texts": list(map(str, one))}
+                     for k, one in enumerate(places)]
+    for one in table["measures"].values():
+        one["values"], one["errors"] = r.normal(size=many), np.full(many, 1e-3)
+    table |= {"outcome": ["steady"] * many, "messages": {}, "folders": None}
+    text = page(table)
+    data, values = data_of(text), table["measures"]["relative_displacement_amplitude"]["values"]
+    shown = np.array([one["values"] for one in data["keys"]])
+    assert len(text.encode()) < 3e6 and shown.shape[1] > 400
+    assert shown.shape[1] == np.prod([len(set(one)) for one in shown.tolist()])  # every combination
+    cases = np.ravel_multi_index(shown.astype(int), counts)
+    assert np.argmax(values) in cases and (len(counts) > 9 or np.argmin(values) in cases)
 
 
 def test_exact_a_key_written_in_several_units_is_shown_in_that_of_its_numbers(table):
