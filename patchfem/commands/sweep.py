@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from .. import core
 from ..campaigns.sweeps import ask, executors
 from ..campaigns.sweeps import sweep as sweeping
-from ..export.sweeps import answer, run
+from ..export.sweeps import receipt, run
 from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, placed, say, texts, word
 
 FIRST = 5  # messages of failed cases that are printed
@@ -37,6 +37,11 @@ class Over:
     def given(self) -> bool:
         """Whether any case is asked for."""
         return bool(self.over or self.cases or self.random or self.sobol)
+
+    def words(self, *more: str) -> tuple:
+        """What asks for the same cases of the same scene, as words."""
+        drawn = f"draw={self.random},{self.sobol},{self.seed}"
+        return (*self.over, "" if self.cases is None else str(self.cases), drawn, *more)
 
     def request(self):
         """The request; Refused where its parts do not stand together."""
@@ -92,16 +97,21 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
                       "of them")
     by = by or By()
     begin, part = perf_counter(), by.part()
+    target, tells = placed(out, f"{scene.stem}-sweep"), "json" if json_ else "faults" if quiet else "words"
+    told = Told(target, not no_page, tells, begin)
+    signed = "" if by.collect or part or keep not in (None, "none") else receipt.sign(
+        scene, (what or Over()).words(*set_, f"page={not no_page}"))
+    if resume and (written := receipt.read(target, signed)):  # all of it is there
+        _answer(written["cases"]["count"], {}, written, told)
+        return
     asked, cases = ask.asked_of(scene, set_, (what or Over()).request())
-    target = placed(out, f"{scene.stem}-sweep")
-    tells = "json" if json_ else "faults" if quiet else "words"
     if by.collect:
-        _answer(run.collect(asked, cases, target, not no_page), Told(target, not no_page, tells, begin))
+        _answered(run.collect(asked, cases, target, not no_page), told)
         return
     line = Progress(quiet)
     try:
-        found = run.sweep_into(asked, cases, run.Place(target, resume, keep or "", part, not no_page),
-                           executors.of(by.executor, by.jobs), None if quiet else say, line)
+        place = run.Place(target, resume, keep or "", part, not no_page)
+        found = run.sweep_into(asked, cases, place, executors.of(by.executor, by.jobs), None if quiet else say, line)
     except (KeyboardInterrupt, core.Missing) as why:
         line.end()
         if isinstance(why, core.Missing) and not line.done:
@@ -115,7 +125,9 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
             print(json.dumps({"cases": line.done, "folder": str(target)}) if json_ else
                   f"shard {by.shard}: {line.done} cases in {target}; when all shards are done: the same with --collect")
         return
-    _answer(found, Told(target, not no_page, tells, begin))
+    if signed and not found.messages and place.kept(len(cases)) == "none":
+        receipt.write(target, signed)
+    _answered(found, told)
 
 
 class Told(NamedTuple):
@@ -149,17 +161,20 @@ class Progress:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
-def _answer(found, told: Told) -> None:
-    """What came out, the worst first, as sweep.json has it."""
-    target, failed = told.target, sorted(found.messages)
-    written = answer.read_answer(target / "sweep.json")
-    counts = written["cases"]["outcomes"]
+def _answered(found, told: Told) -> None:
+    """What came out, as its folder has it."""
+    _answer(len(found), found.messages, json.loads((told.target / "sweep.json").read_bytes()), told)
+
+
+def _answer(number: int, messages: dict, written: dict, told: Told) -> None:
+    """What came out of so many cases, the worst first, as sweep.json has it; messages: of those that failed."""
+    target, failed, counts = told.target, sorted(messages), written["cases"]["outcomes"]
     if told.tells == "json":
-        print(json.dumps({"cases": len(found), "outcomes": counts, "failed": len(failed), "answer": written["answer"],
+        print(json.dumps({"cases": number, "outcomes": counts, "failed": len(failed), "answer": written["answer"],
                           "over_tolerance": written["cases"]["over_tolerance"], "folder": str(target),
                           "seconds": round(perf_counter() - told.begin, 3)}, ensure_ascii=False))
     elif told.tells == "words":
-        print(f"{len(found)} cases: " + ", ".join(f"{count} {name}" for name, count in counts.items()))
+        print(f"{number} cases: " + ", ".join(f"{count} {name}" for name, count in counts.items()))
         for said in written["sentences"]:
             print(said)
         if told.page:
@@ -169,16 +184,16 @@ def _answer(found, told: Told) -> None:
             print(f"results: {tables[0]} {tables[1]}")
         else:
             print(f"results: {target / 'sweep.json'}; sweep.csv and sweep.nc of so many cases take some "
-                  f"{1e-6 * TABLE * len(found):.0f} MB: the same command with --collect writes them")
+                  f"{1e-6 * TABLE * number:.0f} MB: the same command with --collect writes them")
     sys.stdout.flush()
     alike = {}
-    for number in failed:
-        alike.setdefault(found.messages[number], []).append(number + 1)
+    for case in failed:
+        alike.setdefault(messages[case], []).append(case + 1)
     for text, numbers in list(alike.items())[:FIRST]:
         say(f"case {numbers[0]}{f' and {len(numbers) - 1} more' * (len(numbers) > 1)}: {text}")
     if len(alike) > FIRST:
         say("sweep.csv has the messages of all failed cases")
-    if len(failed) == len(found):
+    if len(failed) == number:
         raise Refused("sweep: no case could be run")
     if failed or "not_converged" in counts:
         raise NotReached

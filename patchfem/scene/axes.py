@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, get_origin
@@ -16,6 +16,7 @@ LIMITS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 MOST = 10_000_000  # values of one range
 _RANGE = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
 _UNIT = re.compile(r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*(.*)")
+_PLAIN = re.compile(r"[-+]?(0|[1-9][0-9]{0,14})(\.[0-9]{1,20})?([eE][-+]?[0-9]{1,2})?")  # a finite number of TOML
 _TEN = 10  # ratio of the ends from which a range of positive numbers is logarithmic unless it says otherwise
 _ENDS = {"]": "[", "}": "{"}
 
@@ -114,9 +115,10 @@ def values_of(key: str, texts: Iterable[str], distinct: bool = True) -> Axis:
     known(key)
     texts, values, wrong = tuple(texts), [], []
     _no_table(key, texts)
+    value = _reading(key)
     for text in texts:
         try:
-            values.append(_value(key, text))
+            values.append(value(text))
         except ValueError as error:
             wrong.append(str(error))
     if not wrong and distinct and len(set(values)) < len(values):
@@ -204,18 +206,26 @@ def _split(text: str) -> list[str]:
     return [*pieces, text[begin:].strip()]
 
 
-def _value(key: str, text: str) -> float | str:
-    """SI value of a text that a key holds, or the text where it is no number; ValueError where it cannot hold it."""
+def _reading(key: str) -> Callable[[str], float | str]:
+    """What reads a text that a key holds: its SI value, or the text where it is no number; ValueError where the key
+    cannot hold it."""
     model, name = owner_of(key)
-    kind = kind_of(model, name) if _is_number(key) else None
+    number, types = _is_number(key), _types(key)
+    kind, inner = kind_of(model, name) if number else None, model_of(model, name)
     if kind is not None:
-        return quantities.parse(text, kind)
-    given = _set_value(key, text)
-    if model_of(model, name) is not None and isinstance(given, dict):
-        return text
-    number = isinstance(given, int | float) and not isinstance(given, bool)
-    held(key, float(given) if number and float in _types(key) else given, LIMITS)
-    return float(given) if number else text
+        return lambda text: quantities.parse(text, kind)
+
+    def read(text: str) -> float | str:
+        if number and float in types and _PLAIN.fullmatch(text):  # of ten thousand drawn values each
+            return float(text)
+        given = _set_value(key, text)
+        if inner is not None and isinstance(given, dict):
+            return text
+        is_number = isinstance(given, int | float) and not isinstance(given, bool)
+        held(key, float(given) if is_number and float in types else given, LIMITS)
+        return float(given) if is_number else text
+
+    return read
 
 
 def _ends(key: str, low: str, high: str) -> tuple:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from hashlib import sha256
-from math import prod
+from math import isfinite, prod
 
 import numpy as np
 
@@ -107,21 +106,27 @@ class Cases:
         in other units or another order have the same name, and also as part of another sweep of the same scene, unless
         all cases of a sweep share a mesh that is chosen for them.
         """
-        @cache
-        def mark(at: int, place: int) -> str:
-            axis, value = self.axes[at], self.axes[at].values[place]
-            return json.dumps([axis.key, value, asked.content(value) if isinstance(value, str) else ""])
+        axes = sorted(self.axes, key=lambda axis: json.dumps(axis.key))  # of all cases alike
+        marks = [_marks(axis, asked) for axis in axes]
+        at = [self.axes.index(axis) for axis in axes]
 
         def signs(shared: str, of: Sequence[int]) -> np.ndarray:
-            marked = mark.__wrapped__ if self.rows else mark  # the values of rows are all others
-            own = (sorted(map(marked, range(len(self.axes)), self.places(number))) for number in of)
-            return np.fromiter((int(sha256("\n".join([shared, *one]).encode()).hexdigest()[:16], 16) for one in own),
-                               np.uint64, len(of))
+            placed = (self.places(number) for number in of)
+            own = ("\n".join([shared, *(mark[places[k]] for mark, k in zip(marks, at))]) for places in placed)
+            return np.fromiter((int(sha256(one.encode()).hexdigest()[:16], 16) for one in own), np.uint64, len(of))
 
         shared = asked.digest()
         if asked.meshed([axis.key for axis in self.axes]):
             shared = sha256(np.sort(signs(shared, range(len(self)))).tobytes()).hexdigest()
         return signs(shared, range(len(self)) if numbers is None else numbers)
+
+
+def _marks(axis: Axis, asked: Asked) -> list[str]:
+    """JSON of the key, each of its values, and the sign of the file that such a value names."""
+    key = json.dumps(axis.key)
+    return [f'[{key}, {value!r}, ""]' if isinstance(value, float) and isfinite(value) else
+            json.dumps([axis.key, value, asked.content(value) if isinstance(value, str) else ""])
+            for value in axis.values]
 
 
 def product(parts: Sequence[Cases]) -> Cases:

@@ -1,0 +1,75 @@
+"""A whole sweep that is resumed is there at once, and only while nothing it is made of has changed."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from command_line import cli
+from scene_texts import COULOMB, POINT, SHORT
+
+from patchfem.export.sweeps import receipt
+
+OVER = ("--over", "friction.static=0.2,0.3,0.4", "--keep", "none")
+LEAN = """import sys
+from patchfem.__main__ import _guarded
+assert _guarded(sys.argv[1:]) == 0
+assert not {"numpy", "pydantic", "h5py", "numba"} & set(sys.modules)"""
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    scene = tmp_path_factory.mktemp("receipt") / "rig.toml"
+    scene.write_text(POINT + COULOMB + SHORT, encoding="utf-8")
+    return scene, scene.parent / "out", cli("sweep", scene, *OVER, "-o", scene.parent / "out")
+
+
+def words(*over) -> tuple:
+    return (*over, "", "draw=0,0,0", "page=True")
+
+
+def test_exact_a_resumed_whole_sweep_says_the_same_and_loads_no_numpy(swept):
+    scene, out, first = swept
+    done = subprocess.run([sys.executable, "-c", LEAN, "sweep", scene, *OVER, "-o", out, "--resume"],
+                          capture_output=True, text=True, check=True)
+    assert first.code == 0 and done.stdout == first.out
+    told = cli("sweep", scene, *OVER, "-o", out, "--resume", "--json")
+    assert '"cases": 3' in told.out and told.code == 0
+
+
+@pytest.mark.parametrize("change", ["chunk", "table", "gone", "scene", "words", "page"])
+def test_always_whatever_has_changed_is_looked_at(swept, change):
+    scene, out, _ = swept
+    assert cli("sweep", scene, *OVER, "-o", out, "--resume").code == 0
+    over = OVER[1]
+    assert receipt.read(out, receipt.sign(scene, words(over)))["cases"]["count"] == 3
+    file = next((out / "chunks").glob("*.h5")) if change == "chunk" else out / "sweep.csv"
+    text, stamp = scene.read_text("utf-8"), file.stat()
+    if change in ("chunk", "table"):
+        os.utime(file, ns=(stamp.st_atime_ns, stamp.st_mtime_ns + 1))
+    if change == "gone":
+        file.unlink()
+    if change == "scene":
+        scene.write_text(text + "# more\n", encoding="utf-8")
+    asked = (over + ",0.5", "", "draw=0,0,0", "page=True") if change == "words" else \
+        (over, "", "draw=0,0,0", "page=False") if change == "page" else words(over)
+    assert receipt.read(out, receipt.sign(scene, asked)) == {}
+    scene.write_text(text, encoding="utf-8")
+    again = cli("sweep", scene, *OVER, "-o", out, "--resume")  # it is whole again, and has its receipt
+    assert again.code == 0 and receipt.read(out, receipt.sign(scene, words(over)))
+
+
+def test_always_the_content_of_a_file_that_a_word_names_counts(swept):
+    scene, *_ = swept
+    other = scene.parent / "push.csv"
+    other.write_text("1", encoding="utf-8")
+    before = receipt.sign(scene, words('drive.file="push.csv"'))
+    other.write_text("2", encoding="utf-8")
+    assert before != receipt.sign(scene, words('drive.file="push.csv"'))
+    assert receipt.sign(scene.parent / "none.toml", words()) == "" and receipt.read(scene.parent, "") == {}
+
+
+def test_exact_a_sweep_with_a_failed_case_has_no_receipt(swept, tmp_path):
+    scene, *_ = swept
+    assert cli("sweep", scene, "--over", "friction.static=0.2,-1", "--keep", "none", "-o", tmp_path / "out").code == 3
+    assert not (tmp_path / "out" / receipt.NAME).exists()
