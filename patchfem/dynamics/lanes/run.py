@@ -151,9 +151,9 @@ def own_of(law: str, motion, name: str) -> np.ndarray:
     return motion[:, at.STATE + getattr(own_state(law), name) - at.OWN]
 
 
-def march_on(law: str, cases: Cases, motion, cycles: int, steps: int) -> np.ndarray:
-    """History (n, c, 4) of cases that march over `cycles` more from a motion (n, STATE and more), or until they repeat;
-    the last cycle then stands for those that follow."""
+def march_on(law: str, cases: Cases, motion, cycles: int, steps: int) -> tuple:
+    """(history (n, c, 4), motion at the end) of cases that march over `cycles` more from a motion (n, STATE and
+    more), or until they repeat; the last cycle then stands for those that follow."""
     n, history = len(cases.damp), np.zeros((len(cases.damp), cycles, 4))
     ended, motion = np.zeros(n, np.int64), motion.copy()
     room, marked = np.zeros((at.OWN + motion.shape[1] - at.STATE) * at.LANES), np.zeros(at.LANES + 1, np.int64)
@@ -161,7 +161,7 @@ def march_on(law: str, cases: Cases, motion, cycles: int, steps: int) -> np.ndar
                        room, marked)
     for case in np.flatnonzero(ended < cycles):
         history[case, ended[case]:] = history[case, ended[case] - 1]
-    return history
+    return history, motion
 
 
 def accelerations(law: str, cases: Cases, motion, cycles: int, steps: int, stride: int = 1) -> np.ndarray:

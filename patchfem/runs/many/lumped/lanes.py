@@ -48,6 +48,7 @@ KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "iwan": "masing", "t
          "nonlocal": "friction.laws.stretch_kernels"}
 MARCH_ON = "yielding", "masing"  # whose motions march on until they settle
 SMOOTH, CALM = (128, 256, 512, 1024, 2048), 0.5  # steps of a cycle under a law of a stretch, its rate in a step then
+PASSES = 0.75  # of the time in which a slide that turns passes the speed of Stribeck, over that of a rate
 RINGING = 512  # steps of a cycle under a law of a stretch from which a ring that is not found is none
 RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
 # of the change at half the steps, of that of the main measures, and of the measure itself, as both marches can miss an
@@ -61,7 +62,7 @@ ORDERLY, SHOWN = 10.0, 0.25  # a change at half the steps that falls by this sho
 MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; change over a tenth of these that is left
 # times twice as many cells as a run by itself has in a check of Iwan, and of its bars: 1 of 590 random cases erred more
 # than one, by 1.9
-FINER_CELLS, SHORT = 4, 2.0
+FINER_CELLS, SHORT = 2, 2.0
 RING = "ring_frequency", "ring_damping"
 DROPPED = 1e-2  # share of a loop by which another may be larger that is forgotten for want of room
 CHECKED, FEWEST = 200, 2  # one of so many cases is held against the exact engine, so many of a batch at least
@@ -136,6 +137,9 @@ def _rate(model: Model) -> tuple:
     rate = damper
     if model.friction.law == "tanh":
         rate = model.limits(model.point.load)[0] / model.friction.reference_speed * scale + damper
+    if model.friction.law == "lugre":  # its peak of force lasts while the slide turns, as long as its speed is that low
+        turns = np.abs(modes.slide[0] * modes.base[0]) * largest(model.rig.drive)
+        rate = np.maximum(damper, PASSES * turns / model.friction.stribeck_speed)
     return np.where(_creates(model), np.inf, np.maximum(rate, np.sqrt(modes.omega[0]**2 + stiff)) / omega),
 
 
@@ -416,24 +420,40 @@ def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
     """((half the range of the slide that motions settle to [m], its error), (n,) each, NaN of those that need none;
     (n,) which of them do not show it after MORE times their cycles, nor by how they come near).
 
-    amplitudes (n, w) [m] of the output by windows; free: (n,) which may.
+    amplitudes (n, w) [m] of the output by windows; free: (n,) which may. They march on by as many cycles as they did,
+    each until it settles, so that what settles soon costs little.
     """
-    out, cycles = np.full((2, len(free)), np.nan), MORE * found.history.shape[1]
+    out, part = np.full((2, len(free)), np.nan), found.history.shape[1]
     if amplitudes.shape[1] > 2:
         free = free & (np.ptp(amplitudes[:, -3:], axis=1) > CHANGES * TIGHTEST * amplitudes[:, -1])
-    lost = np.zeros(len(free), bool)
-    where = np.flatnonzero(free)
-    history = march.march_on(law, march.Cases(*(part[where] for part in cases)), found.motion[where], cycles, steps)
-    ranges, ends = np.ptp(history[:, :, :2], axis=2) / 2, np.arange(cycles - 1, 0, -cycles // MORE)[::-1]
-    last, left = ranges[:, -1], 2 * np.ptp(ranges[:, -cycles // MORE:], axis=1)
-    with np.errstate(all="ignore"):
-        value, error = steady_amplitudes(ranges[:, ends], history[:, ends, 2:] @ [1, 1j])
-    closes = left < SETTLED * last
-    value, error = np.where(closes, last, value), np.where(closes, left + 1e-9 * last, error)
-    known = error < 10 * SETTLED * last
-    out[:, where] = np.where(known, (value, error), np.nan)
-    lost[where] = ~known
+    lost, where, motion = free.copy(), np.flatnonzero(free), found.motion[free]
+    history = np.empty((where.size, 0, 4))
+    for _ in range(MORE):
+        if not where.size:
+            break
+        more, motion = march.march_on(law, _of(cases, where), motion, part, steps)
+        history = np.concatenate([history, more], axis=1)
+        value, error = _known(history, part)
+        known = error < 10 * SETTLED * np.ptp(history[:, -1, :2], axis=1) / 2
+        out[:, where[known]], lost[where[known]] = (value[known], error[known]), False
+        where, motion, history = where[~known], motion[~known], history[~known]
     return tuple(out), lost
+
+
+def _known(history, part: int) -> tuple:
+    """(half the range of the slide that motions settle to [m], its error, infinite where nothing tells it, (n,) each),
+    of their history (n, c, 4), the last `part` cycles of which have come since it was asked last: what these change it
+    by where they hardly do, and no more than those before them; in the end an extrapolation of windows."""
+    ranges = np.ptp(history[:, :, :2], axis=2) / 2
+    last, left = ranges[:, -1], 2 * np.ptp(ranges[:, -part:], axis=1)
+    before = 2 * np.ptp(ranges[:, -2 * part:-part], axis=1) if ranges.shape[1] > part else np.inf
+    closes = (left < SETTLED * last) & (left <= np.maximum(before, 1e-9 * last))
+    value, error = last, np.full(len(last), np.inf)
+    if ranges.shape[1] == MORE * part:
+        ends = np.arange(MORE * part - 1, 0, -part)[::-1]
+        with np.errstate(all="ignore"):
+            value, error = steady_amplitudes(ranges[:, ends], history[:, ends, 2:] @ [1, 1j])
+    return np.where(closes, last, value), np.where(closes, left + 1e-9 * last, error)
 
 
 def cases_of(models) -> tuple:
