@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 
 import patchfem as pf
 from patchfem.dynamics.march.march import march, warm_up
+from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_of
 from patchfem.runs.rig.numerics import choose
 from patchfem.structure.drives import Recorded
@@ -54,13 +55,21 @@ def random_base(seconds: float, rms: float, seed: int = 1) -> Recorded:
     return Recorded(np.arange(count) / RATE, value, STEPS / RATE)
 
 
-def tested(scene, seconds: float, rms: float, seed: int = 1) -> Test:
-    """The rig of a scene (path or text, without [contact]) under `random_base` from rest."""
+def marched(scene, drive=None, steps: int = STEPS, seconds: float | None = None):
+    """Every sample (`Window` of the march) of the rig of a scene, path or text, from rest; drive: that of the scene
+    unless given; steps: in what counts as its cycle; seconds: of the run, those of the drive unless given."""
     model = pf.build(scene)
-    drive, modes = random_base(seconds, rms, seed), model.rig.modes
-    contact, cycles = contact_of(model, choose(model), None), int(seconds * RATE) // STEPS - 1
+    drive, modes = drive or model.rig.drive, model.rig.modes
+    patch = None if model.patch is None else solve_all(model.patch, model.accuracy.tolerance, False)[0]
+    contact = contact_of(model, choose(model), patch)
+    cycles = int((seconds or drive.duration) / drive.period)
     warm_up(modes, drive, contact)
-    seen = march(modes, drive, contact, cycles, STEPS, cycles).window
+    return march(modes, drive, contact, cycles, steps, cycles).window
+
+
+def tested(scene, seconds: float, rms: float, seed: int = 1) -> Test:
+    """The rig of a scene under `random_base` from rest."""
+    seen = marched(scene, random_base(seconds, rms, seed), seconds=seconds - STEPS / RATE)
     return Test(seen.base_acceleration, seen.acceleration, seen.output, seen.output_rate)
 
 

@@ -1,0 +1,122 @@
+"""Would a sweep from 130 to 160 Hz below 5 g have shown one critical level at all frequencies, as the report says?
+
+DRAFT
+
+Run: python studies/report/sweeps.py
+"""
+
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from drawing import drawing
+from modal_test import marched
+from told import told
+
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
+
+HERE = Path(__file__).parent
+QUESTION, ANSWER = told(__doc__)
+REPRODUCED = ""
+G, MIL, DISTORTED = 9.80665, 25.4e-6, 0.03
+LOW, HIGH, RATE = 130.0, 160.0, 15.0  # of the sweep [Hz], [Hz], [Hz/s]
+LEVELS = (3.0, 3.8, 4.0, 4.1, 4.2, 4.3, 4.4, 4.5, 4.75)  # report, 4.C: below 5 g
+SHOWN = (3.0, 4.2, 4.4, 4.75)
+MODELS = {"rigid block": "block.toml", "grooves": "grooved.toml", "second path": "../table_1/second_path.toml"}
+
+
+class Swept(NamedTuple):
+    """One sweep: model; level [g]; at the middle of every stretch of ten cycles, (k,): frequency [Hz], largest
+    acceleration [g], half peak to peak of the displacement [mil], third over first harmonic of the acceleration."""
+
+    model: str
+    level: float
+    frequency: np.ndarray
+    acceleration: np.ndarray
+    displacement: np.ndarray
+    distortion: np.ndarray
+
+
+def scene(model: str) -> str:
+    """Text of a rig whose base is swept."""
+    text = (HERE / MODELS[model]).read_text("utf-8")
+    text = "\n".join(line for line in text[:text.index("[drive]")].splitlines()
+                     if not line.startswith(("lifted_mass", "travel")))
+    return f"""{text}
+[drive]
+kind = "base"
+waveform = "sweep"
+from = "{LOW} Hz"
+to = "{HIGH} Hz"
+rate = "{RATE} Hz/s"
+acceleration = "4 g"
+[accuracy]
+method = "march"
+"""
+
+
+def swept(model: str, level: float) -> Swept:
+    """The sweep at a level [g], cut into stretches of ten cycles."""
+    seen = marched(scene(model).replace('"4 g"', f'"{level} g"'), steps=200)
+    turns = LOW * seen.time + RATE * seen.time**2 / 2
+    even = np.arange(0, turns[-1], 1 / 64)
+    felt, out = (np.interp(even, turns, one) for one in (seen.acceleration, seen.output))
+    felt, out = (one[:one.size // 640 * 640].reshape(-1, 640) for one in (felt, out))
+    lines = np.abs(np.fft.rfft(felt, axis=1))
+    middle = (np.arange(len(felt)) + 0.5) * 10
+    return Swept(model, level, np.sqrt(LOW**2 + 2 * RATE * middle), np.abs(felt).max(1) / G,
+                 np.ptp(out, axis=1) / 2 / MIL, lines[:, 30] / lines[:, 10])
+
+
+def critical(sweeps: list) -> np.ndarray:
+    """Level [g] (k,) at which the waveform becomes distorted, at the frequencies of the sweeps of one model, which rise
+    in level: between two of them by the logarithm of the distortion."""
+    logs = np.log(np.maximum([one.distortion for one in sweeps], 1e-6) / DISTORTED)
+    first = np.argmax(logs > 0, axis=0)
+    k = np.arange(logs.shape[1])
+    low, high = logs[first - 1, k], logs[first, k]
+    levels = np.array([one.level for one in sweeps])
+    return levels[first - 1] + (levels[first] - levels[first - 1]) * low / (low - high)
+
+
+def picture(sweeps: list, path: Path) -> Path:
+    """Acceleration over input above the distortion, a column per model."""
+    colours = dict(zip(SHOWN, ("black", GREY, BLUE, ORANGE)))
+    with drawing(path, (10.4, 5.6), 2, 3, sharex=True, sharey="row") as (_, axes):
+        for column, model in enumerate(MODELS):
+            size, wave = axes[:, column]
+            for one in (each for each in sweeps if each.model == model and each.level in SHOWN):
+                size.plot(one.frequency, one.acceleration / one.level, color=colours[one.level], lw=1.2,
+                          label=f"{one.level:g} g")
+                wave.semilogy(one.frequency, np.maximum(one.distortion, 1e-4), color=colours[one.level], lw=1.2)
+            wave.axhline(DISTORTED, color=GREY, lw=0.8, ls="--")
+            size.set(title=model, ylim=(0.7, 1.7))
+            wave.set(xlabel="frequency [Hz]", xlim=(LOW, HIGH), ylim=(1e-4, 0.5))
+        axes[0, 0].set_ylabel("peak acceleration / input")
+        axes[1, 0].set_ylabel("third / first harmonic")
+        axes[0, 0].legend(loc="upper left", ncols=2, fontsize=9)
+        axes[1, 0].text(145, 0.035, "seen as distorted", color=GREY, fontsize=9)
+    return path
+
+
+def main(path: Path | None = HERE / "sweeps.svg", models=tuple(MODELS)) -> list:
+    """[Swept], printed and drawn."""
+    sweeps = [swept(model, level) for model in models for level in LEVELS]
+    for model in models:
+        mine = [one for one in sweeps if one.model == model]
+        level, still = critical(mine), mine[0]
+        print(f"{model:12} distorted from {level.min():.2f} to {level.max():.2f} g on, mean {level.mean():.2f}; before, at "
+              f"{still.level:g} g, the gauge sees {still.displacement[still.frequency < 135].max():.2f} mil below 135 Hz, "
+              f"{still.displacement[still.frequency > 140].max():.2f} mil above 140 Hz")
+    if path is not None:
+        picture(sweeps, path)
+    print(ANSWER)
+    return sweeps
+
+
+if __name__ == "__main__":
+    main()
