@@ -128,10 +128,13 @@ def _without_order(kind: str, gap: float, earlier: float, least: float, missed: 
 
 
 def _orderly(fine: dict, last: dict, before: dict) -> bool:
-    """Whether the change of every main measure falls with the step: where one does not, no other's order is believed.
+    """Whether the change of every main measure falls with the step: where one does not, or stands in coarser runs
+    alone, no other's order is believed.
 
     last, before: changes at the last halving of the steps and at the one before, by name.
     """
+    if any(name in before and name not in last for name in MAIN):
+        return False
     seen = [name for name in MAIN if name in before and abs(last[name]) > ROUND * abs(fine[name])
             and abs(fine[name]) > floor_of(name)]
     return all(abs(before[name]) >= 2**FALLS * abs(last[name]) for name in seen)

@@ -6,13 +6,14 @@ rigid Coulomb block, 128 to 135 Hz for one that climbs its grooves, 295 Hz besid
 
 Only the grooves pass 148 Hz, at 4.5 g rms: 144 to 160 Hz with a damping ratio of 1.3, in four records of 20 s. A rigid
 block nears its own 143 Hz from below as it slides more, 131 Hz at 6 g rms, 142 Hz at 12 g. The second path, which
-explains the displacements of Table 1 best, cannot have acted in this test: its mode lies near 300 Hz where it is
-nearly critical and near 260 Hz at 3 g. An added spring that lifts 143 to 148 Hz would have 0.071 of the flexures'
-stiffness and give way by 27 mil before 4 g made it slip, 336 times what was measured at 4 g. For large slides the
-damping is that of statistical linearisation, 0.003 + sqrt(2/pi) mu N/(2 m omega sigma_v). A slide of 1.4 mil rms is 17
-times the 0.08 mil at 4 g and 143 Hz: if the test was a random one, it was the hardest of all. The report says neither
-how it was driven nor how hard. That the load suppresses yaw is not reproduced: one point of contact leaves its peak at
-128 Hz. Of the print only the caption could be read (28 lb, where the text says 26).
+explains the displacements of Table 1 best, cannot have acted in this test: its mode lies near 300 Hz where it is nearly
+critical and near 260 Hz at 3 g. An added spring that lifts 143 to 148 Hz would have 0.071 of the flexures' stiffness
+and give way by 27 mil before 4 g made it slip, 336 times what was measured at 4 g. For large slides the damping is that
+of statistical linearisation, 0.003 + sqrt(2/pi) mu N/(2 m omega sigma_v). A slide of 1.4 mil rms is 17 times the 0.08
+mil at 4 g and 143 Hz: if the test was a random one, it was the hardest of all. The report says neither how it was
+driven nor how hard. That the load suppresses yaw is not reproduced: one point of contact leaves its peak at 128 Hz
+(engaged.py has what pieces with a width do, and the coherence of these tests). Of the print only the caption could be
+read (28 lb, where the text says 26).
 
 Run: python studies/report/figure_27.py
 """
@@ -33,7 +34,7 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = "in part: critically damped, yet not at 148 Hz (the grooves: at a damping of 1.3); yaw is not suppressed"
+REPRODUCED = "in part: critically damped, yet not at 148 Hz (the grooves: at a damping of 1.3); one point leaves yaw"
 MIL, ONSET = 25.4e-6, 4.14  # of block.toml [g]
 POINT = '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
 CASES = (("rigid block", 1.0), ("rigid block", 4.2), ("rigid block", 6.0), ("rigid block", 12.0), ("grooves", 4.5),

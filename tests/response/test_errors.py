@@ -132,6 +132,14 @@ def test_exact_changes_that_turn_their_sign_keep_the_larger_one():
     assert step_error(*same, 400)[NAME] == pytest.approx(SURE * 1e-3 / 2, rel=1e-9)
 
 
+def test_always_no_order_is_believed_where_coarser_runs_alone_have_a_loop():
+    """A finest run that ends before its loop closes: the change stands as it does where no order is shown."""
+    fine, half, quarter = ({"friction_work": 1 + 1e-3 * h**2} for h in (1, 2, 4))
+    assert step_error(fine, half, quarter, 400)["friction_work"] == pytest.approx(SURE * 1e-3, rel=1e-9)
+    half["loop_area"] = quarter["loop_area"] = 1.0
+    assert step_error(fine, half, quarter, 400)["friction_work"] == pytest.approx(LOOSE * 3e-3, rel=1e-9)
+
+
 def test_exact_a_peak_that_two_runs_read_at_one_sample_errs_by_first_order():
     """Equal at the last two steps: they share samples. An amplitude, which is not read at one, errs by half of that."""
     runs = [{NAME: 1.0, "absolute_acceleration_peak": 1.0 + gap} for gap in (0.0, 0.0, 1e-3)]

@@ -1,0 +1,194 @@
+"""What the rig did: the sweep below 5 g, the levels with their gauge, the ringing loop, the ways to run away."""
+
+import numpy as np
+import pytest
+from study_module import study
+
+import patchfem as pf
+
+
+def inside(text, *parts):
+    """Every part stands in the text."""
+    text = " ".join(text.split())
+    missing = [part for part in parts if part not in text]
+    assert not missing, f"{missing} not in: {text}"
+
+
+def test_figure_8_the_piece_swings_as_its_closed_form():
+    """Up to 20 Hz it breaks away from rest; the piece's friction is Coulomb's, the cell's the spring's."""
+    figure = study("report/figure_8.py")
+    for frequency in (5.0, 10.0, 20.0):
+        one = figure.loop(frequency)
+        assert one.peak == pytest.approx(figure.ring(frequency), rel=2e-3)
+        assert np.abs(one.friction).max() == pytest.approx(figure.LIMIT, rel=1e-12)
+        inside(figure.ANSWER, *[f"{one.peak:.2f} times the friction at 10 Hz"] * (frequency == 10))
+
+
+def test_figure_8_work_in_the_load_cell_is_the_work_of_the_friction():
+    """Over a cycle the fixture stores nothing and its damper takes little: both loops have the area of the ledger."""
+    figure = study("report/figure_8.py")
+    one = figure.loop(10.0)
+    area = abs(np.trapezoid(one.friction, one.slip)) / (4 * figure.LIMIT * figure.STROKE)
+    assert area == pytest.approx(one.work, rel=2e-3)
+    assert one.work == pytest.approx(1 - figure.LIMIT / figure.STIFFNESS / figure.STROKE, rel=5e-3)
+
+
+@pytest.mark.slow
+def test_figure_8_the_sentence(tmp_path, capsys):
+    figure = study("report/figure_8.py")
+    loops = {one.frequency: one for one in figure.main(tmp_path / "x.svg")}
+    inside(figure.ANSWER, f"{loops[10].peak:.2f} times the", f"{loops[20].peak:.2f} at 20 Hz")
+    read = {f: figure.read_as_rigid(loops[f]) for f in (2.0, 10.0)}
+    assert all(f"{static:.3f}" == "0.300" and abs(length * 1e6 - 3.5) < 0.06 for static, length in read.values())
+    assert figure.LIMIT / figure.STIFFNESS == pytest.approx(3.5e-6, rel=0.01)
+    inside(figure.__doc__, f"{figure.ring(10):.3f} at 10 Hz, {figure.ring(40):.3f} at 40", f"{loops[40].peak:.3f})",
+           f"{loops[10].swings} swings a stroke at 10 Hz and {loops[20].swings}", f"is {loops[10].work:.2f} of that")
+    falls = figure.loop(2.0, 0.33)
+    inside(figure.__doc__, f"the cell shows {falls.peak:.2f}")
+    assert falls.sticks > 50 > 10 > figure.loop(2.0).sticks
+    assert figure.ANSWER in capsys.readouterr().out and "load cell" in (tmp_path / "x.svg").read_text()
+
+
+def test_exact_a_swept_block_that_friction_holds_moves_with_the_base():
+    sweeps = study("report/sweeps.py")
+    one = sweeps.swept("rigid block", 4.0)
+    assert one.displacement.max() < 1e-9 and one.distortion.max() < 2e-3
+    assert one.acceleration == pytest.approx(4.0, rel=2e-3)
+    assert one.frequency[0] > 130 and one.frequency[-1] < 160 and np.all(np.diff(one.frequency) > 0)
+
+
+@pytest.mark.slow
+def test_sweeps_the_sentence(tmp_path, capsys):
+    sweeps = study("report/sweeps.py")
+    found = sweeps.main(tmp_path / "x.svg")
+    told = {"rigid block": ("at every", 0), "grooves": ("from 136", 136), "second path": ("beside", 136)}
+    for model, (words, least) in told.items():
+        words = "between {:.2f} and {:.2f} g " + words
+        mine = [one for one in found if one.model == model]
+        level = sweeps.critical(mine)[mine[0].frequency > least]
+        inside(sweeps.ANSWER, words.format(level.min(), level.max()))
+        top = mine[-1].acceleration[mine[-1].frequency > 131] / 4.75
+        if model != "second path":
+            inside(sweeps.__doc__, f"{top.min():.2f} to {top.max():.2f}")
+            assert mine[-1].level == 4.75
+    still = next(one for one in found if one.model == "grooves" and one.level == 3.0)
+    inside(sweeps.__doc__, f"reads {still.displacement[still.frequency < 135].max():.2f} mil at 3 g where it reads "
+           f"{still.displacement[still.frequency > 140].max():.2f} at most")
+    assert f"{sweeps.critical([one for one in found if one.model == 'grooves']).min():.1f}" == "4.0"
+    assert sweeps.ANSWER in capsys.readouterr().out
+
+
+def test_always_a_level_ends_in_its_steady_motion():
+    """The series of levels, marched, against the harmonic balance of each level alone."""
+    steps = study("report/steps.py")
+    for one in steps.steps(143.0, steps.raised(143.0))[1:]:
+        found = pf.run(steps.text(), **{"measured.file": str(steps.TABLE), "drive.acceleration": one.level * steps.G})
+        seen = found.measures["relative_displacement_amplitude"].value / steps.MIL
+        felt = found.measures["absolute_acceleration_peak"].value / steps.G
+        assert one.gauge == pytest.approx(seen, abs=5e-3) and one.acceleration == pytest.approx(felt, rel=0.02)
+
+
+@pytest.mark.slow
+def test_steps_the_sentence(tmp_path, capsys):
+    steps = study("report/steps.py")
+    found, fits = steps.main(tmp_path / "x.svg")
+    every = [one for row in found.values() for one in row]
+    stable = [np.log(one.read[1] / one.gauge) for one in every if one.read[1] and not one.unstable]
+    inside(steps.ANSWER, f"are {np.exp(np.mean(stable)):.2f} times")
+    gain, (low, high) = fits[True].fit.values[3], fits[True].fit.intervals[3]
+    inside(steps.ANSWER, f"{gain:.2f} ({low:.2f} to {high:.2f})")
+    for part, words in (("fitted", "{:.3f} for {:.3f}, and"), ("held_out", "worse, {:.3f} for {:.3f}")):
+        scores = [fits[free].scored(fits[free].logs, fits[free].left)[part]["all"] for free in (True, False)]
+        inside(steps.ANSWER, words.format(*scores))
+    for row in found.values():
+        *first, last = [f"{one.gauge:.3f}" for one in row]
+        inside(steps.__doc__, f"{', '.join(first)} and {last} V")
+    assert steps.ANSWER in capsys.readouterr().out
+
+
+def test_always_friction_far_off_the_axis_lets_go_at_135_hz_first():
+    """At 7.25 g grooves hold at 135 and 143 Hz; with 0.30 of yaw they let go at 135 Hz alone."""
+    ways = study("report/runaways.py")
+    for name, left in (("grooves", [False, False]), ("grooves, yaw 0.30", [True, False])):
+        assert [ways.motion(name, f, 7.25)[0] for f in (135.0, 143.0)] == left
+
+
+def test_exact_friction_alone_slides_without_a_stop_from_den_hartogs_level_on():
+    """Without a stop from 1.2792 times the limit on at 143 Hz: at 1.2 it stays, at 1.4 it does not."""
+    ways = study("report/runaways.py")
+    limit = 0.4 * 26 * 4.4482216 / 1.123 / ways.G
+    stays, leaves = (ways.motion("friction alone", 143.0, share * limit) for share in (1.2, 1.4))
+    assert not stays[0] and leaves[0] and stays[1] < 1
+
+
+@pytest.mark.slow
+def test_runaways_the_sentence(tmp_path, capsys):
+    ways = study("report/runaways.py")
+    rows = {one.name: one for one in ways.main(tmp_path / "x.svg")}
+    near, far = rows["grooves, yaw 0.25"], rows["grooves, yaw 0.30"]
+    inside(ways.ANSWER, f"{near.levels[0]:.1f} to {far.levels[0]:.1f} g at 135",
+           f"{far.levels[1]} to {near.levels[1]} g at 143", f"moves {near.before[1]:.1f} to {far.before[1]:.1f} mil")
+    assert near.levels[2:] == far.levels[2:] == (8.0, 8.0)
+    inside(ways.__doc__, "Grooves leave at " + ", ".join(f"{level}" for level in rows["grooves"].levels))
+    late = {name: one.levels[0] - one.levels[1] for name, one in rows.items()}
+    quarter = [name for name in rows if name.startswith("grooves") and name not in
+               ("grooves worn to 10 um", "grooves, yaw 0.25", "grooves, yaw 0.30", "grooves, yaw 0.30 at 150 Hz")]
+    assert len(quarter) == 7 and all(late[name] == 0.25 for name in quarter)
+    assert late["grooves worn to 10 um"] == -0.25 and late["interlocking spring"] == 0.5
+    assert late["softening spring"] == 0.25 and late["second interface that slips"] == 0
+    alone, aside = rows["friction alone"].levels, rows["grooves, yaw 0.30 at 150 Hz"].levels
+    assert alone == tuple(sorted(alone)) and alone[0] == 5.25 and alone[3] - alone[0] == 0.5
+    assert min(aside) == aside[2] == 4.0
+    assert not ways.motion("grooves", 135.0, 8.0)[0] and not ways.motion("grooves, yaw 0.09", 135.0, 8.0)[0]
+    for level, left in ((5.75, False), (6.25, True)):  # 400 cycles do not change it
+        assert ways.motion("grooves, yaw 0.30", 135.0, level, **{"drive.cycles": 400})[0] == left
+    assert ways.ANSWER in capsys.readouterr().out
+
+
+def test_always_a_held_block_turns_about_one_point_and_not_on_a_patch():
+    engaged = study("report/engaged.py")
+    for mode, touches in engaged.CASES.items():
+        peak = {touch: engaged.turned(mode, touch, engaged.HELD, 4.0, 5).peak for touch in touches}
+        patches = [peak[touch] for touch in touches if "patch" in touch]
+        assert patches and max(patches) < 2e-3 * peak["one point on the axis"]
+
+
+def test_exact_a_point_on_the_axis_leaves_the_other_mode_free():
+    """H1 of the yaw mode below a tenth of its frequency's width: share/(omega0^2 - omega^2) of the base."""
+    engaged = study("report/engaged.py")
+    one = engaged.turned("yaw", "one point on the axis", engaged.SLIDING, 16.0)
+    part = (one.f >= 40) & (one.f <= 110)
+    w, own = 2 * np.pi * one.f[part], 2 * np.pi * 129
+    exact = 0.05 / (own**2 - w**2) * engaged.G * 1e6
+    assert np.median(one.moved[part] / exact) == pytest.approx(1, abs=0.01)
+
+
+@pytest.mark.slow
+def test_engaged_the_sentence(tmp_path, capsys):
+    engaged = study("report/engaged.py")
+    turns, tests = engaged.main(tmp_path / "x.svg")
+    peak = {(one.mode, one.touch, one.level): one.peak for one in turns}
+    left = {key: value / peak[key[0], "one point on the axis", key[2]] for key, value in peak.items()}
+    one, two = left["yaw", "a patch of 12.7 mm", 5.0], left["yaw", "two patches 20 mm apart", 5.0]
+    inside(engaged.ANSWER, f"leaves {one:.2f} of its peak, two patches 20 mm apart {two:.2f}")
+    inside(engaged.__doc__, f"leaves {left['yaw', 'one point off it', 5.0]:.2f} of yaw",
+           f"to {left['rocking', 'a patch of 12.7 mm', 5.0]:.5f} of its peak",
+           f"leaves {left['rocking', 'one point off it', 5.0]:.2f} of it")
+    more = [[engaged.turned("yaw", touch, 5.0, seed=seed).peak / engaged.turned("yaw", "one point on the axis", 5.0,
+                                                                                  seed=seed).peak for seed in (2, 3)]
+            for touch in ("a patch of 12.7 mm", "two patches 20 mm apart")]
+    inside(engaged.__doc__, *[f"{min(found):.2f} to {max(found):.2f}" for found in
+                              ([one, *more[0]], [two, *more[1]])])
+    coherent = {model: seen.coherence.mean() for model, (_, _, seen) in tests.items()}
+    inside(engaged.ANSWER, f"is {coherent['grooves']:.2f} to {coherent['rigid block']:.2f} in the mean")
+    assert f"{coherent['second path']:.2f}" == "0.99" and coherent["a damper as in Fig. 27"] > 0.99
+    springs = [tests[engaged.SPRING], *(engaged.damped(engaged.SPRING, engaged.CRITICAL[engaged.SPRING], seed=seed)
+                                        for seed in (2, 3, 4))]
+    f, damping = ([one[k] for one in springs] for k in (0, 1))
+    inside(engaged.__doc__, f"{min(f):.0f} to {max(f):.0f} Hz and {min(damping):.2f} to {max(damping):.2f} of critical",
+           f"a coherence of {coherent[engaged.SPRING]:.2f}")
+    fitted = 5.1e6 / (1.19396625 * (2 * np.pi * 143)**2)  # spring and yaw of studies/table_1, over the flexures
+    assert fitted / engaged.SHARE == pytest.approx(7, abs=0.2) and engaged.SHARE / 0.0711 == pytest.approx(10, abs=0.6)
+    f, damping, _ = tests[engaged.DAMPER]
+    inside(engaged.__doc__, f"has {damping:.1f} of critical damping at {f:.0f} Hz")
+    assert engaged.ANSWER in capsys.readouterr().out
