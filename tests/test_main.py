@@ -1,6 +1,7 @@
 """A command as a process of its own: how it ends, and how many threads it brings."""
 
 import os
+import signal
 import subprocess
 import sys
 
@@ -93,9 +94,12 @@ def test_exact_a_command_that_is_asked_to_end_shows_no_traceback(scene, when, co
 @pytest.mark.skipif(os.name != "posix", reason="signals that end a process elsewhere cannot be caught")
 def test_exact_an_interrupt_in_a_callback_of_the_compiler_is_not_lost():
     """Python takes a signal in whatever it runs next; where that is called by LLVM, through ctypes, the exception was
-    dropped with a word on stderr, and the run went on."""
+    dropped with a word on stderr, and the run went on. A signal that is ignored here (nohup, a job in the background)
+    is ignored there."""
     done = subprocess.run([sys.executable, "-c", SWALLOWED], text=True, capture_output=True, timeout=60)
-    assert done.stdout.split() == ["SIGTERM", "SIGINT", "SIGHUP"] and not done.stderr
+    taken = [name for name in ("SIGTERM", "SIGINT", "SIGHUP")
+             if signal.getsignal(getattr(signal, name)) is not signal.SIG_IGN]
+    assert done.stdout.split() == taken and taken and not done.stderr
 
 
 def test_always_a_profiler_has_its_say(scene):
