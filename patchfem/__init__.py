@@ -50,6 +50,7 @@ if TYPE_CHECKING:
         Result,
         Scene,
         SceneError,
+        backbone,
         build,
         compare,
         cost,
@@ -65,8 +66,8 @@ if TYPE_CHECKING:
 
 __version__ = "0.4.0"
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "build", "compare", "cost", "demo", "load", "new", "plan", "plot", "run",
-           "run_many", "sweep"]
+           "SceneError", "backbone", "build", "compare", "cost", "demo", "load", "new", "plan", "plot",
+           "run", "run_many", "sweep"]
 _later = modules_of(__name__, __path__)
 
 

@@ -69,8 +69,8 @@ from .commands.streams import plain, ready
 
 # verb -> the module of its function, which is loaded where the verb is asked for
 VERBS = {"new": start, "demo": start, "check": scene, "plan": scene, "run": run, "sweep": sweep, "profile": profile,
-         "compare": compare, "cost": study, "fit": study, "mesh": scene, "import": lab, "export": look, "view": look,
-         "report": look, "schema": start, "doctor": start, "cite": start}
+         "compare": compare, "cost": study, "backbone": study, "fit": study, "mesh": scene, "import": lab,
+         "export": look, "view": look, "report": look, "schema": start, "doctor": start, "cite": start}
 
 OUT_OF_MEMORY = "out of memory; `patchfem plan` names what takes most of it and the key that drives it"
 

@@ -15,10 +15,12 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .campaigns import backbone as backbones
 from .campaigns import cost as cost_curves
 from .campaigns.sweeps import ask, executors
 from .campaigns.sweeps import asked as case_models
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
+from .export import backbone as backbone_files
 from .export import cost as cost_files
 from .export import folder as results_folder
 from .export import histories, shown
@@ -52,7 +54,7 @@ if TYPE_CHECKING:
     from .runs.many.answers import Answers
 
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "build", "compare", "cost", "demo", "load", "new", "plan", "plot", "run",
+           "SceneError", "backbone", "build", "compare", "cost", "demo", "load", "new", "plan", "plot", "run",
            "run_many", "sweep"]
 TEXT = "<text>"  # the name of a scene that came without a file
 
@@ -143,6 +145,27 @@ def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Pat
             names = cost_files.shown(runs[knob])
             cost_files.write_picture(Path(out), knob, runs[knob], model.accuracy.tolerance, names)
     return {knob: cost_files.answer_of(each, model.accuracy.tolerance) for knob, each in runs.items()}
+
+
+def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "", amplitudes: Iterable[float] | None = None,
+             method: str = "all", **sets: Any) -> Dataset:
+    """Frequency and damping ratio of a mode over its amplitude at the output, with errors, as an xarray.Dataset.
+
+    scene and sets as `load` takes them. mode: its name, of masses its number; the first unless given. amplitudes: (k,)
+    [m], around where the contact slips unless given. method: "balance", "decay", "quasi-static" or "all"; each has
+    variables of its own name over amplitudes of its own. The attributes have `free_frequency` and `stuck_frequency`
+    [Hz], `exponent_micro` and `exponent_gross` of the contact's loss, `flutter_amplitude` [m], where they are known;
+    `missing`: why a method gave no curve. PatchfemError for a scene without a rig or friction, or no such mode.
+    """
+    model = build(scene, **sets)
+    ways = backbones.WAYS if method == "all" else (method,)
+    if unknown := set(ways) - set(backbones.WAYS):
+        raise PatchfemError(f"backbone: method {unknown.pop()!r}: one of {', '.join(backbones.WAYS)} or all")
+    wanted = None if amplitudes is None else sorted(float(one) for one in amplitudes)
+    if wanted is not None and not (wanted and wanted[0] > 0 and wanted[-1] < float("inf")):
+        raise PatchfemError("backbone: amplitudes are lengths above 0")
+    found = backbones.backbone(model, mode, wanted, ways)
+    return backbone_files.contents(found, model.source.title).to_xarray()
 
 
 def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *, out: str | Path | None = None,

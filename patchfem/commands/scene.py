@@ -74,7 +74,7 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
     if probe and asked is not None:
         solved = result.probed(found.model)
         answer["stiffness_chain"]["pieces_shear"] = solved["tangential_stiffness"] if asked.shear else "rigid"
-        answer["probe"] = solved
+        answer["probe"], answer["modes"] = solved, found.modes(answer["stiffness_chain"])
     if json_:
         print(json.dumps(answer))
         return
@@ -104,6 +104,9 @@ def _print_plan(answer: dict, probe: bool) -> None:
                                    for k, v in answer["stiffness_chain"].items()))
     if not probe and not isinstance(answer["stiffness_chain"].get("pieces_shear", "rigid"), str):
         print("         pieces_shear is an upper estimate from the layers; --probe solves it")
+    for one in answer.get("modes", ()):
+        held = "" if one["stuck_frequency"] is None else f", {one['stuck_frequency']:.5g} Hz while the contact holds"
+        print(f"mode     {one['name']} {one['free_frequency']:.5g} Hz free{held}")
     print("groups   " + ", ".join(f"{k} {v:.4g}" for k, v in answer["groups"].items()))
     for sentence in answer["verdict"]:
         print(f"verdict  {sentence}")

@@ -1,4 +1,4 @@
-"""Verbs that run a scene many times: error against time, and values fitted to measurements."""
+"""Verbs that run a scene many times: error against time, a mode over its amplitude, values fitted to measurements."""
 
 import json
 from dataclasses import dataclass
@@ -8,21 +8,24 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from .. import scales
+from ..campaigns import backbone as backbones
 from ..campaigns import cost as cost_curves
 from ..campaigns import fit as loop_fits
 from ..campaigns import fit_path, wear_coefficient
 from ..campaigns.rows import asked as asking
 from ..campaigns.rows import fit as row_fits
 from ..effects import unbuilt
+from ..export import backbone as backbone_files
 from ..export import cost as cost_files
 from ..export import fit as fit_lines
 from ..export import fit_folder, results, wear_fit
 from ..export import fit_rows as written
 from ..model import model
-from ..scene import ranges
+from ..scene import axes, ranges
 from ..scene import scene as scenes
 from .shared import (
     Json,
+    NoPage,
     NotReached,
     Out,
     Quiet,
@@ -66,6 +69,51 @@ def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle,
         print(json.dumps(answer))
 
 
+ALL = "all"  # of the ways of a backbone
+
+
+def backbone(scene: Path, /, *, mode: word("a mode by its name, such as axial; of masses by its number; the first "
+                                           "unless given") = "",
+             amplitudes: word('half peak-to-peak at the output, such as "1 um..1 mm:25"; around where the contact '
+                              "slips unless given") = "",
+             method: Annotated[Literal["balance", "decay", "quasi-static", "all"], Parameter(
+                 help="how the motion is found: the others tell what one leaves out, such as balance")] = ALL,
+             out: Out = None, set_: Sets = (), no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
+    """Frequency and damping of a mode of SCENE over its amplitude, the contact included; its drive does not act.
+
+    Example: patchfem backbone rig.toml --mode axial --amplitudes "0.1 um..1 mm:25"
+    """
+    found = model_of(scene, set_)
+    ways = backbones.WAYS if method == ALL else (method,)
+    one = backbones.backbone(found, mode, _lengths(amplitudes), ways,
+                             None if quiet or json_ else lambda way: say(f"{way} ..."))
+    target = placed(out, f"{found.source.path.stem}-backbone")
+    answer = backbone_files.write_into(one, found.source.title, found.source.resolved, target, not no_page)
+    if json_:
+        print(json.dumps(answer, ensure_ascii=False))
+    else:
+        print("\n".join(backbone_files.lines_of(one)))
+        for text in one.notes:
+            print(f"note: {text}")
+        print(f"results: {target}")
+    if not one.curves:
+        raise NotReached
+
+
+def _lengths(text: str):
+    """Rising amplitudes [m] of "a..b:n" or a list of them; None where nothing is given."""
+    if not text:
+        return None
+    found, wrong = axes.read([f"{LENGTH}={text}"])
+    if wrong:
+        raise scenes.SceneError([one.replace("--over ", "").replace(LENGTH, "--amplitudes") for one in wrong])
+    values = sorted(float(one) for one in found[0].values)
+    if values[0] <= 0:
+        raise Refused("--amplitudes: they are above 0")
+    return values
+
+
+LENGTH = "drive.displacement"  # a key whose values are read as amplitudes are
 EXACT = 1e-12  # of a value, below which an error is round-off
 
 

@@ -9,6 +9,7 @@ motion: flutter. Below it the motion falls, to rest or to a smaller limit cycle 
 every law of a harmonic balance: the motion of `harmonic.backbone` whose damping is 0.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,7 @@ PLACES = 48  # amplitudes at which the damping of a free motion is looked at
 LOW, HIGH = 1e-6, 4.0  # the first and the last of them, over 4 F/(pi |c| omega)
 ROUND = 1e-9  # of an amplitude, what round-off and the tolerances of the solves leave
 SHUT = 1e-8  # share of the swing in a half period, by which a slide at rest moves on
+SECANTS = 12  # steps to the rate that balances an amplitude
 FEW = 9  # harmonics of the first answer; the second, of twice as many, shows its error
 
 
@@ -57,16 +59,51 @@ def of_relay(modes: ModalBasis, row, slides: float, holds: float) -> list:
     turn on the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half period T/2, and that in which the
     slide comes to rest there is a cycle, if it goes one way all the time and what would hold it is more than `holds`.
     """
-    out = []
-    for mode in unstable_modes(modes):
-        half = np.pi / modes.omega[mode] * np.geomspace(0.6, 1.7, 400)
-        rest = np.array([_turn(modes, row, slides, t)[1] for t in half])
-        for k in np.flatnonzero(rest[:-1] * rest[1:] <= 0):
-            t = brentq(lambda t: _turn(modes, row, slides, t)[1], half[k], half[k + 1], xtol=1e-16, rtol=1e-14)
-            shut = abs(_turn(modes, row, slides, t)[1]) < SHUT  # not so where a mode without damping is in resonance
-            if shut and (found := _slides_through(modes, row, (slides, holds), t)) is not None:
-                out.append(found)
-    return sorted(out)
+    return sorted(one for mode in unstable_modes(modes) for one in _turning(modes, row, (slides, holds), mode))
+
+
+def _turning(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
+    """Cycles of `of_relay` whose frequency is near that of the coordinate `mode`; forces (2,) [N] as there."""
+    out, half = [], np.pi / modes.omega[mode] * np.geomspace(0.6, 1.7, 400)
+    rest = _speeds(modes, row, forces[0], half)
+    for k in np.flatnonzero(rest[:-1] * rest[1:] <= 0):
+        t = brentq(lambda t: _turn(modes, row, forces[0], t)[1], half[k], half[k + 1], xtol=1e-16, rtol=1e-14)
+        shut = abs(_turn(modes, row, forces[0], t)[1]) < SHUT  # not so where a mode without damping is in resonance
+        if shut and (found := _slides_through(modes, row, forces, t)) is not None:
+            out.append(found)
+    return out
+
+
+def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int) -> list:
+    """(Cycle, damping ratio that it balances) at amplitudes (k,) [m] of the output under rigid friction; None where the
+    slide would hold on the way.
+
+    A damping -g of every coordinate keeps the motion of `mode` up (extended periodic motion: Krack 2015); its ratio is
+    g/(2 omega). row, forces (slides, holds) [N]: as of `of_relay`.
+    """
+    def cycle(log_g: float):
+        lifted = replace(modes, damping=modes.dampers - np.exp(log_g) * np.eye(modes.omega.size))
+        found = [one for one in _turning(lifted, row, forces, mode) if one.amplitude > 0]
+        return min(found, key=lambda one: abs(one.omega - modes.omega[mode]), default=None)
+
+    own = float(modes.dampers[mode, mode])
+    first = 4 * forces[0] * abs(row[mode] * modes.output[mode]) / (np.pi * modes.mass * modes.omega[mode])
+    return [_balanced_at(cycle, float(a), own, first / float(a)) for a in amplitudes]
+
+
+def _balanced_at(cycle, amplitude: float, own: float, more: float) -> tuple | None:
+    """(Cycle, ratio) of a rate g near own + more [1/s]; by the method of secants on the logarithms."""
+    g = np.log([own + more, own + 1.01 * more])
+    found = [cycle(one) for one in g]
+    for _ in range(SECANTS):
+        if None in found:
+            return None
+        off = [np.log(one.amplitude / amplitude) for one in found]
+        if abs(off[1]) < ROUND or off[0] == off[1]:
+            return found[1], float(np.exp(g[1]) / (2 * found[1].omega))
+        g = np.array([g[1], g[1] - off[1] * (g[1] - g[0]) / (off[1] - off[0])])
+        found = [found[1], cycle(g[1])]
+    return None
 
 
 def _flow(modes: ModalBasis, t) -> np.ndarray:
@@ -75,6 +112,15 @@ def _flow(modes: ModalBasis, t) -> np.ndarray:
     if modes.damping is None:
         blocks = [part[..., None] * np.eye(modes.omega.size) for part in blocks]
     return np.block([[blocks[0], blocks[1]], [blocks[2], blocks[3]]])
+
+
+def _speeds(modes: ModalBasis, row, force: float, half) -> np.ndarray:
+    """Slide rate at the turn (k,), over that of its swing, of half periods (k,) [s]: as of `_turn`, all at once."""
+    n, eye = modes.omega.size, np.eye(2 * modes.omega.size)
+    rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
+    flow = _flow(modes, half)
+    y = np.einsum("kab,kb->ka", np.linalg.pinv(flow + eye, rcond=1e-14), (flow - eye) @ rest)
+    return y[:, n:] @ row * half / np.maximum(np.abs(y[:, :n]) @ np.abs(row), 1e-300)
 
 
 def _turn(modes: ModalBasis, row, force: float, t: float) -> tuple:

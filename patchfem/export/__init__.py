@@ -24,6 +24,7 @@ In: a `Result`. Out: files. A module imports its own entry of this list and the 
 20. `fit_folder` a fit on disk
 21. `fit_rows`  a rig fitted to rows
 22. `wear_fit`  a fitted wear coefficient on disk
+23. `backbone`  frequency and damping over the amplitude on disk
 
 Read `folder` first.
 """

@@ -17,7 +17,8 @@ PAGE = "report.html"
 FILES = ("summary.json", "result.nc", "fields.vtkhdf", PAGE, "scene.resolved.toml", "fields.pvd",
          "fields_frames", "fit.json", "fit.csv", "fit.svg", "scene.fitted.toml", "wear.npz",
          "starts.json", "compare.json", "surface_before.csv", "surface_after.csv", "difference.x3p", "difference.csv",
-         "profile.json", "profile.csv", "surfaces", "pairs.csv", "pairs.json")
+         "profile.json", "profile.csv", "surfaces", "pairs.csv", "pairs.json",
+         "backbone.csv", "backbone.nc", "backbone.json", "backbone.svg")
 LOCK = ".writer"
 STATE, STARTS = "wear.npz", "starts.json"
 STATES = re.compile(r"wear\.npz|starts\.json|march_\d+\.npz")  # of an interrupted run or fit, from which it goes on

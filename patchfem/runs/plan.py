@@ -53,12 +53,16 @@ class Plan:
                  f"{self.bytes / 1e6:.0f} MB"]
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
 
+    def modes(self, chain: dict) -> list:
+        """Each mode's name, free and stuck frequency [Hz] with the links of a chain; [] without a rig."""
+        return of_rig.modes_of(self.model.rig, chain) if self.model.rig is not None else []
+
     def as_json(self) -> dict:
         """The plan as the object that `patchfem plan --json` prints."""
         return {"kind": self.kind, "effects": [{"effect": e, "equations": EFFECTS[e].equations} for e in self.effects],
                 "not_in_scene": list(self.not_in_scene), "engine": self.engine, "unknowns": self.unknowns,
                 "steps": self.steps, "seconds": self.seconds, "bytes": self.bytes, "stiffness_chain": self.chain,
-                "groups": self.groups, "verdict": list(self.verdict),
+                "groups": self.groups, "verdict": list(self.verdict), "modes": self.modes(self.chain),
                 "memory": {part.what: int(part.bytes) for part in self.parts},
                 "compile_seconds": self.compile_seconds}
 

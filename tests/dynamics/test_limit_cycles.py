@@ -1,5 +1,7 @@
 """Limit cycles of modes of negative damping beside friction: closed forms, and integration in time by scipy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -101,3 +103,27 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
         above, below = (swing(cycle.amplitude * (1 + way * bar)) / (cycle.amplitude * (1 + way * bar)) - 1
                         for way in (1, -1))
         assert (above < 0 < below) if cycle.lasts else (below < 0 < above)
+
+
+def test_exact_the_backbone_of_rigid_friction_has_its_closed_form():
+    """At an amplitude A a block that loses h = F/k at every swing wants the gain G = (A/h + 1)/(A/h - 1) from each:
+    pi z/sqrt(1 - z^2) = ln G for the net ratio -z, over the frequency of the damped block."""
+    modes, force, zeta = modes_of([750.0], [0.003], [1.0], [2.0]), 9.0, 0.003
+    h = force / (0.5 * 750.0**2)
+    places = h * np.array([3.0, 10.0, 200.0])
+    gain = np.log((places + h) / (places - h))
+    net = gain / np.hypot(np.pi, gain)
+    omega = 750.0 * np.sqrt(1 - net**2)
+    found = limit_cycles.relay_backbone(modes, modes.slide, (force, force), 2 * places, 0)
+    assert [one.omega for one, _ in found] == pytest.approx(omega, rel=1e-8)
+    assert [ratio for _, ratio in found] == pytest.approx((net + zeta) * 750.0 / omega, rel=1e-7)
+    assert limit_cycles.relay_backbone(modes, modes.slide, (force, 4 * force), [2.4 * h], 0) == [None]  # it holds
+
+
+def test_the_backbone_of_two_modes_is_the_cycle_of_its_damping():
+    """Lifted by the found ratio, the rig has a limit cycle of the amplitude that was asked for."""
+    modes = modes_of([750.0, 2600.0], [0.003, 0.02], [1.0, 0.7], [1.0, -0.4])
+    [(cycle, ratio)] = limit_cycles.relay_backbone(modes, modes.slide, (9.0, 9.0), [4e-4], 0)
+    lifted = replace(modes, damping=modes.dampers - 2 * ratio * cycle.omega * np.eye(2))
+    again = limit_cycles.of_relay(lifted, modes.slide, 9.0, 9.0)
+    assert min(abs(one.amplitude / 4e-4 - 1) for one in again) < 1e-8

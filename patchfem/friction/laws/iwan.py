@@ -98,3 +98,14 @@ def from_keys(friction, load: float) -> Iwan:
     counts as 1 N."""
     k, most = sliders(friction.static, friction.stiffness / (load or 1.0), friction.chi, friction.beta)
     return Iwan(k, most)
+
+
+def loop_from_keys(friction, load: float, slide: float) -> tuple:
+    """(force at the turns [N], area [J]) of the loop of the law of a [friction] table at an amplitude of the slide [m],
+    without cells: the curve of first loading by Segalman's eq. 22, twice as large by Masing's rule."""
+    chi, force = friction.chi, friction.static * load
+    most = largest(force, friction.stiffness, chi, friction.beta)
+    scale, r = force / (friction.beta + (chi + 1) / (chi + 2)), min(slide / most, 1.0)
+    tip = scale * ((friction.beta + 1) * r - r**(chi + 2) / (chi + 2))
+    under = scale * most * ((friction.beta + 1) * r**2 / 2 - r**(chi + 3) / ((chi + 2) * (chi + 3)))
+    return tip, 8 * (under + force * max(slide - most, 0.0)) - 4 * slide * tip

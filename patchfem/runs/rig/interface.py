@@ -42,7 +42,7 @@ def contact_of(model: Model, numerics: Numerics, patch):
     rows, found = [*rig.modes.interfaces], []
     if many:
         loads = strips.strip_loads(patch) if patch is not None else [one.load for one in rig.interfaces]
-        parts = [_element(rig.interfaces[k if patch is None else 0], load, rig.speed) for k, load in enumerate(loads)]
+        parts = [element_of(rig.interfaces[k if patch is None else 0], load, rig.speed) for k, load in enumerate(loads)]
         if model.soft:  # strips, each with the elements of its own
             f = model.friction
             length = law_from(f, patch.pressure.load).element(patch.pressure.load).length
@@ -79,7 +79,7 @@ def flank_of(model: Model, patch):
     return periodic.ElasticFlank(_climbing(model, patch))
 
 
-def _element(one: InterfaceLaw, load: float, speed: float) -> Element:
+def element_of(one: InterfaceLaw, load: float, speed: float) -> Element:
     """The law of an interface under a load [N]; speed [m/s] to expect."""
     f = one.numbers
     if has(f.law, "bonds"):

@@ -23,6 +23,41 @@ def chain(rig) -> dict:
     return {"mode": rig.stiffness} | ({"bonded": rig.bonded} if rig.bonded is not None else {})
 
 
+def held_stiffness(chain: dict) -> float:
+    """Tangential stiffness [N/m] of an interface while nothing slips: the links of a plan's chain in series; infinite
+    where all are rigid, 0 of a law that creeps."""
+    links = {name: link for name, link in chain.items() if name not in ("mode", "bonded", "grooves")
+             and not name.startswith("bonds_")}
+    if str(links.get("bonds", "")).startswith("none"):
+        return 0.0
+    soft = sum(1 / link for link in links.values() if not isinstance(link, str) and link > 0)
+    return 1 / soft if soft else inf
+
+
+def held_mode(modes, rows, stiffness, number: int) -> tuple:
+    """(omega [rad/s], shape (n,)) of the mode with most of a coordinate when the rows (i, n) hold with stiffness (i,)
+    [N/m]; (None, the coordinate alone) where one is infinite. The coordinate's part of the shape is 1."""
+    if not np.isfinite(stiffness).all():
+        return None, np.eye(modes.omega.size)[number]
+    values, vectors = np.linalg.eigh(np.diag(modes.omega**2) + rows.T * stiffness @ rows / modes.mass)
+    k = int(np.argmax(np.abs(vectors[number])))
+    return float(np.sqrt(max(values[k], 0.0))), vectors[:, k] / vectors[number, k]
+
+
+def modes_of(rig, chain: dict) -> list:
+    """Name, free and stuck frequency [Hz] of each mode: without the contact, and with it held by the links of a chain;
+    None where nothing gives way, and without friction."""
+    modes, rows = rig.modes, rig.modes.interfaces
+    stiffness = np.full(len(rows), held_stiffness(chain) if rig.interfaces else inf)
+    named = rig.by_modes and modes.shapes is None
+    out = []
+    for k, omega in enumerate(modes.omega):
+        held = held_mode(modes, rows, stiffness, k)[0]
+        out.append({"name": modes.names[k] if named else f"mode {k + 1}", "free_frequency": float(omega) / (2 * pi),
+                    "stuck_frequency": None if held is None else held / (2 * pi)})
+    return out
+
+
 def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
     """Engine, steps of all passes and seconds of a coupled run; sizes that are foreseen go into `unknowns`."""
     numerics = choose(model, per_point)

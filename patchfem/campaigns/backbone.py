@@ -1,0 +1,584 @@
+"""Backbone of a mode with its joint: frequency and damping over the amplitude, in three ways beside each other.
+
+"balance": the periodic motion that a negative damping keeps up, by harmonic balance, under rigid friction exactly from
+turn to turn (extended periodic motion: Krack 2015). "decay": a release from the largest amplitude, read from turn to
+turn. "quasi-static": one static force along the shape of the held mode and the loops of the laws. The first is what a
+slow decay shows; the second has what a swing loses within a cycle, too; the third leaves out how the force bends the
+motion.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiled import load
+from ..core import NotConverged, Outcome, PatchfemError, Start, say
+from ..dynamics import limit_cycles
+from ..dynamics.events import elements
+from ..dynamics.harmonic import quasi_static
+from ..dynamics.harmonic.backbone import FreeBalance
+from ..dynamics.harmonic.forces import Group
+from ..dynamics.harmonic.harmonic import pack as harmonics_packed
+from ..dynamics.harmonic.laws import Jenkins, synthesis
+from ..dynamics.harmonic.point import balance_of
+from ..dynamics.march import models
+from ..effects import has
+from ..friction.record import loop_from
+from ..model.model import Model
+from ..model.slide import SlidePath
+from ..model.source import placed
+from ..response import ring_down
+from ..response.errors import with_errors
+from ..runs.bench import bench
+from ..runs.bench.engine import steps_of
+from ..runs.bench.errors import errors_of
+from ..runs.patch import result as patch_result
+from ..runs.plan import plan
+from ..runs.rig import engines, interface, numerics
+from ..runs.rig.engines import ENGINES
+from ..runs.rig.plan import held_mode, held_stiffness
+from ..runs.rig.steady.balance import BalanceFinder
+from ..structure import drives
+
+WAYS = ("balance", "decay", "quasi-static")
+LADDER = (9, 19, 39)  # harmonics that are tried
+DECADE = 8  # amplitudes a decade, unless given
+LOW, HIGH = 1e-2, 15.0  # their ends over the slide at which all of the contact slips
+MICRO, GROSS = 0.3, 3.0  # shares of that slide, below which the contact is in micro-slip, above which all of it slips
+FREE = 2.0  # the first of rigid friction, over what friction deflects the mode by at rest
+CELLS = 4.0  # by which the change at four cells in one is divided, some 15 times the error
+SMALL = 1e-5  # of the slide at which all of the contact slips, one in which nothing slips
+LOOPS = 3.0  # cycles of a loop on a bench, of which the last is read
+ROUND = 1e-9  # of a value, what round-off leaves
+SAMPLES = 4096  # of a cycle of a static loop, and that a largest motion is read from
+CLOSE = 1e-7  # of an amplitude, within which a free motion is at it
+CYCLES = (50.0, 200.0, 800.0)  # lengths of a decay that are tried
+DENSE = 400.0  # of them where several modes ring, whose samples are all kept
+BESIDE = 1.15  # the release over the largest amplitude: the first swings still show how it began
+FINER = 3  # doublings of the steps of a decay
+DOWN = (1, 3)  # half swings of a reading, and of the one that shows how much the decay bends
+
+
+UNKNOWN = ("bonds have a loop in closed form for the stretch reading of order 1, a constant length, no breakaway and "
+           "pieces that do not give way alone")
+
+
+class Curve(NamedTuple):
+    """One way: amplitude (k,) [m] at the output, frequency (k,) [Hz] and damping ratio (k,) [1] with their errors, loss
+    of the contact per cycle (k,) [J], NaN where it is not known."""
+
+    amplitude: np.ndarray
+    frequency: np.ndarray
+    frequency_error: np.ndarray
+    damping: np.ndarray
+    damping_error: np.ndarray
+    loss: np.ndarray
+
+    def at(self, pick) -> "Curve":
+        """Some of its points: bools (k,)."""
+        return Curve(*(part[pick] for part in self))
+
+
+class Backbone(NamedTuple):
+    """Curves of a mode by the way they were found; missing: way -> why it is none; free, stuck [Hz]: of the mode
+    without the contact and with it held, None where it does not move then; micro, gross: exponents of the contact's
+    loss over the amplitude at both ends, None where it loses nothing; flutter [m]: the amplitude beyond which the mode
+    gains energy, None without; notes: sentences."""
+
+    mode: str
+    free: float
+    stuck: float | None
+    curves: dict
+    missing: dict
+    micro: float | None
+    gross: float | None
+    flutter: float | None
+    notes: tuple
+
+
+class Joint(NamedTuple):
+    """The rig of a backbone: its Model, pressed Patch or None, coarser Patch or None, number of the mode's coordinate,
+    held: (omega [rad/s], shape (n,)) of the mode with the contact held by `stiffness` (i,) [N/m], omega None where
+    nothing gives way."""
+
+    model: Model
+    patch: object
+    coarse: object
+    mode: int
+    held: tuple
+    stiffness: np.ndarray
+
+    @property
+    def reach(self) -> float:
+        """Motion at the output per unit of the held shape."""
+        return abs(float(self.model.rig.modes.output @ self.held[1]))
+
+    @property
+    def modes(self):
+        """The ModalBasis of the rig."""
+        return self.model.rig.modes
+
+
+def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progress=None) -> Backbone:
+    """Curves of a rig's mode, of its first where none is named.
+
+    amplitudes (k,) [m] at the output, rising; None: from a hundredth to 30 times the slide at which all of the contact
+    slips. progress: called with a way that begins. PatchfemError for a scene that has no rig with friction or with a
+    spring that bends, or no such mode.
+    """
+    with placed(model.source):
+        joint = _joint(model, mode)
+        wanted = _default(joint) if amplitudes is None else np.asarray(amplitudes, float)
+        curves, missing = {}, {}
+        for way in methods:
+            if progress is not None:
+                progress(way)
+            try:
+                curves[way] = FIND[way](joint, wanted)
+            except (NotConverged, PatchfemError) as reason:
+                missing[way] = str(reason).removeprefix("backbone: ")
+    return _put_together(joint, curves, missing)
+
+
+def _joint(model: Model, name: str) -> Joint:
+    if model.rig is None:
+        raise PatchfemError("a backbone is that of a rig: give the scene [structure] and [drive]", "structure")
+    modes = model.rig.modes
+    if model.friction is None and not model.rig.bends and not model.rig.interfaces:
+        raise PatchfemError("without friction, or a spring that bends, frequency and damping do not change with the "
+                            "amplitude", "friction")
+    number = _number(model.rig, name)
+    patch, coarse = None, None
+    if model.patch is not None:
+        patch, coarse, *_ = *patch_result.solve_all(model.patch, model.accuracy.tolerance), None
+        if patch.pressure.outcome is Outcome.NO_CONTACT:
+            raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
+    stiffness = _held_by(Joint(model, patch, coarse, number, (None, np.eye(modes.omega.size)[number]),
+                               np.full(len(modes.interfaces), held_stiffness(plan(model).chain))))
+    return Joint(model, patch, coarse, number, held_mode(modes, modes.interfaces, stiffness, number), stiffness)
+
+
+def _number(rig, name: str) -> int:
+    """Number of the coordinate of a mode by its name, or of a rig of masses by its number from 1; of the first mode of
+    the scene unless given."""
+    modes, names = rig.modes, list(rig.modes.names)
+    if not rig.by_modes:
+        if name and not (name.isdecimal() and 1 <= int(name) <= modes.omega.size):
+            raise PatchfemError(f"backbone --mode {name}: the rig has {modes.omega.size} modes, counted from 1", "")
+        return int(name) - 1 if name else int(np.argmax(modes.omega > 0))
+    if name and name not in names:
+        raise PatchfemError(f"backbone --mode {name}: no mode of this name; the rig has {', '.join(names)}", "")
+    k = names.index(name) if name else 0
+    return k if modes.shapes is None else int(np.argmax(np.abs(modes.shapes[k])))
+
+
+def _held_by(joint: Joint) -> np.ndarray:
+    """Tangential stiffness (i,) [N/m] of each interface when nothing slips: of the laws' loops where they have one in
+    closed form, of a small loop on a bench where there is one interface, else of the plan's chain."""
+    model, chain = joint.model, joint.stiffness
+    if _rigid(model) or model.friction is None or model.grooves is not None or model.rig.load_varies \
+            or model.rig.strips_slide_apart or not np.isfinite(chain).all() or not chain.all():
+        return chain
+    try:
+        return _group(joint, joint.patch).stiffness()[:chain.size]
+    except PatchfemError:
+        if chain.size > 1:
+            return chain
+        small = SMALL * _limit(joint) / chain[0]
+        return np.array([_loop(joint, small, model.rig.own_frequency)[0].values["secant_stiffness"]])
+
+
+def _limit(joint: Joint) -> float:
+    """Largest friction [N] of the first interface; 0 without friction."""
+    model = joint.model
+    if len(model.rig.interfaces) > 1 and joint.patch is None:
+        return model.rig.interfaces[0].numbers.static * model.rig.interfaces[0].load
+    load = joint.patch.pressure.load if joint.patch is not None else model.nominal_load
+    return model.friction.static * load if model.friction is not None else 0.0
+
+
+def _default(joint: Joint) -> np.ndarray:
+    """Amplitudes (k,) [m] at the output, from where the contact holds to where the mode slides as if it were free."""
+    low, high = _ends(joint)
+    return _amplitude_of(joint, np.geomspace(low, high, 1 + int(np.ceil(DECADE * np.log10(high / low)))))
+
+
+def _amplitude_of(joint: Joint, slide):
+    """Amplitude [m] at the output of the held mode whose interface slides by `slide` [m]."""
+    return joint.reach / (abs(float(joint.modes.interfaces[0] @ joint.held[1])) or 1.0) * slide
+
+
+def _knee(joint: Joint) -> float:
+    """Slide [m] at which all of the contact slips, of rigid friction 0; of springs alone that at which they bend."""
+    rig, stiffness = joint.model.rig, float(joint.stiffness[0])
+    if joint.model.friction is None and not rig.interfaces:  # it doubles the mode's stiffness, or has a wave behind it
+        return float(np.sqrt(_spring(joint) / rig.cubic)) if rig.cubic is not None else rig.interlock[1]
+    return _limit(joint) / stiffness if stiffness else _limit(joint) / _spring(joint)
+
+
+def _spring(joint: Joint) -> float:
+    """Stiffness [N/m] of the mode without the contact."""
+    return joint.modes.mass * float(joint.modes.omega[joint.mode] or joint.held[0])**2
+
+
+def _ends(joint: Joint) -> tuple:
+    """Smallest and largest slide [m] of the default amplitudes."""
+    knee, stiffness, free = _knee(joint), float(joint.stiffness[0]), _limit(joint) / _spring(joint)
+    if 0 < stiffness < np.inf or not free:
+        return LOW * knee, HIGH * max(knee, free)
+    return FREE * free, HIGH * HIGH * free
+
+
+def _balanced(joint: Joint, amplitudes) -> Curve:
+    """Curve by harmonic balance, under rigid friction from turn to turn."""
+    _refuse(joint, "balance")
+    model = joint.model
+    if _rigid(model):
+        return _turned(joint, amplitudes)
+    group = _group(joint, joint.patch)
+    found, error = _free(group, joint, amplitudes, LADDER[0]), None
+    for harmonics in LADDER[1:]:
+        better = _free(group, joint, amplitudes, harmonics)
+        error, found = 2 * np.abs(better - found) + ROUND * np.abs(better), better
+        if (error[:2] <= model.accuracy.tolerance * np.abs(found[:2])).all():
+            break
+    error += _in_space(joint, lambda laws: _free(laws, joint, amplitudes, LADDER[0]))
+    swings = found[1] < 1  # a motion that loses more in a cycle does not swing
+    if not swings.any():
+        raise NotConverged("the mode does not swing at these amplitudes: its damping ratio is above 1")
+    return Curve(amplitudes, found[0], error[0], found[1], error[1], found[2]).at(swings)
+
+
+def _refuse(joint: Joint, way: str) -> None:
+    """PatchfemError where a steady loop does not tell the free motion."""
+    model = joint.model
+    for reason, holds in (("over grooves", model.grooves is not None),
+                          ("under a load that changes with the motion", model.rig.load_varies),
+                          ("of strips that slide apart", model.rig.strips_slide_apart),
+                          ("of several interfaces of rigid friction", _rigid(model) and len(model.rig.interfaces) > 1)):
+        if holds:
+            raise PatchfemError(f"no {way} is known {reason}")
+
+
+def _rigid(model: Model) -> bool:
+    """Whether friction holds without any stretch."""
+    return not model.soft and any(has(one.numbers.law, "set-valued") for one in model.rig.interfaces)
+
+
+def _group(joint: Joint, patch) -> Group:
+    """Laws on the rows of a rig on one of its meshes; PatchfemError where a law has no steady loop of its own."""
+    model, rig = joint.model, joint.model.rig
+    try:
+        if len(rig.interfaces) < 2:
+            return BalanceFinder(model, numerics.choose(_steady(model)), patch).group
+        load("dynamics.harmonic.cycle_kernels", None)
+        return Group(rig.modes, [(k, models.element_model(interface.element_of(one, one.load, rig.speed)))
+                                 for k, one in enumerate(rig.interfaces)])
+    except PatchfemError:
+        raise PatchfemError(UNKNOWN) from None
+
+
+def _steady(model: Model) -> Model:
+    """The model with the method left to the program."""
+    return replace(model, accuracy=model.accuracy.model_copy(update={"method": "auto"}))
+
+
+def _in_space(joint: Joint, read) -> np.ndarray:
+    """Errors of what read(Group) gives from laws on the coarser mesh, and of a density of sliders from its cells: the
+    largest change where four of them are one, which is some 15 times the error, and a share of the usual one, as a
+    motion that turns where both have a border changes nothing."""
+    model, fine, error = joint.model, _group(joint, joint.patch), 0.0
+    best = read(fine)
+    if joint.coarse is not None and model.soft:
+        error = error + np.abs(read(_group(joint, joint.coarse)) - best)
+    if any(has(one.numbers.law, "cells") for one in model.rig.interfaces):
+        apart = [np.abs(read(_joined(fine, *one)) - best) for one in engines.JOINED]
+        gap = np.max(apart, axis=0) / CELLS
+        usual = np.median(gap / np.maximum(np.abs(best), 1e-300), axis=1, keepdims=True)
+        error = error + np.maximum(gap, usual * np.abs(best))
+    return error
+
+
+def _joined(group: Group, count: int, first: int) -> Group:
+    """The laws of a group in which each `count` elements are one, from the number `first` on."""
+    def fewer(law):
+        if not isinstance(law, Jenkins):
+            return law
+        one = elements.merged(elements.Elements(law.stiffness, law.limit_slide, np.arange(law.stiffness.size)), count,
+                              first)
+        return Jenkins(one.stiffness, one.yield_slide)
+
+    other = group.with_samples(group.samples)
+    other.laws = [tuple(map(fewer, laws)) for laws in group.laws]
+    return other
+
+
+def _free(group: Group, joint: Joint, amplitudes, harmonics: int) -> np.ndarray:
+    """(frequency [Hz], damping, loss [J]) (3, k) of the free motions at amplitudes (k,) [m] of the output."""
+    modes = joint.modes
+    omega, shape = held_mode(modes, group.rows, group.stiffness(), joint.mode)
+    reach = abs(float(modes.output @ shape))
+    widest = np.abs(group.rows @ shape) * amplitudes[-1] / reach
+    equations = FreeBalance(balance_of(modes, group, group.samples or group.samples_for(harmonics, widest)), joint.mode,
+                            harmonics, omega)
+    balance, k = equations.balance, np.arange(harmonics + 1)
+    y = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
+    y[:, 1] = balance.faces @ shape
+    x, out = np.append(harmonics_packed(y), [1.0, 0.0]), []
+    for amplitude in amplitudes:
+        here = amplitude / reach
+        for _ in range(6):
+            x, free = equations.solve(x, here)
+            size = _largest(free.modal @ modes.output)
+            if abs(size / amplitude - 1) < CLOSE:
+                break
+            here *= amplitude / size
+        reach = amplitude / here
+        loss = np.pi * float(np.sum(k * (np.conj(free.slides) * free.forces).imag))
+        out.append((free.omega / (2 * np.pi), free.zeta, loss))
+    return np.array(out).T
+
+
+def _largest(harmonics) -> float:
+    """(max - min)/2 of a motion with harmonics (H + 1,)."""
+    return float(np.ptp(synthesis(harmonics, SAMPLES))) / 2
+
+
+def _turned(joint: Joint, amplitudes) -> Curve:
+    """Curve under rigid friction; it begins where the motion no longer holds on the way."""
+    model, modes, load = joint.model, joint.model.rig.modes, _limit(joint)
+    if model.rig.bends or not modes.omega.all():
+        raise PatchfemError("under rigid friction it is not known beside a spring that bends or a mode of 0 Hz")
+    f, row = model.friction, modes.interfaces[0]
+    kinetic = load if f.kinetic is None else load * f.kinetic / f.static
+    found = limit_cycles.relay_backbone(modes, row, (kinetic, load), amplitudes, joint.mode)
+    kept = [(a, *one) for a, one in zip(amplitudes, found) if one is not None]
+    if not kept:
+        raise NotConverged("under rigid friction no swing of these amplitudes slides from turn to turn; give larger "
+                           "ones")
+    a = np.array([one[0] for one in kept])
+    frequency, damping = np.array([(c.omega / (2 * np.pi), zeta) for _, c, zeta in kept]).T
+    loss = 4 * kinetic * a * abs(row[joint.mode] / modes.output[joint.mode]) if modes.omega.size == 1 else \
+        np.full(a.size, np.nan)
+    error = np.array([c.error / c.amplitude for _, c, _ in kept])
+    return Curve(a, frequency, (error + ROUND) * frequency, damping, (error + ROUND) * damping, loss)
+
+
+def _static(joint: Joint, amplitudes) -> Curve:
+    """Curve by one static force along the shape of the held mode; where the laws have no loop in closed form, by loops
+    of the contact alone on a bench."""
+    _refuse(joint, "static curve")
+    if _rigid(joint.model):
+        raise PatchfemError("rigid friction gives way nowhere, so the held mode has no static curve")
+    if (known := _in_closed_form(joint, amplitudes)) is not None:
+        return known
+    try:
+        group = _group(joint, joint.patch)
+    except PatchfemError:
+        if len(joint.model.rig.interfaces) > 1 or joint.model.rig.bends:
+            raise
+        return _on_a_bench(joint, amplitudes)
+
+    def read(laws, samples: int) -> np.ndarray:
+        held = held_mode(joint.modes, laws.rows, laws.stiffness(), joint.mode)
+        reach = abs(float(joint.modes.output @ held[1]))
+        return _rows(joint, quasi_static.along(joint.modes, laws, amplitudes / reach, held, samples))
+
+    best = read(group, SAMPLES)
+    error = np.abs(best - read(group, SAMPLES // 2)) + ROUND * np.abs(best)
+    error += _in_space(joint, lambda laws: read(laws, SAMPLES))
+    return Curve(best[0], best[1], error[1], best[2], error[2], best[3])
+
+
+def _in_closed_form(joint: Joint, amplitudes) -> Curve | None:
+    """Static curve of one interface whose law knows its loop; None where there is more, or the loop is not known."""
+    model, modes = joint.model, joint.modes
+    if model.friction is None or model.soft or model.rig.bends or len(model.rig.interfaces) > 1:
+        return None
+    slides = np.abs(modes.interfaces[0] @ joint.held[1]) * amplitudes / joint.reach
+    found = [loop_from(model.friction, _limit(joint) / model.friction.static, float(one)) for one in slides]
+    if None in found:
+        return None
+    best = _rows(joint, quasi_static.through(modes, modes.interfaces[0], joint.held, slides,
+                                             [quasi_static.Loops(*one) for one in found]))
+    error = ROUND * np.abs(best)
+    return Curve(best[0], best[1], error[1], best[2], error[2], best[3])
+
+
+def _rows(joint: Joint, found: list) -> np.ndarray:
+    """(amplitude [m] at the output, frequency [Hz], damping, loss [J]) (4, k) of `quasi_static.Static`s."""
+    return np.array([(abs(float(joint.modes.output @ one.z)), one.omega / (2 * np.pi), one.zeta, one.loss)
+                     for one in found]).T
+
+
+def _on_a_bench(joint: Joint, amplitudes) -> Curve:
+    """Static curve from loops of the contact on a bench, a few cycles at the mode's own frequency."""
+    modes, row = joint.modes, joint.modes.interfaces[0]
+    slides = np.abs(row @ joint.held[1]) * amplitudes / joint.reach
+    found, errors = [], []
+    for slide in slides:
+        fine, alone, steps = _loop(joint, float(slide), joint.held[0] / (2 * np.pi))
+        bars = with_errors(fine.values, *errors_of(alone, joint.patch, joint.coarse, fine, steps)[0], least=1e-10)
+        tip, area = (fine.values[name] for name in ("secant_stiffness", "loop_area"))
+        found.append(quasi_static.Loops(tip * slide, area))
+        errors.append(quasi_static.Loops(bars["secant_stiffness"].error * slide, bars["loop_area"].error))
+
+    def read(loops) -> np.ndarray:
+        return _rows(joint, quasi_static.through(modes, row, joint.held, slides, loops))
+
+    best = read(found)
+    error = ROUND * np.abs(best)
+    for change in ((1, 0), (0, 1)):  # the tip, then the area, each by its error
+        moved = [quasi_static.Loops(one.tip + change[0] * off.tip, one.area + change[1] * off.area)
+                 for one, off in zip(found, errors)]
+        error += np.abs(read(moved) - best)
+    return Curve(best[0], best[1], error[1], best[2], error[2], best[3])
+
+
+def _loop(joint: Joint, slide: float, frequency: float) -> tuple:
+    """(BenchRun, its Model, its steps) of a few cycles of the contact alone under a sine of amplitude `slide` [m]."""
+    path = SlidePath("sine", slide, frequency, None, 0.0, LOOPS, None, None)
+    alone = replace(_steady(joint.model), kind="bench", rig=None, slide=path)
+    steps = steps_of(alone)
+    return bench.run(alone, joint.patch, steps), alone, steps
+
+
+def _decayed(joint: Joint, amplitudes) -> Curve:
+    """Curve of a release from the largest amplitude, read from turn to turn, as far as it comes down."""
+    model = released(joint, BESIDE * float(amplitudes[-1]))
+    for cycles in CYCLES:
+        many = joint.modes.omega.size > 1
+        what = replace(model, rig=replace(model.rig, cycles=min(cycles, DENSE) if many else cycles))
+        how = numerics.choose(what)
+        how = replace(how, window=int(what.rig.cycles)) if many else how
+        engine = ENGINES[how.engine]
+        found = engine.run(what, how, joint.patch, 0, None, None)
+        read = _read(joint, found)[0]
+        if found.outcome is Outcome.STUCK or not read.whole or read.amplitude[-1] < amplitudes[0]:
+            break
+    for _ in range(FINER + 1):
+        best, reading, error = _with_errors(joint, what, how, found, amplitudes)
+        known = np.isfinite(best[0])
+        if (error[0][known] <= np.maximum(model.accuracy.tolerance * best[0], reading[0])[known]).all() or \
+                not engine.in_time(what, how, joint.patch) or "steps_per_cycle" in how.pinned:
+            break
+        how = how.finer()
+        found = engine.run(what, how, joint.patch, 0, None, None)
+    error += reading
+    if not known.any():
+        raise NotConverged("the release did not swing down through these amplitudes")
+    return Curve(amplitudes, best[0], error[0], best[1], error[1], np.full(amplitudes.size, np.nan)).at(known)
+
+
+def released(joint: Joint, amplitude: float) -> Model:
+    """The model of a joint whose mode is released at an amplitude [m] of the output, in the shape of the held mode."""
+    model, modes = _steady(joint.model), joint.modes
+    start = Start(joint.held[1] * amplitude / joint.reach, np.zeros(modes.omega.size))
+    period = 2 * np.pi / (joint.held[0] or modes.omega[joint.mode])
+    rig = replace(model.rig, drive=drives.release(period), start=start, kind="free", waveform="", frequency=None,
+                  levels=(), level_cycles=0.0, force=None)
+    return replace(model, rig=rig)
+
+
+def _read(joint: Joint, found) -> tuple:
+    """(RingDown of every swing, of every third one) of a Solution; beside other modes of the part of the motion along
+    the held shape."""
+    motion, shape = found.response, joint.held[1]
+    place, rate = motion.output, motion.output_rate
+    if shape.size > 1:
+        place, rate = (part @ shape * joint.reach / (shape @ shape) for part in (motion.modal, motion.modal_rate))
+    times, places = ring_down.turns(motion.time, place, rate)
+    return tuple(ring_down.ring_down(times, places, every) for every in DOWN)
+
+
+def _with_errors(joint: Joint, what: Model, how, found, amplitudes) -> tuple:
+    """((2, k) frequency [Hz] and damping at amplitudes (k,) of a release, (2, k) what reading them from three times the
+    swings, or half of them, changes, (2, k) what coarser runs change)."""
+    engine, read, made = ENGINES[how.engine], _read(joint, found), {}
+    best = np.array(read[0].at(amplitudes))
+    reading = np.abs(np.array(read[1].at(amplitudes)) - best)
+    reading = np.fmax(reading, read[0].bend(amplitudes))
+    reading, error = np.where(np.isfinite(reading), reading, 0.0), ROUND * np.abs(best)
+
+    def curve(variant) -> np.ndarray:
+        if variant not in made:
+            run = engine.run(what, replace(variant.numerics, whole=True), variant.patch, 0, None, None)
+            made[variant] = np.array(_read(joint, run)[0].at(amplitudes))
+        return made[variant]
+
+    ways = [*engine.in_time(what, how, joint.patch), *engine.in_space(what, how, joint.patch, joint.coarse, found)]
+    for way in ways:
+        if way.runs:
+            beside = best if way.beside is None else curve(way.beside)
+            runs = way.runs if way.of == "cells" else way.runs[:1]
+            change = np.nan_to_num([np.abs(curve(one) - beside) for one in runs]).max(axis=0)
+            error += change
+    return best, reading, error
+
+
+FIND = {"balance": _balanced, "decay": _decayed, "quasi-static": _static}
+
+
+def _put_together(joint: Joint, curves: dict, missing: dict) -> Backbone:
+    """The Backbone of the curves found."""
+    modes = joint.model.rig.modes
+    name = modes.names[joint.mode] if modes.shapes is None else f"mode {joint.mode + 1}"
+    own = float(modes.omega[joint.mode]) / (2 * np.pi)
+    stuck = None if joint.held[0] is None else joint.held[0] / (2 * np.pi)
+    first = next((curves[way] for way in ("quasi-static", "balance") if way in curves), None)
+    micro, gross = _exponents(joint, first) if first is not None else (None, None)
+    edge = next((found for one in curves.values() if (found := _edge(one)) is not None), None)
+    return Backbone(name, own, stuck, curves, missing, micro, gross, edge, tuple(_differences(curves)))
+
+
+def _exponents(joint: Joint, one: Curve) -> tuple:
+    """Slopes of the logarithm of the loss over that of the amplitude between the first two points, where they lie in
+    micro-slip, and between the last two, where all of the contact slips; None elsewhere."""
+    a, loss, knee = one.amplitude, one.loss, _amplitude_of(joint, _knee(joint))
+    ends = (a[0] < MICRO * knee, (0, 1)), (a[-1] > GROSS * knee, (-2, -1))
+    return tuple(float(np.log(loss[j] / loss[i]) / np.log(a[j] / a[i]))
+                 if there and a.size > 1 and loss[i] > 0 and loss[j] > 0 else None for there, (i, j) in ends)
+
+
+def _edge(one: Curve) -> float | None:
+    """Largest amplitude [m] at which the damping falls through 0, straight between the points."""
+    falls = np.flatnonzero((one.damping[:-1] > 0) & (one.damping[1:] <= 0))
+    if not falls.size:
+        return None
+    k = int(falls[-1])
+    share = one.damping[k] / (one.damping[k] - one.damping[k + 1])
+    return float(one.amplitude[k] * (one.amplitude[k + 1] / one.amplitude[k])**share)
+
+
+WHY = {"decay": "a decay shows the mean over a cycle, in which it loses {:.2g} of its swing there",
+       "quasi-static": "the static curve takes the stiffness from tip to tip, the balance the first harmonic of the "
+                       "force"}
+
+
+def _differences(curves: dict) -> list:
+    """Sentences on where the decay and the static curve leave the balance beyond their errors, and why."""
+    if "balance" not in curves:
+        return []
+    out, best = [], curves["balance"]
+    for way, why in WHY.items():
+        if way not in curves:
+            continue
+        one, x = curves[way], np.log(best.amplitude)
+        inside = np.clip(np.log(one.amplitude), x[0], x[-1])
+        inside = np.abs(inside - np.log(one.amplitude)) < CLOSE
+        for what in ("frequency", "damping"):
+            beside, bar = (np.interp(np.log(one.amplitude), x, getattr(best, part)) for part in (what, f"{what}_error"))
+            off = np.abs(getattr(one, what) - beside)
+            share = np.where(inside & (off > bar + getattr(one, f"{what}_error")), off / np.abs(beside), 0.0)
+            if share.size and share.max() > 0:
+                k = int(np.argmax(share))
+                lost = -np.expm1(-2 * np.pi * beside_damping(best, one.amplitude[k]))
+                out.append(f"{what} by {way} and by balance differ most at {say(one.amplitude[k], 3)}, by "
+                           f"{100 * share[k]:.2g} %: {why.format(lost)}")
+    return out
+
+
+def beside_damping(one: Curve, amplitude: float) -> float:
+    """Damping ratio of a curve at an amplitude [m], straight in its logarithm."""
+    return float(np.interp(np.log(amplitude), np.log(one.amplitude), one.damping))

@@ -1,0 +1,149 @@
+"""A backbone on disk: backbone.csv, backbone.nc, a picture and a page; its answer as plain numbers and as lines."""
+
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__, scales
+from ..campaigns.backbone import Backbone
+from ..disk.whole import write_rows, write_text
+from .drawing import charts, pictures
+from .netcdf import Contents, write
+from .pages.document import Section, document, table
+from .results import Folder
+from .summary import write_json
+
+COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error")
+HEAD = ("method", "amplitude [m]", "frequency [Hz]", "frequency_error [Hz]", "damping", "damping_error")
+WAYS = {"balance": "The periodic motion that a negative damping of the whole rig keeps up. It is what a slow decay "
+                   "shows, and what a test in phase resonance follows.",
+        "decay": "A release from the largest amplitude, read from turn to turn.",
+        "quasi-static": "One static force along the shape of the mode with the contact held, and the loops of the "
+                        "friction law."}
+COLOURS = {"balance": "accent", "decay": "warm", "quasi-static": "#2f9e63"}
+LISTED = 9  # amplitudes in the table on the screen
+
+
+def answer_of(found: Backbone) -> dict:
+    """The object that `patchfem backbone --json` prints, in SI."""
+    return {"mode": found.mode, "free_frequency": found.free, "stuck_frequency": found.stuck,
+            "curves": {way: {name: getattr(one, name).tolist() for name in COLUMNS}
+                       for way, one in found.curves.items()},
+            "missing": found.missing, "exponent": {"micro": found.micro, "gross": found.gross},
+            "flutter_amplitude": found.flutter, "notes": list(found.notes)}
+
+
+def contents(found: Backbone, title: str = "") -> Contents:
+    """backbone.nc: every curve under the name of its way, over amplitudes of its own."""
+    variables, coordinates = {}, {}
+    for way, one in found.curves.items():
+        name = way.replace("-", "_")
+        coordinates[f"{name}_amplitude"] = (f"{name}_amplitude", one.amplitude, {
+            "units": "m", "long_name": "half peak-to-peak at the output"})
+        for of, unit, words in (("frequency", "Hz", "frequency"), ("frequency_error", "Hz", "error of the frequency"),
+                                ("damping", "1", "damping ratio, structure and friction together"),
+                                ("damping_error", "1", "error of the damping ratio")):
+            variables[f"{name}_{of}"] = (f"{name}_amplitude", getattr(one, of), {
+                "units": unit, "long_name": f"{words}, by {way}"})
+    numbers = {"free_frequency": found.free, "stuck_frequency": found.stuck, "exponent_micro": found.micro,
+               "exponent_gross": found.gross, "flutter_amplitude": found.flutter}
+    return Contents(variables, coordinates, {"title": title, "patchfem": __version__, "mode": found.mode} | (
+        {"missing": "; ".join(f"{way}: {text}" for way, text in found.missing.items())} if found.missing else {}) | {
+        name: value for name, value in numbers.items() if value is not None})
+
+
+def write_into(found: Backbone, title: str, resolved: str, target: Path, with_page: bool = True) -> dict:
+    """Write the folder `target`, and return the answer; title: of the scene, resolved: its text in SI."""
+    answer = answer_of(found)
+    with Folder(target) as folder:
+        write_rows(folder.path / "backbone.csv", [HEAD, *(
+            [way, *(repr(float(value)) for value in row)] for way, one in found.curves.items()
+            for row in zip(*(getattr(one, name) for name in COLUMNS)))])
+        write(contents(found, title), folder.path / "backbone.nc")
+        write_json(answer, folder.path / "backbone.json")
+        write_text(folder.path / "scene.resolved.toml", resolved)
+        if found.curves:
+            write_text(folder.path / "backbone.svg", pictures.draw(drawn(found)))
+        if with_page:
+            write_text(folder.path / "report.html", page(found, title))
+    return answer
+
+
+def drawn(found: Backbone) -> list:
+    """The two charts: frequency and damping ratio over the amplitude, with their errors."""
+    unit, scale = scales.axis_unit(np.concatenate([one.amplitude for one in found.curves.values()]), "m")
+    out = []
+    for name, label, of, log in (("frequency", "frequency", "Hz", False), ("damping", "damping ratio", "", True)):
+        marks = []
+        for way, one in found.curves.items():
+            x, y = one.amplitude * scale, getattr(one, name)
+            shown = (y > 0) | (not log)
+            marks.append(charts.line(x[shown], y[shown], COLOURS[way], way))
+            error = getattr(one, f"{name}_error")[shown]
+            marks.append(charts.mark("dots", COLOURS[way], "", x=x[shown], y=y[shown], errors=error, shape="circle",
+                                     **({"floor": 0.1 * float(y[shown].min(initial=1.0))} if log else {})))
+        out.append(charts.chart(label.capitalize(), charts.axis("amplitude at the output", unit, True),
+                                charts.axis(label, of, log), marks))
+    return out
+
+
+def page(found: Backbone, title: str) -> str:
+    """The HTML page of a backbone."""
+    made = [one | {"anchor": f"chart{number}"} for number, one in enumerate(drawn(found))] if found.curves else []
+    cells = "".join(f'<div id="{one["anchor"]}" class=chart role=img aria-label="{escape(one["title"])}"></div>'
+                    for one in made)
+    told = "".join(f"<p>{escape(text)}</p>" for text in sentences(found))
+    sections = [Section("curves", "Frequency and damping over the amplitude",
+                        f"<figure><div class=row>{cells}</div><figcaption>Bars are numerical errors.</figcaption>"
+                        "</figure>" if made else "<p>No curve was found.</p>"),
+                Section("ways", "How they were found", table(("", ""), [
+                    [escape(way), escape(text if way in found.curves else f"not known: {found.missing[way]}")]
+                    for way, text in WAYS.items() if way in found.curves or way in found.missing]) + "".join(
+                        f"<p>{escape(text[0].upper() + text[1:])}.</p>" for text in found.notes)),
+                Section("values", "Values", _values(found))]
+    title = f"Mode {found.mode} over its amplitude" + f": {title}" * bool(title)
+    return document(title, told, sections, {"charts": made} if made else None,
+                    ("figures.js", "curves.js") if made else ())
+
+
+def _values(found: Backbone) -> str:
+    heads = ("method", ">amplitude", ">frequency", ">damping ratio")
+    rows = [[way, *(escape(text) for text in _told(one, k))] for way, one in found.curves.items()
+            for k in range(one.amplitude.size)]
+    return table(heads, rows)
+
+
+def _told(one, k: int) -> tuple:
+    """(amplitude, frequency, damping ratio) of a point of a curve in words, with errors."""
+    return (scales.short(one.amplitude[k], "m", 3), scales.told(one.frequency[k], one.frequency_error[k], unit="Hz"),
+            scales.told(one.damping[k], one.damping_error[k]))
+
+
+def sentences(found: Backbone) -> list:
+    """The answer in sentences."""
+    held = "" if found.stuck is None else f", and {found.stuck:.5g} Hz while the contact holds"
+    out = [f"Mode {found.mode} has {found.free:.5g} Hz without the contact{held}."]
+    best = next((found.curves[way] for way in ("balance", "quasi-static", "decay") if way in found.curves), None)
+    if best is not None:
+        k = int(np.argmax(best.damping))
+        inside = 0 < k < best.amplitude.size - 1
+        where = "Its damping ratio is largest" if inside else "Within these amplitudes its damping ratio is largest"
+        out.append(f"{where} at {scales.short(best.amplitude[k], 'm', 3)}: {best.damping[k]:.3g}, at "
+                   f"{best.frequency[k]:.5g} Hz.")
+    powers = [f"to the power {value:.3g} {where}" for value, where in (
+        (found.micro, "at the smallest of these amplitudes"), (found.gross, "at the largest")) if value is not None]
+    if powers:
+        out.append(f"The contact's loss per cycle rises with the amplitude {' and '.join(powers)}.")
+    if found.flutter is not None:
+        out.append(f"Beyond {scales.short(found.flutter, 'm', 3)} the mode gains energy: friction no longer holds it.")
+    return out
+
+
+def lines_of(found: Backbone) -> list:
+    """The answer in lines for the screen: sentences, a table of some amplitudes, what is missing."""
+    out = [*sentences(found), f"{'method':<13}{'amplitude':>12}{'frequency':>26}{'damping ratio':>26}"]
+    for way, one in found.curves.items():
+        pick = np.unique(np.linspace(0, one.amplitude.size - 1, LISTED).round().astype(int))
+        out += [f"{way:<13}{cells[0]:>12}{cells[1]:>26}{cells[2]:>26}" for cells in (_told(one, k) for k in pick)]
+    return [*out, *(f"{way}: not known: {text}" for way, text in found.missing.items())]

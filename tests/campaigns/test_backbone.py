@@ -1,0 +1,142 @@
+"""Backbones of scenes: three ways beside each other and beside closed forms."""
+
+import numpy as np
+import pytest
+
+import patchfem as pf
+from patchfem.campaigns.backbone import backbone
+
+RIG = """
+[normal]
+load = "100 N"
+[friction]
+%s
+static = 0.3
+[structure]
+moving_mass = "0.5 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "100 Hz"
+damping = 0.002
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "100 Hz"
+acceleration = "1 g"
+cycles = 20
+"""
+IWAN = 'law = "iwan"\nchi = -0.5\nbeta = 0.5\nstiffness = "20 kN/m"'
+PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
+OMEGA = 200 * np.pi
+
+
+def model(law: str, **sets):
+    return pf.build(RIG % law, **sets)
+
+
+def segalman(u):
+    """Force [N] and loss [J] of the joint IWAN by Segalman's closed form at slides below phi_max = 2.7 mm."""
+    r, scale = u / 2.7e-3, 30 / (0.5 + 1 / 3)
+    force = scale * (1.5 * r - r**1.5 / 1.5)
+    return force, 8 * scale * 2.7e-3 * (0.75 * r**2 - r**2.5 / 3.75) - 4 * u * force
+
+
+def test_exact_the_static_curve_of_an_iwan_joint_is_segalmans():
+    a = np.array([1e-5, 1e-4, 1e-3, 2.5e-3])
+    found = backbone(model(IWAN), "", a, ("quasi-static",))
+    one, (force, loss) = found.curves["quasi-static"], segalman(a)
+    omega = np.sqrt(OMEGA**2 + force / (0.5 * a))
+    assert one.frequency == pytest.approx(omega / (2 * np.pi), rel=1e-12)
+    assert one.damping == pytest.approx(0.002 * OMEGA / omega + loss / (np.pi * (omega * a)**2), rel=1e-9)
+    assert found.micro == pytest.approx(2.5, abs=1e-6) and found.gross is None
+    assert found.free == pytest.approx(100) and found.stuck == pytest.approx(np.sqrt(OMEGA**2 + 4e4) / (2 * np.pi))
+
+
+def test_the_balance_of_an_iwan_joint_keeps_its_bars_and_the_decay_follows_it():
+    """In micro-slip one harmonic carries all: the balance has the static curve's loss. The decay is within its bar and
+    what the damping changes over one of its swings."""
+    a = np.geomspace(2e-5, 2e-3, 6)
+    found = backbone(model(IWAN), "", a)
+    static, balance, decay = (found.curves[way] for way in ("quasi-static", "balance", "decay"))
+    assert balance.damping[0] == pytest.approx(static.damping[0], rel=1e-3)
+    inside = np.isin(a, decay.amplitude)
+    change = np.gradient(balance.damping, np.log(a))[inside] * 2 * np.pi * balance.damping[inside]
+    off = np.abs(decay.damping - balance.damping[inside])
+    assert inside.sum() >= 4 and (off < decay.damping_error + 2 * change).all()
+    assert np.abs(decay.frequency - balance.frequency[inside]).max() < 0.1
+
+
+def test_exact_rigid_friction_by_balance_and_by_decay():
+    """A block loses 2 h of every half swing, h = F/k: the decay reads ln(S/(S - 4 h)) at the mean of both swings, and
+    the balance has loss over 2 pi m omega^2 A^2 but for what one harmonic leaves out, of the order of the ratio."""
+    h = 30 / (0.5 * OMEGA**2)
+    found = backbone(model('law = "coulomb"'), "", np.geomspace(20 * h, 80 * h, 4))
+    decay, balance = found.curves["decay"], found.curves["balance"]
+    assert list(found.missing) == ["quasi-static"] and "gives way nowhere" in found.missing["quasi-static"]
+    first = 2 * h / (np.pi * balance.amplitude) + 0.002
+    assert balance.damping == pytest.approx(first, rel=2e-2)
+    assert decay.damping == pytest.approx(np.interp(decay.amplitude, balance.amplitude, balance.damping), rel=2e-2)
+    assert found.micro is None and found.gross == pytest.approx(1)
+
+
+def test_exact_a_cubic_spring_has_duffings_backbone():
+    """omega^2 = omega_0^2 + 3 k3 A^2/(4 m) to the first order of k3 A^2/k, and the damping of the structure alone."""
+    scene = RIG % PLASTIC
+    scene = scene[scene.index("[structure]"):] + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n'
+    a = np.array([1e-5, 1e-4])
+    found = backbone(pf.build(scene), "", a, ("balance", "quasi-static"))
+    omega = np.sqrt(OMEGA**2 + 0.75e9 * a**2 / 0.5)
+    assert found.curves["balance"].frequency == pytest.approx(omega / (2 * np.pi), rel=1e-6)
+    static = np.sqrt(OMEGA**2 + 1e9 * a**2 / 0.5)
+    assert found.curves["quasi-static"].frequency == pytest.approx(static / (2 * np.pi), rel=1e-9)
+    assert found.curves["balance"].damping == pytest.approx(0.002 * OMEGA / omega, rel=1e-5)
+
+
+def test_a_mode_that_gains_energy_has_the_amplitude_of_flutter():
+    """Where the balance falls through 0 is the limit cycle that does not last."""
+    one = pf.build(RIG % PLASTIC, **{"structure.mode.axial.damping": -0.01})
+    found = backbone(one, "", np.geomspace(2e-3, 2e-2, 25), ("balance",))
+    free = (RIG % PLASTIC).replace('kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"',
+                                   'kind = "free"\ndisplacement = "1 mm"')
+    told = pf.run(free, **{"structure.mode.axial.damping": -0.01}).measures["flutter_amplitude"]
+    assert found.flutter == pytest.approx(told.value, rel=0.01)
+
+
+def test_two_modes_are_told_by_name_and_held_by_shape():
+    """The held mode with most of the axial coordinate is the axial one, whatever its place among the frequencies."""
+    scene = (RIG % 'law = "elastic-plastic"\nbond_length = "1 um"').replace("[drive]", """[[structure.mode]]
+name = "yaw"
+frequency = "80 Hz"
+damping = 0.01
+slide = 0.1
+[drive]""")
+    one = pf.build(scene)
+    found = backbone(one, "axial", [1e-8], ("balance",))
+    k = np.diag([OMEGA**2, (160 * np.pi)**2]) + 30e6 / 0.5 * np.outer([1, 0.1], [1, 0.1])
+    assert found.stuck == pytest.approx(np.sqrt(np.linalg.eigvalsh(k)[-1]) / (2 * np.pi))
+    assert found.curves["balance"].frequency == pytest.approx(found.stuck, rel=1e-6)
+    low = backbone(one, "yaw", [1e-9], ("quasi-static",))
+    first = np.sqrt(np.linalg.eigvalsh(k)[0]) / (2 * np.pi)
+    assert low.curves["quasi-static"].frequency == pytest.approx(first, rel=1e-6)
+    with pytest.raises(pf.PatchfemError, match="the rig has axial, yaw"):
+        backbone(one, "pitch")
+
+
+def test_refuses_what_has_no_backbone():
+    with pytest.raises(pf.PatchfemError, match="do not change with the"):
+        backbone(pf.build((RIG % PLASTIC)[(RIG % PLASTIC).index("[structure]"):]))
+    with pytest.raises(pf.PatchfemError, match="that of a rig"):
+        backbone(pf.build('[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\n'
+                          'amplitude = "1 mm"\nfrequency = "10 Hz"\n'))
+    found = backbone(model('law = "tanh"\nreference_speed = "1 mm/s"'), "", [1e-2, 2e-2])
+    assert "speed of the slide" in found.missing["quasi-static"] and set(found.curves) >= {"balance"}
+
+
+def test_python_gives_a_dataset():
+    found = pf.backbone(RIG % IWAN, amplitudes=[1e-3, 1e-4], method="quasi-static")
+    assert found["quasi_static_amplitude"].values == pytest.approx([1e-4, 1e-3], rel=1e-9)
+    assert found["quasi_static_frequency"].attrs["units"] == "Hz" and found.attrs["mode"] == "axial"
+    with pytest.raises(pf.PatchfemError, match="one of balance"):
+        pf.backbone(RIG % IWAN, method="static")
+    with pytest.raises(pf.PatchfemError, match="above 0"):
+        pf.backbone(RIG % IWAN, amplitudes=[0.0])

@@ -1,0 +1,84 @@
+"""patchfem backbone: what it prints, the files it writes, what it refuses."""
+
+import csv
+import json
+
+import pytest
+import xarray as xr
+
+from patchfem.__main__ import main
+
+SCENE = """
+[normal]
+load = "100 N"
+[friction]
+law = "iwan"
+static = 0.3
+chi = -0.5
+beta = 0.5
+stiffness = "20 kN/m"
+[structure]
+moving_mass = "0.5 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "100 Hz"
+damping = 0.002
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "100 Hz"
+acceleration = "1 g"
+cycles = 20
+"""
+COLUMNS = ["method", "amplitude [m]", "frequency [Hz]", "frequency_error [Hz]", "damping", "damping_error"]
+
+
+@pytest.fixture
+def scene(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "joint.toml").write_text(SCENE, "utf-8")
+    return tmp_path
+
+
+def run(*words) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main([str(word) for word in words])
+    return ended.value.code or 0
+
+
+def test_exact_files_and_the_answer_hold_the_same_numbers(scene, capsys):
+    assert run("backbone", "joint.toml", "--amplitudes", "10 um..1 mm:3", "--method", "quasi-static", "--json") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert set(answer) >= {"mode", "free_frequency", "stuck_frequency", "curves", "exponent", "flutter_amplitude"}
+    curve = answer["curves"]["quasi-static"]
+    assert set(curve) == {"amplitude", "frequency", "frequency_error", "damping", "damping_error"}
+    assert curve["amplitude"] == pytest.approx([1e-5, 1e-4, 1e-3], rel=1e-9)
+    folder = scene / "out" / "joint-backbone"
+    head, *rows = csv.reader((folder / "backbone.csv").read_text("utf-8").splitlines())
+    assert head == COLUMNS and [float(row[2]) for row in rows] == curve["frequency"]
+    with xr.open_dataset(folder / "backbone.nc") as data:
+        assert data["quasi_static_damping"].values.tolist() == curve["damping"]
+        assert data.attrs["stuck_frequency"] == answer["stuck_frequency"]
+    assert json.loads((folder / "backbone.json").read_text("utf-8")) == answer
+    page = (folder / "report.html").read_text("utf-8")
+    assert "Frequency and damping over the amplitude" in page and "axial" in page
+    assert (folder / "backbone.svg").read_text("utf-8").startswith("<svg")
+
+
+def test_the_screen_answers_in_sentences_and_names_what_is_not_known(scene, capsys):
+    rigid = SCENE.replace('"iwan"', '"coulomb"').replace("chi = -0.5\nbeta = 0.5\n", "")
+    (scene / "joint.toml").write_text(rigid.replace('stiffness = "20 kN/m"\n', ""), "utf-8")
+    assert run("backbone", "joint.toml", "--amplitudes", "2 mm,5 mm", "--no-page", "-q") == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith("Mode axial has 100 Hz without the contact.\n") and "quasi-static: not known: " in shown
+    assert not (scene / "out" / "joint-backbone" / "report.html").exists()
+
+
+@pytest.mark.parametrize("words, said", [
+    (("--amplitudes", "1..2"), "bare number"), (("--amplitudes", "1 um..x"), "--amplitudes"),
+    (("--mode", "yaw"), "the rig has axial"), (("--method", "static"), "balance"),
+    (("--amplitudes", "0 um,1 um"), "--amplitudes")])
+def test_refuses_with_the_option_that_is_wrong(scene, capsys, words, said):
+    assert run("backbone", "joint.toml", *words) == 2
+    told = capsys.readouterr().err
+    assert said in told and "Traceback" not in told
