@@ -234,7 +234,7 @@ def test_exact_key_follows_the_kernels_only(tmp_path, monkeypatch):
     (package / "core.py").write_text("# edited", "utf-8")
     assert compiled.kernel_key() == same
     seen = {same}
-    tuples = [package / "dynamics" / name for name in compiled.TUPLES]
+    tuples = [package / name for name in compiled.TUPLES]
     for path in (*sorted(package.rglob("*kernels.py")), *tuples):
         path.write_text(path.read_text("utf-8") + "# edited\n", "utf-8")
         seen.add(compiled.kernel_key())

@@ -46,7 +46,8 @@ from .plain import plain
 
 HERE = Path(__file__).parents[1]  # the package
 # tuples that kernels take: numba's cache would not notice two of their fields that change places
-TUPLES = "contacts/arrays.py", "smooth/arrays.py", "events/plant.py", "events/elements.py"
+TUPLES = ("contact/many/arrays.py", "dynamics/contacts/arrays.py", "dynamics/smooth/arrays.py",
+          "dynamics/events/plant.py", "dynamics/events/elements.py")
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # numba's own switch: all runs as the Python it is
 LEAST = 1 << 21  # bytes of the machine code of a run
 PATIENCE = 2.0  # CPU seconds of a function as Python in a process, from which on it is compiled: a tenth of that
@@ -62,7 +63,7 @@ def sources():
     compiled."""
     digest = hashlib.sha256()
     for source in (*(HERE / "compiled" / name for name in ("inner.py", "held.py")), *sorted(HERE.rglob("*kernels.py")),
-                   *(HERE / "dynamics" / name for name in TUPLES)):
+                   *(HERE / name for name in TUPLES)):
         digest.update(str(source.relative_to(HERE)).encode() + b"\0" + source.read_bytes())
     return digest
 

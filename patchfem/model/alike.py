@@ -90,12 +90,13 @@ def renumbered(model: Model, like: Numbered, values: Sequence, sets: tuple = ())
 
 
 def _pressed(patch, numbers: dict):
-    """A `PatchModel` under the numbers of its load and its tilt."""
-    load, angle = (numbers.get(key) for key in (("contact", None, "load"), ("contact", "tilt", "angle")))
-    if angle is not None:
-        shapes = tuple((name, part.model_copy(update={"angle": angle}) if name == "tilt" else part)
-                       for name, part in patch.gap.shapes)
-        patch = replace(patch, gap=replace(patch.gap, shapes=shapes))
+    """A `PatchModel` under the numbers of its load and its shapes."""
+    shapes = {part: {key: value} for (table, part, key), value in numbers.items() if table == "contact" and part}
+    if shapes:
+        patch = replace(patch, gap=replace(patch.gap, shapes=tuple(
+            (name, part.model_copy(update=shapes[name]) if name in shapes else part)
+            for name, part in patch.gap.shapes)))
+    load = numbers.get(("contact", None, "load"))
     return patch if load is None else replace(patch, load=load)
 
 

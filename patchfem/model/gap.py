@@ -77,8 +77,9 @@ class Gap:
                    np.zeros(x.size))
 
     def at(self, x) -> tuple:
-        """Gap of the unloaded surfaces (m,) [m] at x (m,) [m], with notes for the user and seconds by shape."""
-        gap, seconds, notes = np.zeros(x.size), {}, ()
+        """Gap of the unloaded surfaces (m,) [m] at x (m,) [m], with notes for the user and seconds by shape; of shapes
+        with n numbers in place of one (m, n) at x (m, 1)."""
+        gap, seconds, notes = np.zeros(x.shape), {}, ()
         for name, part in self.shapes:
             begin = perf_counter()
             keys = {key: value for key, value in part if key != "on"}

@@ -86,7 +86,7 @@ def handed(work: Work, numbers: Sequence[int], found: Answers, told: list) -> tu
 
 
 def _alike(work: Work, numbers: Sequence[int]) -> Alike | None:
-    """The models of cases that differ in plain numbers alone; None of others, and of patches, which share meshes."""
+    """The models of cases that differ in plain numbers alone; None of others, and of patches that move."""
     cases, values = np.asarray(numbers), work.cases.columns(numbers)
     if work.keep is not None or values is None:
         return None
@@ -94,7 +94,11 @@ def _alike(work: Work, numbers: Sequence[int]) -> Alike | None:
         found = work.asked.alike([axis.key for axis in work.cases.axes], values, work.cases.sets, cases)
     except PatchfemError:  # the first of them has no model
         return None
-    return found if found is not None and found.first.patch is None else None
+    if found is None or found.first.patch is None:
+        return found
+    if found.first.kind != "patch":
+        return None
+    return found if work.meshes is None else replace(found, first=work.meshes.given(found.first))
 
 
 def _model(work: Work, number: int):

@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import compiled
 from ...core import PatchfemError
-from ...model.alike import some
+from ...model.alike import Alike, some
 from ...model.model import Model
 from . import one_by_one
 from .answers import Answers
@@ -49,14 +49,17 @@ def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least
     def of(function: str) -> Callable:
         return lambda *given: getattr(module(), function)(*given)
 
+    def parts(models: Sequence) -> dict:
+        some_of = [models.first] if isinstance(models, Alike) else models
+        return module().parts(models) if any(getattr(one, "kind", "") == kind for one in some_of) else {}
+
     asked = of("refuses")
     return Batch(name, lambda model: asked(model) if model.kind == kind else f"it is a {model.kind}", of("group"),
-                 of("solve"), share, compile, least, of("parts") if columns else None,
-                 together)
+                 of("solve"), share, compile, least, parts if columns else None, together)
 
 
 # the first that does not refuse a model takes it
-BATCHES: tuple[Batch, ...] = (_batch("patches", "patch", together=512),
+BATCHES: tuple[Batch, ...] = (_batch("patches", "patch", compile=6.0, columns=True, together=2048),
                               _batch("lumped.lanes", "rig", compile=6.0, least=64, columns=True, together=64),
                               _batch("lumped.lumped", "rig", compile=12.0),
                               _batch("lumped.sheared", "rig", 0.4, 12.0, together=64),
@@ -73,6 +76,8 @@ def batch_compile_seconds(batch: Batch, model: Model) -> float:
 def _kind(batch: Batch, model: Model) -> str:
     """What the compiled code of a batch hangs on, in words."""
     rig = model.rig
+    if rig is None:
+        return batch.name
     return " ".join([batch.name, rig.waveform, *(one.numbers.law for one in rig.interfaces), str(bool(model.soft))])
 
 
@@ -108,13 +113,17 @@ def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = Non
 
 def _by_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
     """(places of the models that no batch takes as columns, {(batch, group): places} of those that one does)."""
-    batch = next((one for one in BATCHES if one.parts is not None and study >= one.least), None)
-    try:
-        parts = batch.parts(models) if batch is not None else {}
-    except Exception:  # what is odd about a model is told by its own run
-        parts = {}
-    return np.setdiff1d(np.arange(len(models)), [case for cases in parts.values() for case in cases]), \
-        {(batch, group): cases for group, cases in parts.items()}
+    out, left = {}, np.arange(len(models))
+    for batch in BATCHES:
+        if batch.parts is None or study < batch.least or not left.size:
+            continue
+        try:
+            parts = batch.parts(some(models, left))
+        except Exception:  # what is odd about a model is told by its own run
+            continue
+        out |= {(batch, group): left[np.asarray(cases)].tolist() for group, cases in parts.items()}
+        left = np.setdiff1d(left, [case for cases in parts.values() for case in left[np.asarray(cases)].tolist()])
+    return left, out
 
 
 def _place(model: Model, study: int) -> tuple:

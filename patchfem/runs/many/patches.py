@@ -9,17 +9,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Outcome
+from ...core import Outcome, allowed
+from ...model.alike import Alike, some
 from ...model.model import Model
 from ..patch import result as of_patch
 from ..patch import static
 from ..patch.meshes import geometry_of
 from ..remedies import Finding, beyond_tolerance
+from ..results.patch_rows import TABLE
 from ..results.result import without_folders
 from . import one_by_one
-from .answers import Answers, joined_answers
+from .answers import Answers
 
-AT_ONCE = 1000  # cases whose forces are held at once
+AT_ONCE = 2048  # cases whose forces are held at once
+TINY = 1e-300  # an error that is always allowed
 
 
 class _Nodes(NamedTuple):
@@ -36,6 +39,12 @@ def group(model: Model) -> Hashable:
     return geometry_of(model.patch), static.pressing_kind(model.patch), model.accuracy.tolerance
 
 
+def parts(models: Sequence[Model]) -> dict:
+    """{group: places} of models that differ in plain numbers alone; of others none."""
+    alike = isinstance(models, Alike) and models.first.kind == "patch" and not refuses(models.first)
+    return {group(models.first): range(len(models))} if alike else {}
+
+
 def solved_together(models: Sequence[Model]) -> list[Model]:
     """The models in their order, those whose patches press together with how they do, for what moves them then."""
     out, groups = list(models), {}
@@ -43,8 +52,7 @@ def solved_together(models: Sequence[Model]) -> list[Model]:
         if not static.not_together(model.patch):
             groups.setdefault(group(model), []).append(case)
     for cases in groups.values():
-        found = static.pressed_together([models[case].patch for case in cases], models[cases[0]].accuracy.tolerance,
-                                        True)
+        found = static.solved_patches([models[case].patch for case in cases], models[cases[0]].accuracy.tolerance)
         for case, one in zip(cases, found):
             if one is not None:
                 out[case] = replace(models[case], patch=replace(models[case].patch, solved=one))
@@ -53,28 +61,46 @@ def solved_together(models: Sequence[Model]) -> list[Model]:
 
 def solve(models: Sequence[Model], say: Callable | None = None) -> Answers:
     """Answers of a group; cases that do not press together with the others are run by themselves."""
-    begin, first, found = perf_counter(), models[0], []
+    out = Answers.blank(len(models))
     for start in range(0, len(models), AT_ONCE):
-        these = [model.patch for model in models[start:start + AT_ONCE]]
-        found += static.pressed_together(these, first.accuracy.tolerance)
-    out, single = Answers.blank(len(models)), [case for case, one in enumerate(found) if one is None]
-    area, nodes = first.patch.length * first.patch.width * first.patch.pairs, None
-    for case, (model, one) in enumerate(zip(models, found, strict=True)):
-        if one is None:
-            continue
-        nodes = nodes or {"interface_nodes": one.nodes}
-        measures = of_patch.floored(model, one.measures)
-        out.put(case, Outcome.DONE, measures, 0.0)
-        out.numerics[case] = nodes
-        warned = [*model.source.remarks, *of_patch.strained_by(model.patch, one.top, one.approach),
-                *beyond_tolerance(Finding(model, measures, _Nodes(np.broadcast_to(0.0, one.nodes))))]
+        cases = range(start, min(start + AT_ONCE, len(models)))
+        out.place(cases, _solved(some(models, cases), say))
+    return out
+
+
+def _solved(models: Sequence[Model], say: Callable | None) -> Answers:
+    begin, first, alike = perf_counter(), models[0], isinstance(models, Alike)
+    asked = static.asked_by_columns(models.columns().patch, len(models)) if alike else \
+        static.asked_of([model.patch for model in models])
+    found, out = static.pressed_together(asked, first.accuracy.tolerance), Answers.blank(len(models))
+    good, wide, tolerance = found.good, ~found.good, first.accuracy.tolerance
+    floors = {name: np.broadcast_to(least, good.shape) for name, least in
+              of_patch.floors(first.patch, tolerance, found.values).items()}
+    for name, values in found.values.items():
+        out.measure(name, TABLE[name].unit)
+        for columns, given in ((out.values, values), (out.errors, found.errors[name]), (out.floors, floors[name])):
+            columns[name][:] = np.where(good, given, np.nan)
+        wide = wide | (found.errors[name] > np.maximum(allowed(tolerance, values, floors[name]), TINY))
+    out.outcome[good] = str(Outcome.DONE)
+    nodes = {"interface_nodes": found.levels[0].x.size}
+    out.numerics.update(dict.fromkeys(np.flatnonzero(good).tolist(), nodes))
+    strained = of_patch.beyond_small_strains(first.patch, found.top, found.approach)
+    mean = found.values["normal_load"] / (first.patch.length * first.patch.width * first.patch.pairs)
+    always, path = bool(first.source.remarks) or not alike, first.source.path
+    for case in np.flatnonzero(good & (wide | strained | always)).tolist():
+        model, measures = models[case], {name: replace(one, floor=float(floors[name][case]))
+                                         for name, one in found.measures(case).items()}
+        warned = [*model.source.remarks,
+                  *of_patch.strained_by(model.patch, float(found.top[case]), float(found.approach[case])),
+                  *beyond_tolerance(Finding(model, measures, _Nodes(found.levels[0].x)))]
         if warned:
             out.warnings[case] = without_folders(warned, model.source.path)
-        notes = [*of_patch.slender(model.patch, measures["normal_load"].value / area), *one.band]
+    for case in np.flatnonzero(good).tolist():
+        notes = [*of_patch.slender(first.patch, mean[case]), *found.band(first.patch, case)]
         if notes:
-            out.notes[case] = without_folders(notes, model.source.path)
+            out.notes[case] = without_folders(notes, path)
+    single = np.flatnonzero(~good)
     out.seconds[:] = (perf_counter() - begin) / len(models)
-    if not single:
-        return out
-    return joined_answers(len(models), [(range(len(models)), out),
-                                        (single, one_by_one.solve([models[case] for case in single], say))])
+    if single.size:
+        out.place(single, one_by_one.solve(some(models, single), say))
+    return out

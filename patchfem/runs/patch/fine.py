@@ -141,7 +141,8 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
         raise NotConverged(f"contact: an overlap of {-opening.min():.1e} m is left at {count} points")
     values, found = _values(asked, (normal, shear), force, np.where(touches, 0.0, opening))
     values |= {"approach": closing, "rotation": asked.gap.angle + theta}
-    hidden = Hidden(asked.length, int(touches.sum()), (asked.length / count,) * len(found), OFFSET,
+    cell = asked.length / count
+    hidden = Hidden(asked.length, int(touches.sum()), cell * bool(found), cell * len(found), OFFSET,
                     asked.moment is not None, float(np.ptp(gap) + np.abs(moved).max()), 0.0, 0.0)
     near = max(1, round(NEAR * count))
     cornered = max(force[:near].max(), force[-near:].max()) > CORNERED * force.max()

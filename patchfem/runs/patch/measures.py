@@ -1,7 +1,6 @@
 """Measures of a static patch with their errors from coarser meshes."""
 
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -13,7 +12,7 @@ from ...mesh.nested import plan_of
 from ...scene.keys.contact import outermost
 from ..results.patch_rows import DECISIVE, TABLE
 from .condensed import pair_beside
-from .limits import edge_limit, limit
+from .limits import Limit, edge_limit, limit
 from .press import Patch, pressed
 from .values import edge_cells, open_ends, unresolved_rounding, values
 
@@ -164,41 +163,47 @@ def combined(series: list, least: dict, nested: bool = True, tolerance: float | 
     that stays; rough: factor of the errors; edged: names of what hangs on edges. Without a coarser mesh there are no
     errors, without a load they are 0.
     """
-    mine, floors, out = series[-1], _floors(), {}
+    mine, floors, names = series[-1], _floors(), list(series[-1])
     if len(series) == 1 or not mine["normal_load"] > 0:
         error = None if len(series) == 1 else 0.0
         return {name: Measure(value, TABLE[name].unit, error, floors[name]) for name, value in mine.items()}
-    for name, value in mine.items():
-        wanted = np.inf if tolerance is None else allowed(tolerance, value, floors[name])
-        known, hidden = [one[name] for one in series], least.get(name, 0.0)
-        limited = partial(edge_limit if name in edged else limit, nested=nested)
-        best, error = _best(limited, known, wanted, hidden, rough)
-        out[name] = Measure(float(best), TABLE[name].unit, float(max(error, alike * abs(value))), floors[name])
+    known, (hidden, floor) = np.array([[one[name] for name in names] for one in series]), \
+        np.array([(least.get(name, 0.0), floors[name]) for name in names]).T
+    wanted = np.inf if tolerance is None else allowed(tolerance, known[-1], floor)
+    best, error = settled(known, hidden, wanted, nested, rough, np.isin(names, edged))
+    out = {name: Measure(value, TABLE[name].unit, wide, floors[name]) for name, value, wide in
+           zip(names, best.tolist(), np.maximum(error, alike * np.abs(known[-1])).tolist())}
     if mine["pressure_peak"] > 0:
         out["loaded_fraction"] = _of_peak(out["loaded_fraction"], out["pressure_peak"])
     return out
 
 
-def _best(limited, known: list, wanted: float, hidden: float, rough: float) -> tuple:
-    """(value, error) of the values `known` on meshes, coarse to fine, by `limited`, their `limit`.
+def settled(known, hidden, wanted, nested: bool = True, rough: float = 1.0, edged=False) -> tuple:
+    """(values, errors) (n, ...) of n measures by their values on meshes, known (levels, n, ...) coarse to fine, as
+    their `limit` has them.
 
-    It is that of fewer meshes where their error is smaller and holds the finest, so that no further mesh widens a bar.
-    hidden: least error on the finest mesh, which falls with its cells; rough: factor of the others.
+    Each is that of fewer meshes where their error is smaller and holds the finest, so that no further mesh widens a
+    bar. hidden: least errors on the finest mesh, which fall with its cells; wanted: errors up to which nothing is
+    extrapolated, (n, ...) or a number; rough: factor of the errors; edged (n,): whether a measure hangs on edges.
     """
-    def of(count: int) -> list:
-        seen, hides = limited(known[:count]), hidden * 2.0**(len(known) - count)
-        twice = EXTRAPOLATED if seen.extrapolated != seen.value else 1.0
-        plain = seen.value, max(rough * seen.error, hides)
-        further = seen.extrapolated, max(rough * seen.left, twice * hides)
-        return [plain] if plain[1] <= wanted else [plain, further]
+    def of(count: int) -> tuple:
+        """Values and errors as they are, and extrapolated; the errors of these are infinite where nothing is."""
+        seen, ends = (one(known[:count], nested) for one in (limit, edge_limit))
+        seen = Limit(*(np.where(edge, theirs, mine) for mine, theirs in zip(seen, ends)))
+        hides = hidden * 2.0**(len(known) - count)
+        twice = np.where(seen.extrapolated != seen.value, EXTRAPOLATED, 1.0)
+        plain, left = np.maximum(rough * seen.error, hides), np.maximum(rough * seen.left, twice * hides)
+        return seen.value, plain, seen.extrapolated, np.where(plain <= wanted, np.inf, left)
 
-    def width(one: tuple) -> float:
-        return one[1]
-
-    value, error = min(of(len(known)), key=width)
-    others = [one for count in range(3, len(known)) for one in of(count)
-              if abs(known[-1] - one[0]) <= one[1]]
-    return min([(value, error), *others], key=width)
+    edge = np.reshape(edged, np.shape(edged) + (1,) * (known.ndim - 1 - np.ndim(edged)))
+    value, error, further, left = of(len(known))
+    out = np.where(left < error, further, value), np.minimum(left, error)
+    for count in range(3, len(known)):
+        first, wide, *more = of(count)
+        for best, bar in ((first, wide), more):
+            better = (np.abs(known[-1] - best) <= bar) & (bar < out[1])
+            out = np.where(better, best, out[0]), np.where(better, bar, out[1])
+    return out
 
 
 def met(found: dict, tolerance: float) -> bool:
@@ -240,10 +245,13 @@ def _unbounded(patch: Patch) -> str:
     return ""
 
 
+def of_peak(fraction, error, share):
+    """Errors of loaded fractions with at least the relative error `share` of the peak that each is divided by."""
+    return np.maximum(error, fraction * share / (1 - np.minimum(share, 0.5)))
+
+
 def _of_peak(fraction: Measure, peak: Measure) -> Measure:
-    """The loaded fraction with at least the relative error of the peak that it is divided by."""
-    share = peak.error / peak.value
-    return replace(fraction, error=max(fraction.error, fraction.value * share / (1 - min(share, 0.5))))
+    return replace(fraction, error=float(of_peak(fraction.value, fraction.error, peak.error / peak.value)))
 
 
 def reaching(found: dict, top: float) -> dict:
@@ -268,17 +276,19 @@ def _floors() -> dict:
 
 
 class Hidden(NamedTuple):
-    """What a pressed patch is told by that three meshes may agree to hide.
+    """What a pressed patch is told by that three meshes may agree to hide, or (q,) of many.
 
-    length [m]; count: nodes in contact; cells: lengths [m] of those in which the contact ends; offset: cells by which
-    an edge may lie off; turns: the rotation is free; spread: range of the gap and largest elastic closing [m]; corner,
-    wedge, missed: pressures [Pa] at loaded corners of a coating, beside a contact of few nodes, of a rounding that is
-    passed over; open_ends [m] of rounded faces; skin: it is smooth; between [m]: of cells, those between two stretches.
+    length [m]; count: nodes in contact; cell, cells [m]: the longest of those in which the contact ends, and all of
+    them together; offset: cells by which an edge may lie off; turns: the rotation is free; spread: range of the gap and
+    largest elastic closing [m]; corner, wedge, missed: pressures [Pa] at loaded corners of a coating, beside a contact
+    of few nodes, of a rounding that is passed over; open_ends [m] of rounded faces; skin: it is smooth; between [m]: of
+    cells, those between two stretches.
     """
 
     length: float
     count: int
-    cells: tuple
+    cell: float
+    cells: float
     offset: float
     turns: bool
     spread: float
@@ -297,7 +307,7 @@ def _hidden(patch: Patch, missed_peak: float) -> Hidden:
     moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
     corner = 0.0 if patch.pieces is not patch.pair.compliance else \
         corner_layer(patch.pair, patch.pressure.sigma_n[[0, -1]], np.diff(patch.x)[[0, -1]])  # a skin evens it out
-    return Hidden(patch.pieces.interface.length, count, tuple(cells.tolist()),
+    return Hidden(patch.pieces.interface.length, count, float(cells.max(initial=0.0)), float(cells.sum()),
                   offset(patch.pair, cells.max(initial=0.0)), "moment_balance" in patch.pressure.residuals,
                   float(np.ptp(patch.gap) + moved), corner,
                   _wedge(patch) if count <= POINT and cells.any() else 0.0, missed_peak, float(open_ends(patch)),
@@ -310,24 +320,23 @@ def least_of(hidden: Hidden, mine: dict) -> dict:
     They are a contact of few nodes, the layer at a loaded corner of a coating thinner than the cells there, a rounding
     smaller than the cells, and round-off.
     """
-    length, load, count, cells = hidden.length, mine["normal_load"], hidden.count, hidden.cells
-    cell = max(max(cells), sum(cells) / 2) if cells else 0.0  # the average where the ends are many
-    aside = cell / (2 * count**2) if count <= POINT else 1e-3 * cell
-    peak = hidden.corner + (mine["pressure_peak"] / (4 * count**2) if cell and count <= FEW else 0.0)
-    peak = max(peak, hidden.wedge, hidden.missed - mine["pressure_peak"])
-    turned = ROUND * (abs(mine["approach"]) + hidden.spread) + abs(mine["rotation"]) * aside * hidden.turns
-    fullness = mine["loaded_fraction"] / mine["pressure_peak"] if mine["pressure_peak"] else 0.0
+    length, load, count, total = hidden.length, mine["normal_load"], hidden.count, mine["pressure_peak"]
+    cell, few = np.maximum(hidden.cell, hidden.cells / 2), count <= POINT  # the average where the ends are many
+    aside = np.where(few, cell / (2 * count**2), 1e-3 * cell)
+    peak = hidden.corner + np.where((cell > 0) & (count <= FEW), total / (4 * count**2), 0.0)
+    peak = np.maximum(np.maximum(peak, hidden.wedge), hidden.missed - total)
+    turned = ROUND * (np.abs(mine["approach"]) + hidden.spread) + np.abs(mine["rotation"]) * aside * hidden.turns
+    fullness = mine["loaded_fraction"] / np.where(total == 0, np.inf, total)
     # an edge of a contact of few nodes lies anywhere in its cell
-    near = max(hidden.offset, 1.0 if count <= POINT else 1 / count**2)
-    near *= not hidden.skin
-    off, outer = (near * cells_of + hidden.open_ends for cells_of in (sum(cells), sum(cells) - hidden.between))
+    near = np.maximum(hidden.offset, np.where(few, 1.0, 1 / count**2)) * (not hidden.skin)
+    off, outer = (near * cells + hidden.open_ends for cells in (hidden.cells, hidden.cells - hidden.between))
     return {"normal_load": 1e-10 * load, "pressure_peak": peak, "contact_fraction": off / length,
             "contact_half_width": outer / 2, "loaded_fraction": peak * fullness,
             "pressure_centre": ROUND * length + aside, "moment": (ROUND * length + aside) * load,
             "rotation": turned / length, "approach": ROUND * hidden.spread}
 
 
-def offset(pair, cell: float) -> float:
+def offset(pair, cell):
     """Cells by which an edge may lie off its place between two nodes of a Pair; cell [m]: the longest there.
 
     A soft coating thinner than the cells is a bed of springs, whose edge lies where the pressure of a node vanishes.
@@ -336,7 +345,8 @@ def offset(pair, cell: float) -> float:
     for grid, piece in ((pair.grid, pair.piece), (pair.upper_grid, pair.upper)):
         if grid.coating > 0:
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]
-            out = max(out, edges.behind(1.0) * min(1.0, cell / grid.coating) * (1 - min(ratio, 1 / ratio)))
+            stiffer = 1 - min(ratio, 1 / ratio)
+            out = np.maximum(out, edges.behind(1.0) * np.minimum(1.0, cell / grid.coating) * stiffer)
     return out
 
 

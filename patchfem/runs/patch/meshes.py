@@ -25,8 +25,8 @@ from .static import patches_on
 CASES = 48  # cases that a mesh is chosen by; of more, those that lie farthest apart
 ROUNDS = 4  # of the search for the contacts
 MOST_NODES = 400  # of the finest interface
-# times the cells that a case asks of its coarsest mesh: the first that are enough are taken
 FASTEST = 3.0  # order by which errors of static measures fall at most: meshes too coarse by it are not tried
+# times the cells that a case asks of its coarsest mesh: the first that are enough are taken, found by halves
 START = (4.0, 2.8, 2.0, 1.7, 1.4, 1.2, 1.0)
 CLOSE = 2.0  # ratio of the cells of neighbouring cases up to which one band holds what lies between them
 
@@ -54,15 +54,16 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
              for share in grids.SWING]
     layout = _layout([*cases, *swept], not (every and all_))
     # a contact that moves on the way has measures that its first state tells nothing of
-    enough = np.inf  # times the cells, above which no mesh meets it
-    for share in () if layout is None else START[-1:] if asked.sweeps else START:
-        if share > max(enough, START[-1]):
-            continue
-        levels, missed_by = _climbed(cases, grids.grids_of(asked, layout.times(share)), tolerance, share > 1)
+    shares, fitting = START[-1:] if asked.sweeps else START, None
+    while shares and layout is not None:
+        share = shares[(len(shares) - 1) // 2]
+        levels, missed_by = _climbed(cases, grids.grids_of(asked, layout.times(share)), tolerance, share > START[-1])
         if missed_by <= 1 or share == START[-1]:
-            return with_digest(levels)
-        enough = share * missed_by**(-1 / FASTEST)
-    return None
+            fitting, shares = levels, tuple(one for one in shares if one > share)
+        else:
+            enough = share * missed_by**(-1 / FASTEST)  # times the cells, above which no mesh meets it
+            shares = tuple(one for one in shares if one < share and one <= max(enough, START[-1]))
+    return fitting and with_digest(fitting)
 
 
 def with_digest(levels) -> Meshes:

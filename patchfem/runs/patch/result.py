@@ -11,6 +11,7 @@ from ...mesh.nested import plan_of
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import bodies_of
 from ...model.source import placed
+from ..results.patch_rows import TABLE
 from ..results.result import Result, at_rest
 from . import kept
 from .kept import band
@@ -58,11 +59,15 @@ def measured(model, patch, coarse) -> dict:
 
 def floored(model, found: dict) -> dict:
     """Measures with the floors of `measured`."""
-    arm = model.patch.length / 2
-    terms = {"approach": abs(found["rotation"].value) * arm, "pressure_centre": arm,
-             "moment": found["normal_load"].value * arm}
-    return found | {name: replace(found[name], floor=max(found[name].floor, model.accuracy.tolerance * size))
-                    for name, size in terms.items()}
+    least = floors(model.patch, model.accuracy.tolerance, {name: one.value for name, one in found.items()})
+    return {name: replace(one, floor=max(one.floor, least[name])) for name, one in found.items()}
+
+
+def floors(asked, tolerance: float, values: dict) -> dict:
+    """Floor of each static measure by its name, of values that are numbers or (q,) of many."""
+    arm = asked.length / 2
+    terms = {"approach": abs(values["rotation"]) * arm, "pressure_centre": arm, "moment": values["normal_load"] * arm}
+    return {name: np.maximum(TABLE[name].floor, tolerance * terms.get(name, 0.0)) for name in values}
 
 
 def static(what, patch, coarse, seconds, warnings, *_) -> Result:
@@ -83,12 +88,9 @@ def strained(asked, patch) -> list:
 
 def strained_by(asked, top: float, approach: float, beyond=()) -> list:
     """The warnings of `strained` from the largest nodal pressure [Pa] and the approach [m]; beyond: one in between."""
-    out, pieces = [], (asked.lower, asked.upper)
-    stuff = [m for piece in pieces for m in (piece.substrate, piece.coating and piece.coating.material) if m]
-    deep = top / min(m.young for m in stuff)
-    closed = approach / sum(piece.height for piece in pieces)
-    for share, what in ((deep, "the peak pressure is {:.3g} of the lowest Young's modulus"),
-                        (closed, "the approach is {:.3g} of the pieces' height")):
+    out, stuff = [], _materials(asked)
+    words = "the peak pressure is {:.3g} of the lowest Young's modulus", "the approach is {:.3g} of the pieces' height"
+    for share, what in zip(_strains(asked, top, approach), words):
         if share > SMALL:
             out.append(what.format(share) + f", beyond the small strains that are assumed ({SMALL:g})")
     out += beyond
@@ -98,6 +100,21 @@ def strained_by(asked, top: float, approach: float, beyond=()) -> list:
         out.append(f"Poisson's ratio {stiff:g} in plane strain (limit {LOCKS:g}): on cells of a given size, which lock "
                    f"towards 0.5, values are off by up to twice their bars; {cure}")
     return out
+
+
+def beyond_small_strains(asked, top, approach):
+    """Whether `strained_by` has a warning for patches, of arrays as well."""
+    return np.maximum(*_strains(asked, top, approach)) > SMALL if asked.chosen else np.ones(np.shape(top), bool)
+
+
+def _strains(asked, top, approach) -> tuple:
+    """(largest nodal pressure over the lowest Young's modulus, approach over the height of the pieces)."""
+    return top / min(m.young for m in _materials(asked)), approach / (asked.lower.height + asked.upper.height)
+
+
+def _materials(asked) -> list:
+    return [material for piece in (asked.lower, asked.upper)
+            for material in (piece.substrate, piece.coating and piece.coating.material) if material]
 
 
 def left_out(model, patch, coarse) -> list:

@@ -135,8 +135,8 @@ def of_patch(model, found, motion: dict, estimate: bool = True) -> dict:
         error, more = None, 0.0 if first is None else first.missing(name, before[name])
         if others and estimate and more is not None:
             meshes = limit([*(one[name] for one in reversed(others)), value])
-            error = jumps[name] + share * max(value - before[name], 0.0) + meshes.error + 1e-12 * value + more + \
-                STRIPS * times * abs(strips[name] - value)
+            error = jumps[name] + share * max(value - before[name], 0.0) + float(meshes.error) + 1e-12 * value + \
+                more + STRIPS * times * abs(strips[name] - value)
         out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor)
     left = found.moments[-1].values.get("groove_amplitude")
     if left is not None:

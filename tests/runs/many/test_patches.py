@@ -1,15 +1,22 @@
 """Static patches pressed together, held against their own single runs: values, bars, warnings and notes."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scene_texts import COATING, PIECE
 
+from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.cases import Cases
+from patchfem.campaigns.sweeps.executors import Here
+from patchfem.export.sweeps.run import swept
 from patchfem.model.model import build
 from patchfem.runs.many import many, one_by_one, patches
 from patchfem.runs.many.meshes import meshed
 from patchfem.runs.patch.grids import contact_extent
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.scene import scene
+from patchfem.scene.axes import values_of
 
 TEXT = PIECE + '{}load = "{} N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING + "{}\n[accuracy]\ntolerance = 1e-2\n"
 TILT, LINE = '[contact.tilt]\nangle = "{} rad"\n', '[contact.load_line]\noffset = "{} m"\n'
@@ -33,6 +40,8 @@ def same(models, together=None):
     for name, values in single.values.items():
         near = PEAK if name in ("pressure_peak", "loaded_fraction") else 1e-12
         size = np.abs(values) + single.floors[name]  # the larger terms that a value is the difference of
+        if name == "rotation":  # the closings of both ends, over the length
+            size = size + np.abs(single.values["approach"]) / models[0].patch.length
         for column, wanted in ((mine.values, values), (mine.errors, single.errors[name]),
                                (mine.floors, single.floors[name])):
             assert (np.abs(column[name] - wanted) <= near * size).all(), name
@@ -45,7 +54,7 @@ def same(models, together=None):
 def test_exact_together_as_one_by_one(tables, values):
     models = family(tables, *values)
     assert all(patches.refuses(model) == "" for model in models)
-    assert all(one is not None for one in patches.static.pressed_together([model.patch for model in models], 1e-2))
+    assert all(one is not None for one in patches.static.solved_patches([model.patch for model in models], 1e-2))
     same(models)
 
 
@@ -93,8 +102,35 @@ def test_exact_patches_solved_together_are_those_of_their_own(tables):
             assert contact_extent(mine).places == pytest.approx(contact_extent(own).places, rel=1e-9)
 
 
-def test_exact_contacts_inside_the_interface_are_run_by_themselves():
-    same(family(CROWN + TILT, 1e-5, 1e-3))
+def test_exact_contacts_inside_the_interface_press_together_too():
+    models = family(CROWN + TILT, 1e-5, 1e-3)
+    assert all(one is not None for one in patches.static.solved_patches([model.patch for model in models], 1e-2))
+    same(models)
+
+
+def test_exact_a_sweep_in_columns_is_that_of_its_models():
+    """The cases of a sweep are one model with columns of numbers; here the same as models of their own."""
+    values = [(-4.5, 2.0, 300.0), (-3.2, 0.4, 700.0), (-3.9, 20.0, 90.0)]
+    text = TEXT.format(PINNED, 100.0, TILT.format(1e-4) + CROWN)
+    keys = {"contact.tilt.angle": [f"{10**a!r} rad" for a, _, _ in values],
+            "contact.crown.radius": [f"{r!r} m" for _, r, _ in values],
+            "contact.load": [f"{load!r} N" for _, _, load in values]}
+    cases = Cases(tuple(values_of(key, texts, False) for key, texts in keys.items()), True)
+    found = swept(Asked(Path("patch.toml"), text), cases, Here())
+    models = meshed([build(scene.loads(text, sets=[f"{key}={texts[k]}" for key, texts in keys.items()]))
+                     for k in range(3)])
+    wanted = many.answers(models)
+    for name, column in wanted.values.items():
+        for mine, other in ((found.values[name], column), (found.errors[name], wanted.errors[name])):
+            assert mine == pytest.approx(other, rel=1e-12), name
+
+
+def test_refuses_a_profile_to_be_pressed_with_others(tmp_path):
+    """What it is averaged over stands in its own bars."""
+    (tmp_path / "waves.csv").write_text("x [mm],z [um]\n" + "".join(f"{0.1 * k},{k % 3}\n" for k in range(-70, 71)))
+    text = TEXT.format(PINNED, 100.0, '[contact.profile]\nfile = "waves.csv"\n')
+    models = meshed([build(scene.loads(text, tmp_path / "patch.toml")) for _ in range(2)])
+    assert "profile" in patches.refuses(models[0])
 
 
 def test_exact_a_case_does_not_depend_on_its_neighbours():

@@ -22,8 +22,8 @@ MOVED = RIG[RIG.index("[structure]"):RIG.index("[[structure.mode]]\nname = \"yaw
     + RIG[RIG.index("[drive]"):RIG.index("[accuracy]")]
 SCENES = {"rig": RIG.replace("tolerance = 1e-2", "tolerance = 1e-3"),
           "jenkins": PIECES + '[contact.shear]\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n' + MOVED + CLOSE,
-          "static": PIECES + CLOSE}
-BATCHES = {"rig": "gathered", "jenkins": "lumped.sheared", "static": "patches"}
+          "static": PIECES + CLOSE, "crowned": PIECES + '[contact.crown]\nradius = "5 m"\n' + CLOSE}
+BATCHES = {"rig": "gathered", "jenkins": "lumped.sheared", "static": "patches", "crowned": "patches"}
 APART, OUTSIDE = 0.01, 0.001  # most of the cases, and of the measures, that lie outside
 
 
@@ -32,7 +32,9 @@ def models(kind: str, seed: int, count: int) -> list:
     r, out = np.random.default_rng(seed), []
     for _ in range(count):
         sets = {"contact.tilt.angle": float(10 ** r.uniform(-5, -3)), "contact.load": float(10 ** r.uniform(1.5, 2.3))}
-        if kind != "static":
+        if kind == "crowned":
+            sets["contact.crown.radius"] = float(10 ** r.uniform(-0.5, 2))
+        elif kind != "static":
             sets |= {"friction.static": float(r.uniform(0.2, 0.45)),
                      "drive.acceleration": float(9.81 * 10 ** r.uniform(0.5, 0.9))}
         if kind == "rig":
@@ -58,7 +60,7 @@ def held(kind: str, seed: int, count: int) -> tuple:
     return compared, outside, int(apart.sum())
 
 
-@pytest.mark.parametrize(("kind", "count"), [("jenkins", 2), ("static", 12)])
+@pytest.mark.parametrize(("kind", "count"), [("jenkins", 2), ("static", 12), ("crowned", 12)])
 def test_always_a_batch_lies_inside_the_bars_of_its_cases(kind, count):
     compared, outside, _ = held(kind, 11, count)
     assert compared >= 10 * count and outside == 0
