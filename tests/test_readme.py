@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 PAGES = ("README.md", "patchfem/CHANGES.md", "patchfem/scene/GUIDE.md", "patchfem/scene/README.md",
          "patchfem/scene/LIMITS.md", "patchfem/scene/MATERIALS.md", "patchfem/scene/MEASURES.md", "studies/README.md",
          "studies/drift/README.md", "studies/friction_ladder/README.md", "studies/report/README.md",
-         "studies/report/conclusions.md", "studies/table_1/README.md", "tests/README.md")
+         "studies/report/conclusions.md", "studies/report/items.md", "studies/table_1/README.md", "tests/README.md")
 
 
 def text(page: str) -> str:

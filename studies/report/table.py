@@ -26,6 +26,7 @@ STUDIES, KEPT = HERE.parent, HERE / "seconds.json"
 QUESTION, ANSWER = told(__doc__)
 REPRODUCED = ""
 LONGEST = 300  # CPU seconds after which a measurement ends
+LONG = 20  # CPU seconds beyond which a study is marked as long
 
 
 class Study(NamedTuple):
@@ -88,15 +89,18 @@ def table(found: list, seconds: dict) -> str:
     return "\n".join([
         "# All studies in one table", "Written by `table.py` from the studies; seconds are CPU seconds of one core. "
         f"{len(known)} of {len(found)} studies are measured, {sum(known):.0f} s together; a dash stands where none is "
-        "measured yet, or where a study wants a file or another program.", "",
+        "measured yet, or where a study wants a file or another program. "
+        f"A study of more than {LONG} s is marked long.", "",
         f"Of {len(figures)} studies of figures of the report {yes} reproduce theirs, the others in part or not. "
         "[The ten conclusions of the report](conclusions.md) have a table of their own.", "",
         "| study | question | answer | seconds | figure reproduced |", "|---|---|---|---|---|", *rows, ""])
 
 
 def shown(seconds: float | None) -> str:
-    """CPU seconds as a cell."""
-    return "-" if seconds is None else f"{seconds:.1f}" if seconds < 10 else f"{seconds:.0f}"
+    """CPU seconds as a cell, those of a study that takes long marked."""
+    if seconds is None:
+        return "-"
+    return f"{seconds:.1f}" if seconds < 10 else f"{seconds:.0f}" + ", long" * (seconds > LONG)
 
 
 def main(measure: list | None = None, path: Path | None = HERE / "README.md") -> list:

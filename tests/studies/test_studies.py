@@ -12,6 +12,18 @@ STUDIES = Path(__file__).parents[2] / "studies"
 
 
 @pytest.mark.slow
+def test_exact_the_docstring_of_tilt_holds_the_figures_of_the_patch():
+    """Of a motion of one cycle: what is said of the pressed patch does not hang on it."""
+    module = study("rig/tilt.py")
+    said, rows = " ".join(module.__doc__.split()), module.main((0.0, 1e-4, 1e-3), 1)
+    (_, some, most), stiff = ([row[name][0] for row in rows] for name in ("contact_fraction", "tangential_stiffness"))
+    assert f"0.1 mrad leaves {100 * some:.0f} % of the patch in contact and 1 mrad {100 * most:.1f} %" in said
+    flat, tilted, wide = (f"{one:.3e}".replace("e+0", "e") for one in stiff)
+    assert f"shear stiffness falls from {flat} to {tilted} and {wide} N/m" in said
+    assert "{:.0f}, {:.0f} and {:.0f} nm of slide".format(*(1e9 * row["thresholds"][1] for row in rows)) in said
+
+
+@pytest.mark.slow
 def test_always_tilt_softens_the_patch_and_hardly_changes_the_rig():
     flat, tilted = study("rig/tilt.py").main((0.0, 1e-3))
     assert flat["contact_fraction"][0] == 1 and tilted["contact_fraction"][0] < 0.03

@@ -1,0 +1,218 @@
+"""What of the report can be computed here: item by item, by which scene, study and test?
+
+See items.md in this folder, which this script writes.
+
+Of 79 items 69 work, 8 in part, none is missing, and of two there is nothing to compute. The verdict is on this program:
+whether the report itself is right an item's study says. Paths are those of the repository.
+
+Run: python studies/report/items.py
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+HERE = Path(__file__).parent
+VERDICTS = {"works": "work", "in part": "work in part", "missing": "are missing", "nothing": "have nothing to compute"}
+
+
+class Item(NamedTuple):
+    """One item: where it stands in the report, what is said there; scene, study and test, paths of the repository, ""
+    without one; verdict: one of VERDICTS, with what is lacking."""
+
+    place: str
+    said: str
+    scene: str
+    study: str
+    test: str
+    verdict: str
+
+
+RIG, PRINTED, GROOVED = "studies/rig/rig.toml", "studies/rig/report.toml", "studies/report/grooved.toml"
+BLOCK, FRAME, LOOP = "studies/report/block.toml", "studies/report/figure_5.toml", "studies/bench/loop.toml"
+TWO = "studies/report/figures_10_12.toml"
+FIGURES, MODAL, HISTORIES = (f"tests/studies/test_report_{name}.py" for name in ("figures", "modal", "histories"))
+CONCLUDED, RIG_DID = "tests/studies/test_report_conclusions.py", "tests/studies/test_report_rig.py"
+
+
+def _figure(name: str) -> str:
+    return f"studies/report/figure{name}.py"
+
+
+def _conclusion(number: int, said: str) -> Item:
+    return Item(f"5, conclusion {number}", said, BLOCK, "studies/report/conclusions.py", CONCLUDED, "works")
+
+
+ITEMS = (
+    Item("2", "friction of constant size against the speed, static below a threshold of speed", BLOCK,
+         "studies/friction_ladder/ladder.py", "tests/friction/laws/test_laws.py", "works"),
+    Item("2.A, eq. 2.1, Fig. 1", "a mass on a spring and a dashpot from the frame, rubbed", BLOCK, _figure("s_2_3"),
+         "tests/dynamics/events/test_coulomb_one_mode.py", "works"),
+    Item("2.A, eqs 2.2, 2.3", "its groups q, D, zeta, xi", BLOCK, _figure("s_2_3"), FIGURES, "works"),
+    Item("2.A", "Newmark's scheme with a threshold of sticking, and the spikes that it makes", BLOCK,
+         "studies/report/conclusions.py", "tests/dynamics/comparison/test_comparison.py", "works"),
+    Item("2.A", "a sine or a step as input displacement", BLOCK, "", "tests/structure/test_drives.py", "works"),
+    Item("2.A", "other models, such as micro-slip, in place of the stuck condition", RIG,
+         "studies/friction_ladder/ladder.py", "tests/slip/test_partial_slip.py", "works"),
+    Item("2.A, Figs 2, 3", "histories, phase plane and friction force of the block at resonance", BLOCK,
+         _figure("s_2_3"), FIGURES, "works"),
+    Item("2.B, eqs 2.4, 2.5, Fig. 4", "friction that grows as tanh of the speed", FRAME, _figure("_5"),
+         "tests/friction/laws/test_rate_law.py", "works"),
+    Item("2.B, Fig. 5", "the block rings, by Euler's method", FRAME, _figure("_5"), FIGURES, "works"),
+    Item("2.B, Fig. 8", "measured loops of friction with ringing", "studies/report/figure_8.toml", _figure("_8"),
+         RIG_DID, "works"),
+    Item("2.B, Figs 6, 7", "photographs of an older set-up", "", "", "", "nothing"),
+    Item("2.B, eqs 2.6, 2.7, Figs 9 to 12", "two masses that rub: ringing below resonance, none near it",
+         TWO, _figure("s_10_12"), FIGURES, "works"),
+    Item("2.C, eqs 2.8, 2.9", "the path of a point and the distance along it since a bond formed", LOOP, "",
+         "tests/friction/bonds/test_quadrature.py", "works"),
+    Item("2.C, eqs 2.10 to 2.13", "a bond grows at rest and by slip, at rates that depend on the temperature", LOOP,
+         "studies/bench/stribeck.py", "tests/friction/bonds/test_temperature.py", "works"),
+    Item("2.C, eqs 2.14, 2.15, Figs 13, 14", "weights of a bond along and across the path", LOOP, _figure("_13"),
+         "tests/friction/bonds/test_spread.py", "works"),
+    Item("2.C, eqs 2.16, 2.17", "the nonlocal law as printed", PRINTED, "studies/rig/readings.py",
+         "tests/friction/bonds/test_list_truths.py", "in part: over grooves and in rigs whose load changes it is "
+         "refused"),
+    Item("2.C, eq. 2.17", "the same on pieces that give way in shear", RIG, "studies/rig/readings.py",
+         "tests/scene/test_scene_refusals.py", "in part: beside [contact.shear] only as reading = \"stretch\" with "
+         "order = 1"),
+    Item("2.C, eq. 2.17", "the normal stress of the place where a bond formed", LOOP, "",
+         "tests/friction/bonds/test_recursion.py", "in part: on = \"lower\" is refused in a rig with the printed law"),
+    Item("2.C, eq. 2.18", "the law at constant speed is a local one", LOOP, "studies/bench/stribeck.py",
+         "tests/friction/bonds/test_quadrature.py", "works"),
+    Item("2.C, eqs 2.19 to 2.21", "static and kinetic coefficients from the lengths of bonds", LOOP,
+         "studies/bench/stribeck.py", "tests/studies/test_bench_studies.py", "works"),
+    Item("3.A, eq. 3.1", "mass, damping and stiffness matrices with friction inside and forces from outside",
+         TWO, "", "tests/structure/test_matrices.py", "works"),
+    Item("3.A, eqs 3.2 to 3.4", "its modes, damping that couples them left in", RIG, "",
+         "tests/structure/test_response.py", "works"),
+    Item("3.B, eqs 3.5 to 3.10", "the solution by Duhamel's integral, implicit in the friction", BLOCK,
+         "studies/integrators/failure.py", "tests/dynamics/comparison/test_comparison.py", "works"),
+    Item("3.B", "displacements and velocities prescribed at the start", "studies/report/free.toml", _figure("_15"),
+         "tests/structure/test_starts.py", "works"),
+    Item("3", "any transient load, or a frequency swept over a range", RIG, "studies/steady/fold.py",
+         "tests/dynamics/events/test_general_drives.py", "works"),
+    Item("3.C.1, eq. 3.11, Fig. 15", "a released block comes to rest", "studies/report/figure_15.toml", _figure("_15"),
+         FIGURES, "works"),
+    Item("3.C.2, Fig. 16", "two masses with a rigid-body mode, the second one rubbed", TWO,
+         "studies/integrators/failure.py", "tests/studies/test_integrators.py", "works"),
+    Item("3.C.2, Figs 17, 18", "accepted by displacement, mass 2 moves though friction holds it", BLOCK,
+         "studies/integrators/failure.py", "tests/studies/test_integrators.py", "works"),
+    Item("3.C.2, Figs 19, 20", "accepted by velocity, no drift but an erratic force", BLOCK,
+         "studies/integrators/failure.py", "tests/studies/test_integrators.py", "works"),
+    Item("3.C.3, eq. 3.12, Figs 21, 22", "the simplified law, elastic to its limit", BLOCK,
+         "studies/integrators/failure.py", "tests/dynamics/events/test_elastic_plastic.py", "works"),
+    Item("4.A", "springs of threaded rods and flexures, a weight that hangs on a cable", RIG, "",
+         "tests/structure/test_universal.py", "in part: one axial mode and a constant load; neither rods nor cable nor "
+         "weight stand in a scene"),
+    Item("4.A", "the base is shaken by a set acceleration; the axial mode lies between 100 and 150 Hz", RIG,
+         "studies/rig/tilt.py", "tests/studies/test_studies.py", "works"),
+    Item("4.A, Figs 23, 24", "photographs of the rig", "", "", "", "nothing"),
+    Item("4.A, Fig. 25", "titanium pieces with 6 mil of tungsten carbide", RIG, "studies/patch/from_file.py",
+         "tests/elasticity/test_elasticity.py", "works"),
+    Item("4.A", "the normal load is varied by the weight", RIG, "studies/table_1/sensitivity.py",
+         "tests/runs/many/test_patches.py", "works"),
+    Item("4.B, Fig. 26", "modal test without rubbing: 143 Hz, damping 0.003", RIG, _figure("_26"), MODAL, "works"),
+    Item("4.B", "rocking at 73 Hz and yaw at 129 Hz beside the axial mode", RIG, "studies/table_1/unfitted.py",
+         "tests/studies/test_table_1.py", "works"),
+    Item("4.B, Fig. 27", "with 26 lbf: nearly critically damped in the vicinity of 148 Hz", GROOVED, _figure("_27"),
+         MODAL, "in part: a mode so damped lies at 101, 128 to 135 or 295 Hz, not at 148 Hz"),
+    Item("4.B, Fig. 27", "rocking and yaw are suppressed when the pieces rub", RIG, "studies/report/engaged.py",
+         RIG_DID, "works"),
+    Item("4.B", "asymmetric friction would have moved the yaw", RIG, "studies/misalignment/roll.py",
+         "tests/studies/test_misalignment.py", "works"),
+    Item("4.C", "exploratory sweeps from 130 to 160 Hz below 5 g", RIG, "studies/report/sweeps.py", RIG_DID, "works"),
+    Item("4.C", "slip begins at 4 g at all frequencies and distorts the acceleration", RIG,
+         "studies/table_1/levels.py", "tests/response/test_levels.py", "works"),
+    Item("4.C", "the level is raised in steps at a fixed frequency, up to 10 g or divergence", RIG,
+         "studies/levels/levels.py", "tests/studies/test_levels_study.py", "works"),
+    Item("4.C", "the strain gauge, 1 V per 0.001 inch", RIG, "studies/report/steps.py",
+         "tests/campaigns/rows/test_fit_rows.py", "works"),
+    Item("4.C", "records of input, absolute acceleration and gauge", RIG, "studies/report/steps.py", RIG_DID, "works"),
+    Item("4.D, Fig. 28", "histories at 135 Hz", GROOVED, _figure("s_28_29"), HISTORIES, "works"),
+    Item("4.D, Fig. 29", "histories at 143 Hz, at 8 g stable and unstable", GROOVED, _figure("s_28_29"), HISTORIES,
+         "works"),
+    Item("4.D, Figs 30, 31", "profiles before and after: waves of 80 um, 13 to 18 um high, lower afterwards", "",
+         _figure("s_30_31"), FIGURES, "in part: on made surfaces; the curves of the print could not be read"),
+    Item("4.D, Figs 2, 3, 32, 33", "q = 0.15 at 5 g beside 0.23 mil measured, 5 g beside 6 g", BLOCK, _figure("s_2_3"),
+         FIGURES, "works"),
+    Item("4.D", "no slip at 4 g, divergence at 8 g by the analysis", BLOCK, _figure("s_2_3"), FIGURES, "works"),
+    Item("Table 1", "absolute accelerations at four frequencies and levels", RIG, "studies/table_1/ladder.py",
+         "tests/studies/test_table_1_ladder.py", "works"),
+    Item("Table 1", "relative displacements, with those flagged unstable or lost", RIG, "studies/table_1/ladder.py",
+         "tests/studies/test_table_1_ladder.py", "works"),
+    Item("Table 1", "onset of slip, 3.8 to 4.2 g", RIG, "studies/table_1/levels.py", "tests/studies/test_table_1.py",
+         "works"),
+    Item("Table 1", "repeats at 135 and 143 Hz", RIG, "studies/report/repeats.py",
+         "tests/studies/test_table_1_repeats.py", "works"),
+    _conclusion(1, "slip begins at one level, whatever the frequency"),
+    _conclusion(2, "above a level the motion diverges, limited by stiffening"),
+    _conclusion(3, "sticking and slipping make the mass ring"),
+    _conclusion(4, "responses can be nearly sinusoidal above certain levels"),
+    _conclusion(5, "a portion of the area rubbed, for want of alignment"),
+    _conclusion(6, "slip begins near the largest input and is largest somewhat later"),
+    _conclusion(7, "the masses are stuck while the input returns to zero"),
+    _conclusion(8, "they slip again and follow the input, lagging"),
+    _conclusion(9, "at sticking the velocity drops and the acceleration jumps"),
+    _conclusion(10, "a model of one degree of freedom does not ring"),
+    Item("Table 1, 4.D", "the order of what runs away: 135 Hz from 6 g, 143 Hz at 8 g", GROOVED,
+         "studies/report/runaways.py", RIG_DID, "in part: friction far off the axis gives the order, with 8 to 11 "
+         "times the displacement that was read; no model of Table 1 gives it"),
+    Item("5", "relative acceleration beside the absolute one", BLOCK, _figure("s_2_3"),
+         "tests/response/test_measures.py", "works"),
+    Item("2.C, reference 2", "the nonlocal law of Oden and Pires, an average over x", LOOP,
+         "studies/friction_ladder/ladder.py", "tests/friction/laws/test_convolution.py", "works"),
+    Item("2.C, eq. 2.17", "slide in two directions, bonds all over the plane", LOOP, "",
+         "tests/friction/bonds/test_plane.py", "works"),
+    Item("3", "any number of interfaces", TWO, "",
+         "tests/dynamics/events/test_coulomb_systems.py", "works"),
+    Item("3", "the stability of the response", RIG, "studies/steady/multipliers.py",
+         "tests/studies/test_steady_studies.py", "works"),
+    Item("3.C", "numerical methods have to be chosen with care: accuracy against time", BLOCK,
+         "studies/integrators/work_precision.py", "tests/campaigns/test_cost.py", "works"),
+    Item("1", "damping of built-up structures by friction at their joints", RIG, "studies/steady/backbone.py",
+         "tests/studies/test_steady_studies.py", "works"),
+    Item("1", "devices that are added to make friction", "", "studies/damper/damper.py",
+         "tests/studies/test_damper_study.py", "works"),
+    Item("Fig. 25", "a mesh of the test pieces", "", "studies/patch/from_file.py", "tests/studies/test_mesh_file.py",
+         "works"),
+    Item("4.D, Fig. 31", "wear of the rubbed surfaces", RIG, "studies/wear/rig_story.py",
+         "tests/studies/test_wear_studies.py", "works"),
+    Item("1", "a law that experiments can check: values from measurements", RIG, "studies/table_1/ladder.py",
+         "tests/campaigns/rows/test_fit_rows.py", "works"),
+    Item("1", "friction against negative damping: flutter and its limit", BLOCK, "", "tests/runs/test_flutter.py",
+         "works"),
+    Item("5, conclusion 2", "stiffening of the flexures at large motion", "studies/table_1/rigid.toml",
+         "studies/report/conclusions.py", CONCLUDED, "works"),
+    Item("1", "from the friction of one asperity to that of many", "", "studies/misalignment/rough_skin.py",
+         "tests/contact/test_skin.py", "in part: stiffness and pressure of many asperities, no law of friction made of "
+         "theirs"),
+)
+
+
+def link(path: str) -> str:
+    """A path of the repository as a link beside the page."""
+    return f"[{path.split('/', 1)[1]}](../../{path})" if path else "-"
+
+
+def table(items=ITEMS) -> str:
+    """The page in Markdown."""
+    counts = [(sum(one.verdict.split(":")[0] == verdict for one in items), words) for verdict, words in
+              VERDICTS.items()]
+    rows = [f"| {number} | {one.place} | {one.said} | {link(one.scene)} | {link(one.study)} | {link(one.test)} | "
+            f"{one.verdict} |" for number, one in enumerate(items, 1)]
+    return "\n".join([
+        "# The report, item by item", "Written by `items.py`. The verdict is on this program: whether the report is "
+        "right an item's study says, and for its conclusions [their table](conclusions.md).", "",
+        f"Of {len(items)} items {', '.join(f'{count} {words}' for count, words in counts)}.", "",
+        "| | report | what it says | scene | study | test | verdict |", "|---|---|---|---|---|---|---|", *rows, ""])
+
+
+def main(path: Path | None = HERE / "items.md") -> tuple:
+    """The items, written as a page."""
+    if path is not None:
+        path.write_text(table(), "utf-8")
+    return ITEMS
+
+
+if __name__ == "__main__":
+    main()
