@@ -1,5 +1,6 @@
 """Measures of many runs as columns, with errors, outcome and reasons: what `runs.rig.rig` makes of one Solution."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -82,11 +83,12 @@ class Runs:
         return (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
 
 
-def batch_answers(models, runs: Runs, numerics: dict) -> tuple:
+def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = None) -> tuple:
     """(Answers of the models, (n,) whether a case must be run by itself, (n,) whether all its errors but that of the
     steady estimate are within its tolerance).
 
-    numerics: as `results.result.choices` has it.
+    numerics: as `results.result.choices` has it; again(Answers) -> (n,) which are answered another time, and are not
+    warned of what is wide.
     """
     n, values = len(models), dict(runs.values)
     values[MAIN] = runs.values.get(MAIN, runs.amplitudes)
@@ -125,6 +127,7 @@ def batch_answers(models, runs: Runs, numerics: dict) -> tuple:
     _reasons(models, sizes, runs, found)
     found.numerics.update({case: numerics | runs.chosen[case] for case in range(n)} if runs.chosen
                           else dict.fromkeys(range(n), numerics))
+    wide_of &= True if again is None else ~again(found)
     alike = isinstance(models, Alike)
     remarks = _remarks(models[0], numerics["engine"]) if alike else ()
     for case in range(n) if remarks or not alike or has(models[0].friction.law, "bonds") \

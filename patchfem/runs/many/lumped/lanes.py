@@ -256,12 +256,13 @@ def _marched(models: Sequence[Model], cases: tuple, steps: int, seen: tuple, coa
     (cycles, law), least = group(models[0]), np.zeros(len(models), bool)
     window = window_of(cycles)
     runs, exact, lost = runs_of(models, cases, steps, seen, coarser)
-    found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window})
+    more = (law == "iwan" or march.flows(KINDS[law])) and 2 * steps <= SMOOTH[-1]
+    found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window},
+                                    partial(too_wide, models) if more else None)
     chosen = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
     found.numerics.update(dict.fromkeys(range(len(models)), chosen))
     wide = too_wide(models, found) | lost | alone
-    serves = law == "iwan" or march.flows(KINDS[law])
-    finer = wide if serves and 2 * steps <= SMOOTH[-1] else least
+    finer = wide if more else least
     return found, (exact | wide | (found.outcome == "grows")) & ~finer, finer
 
 
