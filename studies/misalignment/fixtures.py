@@ -3,17 +3,18 @@
 The fixture decides. With a rigid one the rig's smooth pieces lose full contact at 9.3e-6 rad and touch on half of the
 patch at 2.9e-5 rad, that is 0.37 um over its 12.7 mm, on a fifth at 1.1e-4 rad:
 
-  tilt      in contact        mean/peak  peak MPa    centre mm  K_n N/um    K_t N/um
-  1e-6      1                 0.700      1.025       -0.207     1850 ± 3    404 ± 2
-  1e-5      0.936 ± 0.006     0.373      1.923       -2.072     1825 ± 5    404 ± 2
-  1e-4      0.219 ± 0.005     0.0862     8.32        -5.324     534 ± 2     229 ± 1
-  1e-3      0.0241 ± 0.0006   0.0118     60.9        -6.241     170 ± 1     120 ± 1
-  1e-2      0.00168 ± 0.0001  0.0009     790 ± 10    -6.342     96 ± 1      84 ± 1
+  tilt      in contact  mean/peak       peak MPa       centre mm        K_n N/um    K_t N/um
+  1e-6      1           0.699 ± 0.01    1.025 ± 0.01   -0.2075±0.0003   1850 ± 2    404 ± 1
+  1e-5      0.9352      0.3729±0.0004   1.923 ±0.002   -2.072 ± 0.003   1826        404 ± 1
+  1e-4      0.2193      0.08616         8.322          -5.324           535.2       229.1±0.3
+  1e-3      0.02392     0.01178         60.87          -6.241           169.9       119.7
+  1e-2      0.001676    0.000904        792.9 ± 0.8    -6.342           96.22       84.08
 
-A holder's spring gives way until its moment is that of the pressure, so every row is met later: half contact at 3.4e-5
-rad with 1e5 N m/rad, 7.5e-5 with 1e4, 4.9e-4 with 1e3 and 4.6e-3 rad (59 um) with 1e2. A piece free to rotate keeps
-full contact under a load line up to 0.15 lengths from its middle and touches on 0.445 ± 0.006 of the patch at a third,
-where a rigid pad on springs has L/6 and 0.5 (the kern). No skin is in these numbers: see `skins.py`.
+(an error stands where it is above a thousandth). A holder's spring gives way until its moment is that of the pressure,
+so every row is met later: half contact at 3.4e-5 rad with 1e5 N m/rad, 7.5e-5 with 1e4, 4.9e-4 with 1e3 and 4.6e-3 rad
+(59 um) with 1e2. A piece free to rotate keeps full contact under a load line up to 0.15 lengths from its middle and
+touches on 0.445 of the patch at a third, where a rigid pad on springs has L/6 and 0.5 (the kern). No skin is in these
+numbers: see `skins.py`.
 
 Run: python studies/misalignment/fixtures.py
 """

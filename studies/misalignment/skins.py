@@ -4,10 +4,10 @@ It decides as much as the fixture. Portion that bears a tenth of the mean pressu
 stiffnesses K_n, K_t in N/um, with a rigid fixture; every figure to 1 % or better but K_n of the linear skin (4 %):
 
   tilt   bare                      linear, 1e13 Pa/m         peaks, 0.2 um scatter     exponential, u0 = 2.5 um
-  1e-5   0.917   1.92 1825 404     1       1.04  861 303     1       1.00  705 276     1       0.73 45.1 33.8
-  1e-4   0.220   8.32  534 229     0.428   3.27  393 194     0.523   3.97  426 199     1       0.91 45.1 33.8
+  1e-5   0.917   1.92 1826 404     1       1.04  861 303     1       1.00  705 276     1       0.73 45.1 33.8
+  1e-4   0.220   8.32  535 229     0.428   3.27  391 193     0.523   3.97  426 199     1       0.91 45.1 33.8
   1e-3   0.024   60.9  170 120     0.120   12.0  120  80     0.096   25.0  160 105     0.786   3.53 43.6 32.5
-  1e-2   0.0017   790   96  84     0.035   41.1   43  33     0.016    134   80  64     0.126   34.5 37.2 28.7
+  1e-2   0.0017   793   96  84     0.035   41.1   43  33     0.016    134   80  64     0.126   34.5 37.2 28.7
 
 The soft skin hardly loses stiffness to a tilt, the bare pieces nineteen parts of twenty of K_n; only the place of the
 pressure is the same in the end. Against rigid pads on the same skins (`closed_forms.wedge_skin`) the pieces

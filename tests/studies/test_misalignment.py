@@ -51,6 +51,19 @@ def coarse(tilted, found):
     return values(pressed(found, tilted.pair(1)))
 
 
+@pytest.mark.share(2)
+@pytest.mark.parametrize("tilt", ["1e-6", "1e-5", "1e-4", "1e-3", "1e-2"])
+def test_exact_the_docstring_of_fixtures_holds_what_it_prints(tilted, fixtures, tilt):
+    """The rows of the rigid fixture, number by number with the digits that stand there."""
+    row = re.search(rf"(?m)^  {tilt} +(.*)$", fixtures.__doc__)[1]
+    names = "contact_fraction", "loaded_fraction", "pressure_peak", "pressure_centre", "normal_stiffness", \
+        "tangential_stiffness"
+    found = tilted.measured(fixtures.held(float(tilt), None))
+    for name, cell in zip(names, re.sub(r" *± *[\d.]+", "", row).split(), strict=True):
+        value, last = found[name].value * fixtures.COLUMNS[name][1], 10.0**-len(cell.partition(".")[2])
+        assert abs(value - float(cell)) <= 0.5001 * last, (name, value, cell)
+
+
 def test_always_the_table_of_the_rigid_fixture(tilted, fixtures):
     for tilt, fraction, peak, centre in ((1e-5, 0.936, 1.923, -2.072), (1e-4, 0.219, 8.32, -5.324),
                                          (1e-2, 0.00168, 790, -6.342)):
