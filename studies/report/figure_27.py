@@ -2,7 +2,7 @@
 
 That the modal test slid the block all the time: below slip it rides along and shows no peak at all, and at a random
 base of 4.2 to 5.1 g rms, which slides it by 0.5 to 1.9 mil rms, one fitted mode is critically damped: at 101 Hz for a
-rigid Coulomb block, 128 to 135 Hz for one that climbs its grooves, 295 Hz beside the second path fitted to Table 1.
+rigid Coulomb block, 128 to 134 Hz for one that climbs its grooves, 295 Hz beside the second path fitted to Table 1.
 
 Only the grooves pass 148 Hz, at 4.5 g rms: 144 to 160 Hz with a damping ratio of 1.3, in four records of 20 s. A rigid
 block nears its own 143 Hz from below as it slides more, 131 Hz at 6 g rms, 142 Hz at 12 g. The second path, which

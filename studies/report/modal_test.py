@@ -62,7 +62,7 @@ def marched(scene, drive=None, steps: int = STEPS, seconds: float | None = None)
     drive, modes = drive or model.rig.drive, model.rig.modes
     patch = None if model.patch is None else solve_all(model.patch, model.accuracy.tolerance, False)[0]
     contact = contact_of(model, choose(model), patch)
-    cycles = int((seconds or drive.duration) / drive.period)
+    cycles = int((seconds or drive.duration) / drive.period + 1e-6)  # 1e-6: a whole number stays one
     warm_up(modes, drive, contact)
     return march(modes, drive, contact, cycles, steps, cycles).window
 
