@@ -10,7 +10,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from fitting import training
-from rungs import AFTERWARDS, EACH, RUNGS, TABLE, variants
+from rungs import EACH, RUNGS, TABLE, variants
 
 from patchfem.campaigns.rows.cells import cells_of, scores
 from patchfem.campaigns.rows.nulls import NULLS, predicted

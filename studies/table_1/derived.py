@@ -1,0 +1,109 @@
+"""Rungs of which a free number is no key of a scene: rods in series with the flexure, and friction that follows wear.
+
+A `Number` stands beside the ranges of a fit; `Derived` asks a scene with what is made of such numbers. `Worn` computes
+the rows of the table one after the other, on the pieces as the rows before wore them.
+"""
+
+from dataclasses import dataclass, replace
+from math import pi
+
+import numpy as np
+
+from patchfem.campaigns.rows.asked import Asked, Question
+from patchfem.campaigns.rows.computed import Computed
+from patchfem.core import frozen_array
+from patchfem.model.model import build
+
+MASS, AXIAL = 1.19396625, 143.0  # kg, Hz: block and axial mode of every scene here
+COEFFICIENT, AREA, MINUTES = 1e-14, 0.0127**2, 10  # m2/N, m2, at each level: assumed as in studies/report/repeats.py
+DEPTH = 1e-6  # m worn, at which the factor of `Worn` is read
+BOND = 0.243e-6  # m by which the point gives way before it slides
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A free number with its ends that is no key of the scene; it stands where a Range does."""
+
+    key: str
+    low: float
+    high: float
+    kind: None = None
+    unit: str = "1"
+
+
+class Derived(Question):
+    """A Question of which the last numbers become --set strings together: derive(*numbers) -> strings."""
+
+    def __init__(self, scene, wanted, measured, derive):
+        super().__init__(scene, wanted, measured)
+        self.derive = derive
+
+    def asked(self, conditions, *sets: str) -> Asked:
+        return DerivedAsked(self.scene, conditions, self.wanted, self.measured, self.derive)
+
+
+class DerivedAsked(Asked):
+    """What Derived asks."""
+
+    def __init__(self, scene, conditions, wanted, measured, derive):
+        super().__init__(scene, conditions, wanted, measured)
+        self.derive = derive
+
+    def strings(self, values) -> list:
+        """--set strings of values (n,)."""
+        keys = [k for k in self.inner if not isinstance(self.wanted[k], Number)]
+        numbers = [float(values[k]) for k in self.inner if k not in keys]
+        return [*(self.wanted[k].assigned(values[k]) for k in keys), *(self.derive(*numbers) if self.derive else ())]
+
+    def model(self, values):
+        return build(self.base.changed(self.strings(values)))
+
+
+def rods(share: float, mass: float) -> list:
+    """--set strings of a block on rods in series with the flexures that carry the strain gage.
+
+    share: of the static compliance that the rods have; mass: at the tip of the flexures, over that of the block. The
+    first mode stays at 143 Hz; the gage reads the tip, by the factor of a static test. Modes have the mass of both, so
+    that the squares of their shares of the base motion sum to 1.
+    """
+    flexure, rod = 1 / (1 - share), 1 / share
+    root = np.sqrt([1.0, mass])
+    stiffness = np.array([[rod, -rod], [-rod, rod + flexure]]) / np.outer(root, root)
+    square, turned = np.linalg.eigh(stiffness)
+    shapes = turned / root[:, None] * np.sqrt(1 + mass)  # (block and tip, mode)
+    shapes *= np.sign(shapes[0])
+    base = (shapes[0] + mass * shapes[1]) / (1 + mass) * (1 - 1e-12)
+    out = [f"structure.moving_mass={MASS * (1 + mass)!r} kg"]
+    for k, name in enumerate(("axial", "rods")):
+        frequency = AXIAL * float(np.sqrt(square[k] / square[0]))
+        numbers = {"slide": shapes[0, k], "base": base[k], "accelerometer": shapes[0, k],
+                   "gauge": shapes[1, k] / (1 - share)}
+        out += [f"structure.mode.{name}.frequency={frequency!r} Hz",
+                *(f"structure.mode.{name}.{key}={float(value)!r}" for key, value in numbers.items())]
+    return out
+
+
+def by_row(cells):
+    """Cells of which every row of the table, in the order of the print, is a condition of its own."""
+    conditions = np.array([(row.frequency, row.input) for row in cells.rows])
+    return replace(cells, conditions=frozen_array(conditions), condition=frozen_array(cells.row, np.int64))
+
+
+class Worn(Computed):
+    """A Computed of a Derived question whose conditions are the rows of the table in the order in which they were run.
+
+    The friction of a row is that of new pieces times 1 + (factor - 1) depth/DEPTH, `factor` the last value: as
+    [wear.friction] has it between two rows of its table. Depth: COEFFICIENT times the mean pressure times the path of
+    the rows before, four times their amplitude less the stretch of the point, for MINUTES at each.
+    """
+
+    def _run(self, values, conditions) -> dict:
+        first, depth, found = float(values[0]), 0.0, {}
+        load = self.asked.scene.normal.load
+        for row in range(max(conditions) + 1):
+            static = first * max(1 + (values[-1] - 1) * depth / DEPTH, 0.05)
+            found |= super()._run([static, *values[1:]], [row])
+            swing = found[row][1]
+            cycles = self.asked.sine(row).omega / (2 * pi) * 60 * MINUTES
+            depth += COEFFICIENT * load / AREA * 4 * max(min(swing, 1e-3) - BOND, 0.0) * cycles
+        return found
