@@ -9,15 +9,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from derived import Worn, by_row
-from rungs import HELD, HERE, RUNGS, SEED, STUCK, TABLE
+from rungs import HELD, HERE, RUNGS, SCREEN, SEED, STUCK, TABLE
 
 from patchfem.campaigns.rows.cells import cells_of, scores
 from patchfem.campaigns.rows.computed import Computed
 from patchfem.campaigns.rows.nulls import predicted
-from patchfem.campaigns.rows.search import Search, residual_of, searched
+from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N
-from patchfem.identify.least_squares import NEAR
-from patchfem.identify.space import space
+from patchfem.identify.least_squares import NEAR, descents
+from patchfem.identify.space import Counted, space
 
 MIL = 25.4e-6
 SCORES = HERE / "scores.json"
@@ -71,53 +71,70 @@ def fitted(rung: str, reading: str, protocol: str, placebo: str = "", starts: in
     begin, one, cells = time.process_time(), RUNGS[rung], cells_for(rung)
     seen = training(cells, protocol)
     computed = computed_for(rung, reading, cells, seen, placebo)
-    found, valleys = best_of(cells, computed, seen, starts or one.starts, most or starts or one.most)
+    values, ends, valleys = best_of(cells, computed, seen, starts or one.starts, most or starts or one.most)
     computed.forget()
-    answer = np.array(computed(found.fit.values, range(len(cells.conditions))))
-    logs, values = cells.logs(*answer), found.fit.values
+    answer = np.array(computed(values, range(len(cells.conditions))))
+    logs = cells.logs(*answer)
     return {"rung": rung, "reading": reading, "protocol": protocol, "placebo": placebo,
             "keys": [free.key for free in computed.asked.wanted], "values": rounded(values, 6),
             "at_bound": bounds(computed.asked.wanted, values), "gain": gain(computed, reading, values),
             "fitted": rounded(scores(cells, logs, seen)), "others": rounded(scores(cells, logs, ~seen)),
             "bootstrap": bootstrap(cells, logs, seen), "logs": rounded(logs),
-            "cells": rounded(answer / np.array([[G_N], [MIL]])), "valleys": valleys, "starts": rounded(found.rms),
+            "cells": rounded(answer / np.array([[G_N], [MIL]])), "valleys": valleys, "starts": rounded(ends),
             "motions": computed.runs, "seconds": round(time.process_time() - begin, 1)}
 
 
 def best_of(cells, computed, seen, starts: int, most: int) -> tuple:
-    """(Found, valleys) of twice as many starts again and again, until two end in the best valley or `most` is reached.
+    """(values (n,), training rms at the end of every start, valleys) of twice as many starts again and again, until two
+    end in the best valley or `most` is reached.
 
     valleys: {"starts", "best": how many of them ended in the best valley, "tied": of every other valley within TIED of
     the best training score its training score and the scores of the readings that were not fitted}.
     """
-    kept = {}
+    wanted, residual = computed.asked.wanted, residual_of(cells, computed, seen, "bound")
+    box = space([one.low for one in wanted], [one.high for one in wanted])
+    quick, drawn, ends = Counted(residual, box, quick=True), np.random.default_rng(SEED), []
     while True:
-        found = searched(cells, computed, seen, Search(starts, SEED, kept=lambda name, *row: kept.setdefault(
-            name, *row) if row else kept.get(name)), "")
-        best, others = valleys_of(cells, computed, seen, found)
+        points = drawn.random((starts - len(ends), SCREEN, len(wanted)))
+        ends += descents(quick, [screened(quick, some, computed.forget) for some in points], before=computed.forget)
+        last = descents(Counted(residual, box), [min(ends, key=lambda one: one.cost).u], before=computed.forget)[0]
+        best, others = valleys_of(cells, computed, seen, last, [(box.values(one.u), one.rms) for one in ends])
         if best > 1 or 2 * starts > most:
-            return found, {"starts": starts, "best": best, "tied": others}
+            valleys = {"starts": starts, "best": best, "tied": others}
+            return box.values(last.u), [one.rms for one in ends], valleys
         starts *= 2
 
 
-def valleys_of(cells, computed, seen, found) -> tuple:
-    """(number of ends in the best valley, the other valleys near it) of a Found."""
-    residual = residual_of(cells, computed, seen, "bound")
+def screened(quick, points, forget) -> np.ndarray:
+    """The point (n,) of some of the unit cube with the least sum of squares, each computed from rest."""
+    costs = []
+    for u in points:
+        forget()
+        found = quick(u)
+        costs.append(np.inf if found is None else float(found @ found))
+    return points[int(np.argmin(costs))]
+
+
+def valleys_of(cells, computed, seen, last, ends) -> tuple:
+    """(number of ends in the best valley, the other valleys near it) of (values, rms) at the ends of the starts; last:
+    the Descent to the bottom of the best."""
+    wanted, residual = computed.asked.wanted, residual_of(cells, computed, seen, "bound")
+    box = space([one.low for one in wanted], [one.high for one in wanted])
 
     def at(values) -> np.ndarray:
         computed.forget()
         return residual(values)
 
-    least, count, known = at(found.fit.values), 0, []
-    for k in np.argsort(found.rms):
-        if not found.rms[k] <= TIED * found.fit.rms:
+    least, count, known = at(box.values(last.u)), 0, []
+    for values, score in sorted(ends, key=lambda one: (not one[1] < np.inf, one[1])):
+        if not score <= TIED * last.rms:
             continue
-        here = at(found.ends[k])
-        if found.rms[k] <= ALIKE * found.fit.rms and rms(here - least) < APART:
+        here = at(values)
+        if score <= ALIKE * last.rms and rms(here - least) < APART:
             count += 1
-        elif rms(here - least) >= APART and all(rms(here - other[0]) >= APART for other in known):
-            logs = cells.logs(*computed(found.ends[k], range(len(cells.conditions))))
-            known.append((here, [found.rms[k], *(scores(cells, logs, ~seen) or {}).values()]))
+        elif rms(here - least) >= APART and all(rms(here - other) >= APART for other, _ in known):
+            logs = cells.logs(*computed(values, range(len(cells.conditions))))
+            known.append((here, [score, *(scores(cells, logs, ~seen) or {}).values()]))
     return count, rounded([row for _, row in known])
 
 
@@ -139,7 +156,7 @@ def gain(computed, reading: str, values) -> float | None:
     return rounded(computed.gain, 6) if reading == STUCK else None
 
 
-def bootstrap(cells, logs, seen, rows=None) -> dict:
+def bootstrap(cells, logs, seen) -> dict:
     """5 and 95 % of the scores of the others (n,) bool when rows are drawn with replacement, the fit kept:
     {"fitted", "others": {kind: [low, high]}, "better": {null: {kind: share of draws in which the model scores the
     others better}}}; None where there is nothing to draw."""

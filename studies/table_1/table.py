@@ -1,6 +1,8 @@
-"""The tables of the ladder as markdown: every rung under every reading, models without mechanics, placebos.
+"""The tables of the ladder as markdown: every rung under every reading, models without mechanics, folds, placebos.
 
 A score is the root mean square of ln(computed/measured): of all readings / of accelerations / of displacements.
+
+Run: python studies/table_1/table.py      (writes the tables into README.md, between its marks)
 """
 
 import sys
@@ -9,46 +11,93 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from fitting import training
-from rungs import EACH, RUNGS, TABLE, variants
+from fitting import KIND, better, intervals, known, training
+from fitting import NULLS as RIVALS
+from rungs import EACH, HERE, ROOT2, RUNGS, STUCK, TABLE, variants
 
 from patchfem.campaigns.rows.cells import cells_of, scores
 from patchfem.campaigns.rows.nulls import NULLS, predicted
 
 UNITS = {"static": "", "stiffness": "MN/m", "damping": "kN s/m", "slide": "", "accelerometer": "", "load": "N",
-         "amplitude": "um", "acceleration_gain": ""}
+         "amplitude": "um", "acceleration_gain": "", "share": "", "mass": "", "factor": ""}
 SIZES = {"stiffness": 1e-6, "damping": 1e-3, "amplitude": 1e6}
 SHORT = {"static": "μ", "stiffness": "k", "damping": "c", "slide": "yaw", "accelerometer": "seen", "load": "N",
-         "amplitude": "A", "acceleration_gain": "gain"}
+         "amplitude": "A", "acceleration_gain": "gain", "share": "rods", "mass": "tips", "factor": "worn"}
+BEFORE = (  # (rung, reading), its scores in the ladder before this one: at 143 Hz, 135 to 155 Hz, left out; its starts
+    ("spring and yaw", ROOT2, ".074 / .082 / .051", ".166 / .138 / .255", ".179 / .132 / .287", 8),
+    ("second path", STUCK, ".063 / .065 / .058", ".186 / .156 / .284", ".298 / .140 / .569", 8),
+    ("second path", ROOT2, ".084 / .097 / .041", ".172 / .125 / .303", ".246 / .129 / .456", 8),
+    ("yaw in the accelerometer", STUCK, ".062 / .063 / .060", ".179 / .144 / .287", ".146 / .097 / .249", 8),
+    ("yaw in the accelerometer", ROOT2, ".073 / .081 / .050", ".168 / .147 / .242", ".204 / .185 / .258", 8),
+    ("rigid Coulomb", "peak", "1.419 / .925 / 2.151", "1.305 / .524 / 2.852", "1.484 / .793 / 2.740", 2),
+    ("grooves", ROOT2, ".584 / .109 / 1.041", ".737 / .231 / 1.657", ".710 / .284 / 1.391", 4),
+    ("grooves, lift and yaw", "fundamental x gain", ".078 / .088 / .048", ".166 / .132 / .269",
+     ".200 / .149 / .317", 3))
+MARK = "<!-- {} -->"
 
 
 def three(found: dict | None) -> str:
     """"all / acceleration / displacement" of scores; a dash where one is missing."""
     if found is None:
         return "-"
-    return " / ".join("-" if found[name] is None else f"{found[name]:.3f}".lstrip("0")
-                      for name in ("all", "acceleration", "displacement"))
+    return " / ".join("-" if found[name] is None else short(found[name]) for name in KIND)
 
 
-def left_out(rows: dict, rung: str, reading: str) -> dict | None:
-    """Scores of every reading by the fit that did not see its frequency; None where a fold is missing."""
-    cells, folds = cells_of(TABLE), [rows.get((rung, reading, protocol, "")) for protocol in EACH[1:]]
-    if None in folds:
-        return None
+def short(score: float) -> str:
+    return f"{score:.3f}".lstrip("0")
+
+
+def folds_of(rows: dict, rung: str, reading: str) -> list | None:
+    """The records of the four folds; None where one is missing."""
+    folds = [rows.get((rung, reading, protocol, "")) for protocol in EACH[1:]]
+    return None if None in folds else folds
+
+
+def left_logs(folds) -> np.ndarray:
+    """Logarithms (n,) of every reading by the fit that did not see its frequency."""
+    cells = cells_of(TABLE)
     logs = np.full(cells.row.size, np.nan)
     for fold in folds:
         out = ~training(cells, fold["protocol"])
         logs[out] = np.array(fold["logs"], float)[out]
-    return scores(cells, logs, np.ones(logs.size, bool))
+    return logs
+
+
+def left_out(rows: dict, rung: str, reading: str) -> dict | None:
+    """Scores of every reading by the fit that did not see its frequency; None where a fold is missing."""
+    folds = folds_of(rows, rung, reading)
+    if folds is None:
+        return None
+    logs = left_logs(folds)
+    return scores(cells_of(TABLE), logs, np.ones(logs.size, bool))
+
+
+def null_left(name: str) -> np.ndarray:
+    """`left_logs` of a model without mechanics."""
+    cells = cells_of(TABLE)
+    out = np.full(cells.row.size, np.nan)
+    for protocol in EACH[1:]:
+        fold = training(cells, protocol)
+        out[~fold] = predicted(cells, name, fold)[0][~fold]
+    return out
 
 
 def numbers(row: dict) -> str:
-    """The fitted numbers of a record, named."""
+    """The fitted numbers of a record, named, and which end of its range one touches."""
     parts = []
-    for key, value in zip(row["keys"], row["values"]):
+    for key, value, end in zip(row["keys"], row["values"], row["at_bound"]):
         name = key.rpartition(".")[2]
-        parts.append(f"{SHORT[name]} {value * SIZES.get(name, 1):.3g} {UNITS[name]}".strip())
+        shown = 0.0 if end == "low" and abs(value * SIZES.get(name, 1)) < 1e-3 else value * SIZES.get(name, 1)
+        parts.append(f"{SHORT[name]} {shown:.3g} {UNITS[name]}".strip() + (f" ({end} end)" if end else ""))
+    if row["reading"] == STUCK:
+        parts.append(f"[gain {row['gain']:.4g}]")
     return ", ".join(parts)
+
+
+def found(row: dict) -> str:
+    """In how many of its starts a record found its valley, and how the nearest other one scores."""
+    text = f"{row['valleys']['best']} of {row['valleys']['starts']}"
+    return text if row["valleys"]["best"] > 1 else text + " †"
 
 
 def nulls() -> list:
@@ -56,45 +105,118 @@ def nulls() -> list:
     cells, out = cells_of(TABLE), []
     seen, every = training(cells, "143"), np.ones(cells.row.size, bool)
     for name in NULLS:
-        logs, left = predicted(cells, name, seen)[0], np.full(cells.row.size, np.nan)
-        for protocol in EACH[1:]:
-            fold = training(cells, protocol)
-            left[~fold] = predicted(cells, name, fold)[0][~fold]
-        whole, found = predicted(cells, name, every)
-        out.append((name, found["acceleration"], scores(cells, logs, seen), scores(cells, logs, ~seen),
-                    scores(cells, left, every), scores(cells, whole, every)))
+        logs, (whole, made) = predicted(cells, name, seen)[0], predicted(cells, name, every)
+        out.append((name, made["acceleration"], scores(cells, logs, seen), scores(cells, logs, ~seen),
+                    scores(cells, null_left(name), every), scores(cells, whole, every)))
     return out
 
 
 def tables(rows: dict) -> list:
     """Lines of markdown of what was computed: (rung, reading, protocol, placebo) -> record."""
-    out = ["| model | reading | numbers | at 143 Hz | 135, 150, 155 Hz | left out | all rows | seconds |",
-           "|---|---|---|---|---|---|---|---|"]
+    return [*_rungs(rows), "", *_left(rows), "", *_before(rows), "", *_placebos(rows)]
+
+
+def _rungs(rows: dict) -> list:
+    out = ["| model | reading | numbers | starts in the best valley | at 143 Hz | 135, 150, 155 Hz | left out | "
+           "all rows | seconds |", "|---|---|---|---|---|---|---|---|---|"]
     for name, factor, fitted, held, left, whole in nulls():
         said = {"constant": "constant x input", "power_input": "power of input",
                 "power_input_frequency": f"input^{factor['input']:.2f} frequency^{factor['frequency']:.2f}"}[name]
-        out.append(f"| none: {said} | | | {three(fitted)} | {three(held)} | {three(left)} | {three(whole)} | |")
+        out.append(f"| none: {said} | | | | {three(fitted)} | {three(held)} | {three(left)} | {three(whole)} | |")
     for rung, one in RUNGS.items():
         for reading in one.readings:
             row = rows.get((rung, reading, "143", ""))
             if row is None:
-                out.append(f"| {rung} | {reading} | not run | | | | | |")
+                out.append(f"| {rung} | {reading} | not run | | | | | | |")
                 continue
             every = rows.get((rung, reading, "all", ""))
-            out.append(f"| {rung} | {reading} | {len(row['values'])}: {numbers(row)} | {three(row['fitted'])} | "
-                       f"{three(row['others'])} | {three(left_out(rows, rung, reading))} | "
+            out.append(f"| {rung} | {reading} | {len(row['values'])}: {numbers(row)} | {found(row)} | "
+                       f"{three(row['fitted'])} | {three(row['others'])} | {_marked(rows, rung, reading)} | "
                        f"{three(every and every['fitted'])} | {row['seconds']:.0f} |")
-    for key in AFTERWARDS:
-        if row := rows.get(key):
-            out.append(f"| afterwards: {key[0]}, {key[2].split(', ')[1]} | {key[1]} | {len(row['values'])}: "
-                       f"{numbers(row)} | {three(row['fitted'])} | {three(row['others'])} | - | - | "
-                       f"{row['seconds']:.0f} |")
-    tried = [key for key in variants() if key[3] and key in rows]
-    if tried:
-        out += ["", "| placebo | in the place of | fitted | predicted |", "|---|---|---|---|"]
-    for rung, reading, protocol, placebo in tried:
-        row, real = rows[rung, reading, protocol, placebo], rows.get((rung, reading, protocol, ""))
+    return out
+
+
+def _marked(rows: dict, rung: str, reading: str) -> str:
+    """The left-out scores, with † where the best valley of a fold was found once only."""
+    folds = folds_of(rows, rung, reading)
+    once = folds and any(fold["valleys"]["best"] < 2 for fold in folds)
+    return three(left_out(rows, rung, reading)) + (" †" if once else "")
+
+
+def shared(rows: dict) -> list:
+    """(rung, reading) of which all folds are there, and their logarithms."""
+    here = [(rung, reading, folds_of(rows, rung, reading)) for rung, one in RUNGS.items() for reading in one.each]
+    return [(rung, reading, folds, left_logs(folds)) for rung, reading, folds in here if folds]
+
+
+def _left(rows: dict) -> list:
+    """Each frequency left out: scores with their bootstrap, and how often the rows drawn anew prefer the model."""
+    cells = cells_of(TABLE)
+    every = np.ones(cells.row.size, bool)
+    out = ["| each frequency left out | reading | all | acceleration | displacement | better than the constant: all, "
+           "acceleration, displacement | better than the strong null in acceleration | folds whose best valley was found "
+           "twice | ends touched |", "|---|---|---|---|---|---|---|---|---|"]
+    null = {name: null_left(one) for name, one in RIVALS.items()}
+    listed = [(f"none: {name}", "", None, logs) for name, logs in null.items()] + shared(rows)
+    for rung, reading, folds, logs in listed:
+        own, drawn = scores(cells, logs, every), intervals(cells, logs, every)
+        cellular = [f"{short(own[kind])} ({short(drawn[kind][0])} to {short(drawn[kind][1])})" for kind in KIND]
+        beats = {name: better(cells, logs, other, every) for name, other in null.items()} if folds else None
+        of_constant = " / ".join(f"{beats['constant'][kind]:.2f}" for kind in KIND) if folds else ""
+        of_strong = f"{beats['strong']['acceleration']:.2f}" if folds else ""
+        twice = f"{sum(fold['valleys']['best'] > 1 for fold in folds)} of 4" if folds else ""
+        out.append(f"| {rung} | {reading} | {' | '.join(cellular)} | {of_constant} | {of_strong} | {twice} | "
+                   f"{_ends(folds) if folds else ''} |")
+    return out
+
+
+def _ends(folds) -> str:
+    """Which numbers lie at an end of their range in which folds."""
+    parts = [f"{SHORT[key.rpartition('.')[2]]} {end} without {fold['protocol'].split()[1]}" for fold in folds
+             for key, end in zip(fold["keys"], fold["at_bound"]) if end]
+    return ", ".join(parts) or "none"
+
+
+def _before(rows: dict) -> list:
+    """The ladder before and after, for what stood in both."""
+    out = ["| model | reading | | at 143 Hz | 135, 150, 155 Hz | left out | starts |", "|---|---|---|---|---|---|---|"]
+    for rung, reading, *before, starts in BEFORE:
+        row = rows.get((rung, reading, "143", ""))
+        if row is None:
+            continue
+        out += [f"| {rung} | {reading} | before | {' | '.join(before)} | {starts} |",
+                f"| | | after | {three(row['fitted'])} | {three(row['others'])} | {_marked(rows, rung, reading)} | "
+                f"{row['valleys']['starts']} |"]
+    return out
+
+
+def _placebos(rows: dict) -> list:
+    out = ["| placebo | in the place of | fitted | predicted |", "|---|---|---|---|"]
+    for rung, reading, protocol, placebo in variants():
+        row, real = rows.get((rung, reading, protocol, placebo)), rows.get((rung, reading, protocol, ""))
+        if not placebo or row is None:
+            continue
         instead = f"{three(real and real['fitted'])}, {three(real and real['others'])}"
         out.append(f"| {rung}: {placebo.rpartition('.')[2].replace('=', ' ')} | {instead} | {three(row['fitted'])} | "
                    f"{three(row['others'])} |")
     return out
+
+
+def parts(rows: dict) -> dict:
+    """Name of a mark in README.md -> the lines that stand behind it."""
+    return {"rungs": _rungs(rows), "left out": _left(rows), "before": _before(rows), "placebos": _placebos(rows)}
+
+
+def main(path: Path = HERE / "README.md") -> str:
+    """Put every table between its marks in README.md; the text written."""
+    text = path.read_text("utf-8")
+    for name, lines in parts(known()).items():
+        before, _, rest = text.partition(MARK.format(name) + "\n")
+        text = before + "\n".join([MARK.format(name), *lines, MARK.format("end")]) + \
+            rest.partition(MARK.format("end"))[2]
+    path.write_text(text, "utf-8")
+    return text
+
+
+if __name__ == "__main__":
+    main()
