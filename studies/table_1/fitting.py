@@ -9,7 +9,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from derived import Worn, by_row
-from rungs import HELD, HERE, RUNGS, SCREEN, SEED, STUCK, TABLE
+from rungs import CONTAINS, HELD, HERE, ROOT2, RUNGS, SCREEN, SEED, STUCK, TABLE, UNDER
 
 from patchfem.campaigns.rows.cells import cells_of, scores
 from patchfem.campaigns.rows.computed import Computed
@@ -24,6 +24,7 @@ SCORES = HERE / "scores.json"
 ALIKE, TIED = 1.01, 1.05  # times the least training score: of the ends of one valley, and of valleys told beside it
 APART = 0.01              # rms difference of the training logarithms of two ends from which they are two valleys
 DRAWS, PERCENT = 4000, (5, 95)  # of the bootstrap over rows
+NEUTRAL = {"worn.factor": 1.0, "rods.share": 0.05, "rods.mass": 0.01}  # of what a smaller rung does not have
 NULLS = {"constant": "constant", "strong": "power_input_frequency"}
 
 
@@ -71,7 +72,8 @@ def fitted(rung: str, reading: str, protocol: str, placebo: str = "", starts: in
     begin, one, cells = time.process_time(), RUNGS[rung], cells_for(rung)
     seen = training(cells, protocol)
     computed = computed_for(rung, reading, cells, seen, placebo)
-    values, ends, valleys = best_of(cells, computed, seen, starts or one.starts, most or starts or one.most)
+    begins = [] if placebo else contained(rung, reading, protocol, computed.asked.wanted)
+    values, ends, valleys = best_of(cells, computed, seen, starts or one.starts, most or starts or one.most, begins)
     computed.forget()
     answer = np.array(computed(values, range(len(cells.conditions))))
     logs = cells.logs(*answer)
@@ -84,23 +86,45 @@ def fitted(rung: str, reading: str, protocol: str, placebo: str = "", starts: in
             "motions": computed.runs, "seconds": round(time.process_time() - begin, 1)}
 
 
-def best_of(cells, computed, seen, starts: int, most: int) -> tuple:
-    """(values (n,), training rms at the end of every start, valleys) of twice as many starts again and again, until two
-    end in the best valley or `most` is reached.
+def contained(rung: str, reading: str, protocol: str, wanted) -> list:
+    """Values (n,) to start from: what `known` has of the rungs and readings that are this one with some numbers kept,
+    fitted to the same rows."""
+    pairs = [(other, reading) for other in CONTAINS.get(rung, ())] + [(rung, other) for other in UNDER.get(reading, ())]
+    rows, out = known(), []
+    for other, under in pairs:
+        row = rows.get((other, under, protocol, ""))
+        if row is not None:
+            kept = {one.partition("=")[0]: float(one.partition("=")[2].split()[0]) for one in RUNGS[other].sets}
+            gain = {"peak": 1.0, ROOT2: 2**0.5}.get(under, row["gain"])
+            given = NEUTRAL | kept | {"measured.acceleration_gain": gain} | dict(zip(row["keys"], row["values"]))
+            out.append([given.get(one.key, 0.0) for one in wanted])
+    return out
+
+
+def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
+    """(values (n,), training rms at the end of every start, valleys) of starts from `begins` (b, n), twice as many
+    random ones again and again, and the best with each number that may be 0 at 0, until two end in the best valley or
+    `most` random ones are reached.
 
     valleys: {"starts", "best": how many of them ended in the best valley, "tied": of every other valley within TIED of
     the best training score its training score and the scores of the readings that were not fitted}.
     """
     wanted, residual = computed.asked.wanted, residual_of(cells, computed, seen, "bound")
     box = space([one.low for one in wanted], [one.high for one in wanted])
-    quick, drawn, ends = Counted(residual, box, quick=True), np.random.default_rng(SEED), []
+    quick, drawn, random = Counted(residual, box, quick=True), np.random.default_rng(SEED), 0
+    ends = descents(quick, [box.unit(one) for one in begins], before=computed.forget)
     while True:
-        points = drawn.random((starts - len(ends), SCREEN, len(wanted)))
+        points = drawn.random((starts - random, SCREEN, len(wanted)))
         ends += descents(quick, [screened(quick, some, computed.forget) for some in points], before=computed.forget)
+        top = min(ends, key=lambda one: one.cost).u
+        zeros = [np.where(np.arange(top.size) == k, 0.0, top) for k, one in enumerate(wanted)
+                 if one.low == 0 and top[k] > NEAR]
+        ends += descents(quick, zeros, before=computed.forget)
         last = descents(Counted(residual, box), [min(ends, key=lambda one: one.cost).u], before=computed.forget)[0]
         best, others = valleys_of(cells, computed, seen, last, [(box.values(one.u), one.rms) for one in ends])
+        random = starts
         if best > 1 or 2 * starts > most:
-            valleys = {"starts": starts, "best": best, "tied": others}
+            valleys = {"starts": len(ends), "best": best, "tied": others}
             return box.values(last.u), [one.rms for one in ends], valleys
         starts *= 2
 

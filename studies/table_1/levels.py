@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from rungs import HERE, RUNGS
+from rungs import HERE, ROOT2, RUNGS, STUCK
 
 from patchfem.campaigns.rows.computed import Computed
 from patchfem.core import G_N
@@ -34,8 +34,8 @@ FREQUENCIES = (135.0, 143.0, 150.0, 155.0)
 DISTORTED, AWAY = 0.03, 2 * 25.4e-6  # 1, m
 ONSETS = [round(2 + 0.05 * k, 2) for k in range(101)]  # g
 RUNAWAYS = [4 + 0.25 * k for k in range(33)]  # g
-SHOWN = (("rigid Coulomb", "peak"), ("second path, patch", "peak x 1.2375"), ("spring and yaw", "fundamental x sqrt2"),
-         ("grooves", "fundamental x sqrt2"), ("grooves, lift and yaw", "fundamental x gain"))
+SHOWN = (("rigid Coulomb", "peak"), ("second path, patch", STUCK), ("spring and yaw", ROOT2), ("path of Fig. 27", STUCK),
+         ("grooves", ROOT2), ("grooves, lift and yaw", "fundamental x gain"))
 
 
 def measured(scene, frequency: float, level: float, name: str) -> float | None:
@@ -70,7 +70,7 @@ def row(rung: str, reading: str, values, frequency: float) -> dict:
 def main(shown=SHOWN, frequencies=FREQUENCIES) -> list:
     """Print and return a `row` per rung and frequency."""
     known = {(one["rung"], one["reading"]): one for one in json.loads((HERE / "scores.json").read_text("utf-8"))
-             if one["protocol"].startswith("143") and not one["placebo"]}  # that of more starts stands last
+             if one["protocol"] == "143" and not one["placebo"]}
     out = []
     for rung, reading in shown:
         for frequency in frequencies:

@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 from fitting import known
-from rungs import HERE, TABLE
+from rungs import HERE, ROOT2, STUCK, TABLE
 
 from patchfem.campaigns.rows.cells import cells_of
 from patchfem.core import G_N
@@ -22,8 +22,8 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 MIL = 25.4e-6
 SHOWN = {  # (rung, reading) -> name, colour, line
     ("rigid Coulomb", "peak"): ("rigid Coulomb", GREY, ":"),
-    ("spring and yaw", "fundamental x sqrt2"): ("spring and yaw, √2 × fundamental", BLUE, "-"),
-    ("yaw in the accelerometer", "peak x 1.2375"): ("yaw in the accelerometer, 1.24 × peak", ORANGE, "-"),
+    ("spring and yaw", ROOT2): ("spring and yaw, √2 × fundamental", BLUE, "-"),
+    ("path of Fig. 27", STUCK): ("path of Fig. 27, 1.24 × peak", ORANGE, "-"),
     ("grooves, lift and yaw", "fundamental x gain"): ("grooves with lift and yaw, gain × fundamental", "#2f7d4f", "--")}
 FREQUENCIES = (135.0, 143.0, 150.0, 155.0)
 

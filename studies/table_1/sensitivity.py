@@ -18,7 +18,7 @@ from scipy.stats import sobol_indices, uniform
 
 sys.path.insert(0, str(Path(__file__).parent))
 from fitting import training
-from rungs import HERE, RUNGS, TABLE
+from rungs import HERE, RUNGS, STUCK, TABLE
 
 from patchfem.campaigns.rows.asked import Question
 from patchfem.campaigns.rows.cells import cells_of, scores
@@ -28,7 +28,7 @@ from patchfem.core import PatchfemError
 from patchfem.identify.least_squares import fit
 from patchfem.scene.ranges import ranges
 
-RUNG, READING = "second path, patch", "peak x 1.2375"
+RUNG, READING = "second path, patch", STUCK
 ASSUMED = {  # key -> the ends of what it may be
     "contact.length": ("10 mm", "15 mm"), "contact.width": ("10 mm", "15 mm"), "contact.height": ("4 mm", "9 mm"),
     "contact.tilt.angle": ("0.01 mrad", "0.3 mrad"), "structure.mode.yaw.damping": ("0.001", "0.01"),

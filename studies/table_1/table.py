@@ -2,7 +2,7 @@
 
 A score is the root mean square of ln(computed/measured): of all readings / of accelerations / of displacements.
 
-Run: python studies/table_1/table.py      (writes the tables into README.md, between its marks)
+Run as a program it writes them into README.md, between its marks.
 """
 
 import sys

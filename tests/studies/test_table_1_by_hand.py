@@ -1,0 +1,73 @@
+"""Two rungs of the ladder from the equations of motion alone, marched by Runge-Kutta with none of the program's code."""
+
+import csv
+
+import numpy as np
+import pytest
+from study_module import ROOT, study
+
+G, MIL, LBF = 9.80665, 25.4e-6, 4.4482216152605
+MASS, LOAD, STRETCH = 1.19396625, 26 * LBF, 0.243e-6  # kg, N, m by which the point gives way
+AXIAL, YAW, RATIO = 2 * np.pi * 143.0, 2 * np.pi * 129.0, 0.003
+
+
+def marched(conditions, friction, stiffness, damping, arm, seen, cycles=400, steps=1000) -> tuple:
+    """(peak, first harmonic) of the accelerometer [m/s2] and half the range of the gage [m] in the last of so many
+    cycles, (c,) each: x'' + 2 D w x' + w^2 x = -a - T/m, q'' likewise = -arm T/m, T = F + k s + c s', s = x + arm q,
+    F' = K s' between -mu N and mu N, K = mu N/STRETCH; the accelerometer reads x'' + a + seen q''."""
+    omega, level, limit = 2 * np.pi * conditions[:, 0], conditions[:, 1], friction * LOAD
+    y, h = np.zeros((5, len(omega))), 2 * np.pi / omega / steps
+
+    def rates(y, t):
+        force, speed = np.clip(y[4], -limit, limit), y[1] + arm * y[3]
+        pull = (force + stiffness * (y[0] + arm * y[2]) + damping * speed) / MASS
+        held = np.where(speed > 0, y[4] < limit, y[4] > -limit)
+        return np.array([y[1], -2 * RATIO * AXIAL * y[1] - AXIAL**2 * y[0] - pull - level * np.sin(omega * t),
+                         y[3], -2 * RATIO * YAW * y[3] - YAW**2 * y[2] - arm * pull,
+                         limit / STRETCH * speed * held])
+
+    felt, shown = np.zeros((steps, len(omega))), np.zeros((steps, len(omega)))
+    for step in range(cycles * steps):
+        t = step * h
+        one = rates(y, t)
+        felt[step % steps] = one[1] + level * np.sin(omega * t) + seen * one[3]
+        shown[step % steps] = y[0]
+        two = rates(y + h / 2 * one, t + h / 2)
+        three = rates(y + h / 2 * two, t + h / 2)
+        y = y + h / 6 * (one + 2 * two + 2 * three + rates(y + h * three, t + h))
+        y[4] = np.clip(y[4], -limit, limit)
+    turn = np.exp(-2j * np.pi * np.arange(steps) / steps)
+    return np.abs(felt).max(axis=0), np.abs(2 / steps * turn @ felt), np.ptp(shown, axis=0) / 2
+
+
+def scores(values: dict, gain: float, fundamental: bool) -> dict:
+    """{whether at 143 Hz: [all, acceleration, displacement]} of Table 1, read from its file."""
+    with open(ROOT / "rig" / "table1.csv", encoding="utf-8") as file:
+        rows = [row for row in list(csv.reader(file))[1:] if row[2] or row[3]]
+    conditions = np.array(sorted({(float(row[0]), float(row[1]) * G) for row in rows}))
+    peak, first, gage = marched(conditions, **values)
+    place = {tuple(one): k for k, one in enumerate(conditions)}
+    logs = {here: ([], []) for here in (True, False)}
+    for row in rows:
+        k = place[float(row[0]), float(row[1]) * G]
+        if row[2]:
+            logs[row[0] == "143"][0].append(np.log(gain * (first if fundamental else peak)[k] / (float(row[2]) * G)))
+        if row[3]:
+            logs[row[0] == "143"][1].append(np.log(max(gage[k], 0.01 * MIL) / (float(row[3]) * MIL)))
+    return {here: [np.sqrt(np.mean(np.square(part))) for part in (felt + shown, felt, shown)]
+            for here, (felt, shown) in logs.items()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rung, reading", [("spring and yaw", "fundamental x sqrt2"), ("path of Fig. 27", "peak x stuck")])
+def test_table_1_scores_of_a_rung_from_its_equations_alone(rung, reading):
+    """Both within 1e-3 of what the program answers at the same numbers. Fig. 27: a mode at 148 Hz, critically damped."""
+    row = study("table_1/fitting.py").known()[rung, reading, "143", ""]
+    given = dict(zip((key.rpartition(".")[2] for key in row["keys"]), row["values"]))
+    stiff = {"stiffness": given.get("stiffness", MASS * ((2 * np.pi * 148)**2 - AXIAL**2)),
+             "damping": 0.0 if "stiffness" in given else 2 * MASS * (2 * np.pi * 148 - RATIO * AXIAL)}
+    found = scores({"friction": given["static"], "arm": given["slide"], "seen": given.get("accelerometer", 0.0), **stiff},
+                   row["gain"] or np.sqrt(2), "fundamental" in reading)
+    for here, name in ((True, "fitted"), (False, "others")):
+        assert found[here] == pytest.approx([row[name][kind] for kind in ("all", "acceleration", "displacement")],
+                                            abs=1e-3)
