@@ -34,8 +34,8 @@ FREQUENCIES = (135.0, 143.0, 150.0, 155.0)
 DISTORTED, AWAY = 0.03, 2 * 25.4e-6  # 1, m
 ONSETS = [round(2 + 0.05 * k, 2) for k in range(101)]  # g
 RUNAWAYS = [4 + 0.25 * k for k in range(33)]  # g
-SHOWN = (("rigid Coulomb", "peak"), ("second path, patch", STUCK), ("spring and yaw", ROOT2), ("path of Fig. 27", STUCK),
-         ("grooves", ROOT2), ("grooves, lift and yaw", "fundamental x gain"))
+SHOWN = (("rigid Coulomb", "peak"), ("second path, patch", STUCK), ("spring and yaw", ROOT2),
+         ("path of Fig. 27", STUCK), ("grooves", ROOT2), ("grooves, lift and yaw", "fundamental x gain"))
 
 
 def measured(scene, frequency: float, level: float, name: str) -> float | None:
