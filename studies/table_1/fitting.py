@@ -73,7 +73,8 @@ def fitted(rung: str, reading: str, protocol: str, placebo: str = "", starts: in
     seen = training(cells, protocol)
     computed = computed_for(rung, reading, cells, seen, placebo)
     begins = [] if placebo else contained(rung, reading, protocol, computed.asked.wanted)
-    values, ends, valleys = best_of(cells, computed, seen, starts or one.starts, most or starts or one.most, begins)
+    first = starts or (one.starts if protocol in ("143", "without 143") else (one.starts + 1) // 2)
+    values, ends, valleys = best_of(cells, computed, seen, first, most or starts or one.most, begins)
     computed.forget()
     answer = np.array(computed(values, range(len(cells.conditions))))
     logs = cells.logs(*answer)
@@ -88,14 +89,16 @@ def fitted(rung: str, reading: str, protocol: str, placebo: str = "", starts: in
 
 def contained(rung: str, reading: str, protocol: str, wanted) -> list:
     """Values (n,) to start from: what `known` has of the rungs and readings that are this one with some numbers kept,
-    fitted to the same rows."""
-    pairs = [(other, reading) for other in CONTAINS.get(rung, ())] + [(rung, other) for other in UNDER.get(reading, ())]
+    fitted to the same rows, and of this one fitted to 143 Hz, where that is a part of these rows."""
+    places = [(other, reading, protocol) for other in CONTAINS.get(rung, ())]
+    places += [(rung, other, protocol) for other in UNDER.get(reading, ())]
+    places += [(rung, reading, "143")] * (protocol not in ("143", "without 143"))
     rows, out = known(), []
-    for other, under in pairs:
-        row = rows.get((other, under, protocol, ""))
+    for other, under, fitted_to in places:
+        row = rows.get((other, under, fitted_to, ""))
         if row is not None:
             kept = {one.partition("=")[0]: float(one.partition("=")[2].split()[0]) for one in RUNGS[other].sets}
-            gain = {"peak": 1.0, ROOT2: 2**0.5}.get(under, row["gain"])
+            gain = {"peak": 1.0, ROOT2: 2**0.5}.get(under) or row["gain"]
             given = NEUTRAL | kept | {"measured.acceleration_gain": gain} | dict(zip(row["keys"], row["values"]))
             out.append([given.get(one.key, 0.0) for one in wanted])
     return out

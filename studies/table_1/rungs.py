@@ -6,7 +6,8 @@ alone, then predicts 135, 150 and 155 Hz; those of `each` are also fitted to all
 time. A start is the best of SCREEN random points, by training readings alone. Further starts are the best fits to the
 same rows of what a rung CONTAINS, and the best end with each number that may be 0 at 0: both were added when the first
 scores showed that eight random starts can find a valley twice and miss a better one, which a smaller rung had found. No
-start saw anything but training readings. The number of random starts doubles, from `starts` up to `most`, until two
+start saw anything but training readings: where 143 Hz is a part of these, the fit to 143 Hz is a start and half as many
+random ones do. The number of random starts doubles, from `starts` up to `most`, until two
 starts end in the best valley; a record says where that failed. Rows flagged U count as lower bounds in a fit and as
 they stand in a score. What climbs grooves is marched from rest, with fewer starts.
 
@@ -170,12 +171,13 @@ SLOW = "spring and yaw, worn", "second path, patch", "rods, spring and yaw", "ri
 
 def _place(variant: tuple) -> tuple:
     """When a variant is worked through by a campaign that may be stopped: 143 Hz of what is quick, the first two of
-    FOLDS, 143 Hz of what is slow, the other folds, all rows, placebos."""
+    FOLDS, 143 Hz of what is slow, the other FOLDS, free gains, the other folds, all rows, placebos."""
     rung, reading, protocol, placebo = variant
     slow = SLOW.index(rung) + 1 if rung in SLOW else 0
     first = FOLDS.index((rung, reading)) if (rung, reading) in FOLDS else len(FOLDS)
     if protocol == "143" and not placebo:
-        return 1.5 * (slow > 0), slow, SMALL.index(rung) if rung in SMALL else 0, READING.index(reading)
+        rank = 1.5 if slow else 2.5 if reading.endswith("gain") else 0
+        return rank, slow, SMALL.index(rung) if rung in SMALL else 0, READING.index(reading)
     if protocol == "all" or placebo:
         return 4 + bool(placebo), slow, 0, 0
     return 1 if first < 2 else 2 if first < len(FOLDS) else 3, slow + first, 0, 0

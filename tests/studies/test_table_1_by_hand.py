@@ -11,7 +11,7 @@ MASS, LOAD, STRETCH = 1.19396625, 26 * LBF, 0.243e-6  # kg, N, m by which the po
 AXIAL, YAW, RATIO = 2 * np.pi * 143.0, 2 * np.pi * 129.0, 0.003
 
 
-def marched(conditions, friction, stiffness, damping, arm, seen, cycles=300, steps=600) -> tuple:
+def marched(conditions, friction, stiffness, damping, arm, seen, cycles=500, steps=600) -> tuple:
     """(peak, first harmonic) of the accelerometer [m/s2] and half the range of the gage [m] in the last of so many
     cycles, (c,) each: x'' + 2 D w x' + w^2 x = -a - T/m, q'' likewise = -arm T/m, T = F + k s + c s', s = x + arm q,
     F' = K s' between -mu N and mu N, K = mu N/STRETCH; the accelerometer reads x'' + a + seen q''."""
