@@ -7,6 +7,7 @@ Run as a program it writes them into README.md, between its marks.
 
 import sys
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 
@@ -34,6 +35,10 @@ BEFORE = (  # (rung, reading), its scores in the ladder before this one: at 143 
     ("grooves, lift and yaw", "fundamental x gain", ".078 / .088 / .048", ".166 / .132 / .269",
      ".200 / .149 / .317", 3))
 MARK = "<!-- {} -->"
+SAID = {"rigid": ("rigid Coulomb", "peak"), "patch": ("patch", "fundamental x gain"),
+        "weight": ("weight on its cable", ROOT2), "spring": ("spring and yaw", ROOT2),
+        "path": ("path of Fig. 27", STUCK), "root": ("path of Fig. 27", ROOT2),
+        "lift": ("grooves, lift and yaw", "fundamental x gain")}
 
 
 def three(found: dict | None) -> str:
@@ -202,9 +207,44 @@ def _placebos(rows: dict) -> list:
     return out
 
 
+def head(rows: dict) -> list:
+    """What the records say, in sentences; every score as all / accelerations / displacements."""
+    one = {name: rows[rung, reading, "143", ""] for name, (rung, reading) in SAID.items()}
+    left = {name: three(left_out(rows, *SAID[name])) for name in ("spring", "path")}
+    none = {name: (three(held), three(out)) for name, _, _, held, out, _ in nulls()}
+    draws = [100 * one[name]["bootstrap"]["better"]["constant"]["acceleration"] for name in ("path", "root")]
+    friction = f"{three(one['patch']['fitted'])}, and {three(one['patch']['others'])} elsewhere"
+    said = [
+        "All scores here are those of all readings / accelerations / displacements. Smaller is better; repeated "
+        "accelerations agree to .086.",
+        f"**What the data exclude**: a block that friction alone holds, rigid ({three(one['rigid']['fitted'])} at "
+        f"143 Hz) or a patch with yaw ({friction}). A weight that hangs on its cable is no spring to them: the fit "
+        f"sets it to 0 and stays at {three(one['weight']['fitted'])}.",
+        f"**Fitted to 143 Hz alone, scored at 135, 150 and 155 Hz**: a constant times the input, "
+        f"{none['constant'][0]}; a power of input and frequency, {none['power_input_frequency'][0]}; spring and yaw, "
+        f"√2 x fundamental, three numbers, {three(one['spring']['others'])}; path of Fig. 27, peak x stuck, three "
+        f"numbers beside the gain and none of them of the path, {three(one['path']['others'])}, and under √2 x "
+        f"fundamental {three(one['root']['others'])}. Spring and yaw win the displacements and lose the accelerations "
+        f"to the constant. The path of Fig. 27 wins both, the accelerations by little: in {draws[0]:.0f} and "
+        f"{draws[1]:.0f} % of the draws of rows. It predicts the displacements worse than the spring, and at 143 Hz "
+        f"itself it is worse in everything: {three(one['path']['fitted'])} beside {three(one['spring']['fitted'])}."]
+    if "-" not in left.values():
+        said.append(
+            f"**Each frequency left out in turn**: constant {none['constant'][1]}; power of input and frequency "
+            f"{none['power_input_frequency'][1]}; spring and yaw, √2 x fundamental, {left['spring']}; path of Fig. 27, "
+            f"peak x stuck, {left['path']}. No rung of which this was made beats the power of input and frequency in "
+            "acceleration, which explains nothing; in displacements both win over every null.")
+    said.append(
+        "**What they cannot tell**: whether the second path is a spring or the flank of a groove "
+        f"({three(one['lift']['others'])} elsewhere), with a damper or without, and whether the accelerometer showed "
+        "peaks, 1.24 times them, or √2 times the fundamental.")
+    return "\n\n".join(fill(text, 120, break_long_words=False, break_on_hyphens=False) for text in said).split("\n")
+
+
 def parts(rows: dict) -> dict:
     """Name of a mark in README.md -> the lines that stand behind it."""
-    return {"rungs": _rungs(rows), "left out": _left(rows), "before": _before(rows), "placebos": _placebos(rows)}
+    return {"head": head(rows), "rungs": _rungs(rows), "left out": _left(rows), "before": _before(rows),
+            "placebos": _placebos(rows)}
 
 
 def main(path: Path = HERE / "README.md") -> str:
