@@ -180,3 +180,14 @@ def test_exact_a_motion_that_marches_on_until_it_settles_is_that_of_ten_times_it
         assert there.sum() > 32
         far = np.ptp(history[:, -1, :2], axis=1) / 2
         assert np.mean(np.abs(value - far)[there] <= error[there] + 1e-9 * far[there]) > 0.97
+
+
+@pytest.mark.filterwarnings("error")
+def test_always_a_march_that_runs_away_by_half_the_steps_has_an_endless_bar_and_says_nothing():
+    values = {name: np.array([1.0, 2.0]) for name in (*lanes.MAIN, "drift_per_cycle", "friction_force_peak",
+                                                      "loop_area", "equivalent_damping", "equivalent_stiffness",
+                                                      "slip_start_phase")}
+    coarse = {name: np.array([1.001, 1e308]) for name in values}
+    for law in ("friction.laws.tanh_kernels", "rigid"):
+        found = lanes.bars(values, lanes.changed(values, [coarse]), law)
+        assert np.isinf(found[lanes.MAIN[0]][1]) and found[lanes.MAIN[0]][0] > 1e-3

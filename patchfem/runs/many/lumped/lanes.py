@@ -544,7 +544,8 @@ def bars(values: dict, changes: dict, law: str = "") -> dict:
                                                                               posinf=np.inf)
         if name == APART[0] and not smooth:  # the limit holds it
             chance = np.where(change <= HELD * size, 0.0, chance)
-        out[name] = np.maximum((OF_STRETCH if march.flows(law) else OF_CHANGE) * np.nan_to_num(change), chance)
+        with np.errstate(over="ignore"):  # of a march that ran away by half the steps
+            out[name] = np.maximum((OF_STRETCH if march.flows(law) else OF_CHANGE) * np.nan_to_num(change), chance)
     return out | _rounded(values, out)
 
 
