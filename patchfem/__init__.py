@@ -35,6 +35,9 @@ From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is im
 and a module that is taken as a whole, as in `from .contact import unilateral`, is loaded at its first use (`later`).
 """
 
+import sys
+from types import ModuleType
+
 from .later import modules_of
 
 TYPE_CHECKING = False  # a type checker takes it for true; typing itself would be loaded before an interrupt is answered
@@ -55,19 +58,25 @@ if TYPE_CHECKING:
         compare,
         cost,
         demo,
+        export,
+        fit,
         load,
+        mesh,
         new,
         plan,
         plot,
+        profile,
+        report,
         run,
         run_many,
         sweep,
+        view,
     )
 
 __version__ = "0.4.0"
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "backbone", "build", "compare", "cost", "demo", "load", "new", "plan", "plot",
-           "run", "run_many", "sweep"]
+           "SceneError", "backbone", "build", "compare", "cost", "demo", "export", "fit", "load", "mesh", "new", "plan",
+           "plot", "profile", "report", "run", "run_many", "sweep", "view"]
 _later = modules_of(__name__, __path__)
 
 
@@ -81,3 +90,22 @@ def __getattr__(name: str):
 
 def __dir__() -> list:
     return [*__all__, "__version__"]
+
+
+class _Folder(ModuleType):
+    """A folder whose name a verb has too: `pf.mesh(scene, out)` beside `patchfem.mesh.files`."""
+
+    def __call__(self, *given, **named):
+        return getattr(_later("api"), self.__name__.rpartition(".")[2])(*given, **named)
+
+
+class _Package(ModuleType):
+    """This package, in which a folder that is imported takes the place of the verb of its name."""
+
+    def __setattr__(self, name: str, value) -> None:
+        if name in __all__ and isinstance(value, ModuleType):
+            value.__class__ = _Folder
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

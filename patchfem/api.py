@@ -13,39 +13,53 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
 from difflib import get_close_matches
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from .campaigns import backbone as backbones
 from .campaigns import cost as cost_curves
+from .campaigns import fit as loop_fits
+from .campaigns import fit_path, wear_coefficient
+from .campaigns.rows import asked as row_asked
+from .campaigns.rows import fit as row_fits
 from .campaigns.sweeps import ask, executors
 from .campaigns.sweeps import asked as case_models
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
 from .export import backbone as backbone_files
 from .export import cost as cost_files
+from .export import fit_folder, fit_rows, histories, results, shown, wear_fit
 from .export import folder as results_folder
-from .export import histories, shown
+from .export import lab as lab_files
+from .export import reports as page_of_several
 from .export import summary as summaries
-from .export.drawing import swept
-from .export.pages import lead, released, words
+from .export.drawing import paraview, swept
+from .export.drawing import view as viewer
+from .export.fields import vtu
+from .export.pages import lead, player, released, words
 from .export.surfaces import compare as compared_data
 from .export.surfaces import pairs as pairs_data
-from .export.surfaces import worn
+from .export.surfaces import roughness, worn
 from .export.sweeps import folder, page, tables
 from .export.sweeps import run as sweep_run
+from .mesh import files as mesh_files
 from .model.model import Model
 from .model.model import build as build_model
 from .runs.many import many, meshes
+from .runs.patch import result as patch_result
 from .runs.plan import Plan
 from .runs.plan import plan as plan_model
 from .runs.results import result as run_result
 from .runs.run import run as run_plan
-from .scene import starting
+from .scene import ranges, starting
 from .scene.changed import Base
 from .scene.scene import Scene, SceneError, loads, text_of, with_files
 from .scene.scene import load as load_file
 from .scene.sets import assignments, texts
+from .scene.sets import text_of as tables_text
 from .surface.compare import pairs as pairs_tables
 from .surface.compare import verdict
+from .surface.files import read as surfaces
+from .surface.roughness import report as roughness_report
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,19 +68,21 @@ if TYPE_CHECKING:
     from .runs.many.answers import Answers
 
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "backbone", "build", "compare", "cost", "demo", "load", "new", "plan", "plot", "run",
-           "run_many", "sweep"]
+           "SceneError", "backbone", "build", "compare", "cost", "demo", "export", "fit", "load", "mesh", "new", "plan",
+           "plot", "profile", "report", "run", "run_many", "sweep", "view"]
 TEXT = "<text>"  # the name of a scene that came without a file
 
 
-def load(scene: str | Path | Scene, /, **sets: Any) -> Scene:
-    """Read a scene from a file or a text; SceneError with every mistake at once.
+def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene:
+    """Read a scene from a file, a text or a dict of its tables; SceneError with every mistake at once.
 
     A str that holds a newline or a bracket is the text of a scene, any other and a Path name a file. sets: keys with
     their values, as ``**{"contact.load": "26 lbf"}``; a text stands as in the scene, a number is in SI, lists are
     taken too. A Scene is read again with the sets added to its own.
     """
     added = assignments(sets)
+    if isinstance(scene, Mapping):  # texts as in a scene, numbers in SI
+        return with_files(loads(tables_text(dict(scene)), TEXT, added))
     if isinstance(scene, Scene):
         return scene if not added else base_of(scene).changed(added)
     if isinstance(scene, str) and ("\n" in scene or "[" in scene):
@@ -222,6 +238,95 @@ def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[
     return many.answers(meshes.meshed([build(one) for one in models]), say=_on_stderr if say is None else say)
 
 
+def fit(scene: str | Path | Scene, /, *, to: str | Path, free: Mapping[str, Any], hold: Iterable[str] = (),
+        offset: Iterable[str] = (), warm_up: bool = False, leave_out: str = "", starts: int = 8, seed: int = 0,
+        out: str | Path | None = None, say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
+    """Values of keys of a scene from what was measured, with intervals: the dict that fit.json holds, in SI.
+
+    scene and sets as `load` takes them. to: a loop of a bench, rows of a rig, a worn depth of a scene with [wear].
+    free: key -> (low, high), texts as in a scene or numbers in SI. hold: rows that are only predicted, such as
+    "frequency=135 Hz,150 Hz"; offset, warm_up: of a loop; leave_out: a column of which each value is left out in turn;
+    starts, seed: of the search over rows. out: the folder that `patchfem fit -o` writes. say: called with one line
+    where something takes long. SceneError, PatchfemError as `patchfem fit` refuses.
+    """
+    found, tell = load(scene, **sets), _on_stderr if say is None else say
+    asked = [f"{key}={'..'.join(texts(key, list(ends)))}" for key, ends in free.items()]
+    with TemporaryDirectory() as room:
+        target = Path(room) / "fit" if out is None else Path(out)
+        if found.wear is not None:
+            one = wear_coefficient.wear_coefficient(build_model(found), str(to), asked, None)
+            text = loads(found.text, found.path, [*found.sets, one.bounds.assigned(one.value)]).resolved()
+            return wear_fit.fit_into(one, found.title, text, target)
+        if found.kind not in ("rig", "linear"):
+            options = fit_path.LoopOptions(tuple(offset), warm_up)
+            return fit_folder.fit_into(loop_fits.fit_loop(found, Path(to), asked, tuple(hold), tell, options), target)
+        wanted, wrong = ranges.ranges(asked)
+        if wrong:
+            raise SceneError(wrong)
+        options = row_fits.RowsOptions(tuple(hold), leave_out, (), row_fits.Search(starts, seed))
+        fitted = row_fits.fit_rows(row_asked.Question(found, wanted, Path(to)), options, tell)
+        with results.Folder(target) as folder:
+            return fit_rows.fit_into(fitted, folder.path, folder.target)
+
+
+def profile(*files: str | Path, cutoff: float | None = None, window: Iterable[float] | None = None,
+            tip: float | None = None, units: tuple[str, str] | None = None) -> dict[str, Any]:
+    """Roughness of measured traces or areal scans: the dict that `patchfem profile --json` prints, in SI.
+
+    cutoff [m]: wavelength that splits roughness from waviness; window [m]: first and last place, of a scan first those
+    of x; tip [m]: radius of the stylus; units: of x and of z for files that name none. `profiles` has a dict per file,
+    `means` those over all. PatchfemError for a file that cannot be read.
+    """
+    asked = {"cutoff": cutoff, "window": None if window is None else tuple(window), "tip": tip}
+    reports = [roughness_report.report_of(surfaces.read_surface(Path(one), units), **asked) for one in files]
+    return {"profiles": [roughness.data_of(one) for one in reports], "means": roughness.means_data(reports)}
+
+
+def report(*folders: str | Path, out: str | Path | None = None, measured: str | Path | None = None) -> Path:
+    """Lay results folders side by side on one page, of one sweep its own; the path of the page. measured: a file of a
+    laboratory, laid over the pictures."""
+    return Path(page_of_several.report_of([Path(one) for one in folders], None if out is None else Path(out),
+                                          None if measured is None else Path(measured)))
+
+
+def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None) -> Path:
+    """Write a results folder in another format, by the ending of `out`; its path.
+
+    Fields: .pvd, .vtu, .vtkhdf; histories and loops: .uff, .mat, .csv; .py: a script that plays the last cycle in
+    ParaView. frame: number of the frame of a .vtu, the last one unless given.
+    """
+    folder, out = Path(folder), Path(out)
+    if out.suffix.lower() in lab_files.ENDINGS:
+        from .export.lab import write  # its folder holds more than words
+
+        write.export(folder, out)
+    elif out.suffix == ".py":
+        paraview.write_script(folder, out)
+    else:
+        vtu.export(folder, out, frame)
+    return out
+
+
+def view(folder: str | Path, out: str | Path | None = None, /, *, frame: int | None = None,
+         magnify: float | None = None) -> None:
+    """Show the pieces of a results folder in a window, or draw them into `out`: a picture, or the last cycle as .gif,
+    .mp4 or .html; arguments as those of `patchfem view`."""
+    if out is not None and Path(out).suffix == ".html":
+        player.write_page(Path(folder), Path(out))
+        return
+    viewer.view(Path(folder), None if out is None else Path(out), frame, magnify)
+
+
+def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> Path:
+    """Write the tagged mesh of the pieces of a scene as .msh or .vtu; its path. PatchfemError without [contact]."""
+    model = build(scene, **sets)
+    if model.patch is None:
+        raise PatchfemError("only a scene with [contact] has a mesh", "contact")
+    low, high = patch_result.bodies(model)
+    mesh_files.write_mesh(low, Path(out), high)
+    return Path(out)
+
+
 def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | None = None, shift: float | None = None,
             keep_spikes: bool = False, pairs: str | Path | None = None) -> dict[str, Any]:
     """Compare a measured surface before with the same surface after: the dict that compare.json holds, in SI.
@@ -252,6 +357,8 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
 
 def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
     """(path, text, --set strings) of a scene as `load` takes it, whether it is valid or not."""
+    if isinstance(scene, Mapping):
+        return Path(TEXT), tables_text(dict(scene)), ()
     if isinstance(scene, Scene):
         return scene.path, scene.text, scene.sets
     if isinstance(scene, str) and ("\n" in scene or "[" in scene):
@@ -368,6 +475,17 @@ class Result(run_result.Result):
     def plot(self) -> Plots:
         """The pictures of the run: pressure(), loop(), history(), levels()."""
         return Plots(self)
+
+    def table(self) -> Any:
+        """The measures as rows of name, value, error and unit in SI: a pandas.DataFrame where pandas is installed, else
+        a list of dicts."""
+        rows = [{"measure": name, "value": one.value, "error": one.error, "unit": one.unit}
+                for name, one in self.measures.items()]
+        try:
+            from pandas import DataFrame
+        except ImportError:
+            return rows
+        return DataFrame(rows).set_index("measure")
 
     def to_xarray(self) -> Dataset:
         """Histories and fields with units and the scene they came from: the Dataset that result.nc holds."""

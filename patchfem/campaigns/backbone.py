@@ -54,6 +54,7 @@ ROUND = 1e-9  # of a value, what round-off leaves
 SAMPLES = 4096  # of a cycle of a static loop, and that a largest motion is read from
 CLOSE = 1e-7  # of an amplitude, within which a free motion is at it
 CYCLES = (50.0, 200.0, 800.0)  # lengths of a decay that are tried
+STARTS = 12  # amplitudes on the way to the free motion that a release begins in
 DENSE = 400.0  # of them where several modes ring, whose samples are all kept
 BESIDE = 1.15  # the release over the largest amplitude: the first swings still show how it began
 FINER = 3  # doublings of the steps of a decay
@@ -316,13 +317,22 @@ def _joined(group: Group, count: int, first: int) -> Group:
 
 def _free(group: Group, joint: Joint, amplitudes, harmonics: int) -> np.ndarray:
     """(frequency [Hz], damping, loss [J]) (3, k) of the free motions at amplitudes (k,) [m] of the output."""
+    k, out = np.arange(harmonics + 1), []
+    for one in _motions(group, joint, amplitudes, harmonics):
+        loss = np.pi * float(np.sum(k * (np.conj(one.slides) * one.forces).imag))
+        out.append((one.omega / (2 * np.pi), one.zeta, loss))
+    return np.array(out).T
+
+
+def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
+    """The `harmonic.backbone.Free` motions at amplitudes (k,) [m] of the output."""
     modes = joint.modes
     omega, shape = held_mode(modes, group.rows, group.stiffness(), joint.mode)
     reach = abs(float(modes.output @ shape))
     widest = np.abs(group.rows @ shape) * amplitudes[-1] / reach
     equations = FreeBalance(balance_of(modes, group, group.samples or group.samples_for(harmonics, widest)), joint.mode,
                             harmonics, omega)
-    balance, k = equations.balance, np.arange(harmonics + 1)
+    balance = equations.balance
     y = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
     y[:, 1] = balance.faces @ shape
     x, out = np.append(harmonics_packed(y), [1.0, 0.0]), []
@@ -335,9 +345,8 @@ def _free(group: Group, joint: Joint, amplitudes, harmonics: int) -> np.ndarray:
                 break
             here *= amplitude / size
         reach = amplitude / here
-        loss = np.pi * float(np.sum(k * (np.conj(free.slides) * free.forces).imag))
-        out.append((free.omega / (2 * np.pi), free.zeta, loss))
-    return np.array(out).T
+        out.append(free)
+    return out
 
 
 def _largest(harmonics) -> float:
@@ -472,13 +481,33 @@ def _decayed(joint: Joint, amplitudes) -> Curve:
 
 
 def released(joint: Joint, amplitude: float) -> Model:
-    """The model of a joint whose mode is released at an amplitude [m] of the output, in the shape of the held mode."""
+    """The model of a joint whose mode is released at an amplitude [m] of the output."""
     model, modes = _steady(joint.model), joint.modes
-    start = Start(joint.held[1] * amplitude / joint.reach, np.zeros(modes.omega.size))
+    start = _start(joint, amplitude)
     period = 2 * np.pi / (joint.held[0] or modes.omega[joint.mode])
     rig = replace(model.rig, drive=drives.release(period), start=start, kind="free", waveform="", frequency=None,
                   levels=(), level_cycles=0.0, force=None)
     return replace(model, rig=rig)
+
+
+def _start(joint: Joint, amplitude: float) -> Start:
+    """Where a release begins, at an amplitude [m] of the output: in the free motion of a balance, so that no other mode
+    rings beside it; where none is known in the shape of the mode, held or, once all of the contact slips, free."""
+    modes, still = joint.modes, np.zeros(joint.modes.omega.size)
+    if still.size > 1:
+        try:
+            _refuse(joint, "balance")
+            first = min(float(_amplitude_of(joint, LOW * _knee(joint))) or amplitude, amplitude)
+            path = np.geomspace(first, amplitude, STARTS)
+            free = _motions(_group(joint, joint.patch), joint, np.unique(path), LADDER[0])[-1]
+            turn = 1j * free.omega * np.arange(LADDER[0] + 1)[:, None]
+            return Start(free.modal.real.sum(axis=0), (turn * free.modal).real.sum(axis=0))
+        except (NotConverged, PatchfemError):
+            pass
+    own = np.eye(still.size)[joint.mode]
+    if amplitude > _amplitude_of(joint, _knee(joint)) and modes.output[joint.mode]:
+        return Start(own * amplitude / abs(float(modes.output[joint.mode])), still)
+    return Start(joint.held[1] * amplitude / joint.reach, still)
 
 
 def _read(joint: Joint, found) -> tuple:
@@ -573,12 +602,7 @@ def _differences(curves: dict) -> list:
             share = np.where(inside & (off > bar + getattr(one, f"{what}_error")), off / np.abs(beside), 0.0)
             if share.size and share.max() > 0:
                 k = int(np.argmax(share))
-                lost = -np.expm1(-2 * np.pi * beside_damping(best, one.amplitude[k]))
+                lost = -np.expm1(-2 * np.pi * one.damping[k])
                 out.append(f"{what} by {way} and by balance differ most at {say(one.amplitude[k], 3)}, by "
                            f"{100 * share[k]:.2g} %: {why.format(lost)}")
     return out
-
-
-def beside_damping(one: Curve, amplitude: float) -> float:
-    """Damping ratio of a curve at an amplitude [m], straight in its logarithm."""
-    return float(np.interp(np.log(amplitude), np.log(one.amplitude), one.damping))

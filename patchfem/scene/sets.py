@@ -21,6 +21,12 @@ def assignments(sets: dict[str, Any]) -> tuple[str, ...]:
     return tuple(f"{key}={value if isinstance(value, str) else _written(key, value)}" for key, value in sets.items())
 
 
+def text_of(tables: dict[str, Any]) -> str:
+    """The text of a scene of these tables, a dict of dicts: texts as in a scene, numbers in SI; SceneError for values
+    that no scene can hold."""
+    return "".join(f"{name} = {_written(str(name), one)}\n" for name, one in tables.items())
+
+
 def texts(key: str, values: Any) -> list[str]:
     """Values of one key as `--over` reads them between commas: texts as they are, numbers in SI with its unit.
 
