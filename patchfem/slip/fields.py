@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..friction.bonds.parameters import Bonds
-from .shear_modes import SHEAR_MODES, enough_modes, shear_modes
+from .shear_modes import SHEAR_MODES, enough_modes, fewest_modes, shear_modes
 
 
 def element_fields(patch, found, states, length: float) -> tuple:
@@ -40,14 +40,17 @@ def point_fields(patch, law: Bonds, shear, states) -> tuple:
     return tau, local
 
 
-def shear_of(patch, law: Bonds, count: int | None, tolerance: float, least: int = SHEAR_MODES):
+def shear_of(patch, law: Bonds, count: int | None, tolerance: float, fewest: bool = False):
     """ShearModes of the pressed patch for a bond law: `count` of them, or as many as the tolerance asks for.
 
     The limit of a node is mu_s sigma_n times its share of the interface [N]; the bonds' length [m] is a spring in
-    series. Unless named, the number is doubled from `least` until the error of the backbone is within `tolerance`.
+    series. Unless named, the number is doubled until the error of the backbone is within `tolerance`; fewest: none more
+    than that takes.
     """
     limit = law.static * patch.pressure.sigma_n * patch.pieces.interface.weight
     weakening = 1 / law.ratio if law.ratio > 0 else np.inf
     if count is not None:
         return shear_modes(patch.giving, limit, law.length, count, weakening)
-    return enough_modes(patch.giving, limit, law.length, least, tolerance, weakening)
+    if fewest:
+        return fewest_modes(patch.giving, limit, law.length, tolerance, weakening)
+    return enough_modes(patch.giving, limit, law.length, SHEAR_MODES, tolerance, weakening)

@@ -23,6 +23,7 @@ from ..elasticity.lapack import dpotrf, dpotri, one_thread
 
 KERNELS = "slip.yield_kernels"
 SHEAR_MODES = 4  # modes a shear reduction starts from: of bare pieces they leave 1e-6 of the friction limit
+FEW, BEYOND = 16, 0.8  # modes that fewer are held against; share of a tolerance that they may miss these by
 GATHERED = 16, 32, 64  # points that may stand for all of a patch
 BACK = 2.0  # bond lengths: exp(2) of the stiffness at rest
 
@@ -69,12 +70,27 @@ class Spectrum:
         """The first `count` modes."""
         return ShearModes(self.points, frozen_array(self.shape[:, :count]), frozen_array(1 / self.values[:count]), self)
 
+    @cached_property
+    def known(self) -> dict:
+        """Backbones (24,) [N] and the coordinates of their modes by how many these are, as they have been asked for."""
+        return {}
+
     def backbone(self, count: int, shape=None, limit=None) -> np.ndarray:
         """Resultant [N] on `slides` with `count` modes, of these points or of others with a shape (k, count) and limits
-        (k,) [N]."""
-        shape, limit = (self.shape[:, :count], self.limit) if shape is None else (shape, limit)
+        (k,) [N]; found from that of the most modes below `count` that is known."""
+        count = min(count, self.values.size)
+        if shape is None and count in self.known:
+            return self.known[count][0]
+        fewer = max((one for one in self.known if one <= count), default=0)
+        start = np.zeros((self.slides.size, count))
+        if fewer:
+            start[:, :fewer] = self.known[fewer][1]
+        given = (self.limit, self.shape[:, :count]) if shape is None else (limit, shape)
         with one_thread(), np.errstate(over="ignore", invalid="ignore"):
-            return _backbone(limit, shape, self.values[:count], self.length, self.slides)
+            found = _backbone(*given, self.values[:count], self.length, self.slides, start)
+        if shape is None and np.isfinite(found[0]).all():
+            self.known[count] = found
+        return found[0]
 
     def share(self, one, other) -> float:
         """Largest difference of two backbones over the friction limit; inf of one that bonds are too short for."""
@@ -184,6 +200,18 @@ def enough_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, 
     return found
 
 
+def fewest_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, tolerance: float,
+                 weakening: float = 1.0, most: int = 64) -> ShearModes:
+    """The fewest `shear_modes`, two at least, whose backbone misses one of four times as many, FEW at least, by less
+    than BEYOND of `tolerance`: the rest is left to what more modes than these would add."""
+    spectrum = _spectrum(tangential, limit, bond_length, weakening)
+    for count in range(2, most):
+        more = max(FEW, 4 * count)
+        if spectrum.share(spectrum.backbone(more), spectrum.backbone(count)) <= BEYOND * tolerance:
+            return spectrum.modes(count)
+    return spectrum.modes(most)
+
+
 def gathered(found: ShearModes, x: np.ndarray, tolerance: float) -> tuple:
     """(modes of few points in place of all, limits (k,) of these [N]): for a motion whose fields nobody asks for.
 
@@ -219,13 +247,14 @@ def gauss(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
     return x.mean() + places * np.ptp(x) / 2, total * vectors[0] ** 2
 
 
-def _backbone(limit, shape, values, length, slides) -> np.ndarray:
-    """Resultant [N] on the virgin slides (k,) for the saturating law D (1 - exp(-xi/length)), by Newton on all of them.
+def _backbone(limit, shape, values, length, slides, start) -> tuple:
+    """(resultant [N], coordinates (k, r) of the modes) on the virgin slides (k,) for the saturating law
+    D (1 - exp(-xi/length)), by Newton on all of them from the coordinates `start`.
 
     No step takes a point further back than BACK lengths, where the law is so steep that Newton does not come back. NaN
     where it does not come to an end.
     """
-    b, going = np.zeros((slides.size, values.size)), np.arange(slides.size)
+    b, going = start, np.arange(slides.size)
     for _ in range(400):
         xi = slides[going, None] - b[going] @ shape.T
         decay = np.exp(np.minimum(-xi / length, 700.0))
@@ -234,7 +263,7 @@ def _backbone(limit, shape, values, length, slides) -> np.ndarray:
         try:
             step = np.linalg.solve(tangent, missing[:, :, None])[:, :, 0]
         except np.linalg.LinAlgError:  # a law too steep for numbers
-            return np.full(slides.size, np.nan)
+            return np.full(slides.size, np.nan), b
         change = step @ shape.T  # of xi
         part = np.where(change < 0, (xi + BACK * length) / np.where(change < 0, -change, 1.0), 1.0).min(axis=1)
         part = np.where((part > 0) & (part < 1), part, 1.0)
@@ -245,7 +274,7 @@ def _backbone(limit, shape, values, length, slides) -> np.ndarray:
             break
     out = -np.expm1(np.minimum(-(slides[:, None] - b @ shape.T) / length, 700.0)) @ limit
     out[going] = np.nan
-    return out
+    return out, b
 
 
 def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:

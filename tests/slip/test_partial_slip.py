@@ -15,6 +15,7 @@ from patchfem.contact.unilateral import press
 from patchfem.core import PatchfemError
 from patchfem.slip.shear_modes import (
     enough_modes,
+    fewest_modes,
     gathered,
     gauss,
     jenkins_set,
@@ -287,6 +288,25 @@ def test_always_short_bonds_have_the_modes_that_they_need(angle):
         errors = [shear_modes(pair.tangential, limit, share * reach, n).backbone_error for n in (4, 8, 16, 32)]
         assert np.all(np.diff(errors) <= 1e-12) and errors[1] < most and errors[0] < 0.05
     assert enough_modes(pair.tangential, limit, 1e-9 * reach, 8, 1e-4).stiffness.size == min(64, np.sum(limit > 0))
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-4])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
+def test_always_the_fewest_modes_meet_a_tolerance_that_one_fewer_misses(angle, tolerance):
+    pair, limit = coated_pair(100), friction_limit(100, angle)
+    found = fewest_modes(pair.tangential, limit, 1e-6, tolerance)
+    count = found.stiffness.size
+    fewer = shear_modes(pair.tangential, limit, 1e-6, count - 1)
+    assert found.backbone_error <= tolerance and (count == 2 or tolerance < 1.3 * fewer.backbone_error)
+    np.testing.assert_allclose(found.shape, shear_modes(pair.tangential, limit, 1e-6, count).shape)
+
+
+def test_always_a_backbone_does_not_depend_on_those_asked_before():
+    pair, limit = coated_pair(100), friction_limit(100, 1e-4)
+    fresh, known = (shear_modes(pair.tangential, limit, 1e-6, 4).of for _ in range(2))
+    for count in (2, 16):
+        known.backbone(count)
+    np.testing.assert_allclose(known.backbone(64), fresh.backbone(64), rtol=1e-11)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-4])

@@ -8,6 +8,7 @@ from itertools import chain
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from ...compiled import load
 from ...core import BaseSine, ModalBasis, Outcome, Response
 from ..contacts import arrays
 from ..contacts.arrays import ModalArrays
@@ -24,6 +25,7 @@ from .models import ContactModel, free_model, load_kernels
 FULL, UNFIT = 2, 4  # status of a loop whose list of bonds is full, and where no contact set fits the motion
 EACH = 5  # columns of an element in a row, as of `faces_kernels`
 AT_ONCE, PIECES = 8000, 16  # steps and cycles of a piece of a run of which nothing is kept
+PASSING = "dynamics.march.passing_kernels"
 REPEATS = 1e-12  # of its size, by which a motion that repeats may still change in all that is left of it
 SUMS = [0, 1, 2, 3, 5, 7, 8]  # of the ledger: what grows from cycle to cycle
 
@@ -102,13 +104,14 @@ def fresh(modes: ModalBasis, drive, model, steps_per_cycle: int, travel: float =
 
 def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float, steps_per_cycle: int,
           window: int = 10, travel: float = np.inf, frames: int = 0, say=None, progress=None,
-          start=None, marks=(), whole: bool = True) -> MarchResult:
+          start=None, marks=(), whole: bool = True, folds: bool = False) -> MarchResult:
     """March for `cycles` drive cycles at `steps_per_cycle` steps from rest or from `start` (core.Start).
 
     window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle; marks: numbers of
     whole cycles after which a Mark is kept besides; whole: False keeps nothing, samples and extremes, from before the
-    last cycles of a run without marks. The outcome is set for travel and where a step missed its residual or the motion
-    is not finite (not_converged, `message` says what); Missing when a bond list overflows.
+    last cycles of a run without marks; folds: of bonds behind shear modes extremes and phasors of all cycles are kept
+    besides, and the sample of the largest slide. The outcome is set for travel and where a step missed its residual or
+    the motion is not finite (not_converged, `message` says what); Missing when a bond list overflows.
     """
 
     # samples: what is kept so far, `last` of it the cycles of the window; marks may be those of an interrupted march
@@ -120,9 +123,12 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
     slot = slot_of(run, (total, steps_per_cycle, window, frames, whole, *sorted(asked)), samples, lambda: fresh(
         modes, drive, model, steps_per_cycle, travel, start))
     found = [mark_of(*one, one[0]) for one in samples.marks]
-    behind = total - max(window, 2) * steps_per_cycle
-    if not (whole or asked or samples.again or run.passed(behind, lambda: slot.offer(run, samples))):
-        run = fresh(modes, drive, model, steps_per_cycle, travel, start)  # it ends before: once more, cycle by cycle
+    behind, folds = total - max(window, 2) * steps_per_cycle, folds and run.folds and not asked
+    if folds and not run.folded(behind, samples):
+        run, samples = fresh(modes, drive, model, steps_per_cycle, travel, start), Samples(last)
+        folds, whole = False, True  # it ends before: once more, cycle by cycle
+    elif not (folds or whole or asked or samples.again or run.passed(behind, lambda: slot.offer(run, samples))):
+        run = fresh(modes, drive, model, steps_per_cycle, travel, start)
         samples.again = True
     extremes, phasors = samples.extremes, samples.phasors
     # room: for how many more samples of cycles before the window; picked: first step of a cycle -> those worth keeping
@@ -138,7 +144,7 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
                     room -= _shelved(samples, run, last[0], picked.pop(last[0][0], None))
                 last.append((first + k * steps_per_cycle, rows[k], work))
                 picked[last[-1][0]] = picks[k]
-            if whole:
+            if whole or folds:
                 extremes += extremes_of(rows, modes, run.prop.dt)
                 phasors += phasors_of(rows, modes, first, steps_per_cycle)
         if run.done in asked:
@@ -153,7 +159,7 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
         if progress is not None:
             progress(run.done / total)
     run.check()
-    if not whole:
+    if not (whole or folds):
         extremes, phasors = ends_of(last, run), []
     end = mark_of(run, list(last)[-window:], extremes)
     rows, start = _joined(list(last))
@@ -363,6 +369,44 @@ class Run:
                 self.leave_out(left)
             if tell is not None:
                 tell()
+        return self.outcome is None
+
+    @property
+    def folds(self) -> bool:
+        """Whether `folded` marches it: bonds behind shear modes alone, under a load that stays."""
+        return type(self) is Run and self.model.tuple_of is arrays.Sheared and not self.model.joints
+
+    def folded(self, steps: int, samples: Samples) -> bool:
+        """March to the step of this number as `passed` does, and keep the extremes and phasors of its cycles and the
+        sample of the largest slide."""
+        n, around, table, far, at, number = 2 * self.modes.omega.size, self.prop.steps, None, np.zeros(
+            self.width + 3), np.zeros(1, np.int64), -1
+        kernels = load(PASSING)
+        room = np.zeros(n + 7), far, at, np.zeros((14, kernels.BLOCK))
+        while self.done < steps and self.outcome is None:
+            size = (steps - self.done) % around or around
+            count = min((steps - self.done) // size, until_look(self.done // around)) if size == around else 1
+            seen, sums, begin, (rows, row) = np.zeros((count, 4)), np.zeros(5), self.done, self.table(size * count)
+            if rows is not table:
+                table, held = rows, kernels.passing.held(
+                    self.state, self.plant, rows, self.contact, GOAL * self.model.limit, float(self.model.limit),
+                    float(self.travel), self.ledger, self.totals, *room)
+            phase, at[0] = 2 * np.pi * (begin % around + np.arange(size + 1)) / around, -1
+            trace = np.array([0 * phase, 0 * phase, np.cos(phase), np.sin(phase)])
+            did, status = kernels.passing.held_call(held, row, sums, trace, seen)
+            self.done, number = begin + did, begin + int(at[0]) - row if at[0] >= 0 else number
+            self.totals += sums[:3]
+            self.second += sums[3:]
+            self._judge(status)
+            samples.extremes += [*zip(*seen[:, :2].T.tolist())]
+            samples.phasors += (seen[:, 2] + 1j * seen[:, 3]).tolist()
+            left = (steps - self.done) // around
+            if self.done % around == 0 and self.outcome is None and self.repeats(left):
+                self.leave_out(left)
+                samples.extremes += samples.extremes[-1:] * left
+                samples.phasors += samples.phasors[-1:] * left
+        if number >= 0:
+            samples.early(far[None], np.array([number]))
         return self.outcome is None
 
     def cycles(self, size: int, stop: int, frames: int, snapshots: list) -> list:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -107,6 +108,7 @@ def element_model(element: Element, reduction=None) -> ContactModel:
     return ContactModel(ELEMENTS, element.limit, fields, element.length, element.kernels or COULOMB, reduction, element)
 
 
+@cache
 def free_model() -> ContactModel:
     """A contact that rubs nothing."""
     return jenkins_model([0.0], [1.0])

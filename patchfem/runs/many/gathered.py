@@ -1,7 +1,8 @@
 """Patches with bonds behind shear, of a study of many: pressed together, each runs by itself, a few points in place of
 all its nodes.
 
-Nobody sees the fields of such a run. What its points and modes each leave out of the backbone is a thousandth of the
+Nobody sees the fields of such a run, nor its histories: the cycles before the last are folded as they pass
+(`dynamics.march.passing_kernels`). What its points and modes each leave out of the backbone is a thousandth of the
 tolerance (`rig.interface.FEWER`), far below the bars, so no further run tells the error of the modes.
 """
 
@@ -9,6 +10,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
 from ...effects import has, listed
+from ...elasticity.lapack import one_thread
 from ...model.model import Model
 from ..rig.engines import MARCH, engine_of
 from . import one_by_one, patches
@@ -37,6 +39,7 @@ def solve(models: Sequence[Model], say=None) -> Answers:
     out, few = Answers.blank(len(models)), [replace(model, patch=replace(model.patch, gathers=True))
                                             for model in models]
     for first in range(0, len(few), TOGETHER):
-        part = patches.solved_together(few[first:first + TOGETHER])
-        out.place(range(first, first + len(part)), one_by_one.solve(part, say))
+        with one_thread():  # more wait for each other longer than such small systems take
+            part = patches.solved_together(few[first:first + TOGETHER])
+            out.place(range(first, first + len(part)), one_by_one.solve(part, say))
     return out

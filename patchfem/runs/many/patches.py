@@ -12,8 +12,8 @@ import numpy as np
 from ...core import Outcome, allowed
 from ...model.alike import Alike, some
 from ...model.model import Model
+from ..patch import kept, static
 from ..patch import result as of_patch
-from ..patch import static
 from ..patch.meshes import geometry_of
 from ..remedies import Finding, beyond_tolerance
 from ..results.patch_rows import TABLE
@@ -46,15 +46,20 @@ def parts(models: Sequence[Model]) -> dict:
 
 
 def solved_together(models: Sequence[Model]) -> list[Model]:
-    """The models in their order, those whose patches press together with how they do, for what moves them then."""
+    """The models in their order, those whose patches press together with how they do, for what moves them then.
+
+    Of patches that are alike, as those of levels or frictions, one is pressed for all, so that they share its shear.
+    """
     out, groups = list(models), {}
     for case, model in enumerate(models):
         if not static.not_together(model.patch):
-            groups.setdefault(group(model), []).append(case)
-    for cases in groups.values():
-        found = static.solved_patches([models[case].patch for case in cases], models[cases[0]].accuracy.tolerance)
-        for case, one in zip(cases, found):
-            if one is not None:
+            asked = kept.by_content(model.patch) if kept.shares(model.patch) else case
+            groups.setdefault(group(model), {}).setdefault(asked, []).append(case)
+    for alike in groups.values():
+        first = [models[cases[0]] for cases in alike.values()]
+        found = static.solved_patches([model.patch for model in first], first[0].accuracy.tolerance)
+        for cases, one in zip(alike.values(), found):
+            for case in cases if one is not None else ():
                 out[case] = replace(models[case], patch=replace(models[case].patch, solved=one))
     return out
 

@@ -133,7 +133,7 @@ def _shear_modes(patch, law, count: int | None, model) -> tuple:
     marches of a pressed patch."""
     made, tolerance, few = _MADE.setdefault(patch, {}), model.accuracy.tolerance, model.patch.gathers
     if (law, count, tolerance, few) not in made:
-        found, force = shear_of(patch, law, count, *((FEWER * tolerance, 2) if few else (0.1 * tolerance,))), None
+        found, force = shear_of(patch, law, count, *((FEWER * tolerance, True) if few else (0.1 * tolerance,))), None
         if few:
             found, force = gathered(found, patch.x[found.points], FEWER * tolerance)
             force = force / law.static

@@ -4,6 +4,7 @@ A law without stiffness, the printed one and that of order 0, holds a block by t
 each turn leaves a strip in the list: its cost grows with the square of the steps.
 """
 
+from functools import lru_cache
 from math import ceil, inf, log2, pi, sqrt
 
 import numpy as np
@@ -32,6 +33,7 @@ MOVES, MOST_HALVINGS = 1e-3, 2  # bond lengths of slip from which a block moves;
 MOST_SWING = 2.0  # radians of the block on its bonds in a step
 
 
+@lru_cache(maxsize=8)
 def quadrature_of(model: Model, numerics: Numerics):
     """How the bonds of a nonlocal law are summed, as a Choice of `friction.bonds.engines`.
 

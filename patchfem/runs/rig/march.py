@@ -37,8 +37,10 @@ def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) ->
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
     frames = 0 if rig.strips_slide_apart else frames  # strips have no common field of shear
+    folds = model.patch is not None and model.patch.gathers  # nobody sees its histories
     done = engine.march(rig.modes, rig.drive, contact, numerics.cycles, numerics.steps, numerics.window, rig.travel,
-                     frames, say, progress, rig.start, rig_levels.level_ends(rig), numerics.whole)
+                     frames, say, progress, rig.start, rig_levels.level_ends(rig),
+                     numerics.whole and not folds, folds)
     seconds = perf_counter() - begin
     done = strips.run_of_strips(done, patch) if rig.strips_slide_apart else done
     return contact, done, seconds, {"reduce": reduced, "compiled_code": loaded}

@@ -5,8 +5,9 @@ import pytest
 from scene_texts import COATED, MODE, SECOND, SHEAR
 
 import patchfem as pf
-from patchfem.runs.many import gathered, many, one_by_one
+from patchfem.runs.many import gathered, many, one_by_one, patches
 from patchfem.runs.many.meshes import meshed
+from patchfem.runs.patch import static
 
 BONDS = '[friction]\nlaw = "nonlocal"\nreading = "stretch"\nstatic = 0.3\nkinetic = 0.3\nbond_length = "1 um"\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
@@ -56,3 +57,17 @@ def test_always_few_points_are_within_the_bars_of_all():
 def test_always_few_points_are_within_the_bars_of_all_many():
     count, wide, outside = held(2, 60)
     assert outside <= 0.003 * count and wide <= 0.03 * count
+
+
+def test_exact_patches_that_are_alike_are_pressed_once():
+    """Two tilts at three levels: two pressed patches, each with its tilt, and its levels share it."""
+    cases = meshed([pf.build(SCENE, **{"contact.tilt.angle": tilt, "drive.acceleration": 10.0 * level})
+                    for level in (1, 2, 3) for tilt in (1e-5, 3e-4)])
+    pressed = [one.patch.solved for one in patches.solved_together(cases)]
+    assert len({id(one) for one in pressed}) == 2 and all(one is pressed[k % 2] for k, one in enumerate(pressed))
+    alone = static.solved_patches([model.patch for model in cases[:2]], cases[0].accuracy.tolerance)
+    for one, other in zip(pressed, alone):
+        assert {name: m.value for name, m in one.measures.items()} == {name: m.value for name, m in
+                                                                       other.measures.items()}
+        np.testing.assert_array_equal(one.patches[0].pressure.sigma_n, other.patches[0].pressure.sigma_n)
+    assert pressed[0].measures["pressure_peak"].value < 0.9 * pressed[1].measures["pressure_peak"].value

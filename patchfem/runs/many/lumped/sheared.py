@@ -14,6 +14,7 @@ import numpy as np
 
 from ....core import Outcome
 from ....effects import has
+from ....elasticity.lapack import one_thread
 from ....model.model import Model
 from ....model.source import placed
 from ....response.errors import pieces_error
@@ -71,15 +72,18 @@ def solve(models: Sequence[Model], say=None) -> Answers:
     found = Answers.blank(len(models))
     for first in range(0, len(models), TOGETHER):
         part = models[first:first + TOGETHER]
-        found.place(range(first, first + len(part)), _solved(part, say))
+        with one_thread():  # more wait for each other longer than such small systems take
+            found.place(range(first, first + len(part)), _solved(part, say))
     return found
 
 
 def _solved(models, say) -> Answers:
     begin, out = perf_counter(), Answers.blank(len(models))
     models = patches.solved_together(models)
-    held = [_pressed(model) for model in models]
-    moves = [case for case, one in enumerate(held) if one is not None]
+    held = dict.fromkeys(range(len(models)))
+    for case in sorted(held, key=lambda case: id(models[case].patch.solved)):  # those of one patch share its elements
+        held[case] = _pressed(models[case])
+    moves = [case for case, one in held.items() if one is not None]
     alone = set(range(len(models))) - set(moves)
     if moves:
         these = [models[case] for case in moves]
