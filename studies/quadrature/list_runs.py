@@ -6,8 +6,8 @@ from time import process_time
 import numpy as np
 
 from patchfem.dynamics.march.models import list_model, load_kernels
+from patchfem.friction.bonds.list_numbers import cutoff, tally_of
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import cutoff
 
 ROOM = 200_000  # strips of a list that keeps every bond
 
@@ -26,7 +26,8 @@ def slide(amplitude: float, steps: int) -> tuple:
 def along(law, path, dt, tail, merge, repeats=1) -> tuple:
     """(forces at the samples, microseconds per step, longest list) of one engine."""
     model = list_model(law, 1.0, cutoff(law.order, tail) if tail else np.inf, merge)
-    model.fields["bondlist"] = np.zeros((10, ROOM)) if not merge else model.fields["bondlist"]
+    if not merge:
+        model.fields.update(bondlist=np.zeros((10, ROOM)), tally=tally_of(ROOM))
     loops, best = load_kernels(), np.inf
     for _ in range(repeats):
         contact = model.build()

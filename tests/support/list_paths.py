@@ -8,7 +8,7 @@ from scipy.special import gamma
 
 from patchfem.dynamics.contacts.arrays import BondList
 from patchfem.friction.bonds import list_kernels
-from patchfem.friction.bonds.list_numbers import law_numbers, share_table
+from patchfem.friction.bonds.list_numbers import law_numbers, share_table, tally_of
 from patchfem.friction.bonds.quadrature import cutoff
 from patchfem.friction.laws.stretch import growth_numbers
 
@@ -31,7 +31,7 @@ def empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
     """A list before any slide, as the functions of `list_kernels` take it."""
     numbers = law_numbers(law, cutoff(law.order, tail) if tail else np.inf, merge)
     now = np.array([0.0, 0.0, 0.0, 0.0, law.length, 0.0])
-    return BondList(np.ones(1), np.zeros((10, capacity)), now, np.zeros(12), numbers, share_table(law),
+    return BondList(np.ones(1), np.zeros((10, capacity)), now, tally_of(capacity), numbers, share_table(law),
                     growth_numbers(law), np.zeros(2), np.ones(1))
 
 

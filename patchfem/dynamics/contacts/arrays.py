@@ -113,7 +113,7 @@ class Flanked(NamedTuple):
 
 
 class BondList(NamedTuple):
-    """One list of bonds for a slide that all share: force = mu_s N [N]; bondlist (10, capacity), now (6,), tally (12,),
+    """One list of bonds for a slide that all share: force = mu_s N [N]; bondlist (10, capacity), now (6,), tally (14,),
     law (24,), table (k,) as in friction.bonds.list_kernels; growth (6,) of eq. 2.10; last (2,) slide increments [m];
     bound (1,): largest force [N]."""
 
@@ -126,6 +126,18 @@ class BondList(NamedTuple):
     growth: np.ndarray
     last: np.ndarray
     bound: np.ndarray
+
+
+class ShearedLists(namedtuple("ShearedLists", ("bondlist", "now", "tally", "law", "table", "nows", "tallies", "time",
+                                               *Sheared._fields))):
+    """Points (m,) behind shear modes of which each is a list of bonds, `shear_list_kernels`.
+
+    bondlist (10, m capacity): the lists beside each other; nows (m, 6), tallies (m, 14): of each, and now, tally of the
+    one that is looked at; law, table: as of `BondList`; time (1,): length of the step [s]; the rest is as of `Sheared`,
+    weight (m,) the friction limits [N] and the first two rows of points as `shear_lists_kernels` has them.
+    """
+
+    __slots__ = ()
 
 
 class Single(NamedTuple):

@@ -6,12 +6,25 @@ The functions are those that `march.loop_kernels` asks of every contact.
 import numpy as np
 
 from ...compiled.inner import njit
-from ...friction.bonds.list_kernels import list_mean, list_slope, list_step
+from ...friction.bonds.list_kernels import list_force, list_mean, list_slope, list_step
 from ...friction.bonds.list_sum_kernels import MOMENTS, POWER
 from ...friction.flags_kernels import LEAN
 from ..modal_kernels import narrowed
 
+SHORT = 1e-9  # bond lengths of an increment, below which its slope is that of both ways
 OWED = 1e-4  # bond lengths at the friction limit: the most that a list of stretched bonds may owe
+
+
+@njit(error_model="numpy", **LEAN)
+def answer(dq, c, v0, dt):
+    """(path-mean weight [1], its slope over dq [1/m]) of a list over dq [m]; the slope of a law other than that of
+    MOMENTS is that of a mean whose force depends on the slide alone, and may be below 0."""
+    if c.law[1] == MOMENTS:
+        return list_slope(dq, c, v0, dt)
+    mean, short = list_mean(dq, c, v0, dt), SHORT * c.law[2]
+    if abs(dq) > short:
+        return mean, (list_force(dq, c, v0, dt) - mean) / dq
+    return mean, (list_force(short, c, v0, dt) - list_force(-short, c, v0, dt)) / (4 * short)
 
 
 @njit(error_model="numpy", **LEAN)
@@ -62,16 +75,22 @@ def commit(dq, force, q, v0, v1, dt, c):
     c.last[0] = dq
     before = c.tally[4]
     ok = list_step(dq, c, v0, v1, dt)
-    net = force * dq - c.force[0] * (c.tally[4] - before)
-    if c.law[1] <= POWER and c.force[0] > 0:
-        owed = c.tally[11] - net / c.force[0]
+    return booked(force * dq, before, c.force[0], c), ok
+
+
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def booked(work, before, limit, c):
+    """Book a step of the list c: its work [J] that is not stored; before: `tally[4]` before it, limit: mu_s N [N]."""
+    net = work - limit * (c.tally[4] - before)
+    if c.law[1] <= POWER and limit > 0:
+        owed = c.tally[11] - net / limit
         c.tally[11] = min(max(owed, 0.0), OWED * c.law[2])
-        net = c.force[0] * (c.tally[11] - owed)
+        net = limit * (c.tally[11] - owed)
     if net < 0:
         c.tally[6] -= net
     else:
         c.tally[7] += net
-    return net, ok
+    return net
 
 
 @njit(error_model="numpy", **LEAN)

@@ -10,6 +10,7 @@ from ...friction.flags_kernels import FAST, LEAN
 from ...friction.laws.elastic_plastic_kernels import spring_end, spring_mean
 
 PLASTIC, POINTS = 1, 2
+SLACK, FALLS, CALM = 100.0, False, 0.0  # as `shear_solve_kernels` has them
 DENSITY, STRETCH, SQUARE, PLAY, LOAD, SLIDE, FORCE, SLOPE = range(8)  # elastic-plastic: traction/mu, springs
 
 

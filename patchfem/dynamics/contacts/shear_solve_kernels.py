@@ -1,10 +1,15 @@
 """The step solve of points behind shear modes of the pieces: xi_j = dq - sum_k psi_kj db_k.
 
 Over a step the coordinates b follow kappa (b + db/2) = psi^T f, f the path-mean forces of the points: the work of the
-holder is what the points and the pieces take, so nothing is created. `ending`: the pieces spring back while the holder
+holder is what the points and the pieces take, so nothing is created. A force that jumps would leave b turning about
+the balance in every step; where a law jumps, kappa CALM (db - db of the step before) stands beside it, which takes two
+thirds of that in a step and changes a smooth motion to second order. `ending`: the pieces spring back while the holder
 stands, kappa (b + db) = psi^T f with the forces f after it, which only loses energy as long as a force grows with the
-slide. Both are minima of convex functions: the slopes of the points are >= 0, and Newton's method with a line search on
-the slope along the step finds them. c: `arrays.Sheared`, or a tuple with its fields from `weight` on.
+slide. Both are minima of convex functions where no slope of a point is below 0, and Newton's method with a line search
+on the slope along the step finds them. The forces of a law that FALLS may fall as its points slide, and then minima
+stand beside each other: what is found lies downhill from where the last steps lead, to which pieces without a mass
+would jump. c: `arrays.Sheared`, or a tuple with its fields from `weight` on. `law` says what the points answer;
+`march.instances` has an instance of this text for points that are lists of bonds.
 """
 
 import numpy as np
@@ -14,11 +19,12 @@ from ...friction.bonds.point_kernels import grow
 from ...friction.flags_kernels import FAST, LEAN
 from ..dense_kernels import factor, solve
 from ..modal_kernels import safe_point
-from .shear_points_kernels import FORCE, SLIDE, SLOPE, respond
+from . import shear_points_kernels as law
 
+FORCE, SLIDE, SLOPE = law.FORCE, law.SLIDE, law.SLOPE
 GRADIENT, STEP, TRIAL = range(3)
 NEAR = 4e-6  # half its square is below the goal of a march, 1e-11
-SLACK = 100.0  # times the goal: a residual that round-off keeps from falling further is taken below it
+SLACK, FALLS, CALM = law.SLACK, law.FALLS, law.CALM  # times the goal: a residual that round-off keeps from falling further is taken below it
 
 
 @njit(error_model="numpy", forceinline=True, **LEAN)
@@ -66,12 +72,12 @@ def pulled(row, psi, points, count, out):
 @njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
 def gradient(y, free, beta, kind, ending, c, out):
     """Residual (1 + r,) at y = (dq, db); beta = 0 or `ending`: the slide is given. Returns the friction force [N]."""
-    part = 1.0 if ending else 0.5
+    part, calm = 1.0 if ending else 0.5, 0.0 if ending else CALM
     slid(y[0], y[1:], c)
-    force = respond(kind, ending, c)
+    force = law.respond(kind, ending, c)
     pulled(FORCE, c.psi, c.points, int(c.count[0]), out)
     for k in range(c.kappa.size):
-        out[k + 1] = c.kappa[k] * (c.b[k] + part * y[k + 1]) - out[k + 1]
+        out[k + 1] = c.kappa[k] * (c.b[k] + part * y[k + 1] + calm * (y[k + 1] - c.last[0, k + 1])) - out[k + 1]
     out[0] = 0.0 if ending or beta == 0.0 else (y[0] - free) / beta + force
     return force
 
@@ -102,7 +108,7 @@ def hessian(beta, ending, c, hess):
             for j in range(count):
                 dot += points[FORCE, j] * psi[l, j]
             hess[k + 1, l + 1] = dot
-        hess[k + 1, k + 1] += c.kappa[k] * (1.0 if ending else 0.5)
+        hess[k + 1, k + 1] += c.kappa[k] * (1.0 if ending else 0.5 + CALM)
     hess[0, 0] = 1.0 if given else 1 / beta + total
 
 
@@ -146,7 +152,13 @@ def descend(free, beta, kind, ending, c, goal):
             if c.ready[which] == 0.0:
                 hessian(beta, ending, c, hess)
                 if not factor(hess):
-                    return force, -count
+                    if not FALLS:
+                        return force, -count
+                    for j in range(int(c.count[0])):
+                        c.points[SLOPE, j] = max(c.points[SLOPE, j], 0.0)
+                    hessian(beta, ending, c, hess)
+                    if not factor(hess):
+                        return force, -count
                 c.ready[which], stale = 1.0, False
             for i in range(y.size):
                 p[i] = -g[i]

@@ -16,10 +16,10 @@ CURE = "loosen accuracy.tail or accuracy.merge, or use reading = \"stretch\" wit
 
 
 class Kept(NamedTuple):
-    """Copies of arrays: the entries in use of a list of bonds, the other fields of its contact by name, and more that
+    """Copies of arrays: the entries in use of every list of bonds, the other fields of its contact by name, and more that
     belong to the run."""
 
-    entries: np.ndarray
+    entries: list
     fields: dict
     others: tuple
 
@@ -28,9 +28,19 @@ def keep(contact, *others) -> Kept | None:
     """What to go back to, of a contact with a list of bonds and of other arrays; None of a contact without one."""
     if not hasattr(contact, "bondlist"):
         return None
-    head, end = contact.tally[:2].astype(int)
     fields = {name: array.copy() for name, array in contact._asdict().items() if name != "bondlist"}
-    return Kept(contact.bondlist[:, head:end].copy(), fields, tuple(array.copy() for array in others))
+    entries = [contact.bondlist[:, head:end].copy() for head, end in _tallies(contact)[:, :2].astype(int)]
+    return Kept(entries, fields, tuple(array.copy() for array in others))
+
+
+def _tallies(contact) -> np.ndarray:
+    """The tallies (m, 14) of the lists of a contact."""
+    return contact.tallies if hasattr(contact, "tallies") else contact.tally[None]
+
+
+def full(contact) -> bool:
+    """Whether a list of a contact has no room; a single one misses nothing else."""
+    return hasattr(contact, "bondlist") and (not hasattr(contact, "flow") or contact.flow[0] == 1.0)
 
 
 def lengthened(contact, kept: Kept, place: str, *others):
@@ -43,12 +53,15 @@ def lengthened(contact, kept: Kept, place: str, *others):
         raise Missing(f"the bond list outgrew {have} entries ({have * ENTRY / 1e6:.0f} MB) {place}; {CURE}", "")
     for array, old in zip(others, kept.others):
         array[...] = old
-    wider, size = np.zeros((rows, min(2 * have, MOST_STRIPS))), kept.entries.shape[1]
-    wider[:, :size] = kept.entries
-    tally = kept.fields["tally"].copy()
-    tally[:2] = 0.0, size
-    return contact._replace(**{name: array.copy() for name, array in kept.fields.items()} | {
-        "bondlist": wider, "tally": tally})
+    found = contact._replace(**{name: array.copy() for name, array in kept.fields.items()})
+    tallies = _tallies(found)
+    room = min(2 * have, MOST_STRIPS) // len(tallies)
+    wider = np.zeros((rows, room * len(tallies)))
+    for j, (tally, entries) in enumerate(zip(tallies, kept.entries)):
+        tally[12], tally[13] = j * room, (j + 1) * room
+        tally[0], tally[1] = j * room, j * room + entries.shape[1]
+        wider[:, j * room:j * room + entries.shape[1]] = entries
+    return found._replace(bondlist=wider)
 
 
 def most_bytes(strips: float) -> float:

@@ -11,6 +11,7 @@ from ..contacts.dispatch import COULOMB, law_of
 
 HERE = "dynamics.march"
 SOLVES = {"dynamics.grooves.contact_kernels": "dynamics.grooves.element_kernels"}  # contacts that solve their step
+SHEARED_LISTS = "dynamics.contacts.shear_list_kernels"  # lists of bonds behind shear modes
 STEADY, WHOLE, POINTS = "", "whole", "points"  # loads: that stays; that changes, borne as a whole or point by point
 
 
@@ -18,6 +19,9 @@ STEADY, WHOLE, POINTS = "", "whole", "points"  # loads: that stays; that changes
 def contact_of(kind: tuple):
     """The compiled contact of a ContactModel's kind (contact, law)."""
     contact, law = kind
+    if contact == SHEARED_LISTS:
+        return compiled.instance(contact, {"solver": compiled.instance("dynamics.contacts.shear_solve_kernels", {
+            "law": compiled.load("dynamics.contacts.shear_lists_kernels")})})
     if not law:
         return compiled.load(contact)
     law = compiled.load(law)

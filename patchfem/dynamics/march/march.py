@@ -575,7 +575,8 @@ class Run:
         book = dict(zip(names, map(float, self.ledger))) | {"stored": self.motion() + self.strained()}
         book |= {"booked": float(self.ledger[8]), "sampled": float(self.second[0]), "passed": float(self.second[1])}
         if hasattr(self.contact, "tally"):
-            tally = self.contact.tally
-            book |= {"created": float(tally[6]), "dissipated": float(tally[7]), "substeps": float(tally[8]),
-                     "strips": float(tally[10])}
+            tally = getattr(self.contact, "tallies", self.contact.tally[None])
+            created, dissipated, substeps = map(float, tally[:, 6:9].sum(axis=0))
+            book |= {"created": created, "dissipated": dissipated, "substeps": substeps,
+                     "strips": float(tally[:, 10].max())}
         return book

@@ -18,6 +18,8 @@ from ..contacts.dispatch import COULOMB
 
 HERE = "dynamics.contacts"
 ELEMENTS = f"{HERE}.element_kernels"
+MOST_AT_FIRST = 256  # strips that the list of a point has room for before it grows, besides those of one step
+WIDE = 1e-6  # bond lengths over which the first bonds of a point lie: one may rest where their force turns
 LANES = 16  # points that compiled loops take at once: fewer left over are one after the other
 IDLE = ELEMENTS, "friction.laws.elastic_plastic_kernels"  # kind of a contact that nothing asks
 
@@ -90,6 +92,10 @@ class ContactModel:
             return {"bonds": bonds_of(self.element, contact.mem[0]).copy()}
         if not hasattr(contact, "psi"):
             return {}
+        if hasattr(contact, "bondlist"):
+            load, share = contact.points[4], contact.tallies[:, 5]  # as if all bonds of a point were stretched alike
+            return {"bonds": np.stack([load, self.length * load * share, share, contact.nows[:, 0], 0 * share]),
+                    "b": contact.b.copy()}
         m, z, s2, play = contact.points[:4, :self.reduction.points.size]
         return {"bonds": np.stack([m, z, s2, contact.flow[1] - self.reduction.shape @ contact.b, play]),
                 "b": contact.b.copy()}
@@ -147,13 +153,29 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
     return ContactModel(f"{HERE}.shear_kernels", limit, fields, law.length, "", shear, None, arrays.Sheared)
 
 
+def lists_model(law, limit, sigma, shear, reach: float, merge: float) -> ContactModel:
+    """Lists of bonds behind shear modes, one a point: any order, either reading. limit: mu_s N (m,) [N] of the points
+    of the ShearModes `shear`, sigma: their pressures (m,) [Pa]; reach, merge: as `list_model` has them."""
+    limit = np.asarray(limit, float)
+    room = min(numbers.room(law, reach, merge), MOST_AT_FIRST + numbers.STRIP * int(min(reach, numbers.NOTHING_LEFT)))
+    fields = arrays.sheared(limit, law.length, growth_numbers(law), np.asarray(shear.shape), shear.stiffness)
+    fields["points"][4], fields["drag"][2, 1:] = sigma, np.asarray(shear.shape).T @ limit / limit.sum()
+    fields |= {"bondlist": np.zeros((10, limit.size * room)), "tally": numbers.tally_of(room), "time": np.ones(1),
+               "tallies": numbers.tally_of(room, limit.size), "now": numbers.now_of(law),
+               "nows": np.tile(numbers.now_of(law), (limit.size, 1)), "table": numbers.share_table(law),
+               "law": numbers.law_numbers(law, reach, merge, WIDE)}
+    return ContactModel(f"{HERE}.shear_list_kernels", float(limit.sum()), fields, law.length, "", shear,
+                        None, arrays.ShearedLists)
+
+
 def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
     """One shared bond list for a rigid slide: any order, either reading; limit = mu_s N [N].
 
     reach: cut-off in bond lengths; merge: widest merged strip in bond lengths at zero age, 0 merges nothing.
     """
-    fields = {"force": [limit], "bondlist": np.zeros((10, numbers.room(law, reach, merge))),
-              "now": [0.0, 0.0, 0.0, 0.0, law.length, 0.0], "tally": np.zeros(12),
+    room = numbers.room(law, reach, merge)
+    fields = {"force": [limit], "bondlist": np.zeros((10, room)), "now": numbers.now_of(law),
+              "tally": numbers.tally_of(room),
               "law": numbers.law_numbers(law, reach, merge), "table": numbers.share_table(law),
               "growth": growth_numbers(law), "last": np.zeros(2), "bound": [(1 + law.initial) * limit]}
     return ContactModel(f"{HERE}.list_kernels", limit, fields, law.length, tuple_of=arrays.BondList)

@@ -6,9 +6,10 @@ engines of `accuracy.quadrature` of it: the cut-off that drops old strips (`trun
 
 c: a named tuple with the arrays of a list, such as `dynamics.contacts.arrays.BondList`: bondlist (10, capacity), the
 rows of `list_sum_kernels`; law (24,) of `list_numbers.law_numbers`; growth (6,) of eq. 2.10; table (k,) of
-`list_numbers.share_table`; now (6,): q, path, damage, growth J, mature length, ref; tally (12,): first strip, end,
+`list_numbers.share_table`; now (6,): q, path, damage, growth J, mature length, ref; tally (14,): first strip, end,
 spread ones, length after the last merge, stored energy [m], force [1], created and dissipated [m], pieces beyond one
-per step, strips merged although their places differ, largest length, energy owed [m] (`dynamics.contacts`).
+per step, strips merged although their places differ, largest length, energy owed [m] (`dynamics.contacts`), first and
+last entry + 1 of its room in the array, which several lists may share.
 """
 
 from math import ceil, exp, expm1
@@ -28,6 +29,7 @@ from .list_sum_kernels import (
     SHARES,
     aged_sums,
     first_bonds,
+    first_mean,
     formed,
     moments_of,
     power_sums,
@@ -93,11 +95,19 @@ def list_state(dq, c, v0, dt):
 
     Friction force = mu_s N * weight. Energy: the force of each bond over its own stretch at frozen damage.
     """
+    q, path, damage, _, _, _ = _after(dq, c.now, c.growth, v0, v0, dt)
+    first, stored = first_bonds(q, path, damage, c.law)
+    force, energy = later_state(dq, c, v0, dt)
+    return first + force, stored + energy
+
+
+@njit(error_model="numpy", **LEAN)
+def later_state(dq, c, v0, dt):
+    """`list_state` without the first bonds."""
     bonds, tally, now, law = c.bondlist, c.tally, c.now, c.law
     q, path, damage, age, eps, middle = _after(dq, now, c.growth, v0, v0, dt)
     head, end, many, p, coarse = int(tally[0]), int(tally[1]), int(tally[2]), law[0], law[5] * law[2]
-    force, energy = first_bonds(q, path, damage, law)
-    size, young = abs(dq), 0.0
+    size, young, force, energy = abs(dq), 0.0, 0.0, 0.0
     if law[1] == MOMENTS:
         _, z, s2 = moments_of(q, exp(now[5] - damage), bonds, head, end)
         force += z / law[2]
@@ -141,6 +151,12 @@ def list_energy(dq, c, v0, dt):
 
 
 @njit(error_model="numpy", **LEAN)
+def _force(dq, c, v0, dt):
+    """The force that means are taken of: without the first bonds in the print, whose mean is closed."""
+    return later_state(dq, c, v0, dt)[0] if c.law[1] >= SHARES else list_force(dq, c, v0, dt)
+
+
+@njit(error_model="numpy", **LEAN)
 def _panel(energy, low, high, dq, c, v0, dt):
     """Integral of the force, or of the energy, over a share of the increment by five Gauss points."""
     out = 0.0
@@ -151,7 +167,7 @@ def _panel(energy, low, high, dq, c, v0, dt):
         if energy:
             out += w / 2 * list_energy(part * dq, c, v0, part * dt)
         else:
-            out += w / 2 * list_force(part * dq, c, v0, part * dt)
+            out += w / 2 * _force(part * dq, c, v0, part * dt)
     return (high - low) * out
 
 
@@ -161,10 +177,10 @@ def list_mean(dq, c, v0, dt):
 
     Stretch reading of order 1: closed. Of another order: what damage takes, the share dR/eps of the stored energy, and
     the gain of that energy, so that no step creates any (twin: `quadrature.Quadrature.step`). Printed law: the mean of
-    the force. Integrals by Simpson's rule where the increment is short (its first value is known), by five Gauss points
-    up to half a bond length, beyond it by such panels that double. An increment that touches the place of the first
-    bonds takes Gauss points as well: their force may jump there, and its value at the place itself is that of neither
-    side.
+    the force, that of the first bonds closed. Other integrals by Simpson's rule where the increment is short (its first value is known), by five Gauss points
+    up to half a bond length, beyond it by such panels that double. In the stretch reading an increment that touches the
+    place of the first bonds takes Gauss points as well: their force may jump there, and its value at the place itself
+    is that of neither side.
     """
     tally, now, law = c.tally, c.now, c.law
     if dq == 0:
@@ -174,7 +190,7 @@ def list_mean(dq, c, v0, dt):
     size = abs(dq) / now[4]
     low, high = min(now[0], now[0] + dq), max(now[0], now[0] + dq)
     touched = low <= TOUCH * abs(dq) and high >= -TOUCH * abs(dq)
-    short = tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0 and not touched
+    short = tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0 and not (touched and law[1] < SHARES)
     kinked = low <= 0.0 <= high and law[3] > 0 and law[0] < 1  # the force of the first bonds turns within the increment
     if law[1] == POWER and (size > LEAST_BALANCED or kinked):
         gain = list_energy(dq, c, v0, dt) - tally[4]
@@ -183,8 +199,9 @@ def list_mean(dq, c, v0, dt):
         return (spent * abs(dq) / middle + gain) / dq
     last = 0.0
     if short:
-        last = list_force(dq, c, v0, dt)
-    return _path_mean(False, short, last, dq, c, v0, dt)
+        last = _force(dq, c, v0, dt)
+    mean = _path_mean(False, short, last, dq, c, v0, dt)
+    return mean + first_mean(dq, now[0], now[1], law) if law[1] >= SHARES else mean
 
 
 @njit(error_model="numpy", **LEAN)
@@ -194,8 +211,10 @@ def _path_mean(energy, short, last, dq, c, v0, dt):
         if energy:
             half = list_energy(0.5 * dq, c, v0, 0.5 * dt)
             return (c.tally[4] + 4 * half + last) / 6
-        half = list_force(0.5 * dq, c, v0, 0.5 * dt)
-        return (c.tally[5] + 4 * half + last) / 6
+        half, before = _force(0.5 * dq, c, v0, 0.5 * dt), c.tally[5]
+        if c.law[1] >= SHARES:
+            before -= first_bonds(c.now[0], c.now[1], c.now[2], c.law)[0]
+        return (before + 4 * half + last) / 6
     size = abs(dq) / c.now[4]
     if size <= 0.5:
         return _panel(energy, 0.0, 1.0, dq, c, v0, dt)
@@ -276,9 +295,10 @@ def _append(dq, place, way, harm, before, more, middle, bonds, tally, now, law):
     if mode == MOMENTS:
         count = kept = 1
     tally[8] += count - 1
-    if end + kept > bonds.shape[1]:
+    room = min(int(tally[13]), bonds.shape[1])
+    if end + kept > room:
         end = _pack(bonds, tally)
-        if end + kept > bonds.shape[1]:
+        if end + kept > room:
             return False
     goal = goal_length(before, now[4], more)
     for piece in range(int(kept) - 1, -1, -1):
@@ -341,10 +361,10 @@ def _cut(bonds, tally, now, law):
 
 @njit(error_model="numpy", **LEAN)
 def _pack(bonds, tally):
-    """Move the list to the front of its array; returns its end."""
-    head, end = int(tally[0]), int(tally[1])
+    """Move the list to the front of its room; returns its end."""
+    head, end, front = int(tally[0]), int(tally[1]), int(tally[12])
     for i in range(bonds.shape[0]):
         for k in range(head, end):
-            bonds[i, k - head] = bonds[i, k]
-    tally[0], tally[1] = 0.0, end - head
-    return end - head
+            bonds[i, k - head + front] = bonds[i, k]
+    tally[0], tally[1] = front, end - head + front
+    return end - head + front

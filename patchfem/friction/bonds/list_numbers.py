@@ -29,17 +29,19 @@ def cutoff(order: float, tail: float) -> float:
     return float(gammainccinv(order + 1, tail))
 
 
-def law_numbers(law: Bonds, reach: float, merge: float) -> np.ndarray:
-    """(24,): order, form, eps_0, m_0, 1/Gamma(p + 1), merge width, cut-off on the clock of the form, -, Gauss points
-    and weights in (0, 1) with |u|^p and with |u|^(p + 1) as their weight.
+def law_numbers(law: Bonds, reach: float, merge: float, wide: float = 0.0) -> np.ndarray:
+    """(24,): order, form, eps_0, m_0, 1/Gamma(p + 1), merge width, cut-off on the clock of the form, half the width of
+    the first bonds, Gauss points and weights in (0, 1) with |u|^p and with |u|^(p + 1) as their weight.
 
-    reach: cut-off in bond lengths of path; of the stretch reading in units of damage.
+    reach: cut-off in bond lengths of path; of the stretch reading in units of damage; wide [bond lengths]: over which
+    the first bonds lie to both sides, where a force that jumps at their place has no step that ends in the jump.
     """
     form = form_of(law)
     out = np.zeros(24)
     reach = min(reach, NOTHING_LEFT)
     out[:7] = (law.order, form, law.length, law.initial, 1 / gamma(law.order + 1), merge,
                reach * (law.length if form >= SHARES else 1.0))
+    out[7] = wide * law.length
     if form == POWER:
         from scipy.special import roots_jacobi
 
@@ -47,6 +49,19 @@ def law_numbers(law: Bonds, reach: float, merge: float) -> np.ndarray:
             x, w = roots_jacobi(4, 0.0, power)
             out[at:at + 4], out[at + 4:at + 8] = (1 + x) / 2, w / 2**(power + 1)
     return out
+
+
+def tally_of(room: int, count: int | None = None) -> np.ndarray:
+    """The tally (14,) of an empty list in an array of `room` entries; (count, 14) of lists one after the other."""
+    out = np.zeros((count or 1, 14))
+    out[:, 12] = out[:, 0] = out[:, 1] = room * np.arange(count or 1)
+    out[:, 13] = out[:, 12] + room
+    return out if count else out[0]
+
+
+def now_of(law: Bonds) -> np.ndarray:
+    """The clocks (6,) of a list before any slide."""
+    return np.array([0.0, 0.0, 0.0, 0.0, law.length, 0.0])
 
 
 def share_table(law: Bonds) -> np.ndarray:

@@ -361,17 +361,41 @@ def aged_sums(q, path, psi, length, bonds, head, many, end, p, coarse):
 def first_bonds(q, path, damage, law):
     """(force [1], energy [m]) per unit mu_s N of the initial bonds, of density m_0 and unstressed at q = 0.
 
-    Their force may jump there: at the place itself, to the round-off of the path, it is 0, the mean of both sides.
+    Their force may jump there: at the place itself, to the round-off of the path, it is 0, the mean of both sides. With
+    a width law[7] [m] they lie evenly as far as that on both sides of their place, where they store nothing.
     q, path [m], damage [1]: now; law: `list_numbers.law_numbers`.
     """
-    p, eps0, m0, norm = law[0], law[2], law[3], law[4]
-    if m0 == 0 or abs(q) <= AT_PLACE * path:
+    p, eps0, m0, norm, wide = law[0], law[2], law[3], law[4], law[7]
+    if m0 == 0 or (wide == 0 and abs(q) <= AT_PLACE * path):
         return 0.0, 0.0
     if law[1] <= POWER:
-        f = m0 * norm * fexp(p * flog(abs(q) / eps0) - damage)
+        left = m0 * norm * fexp(-damage) * fexp(-p * flog(eps0))
+        if wide > 0:
+            f, g = spread_over(q, -wide, wide, p)
+            return left * f, left * (g - fexp((p + 1) * flog(wide)) / (p + 2)) / (p + 1)
+        f = left * fexp(p * flog(abs(q)))
         return f * np.sign(q), f * abs(q) / (p + 1)
     f = m0 * norm * fexp(p * flog(path / eps0) - path / eps0)
-    return f * np.sign(q), f * abs(q)
+    if wide > abs(q):
+        return f * q / wide, f * q * q / (2 * wide)
+    return f * np.sign(q), f * (abs(q) - wide / 2)
+
+
+@njit(error_model="numpy", **LEAN)
+def first_mean(dq, q, path, law):
+    """Path mean [1] of the force of the first bonds of the print over the increment dq [m] from the slide q, path [m]
+    before it: exact on both sides of their place, where it jumps, or turns over the width law[7]."""
+    p, eps0, size, wide = law[0], law[2], abs(dq), law[7]
+    if law[3] == 0:
+        return 0.0
+    way = np.copysign(1.0, dq)
+    enter, leave = min(max(-way * q - wide, 0.0), size), min(max(-way * q + wide, 0.0), size)
+    ends = share(p, path / eps0), share(p, (path + enter) / eps0), share(p, (path + leave) / eps0)
+    total = share(p, (path + size) / eps0) - ends[2] - (ends[1] - ends[0])
+    if leave > enter:
+        start, end = way * q + enter, way * q + leave
+        total += (ends[2] - ends[1]) * 0.5 * (start + end) / wide
+    return way * law[3] * total * eps0 / size
 
 
 @njit(error_model="numpy", **LEAN)

@@ -65,7 +65,7 @@ def _slid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Wa
     if model.slide.across is not None:
         return stepping.run_plane(model, patch, *path, frames, watch)
     if model.soft:
-        return shear.with_shear(model, patch, *path, frames, watch), {}
+        return shear.with_shear(model, patch, *path, frames, watch, engine), {}
     if engine.kind == STEPPED:
         return stepped(model, patch, *path, frames, watch), {}
     if engine.kind == CLOSED:

@@ -17,7 +17,7 @@ from ...friction.bonds.engines import choose as choose_sum
 from ...friction.bonds.parameters import LONGEST
 from ...slip import shear_modes
 
-CLOSED, ELEMENTS, POINTS, RECURSION, LIST, STEPPED, PLANE = range(7)
+CLOSED, ELEMENTS, POINTS, RECURSION, LIST, STEPPED, PLANE, LISTS = range(8)
 NAMES = {CLOSED: "closed form", ELEMENTS: "parallel elements", POINTS: "bond points", RECURSION: "recursion",
          STEPPED: "law step by step", PLANE: "two directions"}
 MOST_STEPS = 200_000  # per cycle over grooves
@@ -39,7 +39,8 @@ class BenchEngine:
     @property
     def name(self) -> str:
         """The name of the engine as summaries and plans have it."""
-        return "bench, " + (f"{self.choice.engine} bond list" if self.kind == LIST else NAMES[self.kind])
+        several = {LIST: "bond list", LISTS: "bond lists"}.get(self.kind)
+        return "bench, " + (f"{self.choice.engine} {several}" if several else NAMES[self.kind])
 
 
 def bench_engine(model, slide, points: int = 1, choice: Choice | None = None) -> BenchEngine:
@@ -54,6 +55,8 @@ def bench_engine(model, slide, points: int = 1, choice: Choice | None = None) ->
     if soft and (has(f.law, "bonds") or model.grooves is not None):
         modes = model.accuracy.shear_modes or shear_modes.SHEAR_MODES
         varies = model.grooves is not None or pressure_changes(model)
+        if model.grooves is None and (listed(f) or model.accuracy.quadrature not in ("auto", "recursion")):
+            return _summed(model, slide, points, choice or sum_of(model, slide), points)
         return BenchEngine(POINTS, rates.behind_modes(points, modes, varies))
     if soft:
         return BenchEngine(ELEMENTS, rates.SLIP_NODE * points + rates.SAMPLE)
@@ -109,20 +112,21 @@ def strokes(slide) -> tuple:
     return float(np.abs(move).sum()) / count, max(way.size / count, 1.0)
 
 
-def _summed(model, slide, points: int, found: Choice) -> BenchEngine:
+def _summed(model, slide, points: int, found: Choice, lists: int = 1) -> BenchEngine:
+    """The engine of a sum over bonds; lists: of them, one a point behind shear modes."""
     law = model.bonds
     if found.engine == "recursion":
         return BenchEngine(RECURSION, rates.RECURSION, found)
-    if law.breakaway:  # a list has no elastic range
+    if law.breakaway and lists == 1:  # a list has no elastic range
         return _stepped(model, slide, points)
     size = slide.size
     strips = min(found.strips, size * max(1.0, 4 * float(np.abs(np.diff(slide)).max()) / law.length))
-    seconds = PASSES * found.seconds * (strips / found.strips if found.strips else 1.0)
+    seconds = (PASSES if lists == 1 else lists) * found.seconds * (strips / found.strips if found.strips else 1.0)
     if size * seconds > LONGEST:
         raise Missing(f"the bond list (about {strips:.0f} entries) would take about {size * seconds:.0f} "
                       f"s, more than {LONGEST:.0f} s; lower accuracy.steps_per_cycle or slide.cycles, or loosen "
                       "accuracy.tail or accuracy.merge", "")
-    return BenchEngine(LIST, seconds, found)
+    return BenchEngine(LIST if lists == 1 else LISTS, seconds, found)
 
 
 def _stepped(model, slide, points: int) -> BenchEngine:

@@ -10,7 +10,7 @@ from ...effects import listed
 from ...response.coarser import Coarser, coarser_space, estimate, left_open
 from ...response.errors import change, step_error
 from . import bench, shear
-from .engine import LIST, PLANE, STEPPED, slips_by_elements
+from .engine import LIST, LISTS, PLANE, STEPPED, slips_by_elements
 from .law import tail_of
 from .ledger import Watch
 
@@ -58,7 +58,7 @@ def ladder_of(model, patch, coarse, fine, steps: int) -> list:
         out.append(shear.coarser_elements(model, patch, coarse, few))
     elif meshed:
         out.append(coarser_space(few._replace(rough=True), few))
-    if fine.engine.kind == LIST and choice.merge > 0:
+    if fine.engine.kind in (LIST, LISTS) and choice.merge > 0:
         narrow = few._replace(choice=replace(choice, merge=FINER * choice.merge))
         out.append(Coarser((narrow,), lambda a, b: {name: MERGED * gap for name, gap in change(a, b).items()}, few,
                         "bonds"))
@@ -67,7 +67,7 @@ def ladder_of(model, patch, coarse, fine, steps: int) -> list:
 
 def sum_error(model, engine) -> float:
     """Bound of the error of the sum over bonds, as a share of the friction limit [1]; 0 without such a sum."""
-    if engine.kind == LIST:
+    if engine.kind in (LIST, LISTS):
         return engine.choice.error
     return tail_of(model) if engine.kind in (STEPPED, PLANE) and listed(model.friction) else 0.0
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...dynamics.march.capacity import keep, lengthened
+from ...dynamics.march.capacity import full, keep, lengthened
 from ...dynamics.march.march import GOAL
 from ...dynamics.march.models import load_kernels
 from .ledger import BLOCK, Watch, frame_numbers, ledger_of
@@ -58,7 +58,7 @@ def follow_path(model, time, slide, frames: int, watch: Watch, paced: bool = Fal
                                      energies[a:b + 1], forces[a:b + 1])
 
         failed = slid(contact)
-        while failed and kept is not None:  # a list of bonds misses nothing but room
+        while failed and full(contact):
             contact = lengthened(contact, kept, f"before sample {b} of the bench")
             failed = slid(contact)
         missed += failed

@@ -4,7 +4,7 @@ leaves open of the former: its change, its grain and its stiffness."""
 import numpy as np
 
 from ...core import NotConverged
-from ...dynamics.march.models import jenkins_model, points_model
+from ...dynamics.march.models import jenkins_model, lists_model, points_model
 from ...effects import has
 from ...friction.record import law_from
 from ...response.coarser import Coarser
@@ -19,12 +19,13 @@ from .rigid import climbing
 GRAIN, STIFF = 1.5, 0.5  # times the change by the grain of the nodes and by that of the stiffness (tests/README.md)
 
 
-def with_shear(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
-    """Slide the holders along the samples time [s], slide [m] (k,). NotConverged where a step misses its residual."""
+def with_shear(model, patch, time, slide, frames: int, watch: Watch, engine=None) -> Slid:
+    """Slide the holders along the samples time [s], slide [m] (k,); engine: of `bench_engine`, where bonds slide.
+    NotConverged where a step misses its residual."""
     if model.grooves is not None:
         return _climbing(model, patch, time, slide, frames, watch)
     if has(model.friction.law, "bonds"):
-        return _points(model, patch, time, slide, frames, watch)
+        return _points(model, patch, time, slide, frames, watch, engine)
     return _elements(model, patch, time, slide, frames, watch)
 
 
@@ -70,15 +71,25 @@ def climbed_fields(patch, contact, states) -> tuple:
     return tau, local
 
 
-def _points(model, patch, time, slide, frames, watch) -> Slid:
-    """Bond points behind the shear modes."""
+def _points(model, patch, time, slide, frames, watch, engine) -> Slid:
+    """Bond points behind the shear modes, or lists of bonds."""
     law = model.bonds
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
     shear = shear_of(patch, law, model.accuracy.shear_modes, 0.1 * model.accuracy.tolerance)
-    done = follow_path(points_model(law, weight, sigma, shear), time, slide, frames, watch, law.grows)
+    found = engine.choice
+    contact = points_model(law, weight, sigma, shear) if found is None else lists_of(patch, law, shear, found)
+    done = follow_path(contact, time, slide, frames, watch, law.grows)
     refuse_missed(done)
     tau, local = point_fields(patch, law, shear, done.states)
     return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)
+
+
+def lists_of(patch, law, shear, found, force=None):
+    """Lists of bonds behind the ShearModes of a pressed patch, summed as the Choice `found` has it; force (k,) [N]: the
+    normal forces of the points where few stand for all."""
+    sigma = patch.pressure.sigma_n[shear.points] if force is None else np.ones_like(force)
+    force = patch.pieces.interface.weight[shear.points] * sigma if force is None else force
+    return lists_model(law, law.static * force, sigma, shear, found.reach(law.order), found.merge)
 
 
 def coarser_elements(model, patch, coarse, few) -> Coarser:

@@ -33,8 +33,8 @@ def fields_of(model, numerics, patch, raw) -> dict:
         return frames_of(patch, np.array([s["time"] for s in shots]), tau, local, np.array([s["slide"] for s in shots]))
     time = np.array([s["time"] for s in shots])
     shear = bool(model.soft)
-    pointed = shear or (numerics.per_point and model.grooves is None)
-    if has(f.law, "bonds") and not listed(f) and pointed:
+    pointed = numerics.per_point and model.grooves is None and not listed(f)
+    if has(f.law, "bonds") and (shear or pointed):
         moments = [(s["slide"], s["bonds"]) for s in shots]
         tau, local = fields.point_fields(patch, model.bonds, raw.contact.reduction, moments)
     elif shear:

@@ -17,7 +17,7 @@ from ...model.model import Model
 from ...slip.fields import shear_of
 from ...slip.shear_modes import gathered
 from ...structure.drive_sizes import omega_of
-from ..bench import averaged, rigid
+from ..bench import averaged, rigid, shear
 from ..patch.kept import elements, strip_elements
 from . import strips, varying_load
 from .lists import quadrature_of
@@ -115,10 +115,12 @@ def contact_model(model: Model, numerics: Numerics, patch):
 def _bonds(model: Model, numerics: Numerics, patch, load: float):
     """The contact of a sum over bonds: a list of them, points behind shear modes, points of a field, or one point."""
     law, found, limit = model.bonds, quadrature_of(model, numerics), model.friction.static * load
-    if found.engine != "recursion":
+    if found.engine != "recursion" and not model.soft:
         return models.list_model(law, limit, found.reach(law.order), found.merge)
     if model.soft:
         reduced, force = _shear_modes(patch, law, numerics.shear_modes, model)
+        if found.engine != "recursion":
+            return shear.lists_of(patch, law, reduced, found, force)
         pressed = (patch.pieces.interface.weight, patch.pressure.sigma_n) if force is None else (force, np.ones_like(
             force))
         return models.points_model(law, *pressed, reduced)

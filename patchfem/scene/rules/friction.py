@@ -66,8 +66,6 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
     if law.breakaway and law.reading == "report":
         draft.say(f"{at}.breakaway", "the law as printed (reading 'report') has none; use 'stretch' or leave it out")
     contact = draft.tables.contact
-    if law.reading == "report" and (law.law is None or has(law.law, "bonds")) and contact and contact.gives_way:
-        draft.say(f"{at}.reading", f"'report' is refused beside {contact.gives_way}; use 'stretch' or leave it out")
     if law.static == 0 and law.law is not None and takes(law.law, "stiffness"):
         draft.say(f"{at}.static", f"0 beside law '{law.law}', whose stiffness needs a force to end at; static > 0 is "
                                   "wanted")  # fmt: skip

@@ -38,8 +38,9 @@ def combinations(draft: Draft, kind: str) -> None:
     still = _still(law) and not climbed(draft.tables)  # along flanks every law has a normal force that changes
     if kind == "bench" and still and draft.tables.normal is not None and draft.tables.normal.amplitude:
         draft.say("normal.amplitude", f"beside law '{law.law}': {refusal('varying-load')}")
-    if kind == "rig" and has(law.law, "bonds") and law.breakaway and law.order != 1:
-        draft.say("friction.breakaway", unbuilt(f"beside order = {law.order:g} in a rig", "order"))
+    if (kind == "rig" or shear) and has(law.law, "bonds") and law.breakaway and law.order != 1:
+        where = "in a rig" if kind == "rig" else f"and {shear}"
+        draft.say("friction.breakaway", unbuilt(f"beside order = {law.order:g} {where}", "order"))
     if kind == "rig":
         _yawing(draft, law, contact)
     if shear:
@@ -75,7 +76,12 @@ def _quadrature(draft: Draft, kind: str, law: Friction, shear: str) -> None:
     """A list of bonds knows neither an elastic range nor, merged, a pressure that changes as it slides."""
     contact, normal, accuracy = draft.tables.contact, draft.tables.normal, draft.tables.accuracy
     engine = accuracy.quadrature if accuracy is not None else None
-    if engine in (None, "auto", "recursion") or not has(law.law, "bonds") or shear:
+    if engine in (None, "auto", "recursion") or not has(law.law, "bonds"):
+        return
+    if shear:
+        if law.breakaway and law.order == 1:
+            draft.say("accuracy.quadrature", unbuilt(f"'{engine}' beside friction.breakaway and {shear}",
+                                                     "use 'recursion' or 'auto'"))
         return
     lower = contact is not None and any(shape.on == "lower" for shape in contact.shapes.values())
     if kind == "rig" and (lower or law.breakaway) and not listed(law):
@@ -149,9 +155,10 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
 
 
 def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:
-    least = -1 if law.reading == "report" else 0
-    if has(law.law, "bonds") and law.order != 1 and (law.order == 0 or _inside(law.order, least)):
-        draft.say("friction.order", unbuilt(f"{law.order:g} beside {shear}", "order"))
+    if has(law.law, "bonds") and law.reading == "report" and _inside(law.order, -1, 0) and law.initial_bonds:
+        draft.say("friction.initial_bonds", f"{law.initial_bonds:g} with order = {law.order:g} beside {shear}: as "
+                                            "printed (R/eps)^order of bonds at rest has no bound, and no force moves "
+                                            "their point; set initial_bonds = 0 or use order >= 0")
     if not has(law.law, "bonds") and not carries(law, "shear"):
         draft.say("friction.law", f"'{law.law}' beside {shear}: leave it out, or {refusal('shear')}")
     weakens = law.static is not None and _inside(law.kinetic, -1, law.static)

@@ -1,0 +1,239 @@
+"""Equation 2.17 behind [contact.shear] summed by hand, for random benches and rigs, and what of their bars holds.
+
+`python printed_bars.py bench 7000 24` scores 24 benches from seed 7000 on, `rig` as many rigs that begin at rest.
+
+The sum is plain NumPy, written from 2.10-2.17 without the compiled lists: every node of a mesh for a tenth of the
+tolerance keeps every bond of its own path, one strip a step, each with the midpoint rule and the share of it on either
+side of u = 0; the pieces are the whole compliance, s_i = q - sum_j C_ij F_j(s_j) at the end of each step, by Newton's
+method on all nodes; a mode moves by the trapezoidal rule, which adds beta to every C_ij. Nothing of it averages a force
+over a step, merges bonds, drops modes or reduces points.
+"""
+
+import sys
+from collections import defaultdict
+from math import gamma, pi
+
+import numpy as np
+
+import patchfem as pf
+from patchfem.model.model import build
+from patchfem.runs import run as runs
+from patchfem.runs.patch import ladder as patches
+from patchfem.scene.scene import loads
+
+MOST, FIRST_WIDE = 40.0, 1e-6  # bond lengths: age of a bond that counts; half width of the first bonds
+COMPARED = {"bench": ("loop_area", "friction_force_peak", "friction_ratio_end", "friction_work", "slip_amplitude"),
+            "rig": ("relative_displacement_amplitude", "loop_area", "friction_force_peak", "friction_work",
+                    "slip_amplitude")}
+PIECES = """
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "115 N"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.shear]
+[friction]
+law = "nonlocal"
+static = 0.3
+bond_length = "1 um"
+[accuracy]
+tolerance = 1e-2
+"""
+MOTION = {"bench": '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "100 Hz"\ncycles = 2\n',
+          "rig": '[structure]\nmoving_mass = "0.884 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n'
+                 'damping = 0.02\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\n'
+                 'cycles = 3\n'}
+
+
+def scene_of(kind: str, seed: int):
+    """A random scene: reading, order, first bonds, growth, pressure, stroke or drive, below and above gross slip."""
+    draw = np.random.default_rng(seed)
+    length = 10 ** draw.uniform(-0.7, 0.5)  # um
+    reading = draw.choice(["report", "report", "report", "stretch"])
+    sets = {"friction.static": f"{draw.uniform(0.15, 0.6):.3f}", "friction.bond_length": f"{length:.4g} um",
+            "contact.load": f"{10 ** draw.uniform(1.7, 2.7):.4g} N", "friction.reading": reading,
+            "friction.order": draw.choice(["0.0", "0.5", "1.0", "2.0"] if reading == "report" else ["0.5", "1.5", "2.0"]),
+            "friction.initial_bonds": draw.choice(["0.0", "0.5", "1.0"])}
+    shape = draw.choice(["crown", "flat", "tilt"])
+    if shape == "crown":
+        sets["contact.crown.radius"] = f"{10 ** draw.uniform(0.3, 2):.3g} m"
+    if shape == "tilt":
+        sets["contact.tilt.angle"] = f"{10 ** draw.uniform(-5.5, -4):.3g} rad"
+    frequency, stroke = draw.uniform(80, 200), length * 10 ** draw.uniform(-0.3, 0.9)
+    push = 10 ** draw.uniform(0.3, 1.0)
+    if kind == "bench":
+        sets |= {"slide.frequency": f"{frequency:.1f} Hz", "slide.amplitude": f"{stroke:.4g} um"}
+        speed = 2 * pi * frequency * stroke * 1e-6
+    else:
+        sets |= {"drive.frequency": f"{frequency:.1f} Hz", "drive.acceleration": f"{push:.3g} g"}
+        speed = push * 9.80665 / (2 * pi * frequency)
+    if draw.random() < 0.4:
+        floor = 0.05 * speed
+        sets |= {"friction.kinetic": f"{float(sets['friction.static']) * draw.uniform(0.7, 0.95):.3f}",
+                 "friction.slip_growth": f"{length * 10 ** draw.uniform(-1, 0):.4g} um",
+                 "friction.rest_growth": f"{speed * frequency * 10 ** draw.uniform(-1, 1):.4g} m/s^2",
+                 "friction.rest_speed": f"{floor:.4g} m/s"}
+    return loads(PIECES + MOTION[kind], "random.toml", [f"{key}={value}" for key, value in sets.items()])
+
+
+class Bonds:
+    """Bonds of m points, each along its own path, by 2.10 and 2.14-2.17."""
+
+    def __init__(self, f, size: int, floor: float):
+        self.f, self.floor, self.mu = f, floor, f.static
+        self.at, self.path, self.harm, self.eps = (np.zeros(size), np.zeros(size), np.zeros(size),
+                                                   np.full(size, f.bond_length))
+        self.low, self.high, self.when, self.hurt, self.born, self.lag = (np.zeros((0, size)) for _ in range(6))
+
+    def grown(self, moved, dt):
+        """(mature length after the step, factor on the distance of a bond from it, length half way) at |v| = moved/dt,
+        2.10."""
+        f = self.f
+        if f.rest_growth is None:
+            return self.eps, np.ones_like(moved), self.eps
+        out = []
+        for part in (1.0, 0.5):
+            rest, slide = f.rest_growth * part * dt / np.maximum(moved / dt, self.floor), part * moved / f.slip_growth
+            target = (rest * f.bond_length + slide * f.bond_length * f.kinetic / f.static) / (rest + slide)
+            left = np.exp(-rest - slide)
+            out += [target + (self.eps - target) * left, left]
+        return out[0], out[1], out[2]
+
+    def weight(self, s, dt, keep: bool = False):
+        """(m,) force over mu_s sigma A of points that slide on to s in a step; keep: take it as the new state."""
+        f, p, e0 = self.f, self.f.order, self.f.bond_length
+        moved, norm = np.abs(s - self.at), gamma(self.f.order + 1)
+        eps, left, middle = self.grown(moved, dt)
+        path, harm = self.path + moved, self.harm + moved / middle
+        low, high = np.vstack([self.low, self.at]), np.vstack([self.high, s])
+        size = np.abs(high - low)
+        share = np.divide(s - low, high - low, out=np.full(low.shape, 0.5), where=size > 0)
+        side = np.where(high >= low, 1.0, -1.0) * (2 * np.clip(share, 0, 1) - 1)  # what lies behind less what lies ahead
+        when, hurt = np.vstack([self.when, path - moved / 2]), np.vstack([self.hurt, harm - moved / middle / 2])
+        born = np.vstack([self.born, middle])
+        gone = np.zeros_like(left) + (left if self.f.rest_growth is not None else 1.0)
+        lag = np.vstack([self.lag * gone, middle * np.sqrt(gone)])  # how far a bond's own length is behind, 2.10 from 0
+        age = path - when
+        if f.reading == "report":
+            own = np.maximum(eps - lag, 1e-9 * eps) if f.rest_growth is not None else e0
+            x = age / own
+            each = np.where(size > 0, x ** p * np.exp(-x), 0.0) * size / (e0 * norm)
+            first = f.initial_bonds / norm * np.where(path > 0, (path / e0) ** p, float(p == 0)) * np.exp(-path / e0)
+            first = first * np.clip(s / (FIRST_WIDE * e0), -1, 1)
+        else:
+            u = np.abs(s - (low + high) / 2)
+            each = (u / born) ** p * np.exp(-(harm - hurt)) * size / (e0 * norm)
+            first = f.initial_bonds / norm * (np.abs(s) / e0) ** p * np.exp(-harm) * np.sign(s)
+        if keep:
+            on = (age / e0 < MOST).any(axis=1)
+            self.low, self.high, self.when, self.hurt, self.born, self.lag = (
+                one[on] for one in (low, high, when, hurt, born, lag))
+            self.at, self.path, self.harm, self.eps = s, path, harm, eps
+        return (each * side).sum(axis=0) + first
+
+
+def settled(bonds: Bonds, limit, c, q: float, dt: float, guess):
+    """(slides (m,), forces (m,)) with s = q - c F(s), from a guess, by Newton's method with a halved step."""
+    s, tiny = guess.copy(), 1e-7 * bonds.f.bond_length
+    force = limit * bonds.weight(s, dt)
+    miss = s - q + c @ force
+    for _ in range(60):
+        if np.abs(miss).max() < 1e-10 * (abs(q) + bonds.f.bond_length):
+            break
+        slope = limit * (bonds.weight(s + tiny, dt) - bonds.weight(s - tiny, dt)) / (2 * tiny)
+        step = np.linalg.solve(np.eye(s.size) + c * slope, miss)
+        for part in 0.5 ** np.arange(12):
+            new = s - part * step
+            there = limit * bonds.weight(new, dt)
+            left = new - q + c @ there
+            if np.linalg.norm(left) < (1 - 0.1 * part) * np.linalg.norm(miss):
+                break
+        s, force, miss = new, there, left
+    return s, force
+
+
+def by_hand(scene, steps: int = 500) -> dict:
+    """Measures of a scene by the sum by hand, at `steps` a cycle."""
+    model = build(scene)
+    patch = patches.solve_all(model.patch, 0.1 * model.accuracy.tolerance, False, False)[0]
+    f = model.friction
+    area = patch.pieces.interface.weight * patch.pressure.sigma_n
+    on = np.flatnonzero(area > 0)
+    limit, c = f.static * area[on], patch.giving[np.ix_(on, on)]
+    bonds = Bonds(f, on.size, model.bonds.rest_speed)
+    if model.rig is None:
+        omega, cycles = 2 * pi * scene.slide.frequency, int(scene.slide.cycles)
+    else:
+        omega, cycles = 2 * pi * scene.drive.frequency, int(scene.drive.cycles)
+    dt = 2 * pi / omega / steps
+    slide, force, slip = (np.zeros(cycles * steps + 1) for _ in range(3))
+    s, before, state, beta = np.zeros(on.size), np.zeros(on.size), np.zeros(3), 0.0
+    if model.rig is not None:
+        modes = model.rig.modes
+        own, zeta, mass = modes.omega[0], modes.zeta[0], modes.mass
+        stiff = own**2 + 4 / dt**2 + 4 * zeta * own / dt
+        beta = 1 / (mass * stiff)
+    for k in range(1, slide.size):
+        t = k * dt
+        if model.rig is None:
+            free = scene.slide.amplitude * np.sin(omega * t)
+        else:  # average acceleration: z'' = 4 (z - z0)/dt^2 - 4 v0/dt - a0
+            z, v, a = state
+            push = -scene.drive.acceleration * np.sin(omega * t)
+            free = (push + 4 * z / dt**2 + 4 * v / dt + a + 2 * zeta * own * (2 * z / dt + v)) / stiff
+        new, there = settled(bonds, limit, c + beta, free, dt, 2 * s - before)
+        before, s = s, new
+        bonds.weight(s, dt, keep=True)
+        force[k] = there.sum()
+        slide[k] = free - beta * force[k]
+        slip[k] = (limit @ s - f.bond_length * force[k]) / limit.sum()
+        if model.rig is not None:
+            z1 = slide[k]
+            a1 = 4 * (z1 - z) / dt**2 - 4 * v / dt - a
+            state = np.array([z1, v + dt / 2 * (a + a1), a1])
+    work = np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(slide))])
+    last = slice(-steps - 1, None)
+    return {"loop_area": work[-1] - work[-steps - 1], "friction_force_peak": np.abs(force[last if beta else slice(None)]).max(),
+            "friction_ratio_end": force[-1] / area.sum(), "friction_work": work[-1],
+            "slip_amplitude": np.ptp(slip[last]) / 2, "relative_displacement_amplitude": np.ptp(slide[last]) / 2}
+
+
+def misses(kind: str, seed: int) -> tuple:
+    """(distance of each measure of a random scene from the sum by hand, extrapolated from two step lengths, over its
+    bar and what these differ by; energy balance)."""
+    scene = scene_of(kind, seed)
+    found = runs.run(pf.plan(scene)).measures
+    rough, fine = by_hand(scene, 300), by_hand(scene, 600)
+    out = {}
+    for name in COMPARED[kind]:
+        if found[name].value is None or found[name].error is None:
+            continue
+        own = abs(fine[name] - rough[name])
+        out[name] = max(abs(found[name].value - fine[name]) - own, 0.0) / max(found[name].error, 1e-3 * found[name].floor), \
+            found[name].value, found[name].error, fine[name], own
+    return out, found["energy_balance"].value
+
+
+def main(kind: str, first: int, count: int) -> None:
+    every, whole = defaultdict(list), []
+    for seed in range(first, first + count):
+        try:
+            found, balance = misses(kind, seed)
+        except pf.PatchfemError as error:
+            print(seed, "ended:", error, flush=True)
+            whole.append(False)
+            continue
+        whole.append(all(one[0] <= 1 for one in found.values()))
+        for name, one in found.items():
+            every[name].append(one[0])
+        print(seed, "inside" if whole[-1] else "OUT", f"balance {balance:.1e}",
+              {name: " ".join(f"{x:.5g}" for x in one) for name, one in found.items() if one[0] > 1}, flush=True)
+    all_ = np.concatenate(list(every.values()))
+    print(f"{all_.size} bars, {np.sum(all_ <= 1)} hold, worst {all_.max():.3g}; all of them in {sum(whole)} of {count}")
+    for name, one in every.items():
+        print(f"  {name} {np.sum(np.array(one) <= 1)} of {len(one)}, median {np.median(one):.2f}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
