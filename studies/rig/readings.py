@@ -1,31 +1,72 @@
-"""What does the printed law change on the rig, against its passive reading?
+"""What does the printed law change on the rig, against its passive reading, on rigid and on elastic pieces?
 
-Over 20 cycles at 143 Hz and 5 g with a rigid slide the printed law holds the block tighter: amplitude 11.69 ± 0.06 um
-against 14.69 ± 0.06 um, loop area 1.69 ± 0.01 mJ against 2.195 ± 0.008 mJ. At a reversal the printed direction u/|u|
-flips bond by bond, which makes the interface stiffer than mu_s N/eps_0.
+It holds the block tighter on both: behind elastic pieces the rig at 143 Hz and 5 g moves by 11.949 ± 0.006 um instead
+of 14.803 ± 0.006 um over 200 cycles.
+
+The loop takes 1.5584 ± 0.0009 mJ instead of 1.9615 ± 0.0008 mJ a cycle and the interface as a whole sticks for 15.2 %
+of it instead of 7.0 %. On rigid pieces the amplitudes are 12.985 ± 0.010 and 15.84 ± 0.02 um, the loops 1.7125 and
+2.1231 mJ: the print lowers the amplitude by 18 to 19 %, elastic pieces lower it by 6.5 to 8 %. At a reversal the
+printed direction u/|u| flips bond by bond, which makes the interface stiffer than mu_s N/eps_0. The printed law creates
+6.04 uJ, as much in 20 cycles as in 200: it does so in the first strokes.
 
 Run: python studies/rig/readings.py
 """
 
+import sys
 from pathlib import Path
+from time import process_time
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from drawing import drawing
+
+from patchfem.export.drawing.pictures import BLUE, ORANGE
 from patchfem.runs import run as runner
 from patchfem.scene import scene
 
 HERE = Path(__file__).parent
-NAMES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area")
+NAMES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "stick_fraction",
+         "energy_created", "energy_balance")
+SHEAR = "[contact.shear]"
 
 
-def main() -> dict:
-    """reading -> {measure: (value, error)} after 20 cycles from rest, rigid slide."""
-    out = {}
-    for reading in ("report", "stretch"):
-        found = runner.run(runner.plan(scene.load(HERE / "report.toml", [f"friction.reading={reading}"])))
-        out[reading] = {name: (found.measures[name].value, found.measures[name].error) for name in NAMES}
-        out[reading]["seconds"] = found.seconds["march"]
-    for name in NAMES:
-        print(f"{name:<34}" + "".join(f"{r}: {v[name][0]:.5g} ± {v[name][1]:.1g}   " for r, v in out.items()))
-    print("seconds of the march              " + "".join(f"{r}: {v['seconds']:.3f}   " for r, v in out.items()))
+def solve(reading: str, elastic: bool, cycles: float):
+    """The Result of the rig at 143 Hz and 5 g; elastic: the pieces give way in shear."""
+    text = (HERE / "rig.toml").read_text("utf-8")
+    if not elastic:
+        text = "".join(line for line in text.splitlines(True) if not line.startswith(SHEAR))
+    sets = [f"friction.reading={reading}", f"drive.cycles={cycles}"]
+    return runner.run(runner.plan(scene.loads(text, str(HERE / "rig.toml"), sets)))
+
+
+def picture(found: dict, path: Path) -> Path:
+    """The friction loops of the last cycle, of both readings, on rigid and on elastic pieces."""
+    with drawing(path, (9.6, 4.2), 1, 2, sharey=True, sharex=True) as (figure, axes):
+        for axis, elastic in zip(axes, (False, True)):
+            for reading, colour, words in (("stretch", BLUE, "stretch kept apart from damage"),
+                                           ("report", ORANGE, "as printed")):
+                w = found[reading, elastic][0]
+                last = w.time >= w.time[-1] - 1 / 143 - 1e-9
+                axis.plot(1e6 * w.slide[last], w.force[last], color=colour, label=words)
+            axis.set(xlabel="slide of the holders [µm]", title="elastic pieces" if elastic else "rigid pieces")
+        axes[0].set_ylabel("friction force [N]")
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    return path
+
+
+def main(cycles: float = 200, path: Path | None = HERE / "readings.svg") -> dict:
+    """(reading, elastic) -> {measure: (value, error)} after so many cycles from rest."""
+    found, out = {}, {}
+    for elastic in (False, True):
+        for reading in ("stretch", "report"):
+            begin = process_time()
+            done = solve(reading, elastic, cycles)
+            found[reading, elastic] = done.window, process_time() - begin
+            out[reading, elastic] = {name: (done.measures[name].value, done.measures[name].error) for name in NAMES}
+            print(f"{reading}, {'elastic' if elastic else 'rigid'} pieces, {found[reading, elastic][1]:.1f} CPU s: "
+                  + ", ".join(f"{name} {v:.5g} ± {e or 0:.1g}" for name, (v, e) in out[reading, elastic].items()),
+                  flush=True)
+    if path is not None:
+        picture(found, path)
     return out
 
 

@@ -22,9 +22,10 @@ NOT_BUILT = "not yet built"
 # (text, sets, key, what the message says)
 REFUSED = [
     (RIG, [SHEAR, "contact.strips.count=8"], "contact.strips", "beside [contact.shear]: leave one of them out"),
-    (RIG, [SHEAR, "friction.order=0.5"], "friction.order", "0.5 beside [contact.shear]: use order = 1"),
-    (RIG, [SHEAR, "friction.order=0"], "friction.order", "0 beside [contact.shear]: use order = 1"),
-    (PATCH_BENCH, [SHEAR, *REPORT[:2], "friction.order=2"], "friction.order", "use order = 1; not yet built"),
+    (PATCH_BENCH, [SHEAR, *REPORT[:2], "friction.order=2", "friction.breakaway=0.1"], "friction.breakaway",
+     "beside order = 2 and [contact.shear]: use order = 1; not yet built"),
+    (PATCH_BENCH, [SHEAR, *REPORT[:2], "accuracy.quadrature=merged", "friction.breakaway=0.1"], "accuracy.quadrature",
+     "'merged' beside friction.breakaway and [contact.shear]: use 'recursion' or 'auto'; not yet built"),
     (PATCH_BENCH, [SHEAR, "friction.kinetic=0.2"], "friction.kinetic", "leave kinetic out; not yet built"),
     (RIG, [SHEAR, COULOMB, "friction.kinetic=0.2"], "friction.kinetic", "0.2 below static = 0.3 beside"),
     (PATCH_BENCH, ["contact.crown.radius=1 m", LOWER], "contact.tilt.on", "put all shapes on one piece; not yet"),
@@ -63,22 +64,20 @@ def test_refuses_what_no_run_can_do(text, sets, key, says):
 
 
 def test_refuses_at_the_line_of_the_file():
-    text = RIG.replace("static = 0.3", "static = 0.3\norder = 0.5")
-    text = text.replace("[friction]", "[contact.shear]\n[friction]")
+    text = RIG.replace("[friction]", "[contact.shear]\n[friction]")
     text = text.replace('angle = "0.1 mrad"', 'angle = "0.1 mrad"\non = "lower"')
     text += '[accuracy]\nmethod = "exact"\n'
     assert mistakes(text) == [
         f"a.toml:{line_of(text, 'on =')}: contact.tilt.on: 'lower' beside [contact.shear]: put the shapes on the upper "
         "piece; not yet built",
-        f"a.toml:{line_of(text, 'order')}: friction.order: 0.5 beside [contact.shear]: use order = 1; not yet built",
         f"a.toml:{line_of(text, 'method')}: accuracy.method: no exact solution exists for law 'nonlocal' beside "
         "[contact.shear]; use 'march' or leave method out",
     ]
 
 
 def test_refuses_combinations_beside_the_list_of_keys():
-    found = mistakes(RIG, SHEAR, "friction.order=2", "contact.strips.count=8")
-    assert [message.split(": ")[1] for message in found] == ["friction.order", "contact.strips"]
+    found = mistakes(RIG, SHEAR, LOWER, "contact.strips.count=8")
+    assert sorted(message.split(": ")[1] for message in found) == ["contact.strips", "contact.tilt.on"]
 
 
 def test_refuses_a_rig_in_which_nothing_slides():

@@ -192,8 +192,11 @@ def test_refuses_kinetic_for_laws_with_one_coefficient(law):
                      "kinetic belongs to coulomb, nonlocal and lugre"]  # fmt: skip
 
 
-def test_refuses_report_reading_beside_shear():
-    assert "refused beside [contact.shear]" in only(RIG, "contact.shear={}", "friction.reading=report")
+def test_refuses_first_bonds_that_hold_any_force_beside_shear():
+    assert "of bonds at rest has no bound" in only(RIG, "contact.shear={}", "friction.reading=report",
+                                                   "friction.order=-0.5")
+    sets = ["contact.shear={}", "friction.reading=report", "friction.order=-0.5", "friction.initial_bonds=0"]
+    assert loads(RIG, sets=sets).friction.initial_bonds == 0
     sets = ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.reading=report", "friction.order=-0.5"]
     assert loads(BENCH, sets=sets).friction.order == -0.5
     assert "must be > -1" in only(RIG, "friction.reading=report", "friction.order=-1")

@@ -3,10 +3,10 @@
 `python printed_bars.py bench 7000 24` scores 24 benches from seed 7000 on, `rig` as many rigs that begin at rest.
 
 The sum is plain NumPy, written from 2.10-2.17 without the compiled lists: every node of a mesh for a tenth of the
-tolerance keeps every bond of its own path, one strip a step, each with the midpoint rule and the share of it on either
-side of u = 0; the pieces are the whole compliance, s_i = q - sum_j C_ij F_j(s_j) at the end of each step, by Newton's
-method on all nodes; a mode moves by the trapezoidal rule, which adds beta to every C_ij. Nothing of it averages a force
-over a step, merges bonds, drops modes or reduces points.
+tolerance keeps every bond of its own path, in strips of 0.2 bond lengths, each with the midpoint rule and the share of
+it on either side of u = 0; the pieces are the whole compliance, s_i = q - sum_j C_ij F_j(s_j) at the end of each step,
+by Newton's method on all nodes; a mode moves by the trapezoidal rule, which adds beta to every C_ij. Nothing of it
+averages a force over a step, merges bonds, drops modes or reduces points.
 """
 
 import sys
@@ -22,6 +22,7 @@ from patchfem.runs.patch import ladder as patches
 from patchfem.scene.scene import loads
 
 MOST, FIRST_WIDE = 40.0, 1e-6  # bond lengths: age of a bond that counts; half width of the first bonds
+FINEST, MOST_PARTS = 0.2, 60  # bond lengths of a strip; of a step, whose parts are more where it is longer
 COMPARED = {"bench": ("loop_area", "friction_force_peak", "friction_ratio_end", "friction_work", "slip_amplitude"),
             "rig": ("relative_displacement_amplitude", "loop_area", "friction_force_peak", "friction_work",
                     "slip_amplitude")}
@@ -53,7 +54,8 @@ def scene_of(kind: str, seed: int):
     reading = draw.choice(["report", "report", "report", "stretch"])
     sets = {"friction.static": f"{draw.uniform(0.15, 0.6):.3f}", "friction.bond_length": f"{length:.4g} um",
             "contact.load": f"{10 ** draw.uniform(1.7, 2.7):.4g} N", "friction.reading": reading,
-            "friction.order": draw.choice(["0.0", "0.5", "1.0", "2.0"] if reading == "report" else ["0.5", "1.5", "2.0"]),
+            "friction.order": draw.choice(["0.0", "0.5", "1.0", "2.0"] if reading == "report" else
+                                          ["0.5", "1.5", "2.0"]),
             "friction.initial_bonds": draw.choice(["0.0", "0.5", "1.0"])}
     shape = draw.choice(["crown", "flat", "tilt"])
     if shape == "crown":
@@ -106,14 +108,18 @@ class Bonds:
         moved, norm = np.abs(s - self.at), gamma(self.f.order + 1)
         eps, left, middle = self.grown(moved, dt)
         path, harm = self.path + moved, self.harm + moved / middle
-        low, high = np.vstack([self.low, self.at]), np.vstack([self.high, s])
+        parts = int(np.ceil(moved.max() / (FINEST * e0 * (f.kinetic or f.static) / f.static))) or 1
+        parts = min(parts, MOST_PARTS)
+        ends = self.at + np.arange(parts + 1)[:, None] / parts * (s - self.at)
+        back = 1 - (np.arange(parts)[:, None] + 0.5) / parts  # of the step, from its end to the middle of a part
+        low, high = np.vstack([self.low, ends[:-1]]), np.vstack([self.high, ends[1:]])
         size = np.abs(high - low)
         share = np.divide(s - low, high - low, out=np.full(low.shape, 0.5), where=size > 0)
-        side = np.where(high >= low, 1.0, -1.0) * (2 * np.clip(share, 0, 1) - 1)  # what lies behind less what lies ahead
-        when, hurt = np.vstack([self.when, path - moved / 2]), np.vstack([self.hurt, harm - moved / middle / 2])
-        born = np.vstack([self.born, middle])
-        gone = np.zeros_like(left) + (left if self.f.rest_growth is not None else 1.0)
-        lag = np.vstack([self.lag * gone, middle * np.sqrt(gone)])  # how far a bond's own length is behind, 2.10 from 0
+        side = np.where(high >= low, 1.0, -1.0) * (2 * np.clip(share, 0, 1) - 1)  # what lies behind less that ahead
+        when, hurt = np.vstack([self.when, path - back * moved]), np.vstack([self.hurt, harm - back * moved / middle])
+        born = np.vstack([self.born, np.tile(middle, (parts, 1))])
+        gone = np.zeros_like(moved) + left
+        lag = np.vstack([self.lag * gone, middle * gone ** back])  # how far a bond's own length is behind, 2.10 from 0
         age = path - when
         if f.reading == "report":
             own = np.maximum(eps - lag, 1e-9 * eps) if f.rest_growth is not None else e0
@@ -194,9 +200,10 @@ def by_hand(scene, steps: int = 500) -> dict:
             state = np.array([z1, v + dt / 2 * (a + a1), a1])
     work = np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(slide))])
     last = slice(-steps - 1, None)
-    return {"loop_area": work[-1] - work[-steps - 1], "friction_force_peak": np.abs(force[last if beta else slice(None)]).max(),
-            "friction_ratio_end": force[-1] / area.sum(), "friction_work": work[-1],
-            "slip_amplitude": np.ptp(slip[last]) / 2, "relative_displacement_amplitude": np.ptp(slide[last]) / 2}
+    pulled = np.abs(force[last if beta else slice(None)])
+    return {"loop_area": work[-1] - work[-steps - 1], "friction_force_peak": pulled.max(), "friction_work": work[-1],
+            "friction_ratio_end": force[-1] / area.sum(), "slip_amplitude": np.ptp(slip[last]) / 2,
+            "relative_displacement_amplitude": np.ptp(slide[last]) / 2}
 
 
 def misses(kind: str, seed: int) -> tuple:
@@ -209,9 +216,9 @@ def misses(kind: str, seed: int) -> tuple:
     for name in COMPARED[kind]:
         if found[name].value is None or found[name].error is None:
             continue
-        own = abs(fine[name] - rough[name])
-        out[name] = max(abs(found[name].value - fine[name]) - own, 0.0) / max(found[name].error, 1e-3 * found[name].floor), \
-            found[name].value, found[name].error, fine[name], own
+        own, bar = abs(fine[name] - rough[name]), max(found[name].error, 1e-3 * found[name].floor)
+        out[name] = (max(abs(found[name].value - fine[name]) - own, 0.0) / bar, found[name].value, found[name].error,
+                     fine[name], own)
     return out, found["energy_balance"].value
 
 

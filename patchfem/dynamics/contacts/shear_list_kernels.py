@@ -10,7 +10,7 @@ from ...friction.flags_kernels import LEAN
 from . import shear_solve_kernels as solver
 from .list_kernels import booked
 from .shear_kernels import MEAN, SLID
-from .shear_lists_kernels import CALM, PACE, WENT, keep, look_at
+from .shear_lists_kernels import PACE, WENT, begin, keep, look_at
 from .shear_points_kernels import FORCE, SLIDE
 
 FULL = 0  # of `flow`
@@ -19,7 +19,7 @@ FULL = 0  # of `flow`
 @njit(error_model="numpy", **LEAN)
 def solve(free, beta, q, v, dt, c, goal):
     """(dq, path-mean force, iterations) of a step with dq = free - beta force; iterations < 0 when it failed."""
-    c.time[0] = dt
+    begin(dt, c)
     force, count = solver.descend(free, beta, 0, False, c, goal)
     return c.y[0, 0], force, count
 
@@ -27,41 +27,52 @@ def solve(free, beta, q, v, dt, c, goal):
 @njit(error_model="numpy", **LEAN)
 def given(dq, q, v, dt, c, goal):
     """(path-mean force, whether it was found) over a slide increment that is prescribed."""
-    c.time[0], c.y[0, 0] = dt, dq
+    begin(dt, c)
+    c.y[0, 0] = dq
     force, count = solver.descend(dq, 0.0, 0, False, c, goal)
     return force, count >= 0
 
 
 @njit(error_model="numpy", **LEAN)
 def commit(dq, force, q, v0, v1, dt, c):
-    """Move lists and pieces by the solved step: (work that is not stored [J], whether every list had room)."""
-    points, lost, fine = c.points, 0.0, True
+    """Move lists and pieces by the solved step: (work that is not stored [J], whether every list had room).
+
+    The lists book by themselves what they dissipate and create.
+    """
+    points, before, fine = c.points, stored(c), True
     c.flow[SLID] += dq
     for j in range(int(c.count[0])):
         look_at(j, c)
-        xi, before = points[SLIDE, j], c.tally[4]
+        xi, energy = points[SLIDE, j], c.tally[4]
         speed = abs(xi) / dt
         fine = list_step(xi, c, speed, speed, dt) and fine
-        lost += booked(points[FORCE, j] * xi, before, c.weight[j], c)
+        booked(points[FORCE, j] * xi, energy, c.weight[j], c)
         keep(j, c)
         points[PACE, j] = max(1.5 * speed - 0.5 * points[WENT, j], 0.0)
         points[WENT, j] = speed
-    for k in range(c.b.size):
-        lost += c.kappa[k] * CALM * (c.y[0, k + 1] - c.last[0, k + 1]) * c.y[0, k + 1]
     solver.went_on(c)
     c.flow[FULL] = 0.0 if fine else 1.0
-    return lost, fine
+    return force * dq - (stored(c) - before), fine
+
+
+@njit(error_model="numpy", **LEAN)
+def stored(c):
+    """Energy [J] in lists and pieces as they stand."""
+    energy = 0.0
+    for k in range(c.b.size):
+        energy += 0.5 * c.kappa[k] * c.b[k] ** 2
+    for j in range(int(c.count[0])):
+        energy += c.weight[j] * (c.tallies[j, 4] - c.tallies[j, 11])
+    return energy
 
 
 @njit(error_model="numpy", **LEAN)
 def state(c, q, v):
     """(force [N], stored energy [J], irreversible slip [m]) of lists and pieces as they stand."""
-    force, energy, total, slip = 0.0, 0.0, 0.0, c.flow[SLID]
+    force, total, slip = 0.0, 0.0, c.flow[SLID]
     for k in range(c.b.size):
-        energy += 0.5 * c.kappa[k] * c.b[k] ** 2
         slip -= c.drag[MEAN, k + 1] * c.b[k]
     for j in range(int(c.count[0])):
         force += c.weight[j] * c.tallies[j, 5]
-        energy += c.weight[j] * (c.tallies[j, 4] - c.tallies[j, 11])
         total += c.weight[j]
-    return force, energy, slip - c.law[2] * force / total if total > 0 else q
+    return force, stored(c), slip - c.law[2] * force / total if total > 0 else q

@@ -1,17 +1,20 @@
 """What points behind shear modes answer to their slides where each is a list of bonds: any order and reading of 2.17.
 
 Every point has a path, a damage and, where bonds grow, a bond length of its own, at its own speed. Its weight is its
-friction limit [N]. Rows of `points` besides SLIDE, FORCE, SLOPE: the speed [m/s] that its bonds grow at in the step, and
-the mean speed of the last one. Twin: `friction.bonds.quadrature.Quadrature`, point by point.
+friction limit [N]. Rows of `points` besides SLIDE, FORCE, SLOPE: the speed [m/s] that its bonds grow at in the step,
+the mean speed of the last one, slide and force of the trial before, nan before the first. Twin:
+`friction.bonds.quadrature.Quadrature`, point by point.
 """
+
+import numpy as np
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from .list_kernels import answer
 from .shear_points_kernels import FORCE, SLIDE, SLOPE
 
-SLACK, FALLS, CALM = 1e4, True, 1 / 16  # sums change their rule of integration with the length of a step, by 1e-8 and less
-PACE, WENT = range(2)  # of `points`
+SLACK, FALLS, CALM = 1e4, True, 1 / 16  # sums change their rule with the length of a step, by 1e-8 and less
+PACE, WENT, TRIED, PULLED = range(4)  # of `points`
 
 __all__ = ["CALM", "FALLS", "FORCE", "SLACK", "SLIDE", "SLOPE", "respond"]
 
@@ -34,13 +37,26 @@ def keep(j, c):
         c.tallies[j, i] = c.tally[i]
 
 
+@njit(error_model="numpy", **LEAN)
+def begin(dt, c):
+    """Begin the solve of a step of dt [s]."""
+    c.time[0] = dt
+    for j in range(c.points.shape[1]):
+        c.points[TRIED, j] = np.nan
+
+
 @njit(error_model="numpy", forceinline=False, **LEAN)  # else that of its caller goes on to all that it calls
 def respond(kind, ending, c):
     """Write path-mean force [N] and slope [N/m] of every point at its slide; returns the friction force [N]."""
     points, dt, force = c.points, c.time[0], 0.0
     for j in range(int(c.count[0])):
         look_at(j, c)
-        f, s = answer(points[SLIDE, j], c, points[PACE, j], dt)
+        xi = points[SLIDE, j]
+        f, s = answer(xi, c, points[PACE, j], dt)
+        if xi != points[TRIED, j]:  # many bonds at one place: a mean that ends among them is steeper than s tells
+            steep = (f - points[PULLED, j]) / (xi - points[TRIED, j])
+            s = steep if steep > s else s
+        points[TRIED, j], points[PULLED, j] = xi, f
         points[FORCE, j], points[SLOPE, j] = c.weight[j] * f, c.weight[j] * s
         force += points[FORCE, j]
     return force

@@ -24,7 +24,9 @@ from . import shear_points_kernels as law
 FORCE, SLIDE, SLOPE = law.FORCE, law.SLIDE, law.SLOPE
 GRADIENT, STEP, TRIAL = range(3)
 NEAR = 4e-6  # half its square is below the goal of a march, 1e-11
-SLACK, FALLS, CALM = law.SLACK, law.FALLS, law.CALM  # times the goal: a residual that round-off keeps from falling further is taken below it
+SLACK = law.SLACK  # times the goal: a residual that round-off keeps from falling further is taken below it
+FALLS, CALM = law.FALLS, law.CALM
+MOST = 1000 if FALLS else 200  # iterations: points that turn to and fro about one place take up to 100
 
 
 @njit(error_model="numpy", forceinline=True, **LEAN)
@@ -147,7 +149,7 @@ def descend(free, beta, kind, ending, c, goal):
     size, least, fall, force, stale, stall = np.inf, np.inf, 0.0, 0.0, True, 0
     for i in range(y.size):
         p[i] = 0.0
-    for count in range(200):  # the first is the guess itself: one place of the gradient in the code, of two that run it
+    for count in range(MOST):  # the first is the guess: one place of the gradient in the code, of two that run it
         if count > 0:
             if c.ready[which] == 0.0:
                 hessian(beta, ending, c, hess)
@@ -193,7 +195,7 @@ def descend(free, beta, kind, ending, c, goal):
             if stall >= 4 and new <= SLACK * goal:
                 return force, count
         size, least = new, min(least, new)
-    return force, -200
+    return force, -MOST
 
 
 @njit(error_model="numpy", forceinline=True, **LEAN)

@@ -16,8 +16,8 @@ CURE = "loosen accuracy.tail or accuracy.merge, or use reading = \"stretch\" wit
 
 
 class Kept(NamedTuple):
-    """Copies of arrays: the entries in use of every list of bonds, the other fields of its contact by name, and more that
-    belong to the run."""
+    """Copies of arrays: the entries in use of every list of bonds, the other fields of their contact by name, and more
+    that belong to the run."""
 
     entries: list
     fields: dict

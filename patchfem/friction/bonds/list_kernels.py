@@ -45,6 +45,7 @@ SLIGHT = 1e-9  # share of the limit that a step's bonds may miss for strips that
 # fourth power of their number, and once they are grown nothing of it is left
 TOUCH = 1e-6  # of an increment, within which it touches the place of the first bonds
 LEAST_BALANCED = 1e-3  # increment in bond lengths below which a difference of energies is no better than the force
+LEAST_WIDE = 1e-6  # the same behind shear, where a solve does not find a step that ends at a change of the rule
 
 
 @njit(error_model="numpy", **LEAN)
@@ -177,10 +178,10 @@ def list_mean(dq, c, v0, dt):
 
     Stretch reading of order 1: closed. Of another order: what damage takes, the share dR/eps of the stored energy, and
     the gain of that energy, so that no step creates any (twin: `quadrature.Quadrature.step`). Printed law: the mean of
-    the force, that of the first bonds closed. Other integrals by Simpson's rule where the increment is short (its first value is known), by five Gauss points
-    up to half a bond length, beyond it by such panels that double. In the stretch reading an increment that touches the
-    place of the first bonds takes Gauss points as well: their force may jump there, and its value at the place itself
-    is that of neither side.
+    the force, that of the first bonds closed. Other integrals by Simpson's rule where the increment is short (its first
+    value is known), by five Gauss points up to half a bond length, beyond it by such panels that double. In the stretch
+    reading an increment that touches the place of the first bonds takes Gauss points as well: their force may jump
+    there, and its value at the place itself is that of neither side.
     """
     tally, now, law = c.tally, c.now, c.law
     if dq == 0:
@@ -190,9 +191,11 @@ def list_mean(dq, c, v0, dt):
     size = abs(dq) / now[4]
     low, high = min(now[0], now[0] + dq), max(now[0], now[0] + dq)
     touched = low <= TOUCH * abs(dq) and high >= -TOUCH * abs(dq)
-    short = tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0 and not (touched and law[1] < SHARES)
+    touched = (touched and law[1] < SHARES) or (law[7] > 0 and law[0] < 1)  # there no change of the rule either
+    least = LEAST_BALANCED if law[7] == 0 else LEAST_WIDE
+    short = tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0 and not touched
     kinked = low <= 0.0 <= high and law[3] > 0 and law[0] < 1  # the force of the first bonds turns within the increment
-    if law[1] == POWER and (size > LEAST_BALANCED or kinked):
+    if law[1] == POWER and (size > least or kinked):
         gain = list_energy(dq, c, v0, dt) - tally[4]
         middle = _after(dq, now, c.growth, v0, v0, dt)[5]
         spent = _path_mean(True, short, gain + tally[4], dq, c, v0, dt)

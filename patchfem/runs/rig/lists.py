@@ -30,6 +30,7 @@ FAST = 2.0  # D from which a block is held fast: 0.6 and more strips per step, a
 TURNING = 0.1  # strokes per step from which they are those of the steps
 MOST_CROWDED = 500  # strips of its list, about one per step, from which steps are not halved again: four times the cost
 MOVES, MOST_HALVINGS = 1e-3, 2  # bond lengths of slip from which a block moves; of the steps that were seen: 0 to 3
+SHEARED = 256.0  # lists of a patch behind shear, times the passes that Newton's method makes more than secants
 MOST_SWING = 2.0  # radians of the block on its bonds in a step
 
 
@@ -131,7 +132,9 @@ def limp(model: Model) -> bool:
 
 def lists_grow(model: Model) -> bool:
     """Whether a law without stiffness holds the block at some time of the run, so that its list grows with every
-    step."""
+    step. Pieces that give way in shear have a stiffness, and the lists of their points are merged."""
+    if model.soft:
+        return False
     most = held_by_bonds(model, gentlest(model.rig))
     return most > 0 and most >= least_held(model)
 
@@ -238,7 +241,8 @@ def list_cost(model: Model, numerics: Numerics) -> tuple:
         found = _summed_by(model, numerics, _stretch(model, 1.0), found.engine)
     steps = numerics.cycles * numerics.steps
     strips = min(found.strips, 2 * steps * max(1.0, found.strips)) if found.tail else min(found.strips, 8 * steps)
-    return strips, steps * found.seconds * (strips / found.strips if found.strips else 1.0)
+    lists = SHEARED if model.soft else 1.0
+    return strips, lists * steps * found.seconds * (strips / found.strips if found.strips else 1.0)
 
 
 def refuse_unresolved(model: Model, numerics: Numerics) -> None:
@@ -261,7 +265,8 @@ def refuse_long_list(model: Model, numerics: Numerics, limit: float = LONGEST) -
     f = model.friction
     if f is None or not has(f.law, "bonds") or quadrature_of(model, numerics).engine == "recursion":
         return
-    refuse_unresolved(model, numerics)
+    if not model.soft:
+        refuse_unresolved(model, numerics)
     entries, seconds = bonds_cost(model, numerics)
     if seconds > limit:
         raise Missing(f"the bond list (about {entries:.0f} entries) would take about {seconds:.0f} s, "

@@ -61,7 +61,9 @@ scene gives; the friction's own heat does not warm it.
 
 **Partial slip.** At constant load and tilt its elements are exact for alike pieces; under a load that changes the
 shear compliance is a set of modes, chosen by the tolerance. With unlike sections the shear's own change of the
-pressure is left out.
+pressure is left out. Where friction falls as a point slides on (bonds that weaken, equation 2.17 as printed) points and
+pieces may balance in more than one way; the pieces have no mass, so a run goes to the balance that lies downhill of
+where its last steps lead, and what is lost on the way counts as dissipated.
 
 **Modes.** The rig is linear between its joints but for `[structure.stiffening]` and an interlocking bonded spring.
 Damping is viscous; hysteretic damping of a file is taken as viscous. A complex mode is turned to its real part.

@@ -1,0 +1,122 @@
+"""Lists of bonds behind shear modes, one a point: 2.17 of any order and reading where the patch slips part by part."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from printed_bars import Bonds as BondsByHand
+from printed_bars import settled
+from scipy.optimize import brentq
+from scipy.special import gammainc
+
+from patchfem.dynamics.march.models import list_model, lists_model, load_kernels
+from patchfem.friction.bonds.parameters import Bonds
+
+LIMIT = np.array([0.7, 1.3, 2.0, 0.4])
+RIGID = SimpleNamespace(shape=np.zeros((4, 0)), stiffness=np.zeros(0), points=np.arange(4))
+PRINTED = [("report", 0.0), ("report", 0.5), ("report", 1.0), ("report", 2.0), ("stretch", 0.0), ("stretch", 0.5),
+           ("stretch", 1.0), ("stretch", 2.0)]
+
+
+def follow(model, path, dt=1e-3):
+    """(forces (k, 3), energies (k, 2), failed steps, contact) of a model along a path."""
+    contact, energies, forces = model.build(), np.zeros((path.size, 2)), np.zeros((path.size, 3))
+    bad = load_kernels().follow_path(path, dt, model.kind, contact, 1e-11 * model.limit, energies, forces)
+    return forces, energies, bad, contact
+
+
+def spring(stiffness: float):
+    """One point behind one spring [N/m]."""
+    return SimpleNamespace(shape=np.ones((1, 1)), stiffness=np.array([stiffness]), points=np.arange(1))
+
+
+def turning(steps: int) -> np.ndarray:
+    """A path that turns five times at other places each [m]."""
+    t = np.linspace(0, 1, steps + 1)
+    return 3e-6 * np.sin(2 * np.pi * 2.5 * t) * (0.4 + t)
+
+
+@pytest.mark.parametrize(("reading", "order"), PRINTED)
+def test_exact_points_of_rigid_pieces_are_one_list(reading, order):
+    law, path = Bonds(0.4, 1e-6, order, reading), turning(80)
+    one = follow(list_model(law, LIMIT.sum(), 25.0, 0.02), path)[0]
+    model = lists_model(law, LIMIT, np.ones(4), RIGID, 25.0, 0.02)
+    forces, _, bad, _ = follow(model, path)
+    away = np.abs(path) > 1e-8  # of the place of the first bonds, which have a width behind shear
+    assert bad == 0 and np.allclose(forces[away, 0], one[away, 0], rtol=0, atol=2e-5 * LIMIT.sum())
+
+
+@pytest.mark.parametrize(("order", "virgin"), [(0.0, lambda x: 1.0), (1.0, lambda x: gammainc(1, x)),
+                                              (2.0, lambda x: gammainc(2, x)), (0.5, lambda x: gammainc(0.5, x))])
+def test_exact_a_point_behind_a_spring_is_loaded_by_the_virgin_curve(order, virgin):
+    """With full first bonds the print is P(p, s/eps), by P(p + 1, x) + x^p exp(-x)/Gamma(p + 1) = P(p, x); p = 0 is
+    Coulomb's law. The holder's slide is s + force/stiffness; to the second order of the step."""
+    law, stiffness, path = Bonds(0.4, 1e-6, order, "report"), 3e6, np.linspace(0, 4e-6, 1601)
+    forces, _, bad, _ = follow(lists_model(law, [2.0], [1.0], spring(stiffness), 745.0, 0.0), path)
+
+    def force(q):
+        if order == 0.0:
+            return min(stiffness * q, 2.0)
+        s = brentq(lambda s: s + 2.0 * virgin(s / 1e-6) / stiffness - q, 0, q, xtol=1e-18)
+        return 2.0 * virgin(s / 1e-6)
+
+    late = np.arange(400, 1601, 100)
+    assert bad == 0
+    assert np.allclose(forces[late, 0], [force(path[k]) for k in late], rtol=0, atol=1e-4 if order == 0.5 else 2e-6)
+
+
+@pytest.mark.parametrize("grows", [False, True])
+@pytest.mark.parametrize(("reading", "order"), PRINTED)
+def test_exact_the_ledger_closes(reading, order, grows):
+    """Work of the holder = gain of the store + what is not stored, over reversals and coarse steps; the stretch reading
+    creates nothing beyond the round-off of its store."""
+    more = {"ratio": 0.7, "rest_growth": 0.05, "slip_growth": 3e-7, "rest_speed": 1e-4} if grows else {}
+    law, path = Bonds(0.4, 1e-6, order, reading, **more), turning(160)
+    draw = np.random.default_rng(3)
+    shape = SimpleNamespace(shape=draw.normal(size=(4, 3)) / np.sqrt(LIMIT)[:, None], stiffness=np.array(
+        [1e6, 3e6, 1e7]), points=np.arange(4))
+    forces, energies, bad, contact = follow(lists_model(law, LIMIT, np.ones(4), shape, 25.0, 0.02), path)
+    work = np.cumsum(forces[:-1, 1] * np.diff(path))
+    lost = np.cumsum(energies[:-1, 0])
+    assert bad == 0
+    assert np.abs(work - lost - energies[1:, 1]).max() < 1e-12 * np.abs(np.diff(work)).sum()
+    made = contact.tallies[:, 6].sum()
+    assert made < 1e-6 * contact.tallies[:, 7].sum() if reading == "stretch" else made >= 0
+
+
+@pytest.mark.parametrize(("reading", "order", "grows"), [("report", 1.0, False), ("report", 1.0, True),
+                                                        ("report", 0.5, True), ("stretch", 2.0, True)])
+def test_always_points_follow_the_sum_by_hand(reading, order, grows):
+    """Every bond kept and summed in NumPy at the end of each step, behind a whole compliance of five points."""
+    more = {"ratio": 0.8, "rest_growth": 0.1, "slip_growth": 3e-7, "rest_speed": 1e-3} if grows else {}
+    law, draw = Bonds(0.4, 1e-6, order, reading, initial=0.5, **more), np.random.default_rng(8)
+    limit, root = draw.uniform(0.5, 2, 5), draw.normal(size=(5, 5))
+    c = 2e-8 * (root @ root.T + np.eye(5))
+    values, vectors = np.linalg.eigh(np.sqrt(limit)[:, None] * c * np.sqrt(limit))
+    modes = SimpleNamespace(shape=vectors / np.sqrt(limit)[:, None], stiffness=1 / values, points=np.arange(5))
+    steps = 900
+    path, dt = turning(steps), 0.05 / steps
+    model = lists_model(law, limit, np.ones(5), modes, 40.0, 0.01)
+    forces, _, bad, _ = follow(model, path, dt)
+    keys = SimpleNamespace(static=law.static, kinetic=law.static * law.ratio, order=order, reading=reading,
+                           bond_length=law.length, rest_growth=law.rest_growth, slip_growth=law.slip_growth,
+                           initial_bonds=law.initial)
+    bonds, s, before, found = BondsByHand(keys, 5, law.rest_speed), np.zeros(5), np.zeros(5), [0.0]
+    for q in path[1:]:
+        new, force = settled(bonds, limit, c, q, dt, 2 * s - before)
+        before, s = s, new
+        bonds.weight(s, dt, keep=True)
+        found.append(force.sum())
+    assert bad == 0 and np.abs(forces[:, 0] - found).mean() < 3e-4 * limit.sum()
+
+
+def test_always_a_step_has_the_balance_downhill_where_bonds_weaken():
+    """A point whose bonds lose nine tenths of their length behind a soft spring jumps: the run goes on, the ledger
+    closes, and what the jump loses is dissipated, not created."""
+    law = Bonds(0.4, 1e-6, 1.0, "stretch", 0.1, 1e-3, 1e-7, 1e-6, 1.0)
+    path = np.linspace(0, 6e-6, 301)
+    model = lists_model(law, [2.0], [1.0], spring(2e5), 30.0, 0.01)
+    forces, energies, bad, contact = follow(model, path, 1e-4)
+    work, lost = np.cumsum(forces[:-1, 1] * np.diff(path)), np.cumsum(energies[:-1, 0])
+    assert bad == 0 and np.abs(work - lost - energies[1:, 1]).max() < 1e-12 * work[-1]
+    assert contact.tallies[0, 6] <= 1e-6 * contact.tallies[0, 7]
