@@ -24,8 +24,6 @@ REFUSED = [
     (RIG, [SHEAR, "contact.strips.count=8"], "contact.strips", "beside [contact.shear]: leave one of them out"),
     (PATCH_BENCH, [SHEAR, *REPORT[:2], "friction.order=2", "friction.breakaway=0.1"], "friction.breakaway",
      "beside order = 2 and [contact.shear]: use order = 1; not yet built"),
-    (PATCH_BENCH, [SHEAR, *REPORT[:2], "accuracy.quadrature=merged", "friction.breakaway=0.1"], "accuracy.quadrature",
-     "'merged' beside friction.breakaway and [contact.shear]: use 'recursion' or 'auto'; not yet built"),
     (PATCH_BENCH, [SHEAR, "friction.kinetic=0.2"], "friction.kinetic", "leave kinetic out; not yet built"),
     (RIG, [SHEAR, COULOMB, "friction.kinetic=0.2"], "friction.kinetic", "0.2 below static = 0.3 beside"),
     (PATCH_BENCH, ["contact.crown.radius=1 m", LOWER], "contact.tilt.on", "put all shapes on one piece; not yet"),

@@ -18,7 +18,7 @@ def _quadrature(draft: Draft, kind: str) -> None:
     key, shear = "accuracy.quadrature", contact.gives_way if contact is not None else ""
     if engine == "recursion" and not alone:
         draft.say(key, "'recursion' sums reading 'stretch' with order = 1 alone; use 'auto' or 'merged'")
-    elif engine != "recursion" and shear:
+    elif engine != "recursion" and shear and alone:
         draft.say(key, f"'{engine}' beside {shear}: every point has its own path there; use 'recursion' or 'auto'")
 
 

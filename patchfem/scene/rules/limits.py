@@ -76,12 +76,7 @@ def _quadrature(draft: Draft, kind: str, law: Friction, shear: str) -> None:
     """A list of bonds knows neither an elastic range nor, merged, a pressure that changes as it slides."""
     contact, normal, accuracy = draft.tables.contact, draft.tables.normal, draft.tables.accuracy
     engine = accuracy.quadrature if accuracy is not None else None
-    if engine in (None, "auto", "recursion") or not has(law.law, "bonds"):
-        return
-    if shear:
-        if law.breakaway and law.order == 1:
-            draft.say("accuracy.quadrature", unbuilt(f"'{engine}' beside friction.breakaway and {shear}",
-                                                     "use 'recursion' or 'auto'"))
+    if engine in (None, "auto", "recursion") or not has(law.law, "bonds") or shear:
         return
     lower = contact is not None and any(shape.on == "lower" for shape in contact.shapes.values())
     if kind == "rig" and (lower or law.breakaway) and not listed(law):
