@@ -42,7 +42,8 @@ from ..runs.rig.steady.balance import BalanceFinder
 from ..structure import drives
 
 WAYS = ("balance", "decay", "quasi-static")
-LADDER = (9, 19, 39)  # harmonics that are tried
+LADDER = (9, 19, 39)  # harmonics that are tried, each time with four times the samples of a cycle
+LEFT, MOST = 3.0, 65536  # changes at twice the harmonics that count as the error; samples of a cycle
 DECADE = 8  # amplitudes a decade, unless given
 LOW, HIGH = 1e-2, 15.0  # their ends over the slide at which all of the contact slips
 MICRO, GROSS = 0.3, 3.0  # shares of that slide, below which the contact is in micro-slip, above which all of it slips
@@ -241,7 +242,7 @@ def _balanced(joint: Joint, amplitudes) -> Curve:
     found, error = _free(group, joint, amplitudes, LADDER[0]), None
     for harmonics in LADDER[1:]:
         better = _free(group, joint, amplitudes, harmonics)
-        error, found = 2 * np.abs(better - found) + ROUND * np.abs(better), better
+        error, found = LEFT * np.abs(better - found) + ROUND * np.abs(better), better
         if (error[:2] <= model.accuracy.tolerance * np.abs(found[:2])).all():
             break
     error += _in_space(joint, lambda laws: _free(laws, joint, amplitudes, LADDER[0]))
@@ -330,8 +331,8 @@ def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
     omega, shape = held_mode(modes, group.rows, group.stiffness(), joint.mode)
     reach = abs(float(modes.output @ shape))
     widest = np.abs(group.rows @ shape) * amplitudes[-1] / reach
-    equations = FreeBalance(balance_of(modes, group, group.samples or group.samples_for(harmonics, widest)), joint.mode,
-                            harmonics, omega)
+    samples = (group.samples or group.samples_for(harmonics, widest)) * (harmonics // LADDER[0])**2
+    equations = FreeBalance(balance_of(modes, group, min(samples, MOST)), joint.mode, harmonics, omega)
     balance = equations.balance
     y = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
     y[:, 1] = balance.faces @ shape

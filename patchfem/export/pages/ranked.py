@@ -5,6 +5,7 @@ from html import escape
 import numpy as np
 
 from ...campaigns.sweeps.ranking import ranking
+from ...core import Outcome
 from ...scales import fitting, plain, short
 from ..written import label
 from . import document
@@ -25,7 +26,8 @@ def told(table: dict, trusted: dict, settled: bool = True) -> tuple:
     has."""
     ranks, found, of = ranks_of(table), quantiles(table, trusted), len(table["outcome"])
     left = of - int(np.sum(trusted[next(iter(ranks))])) if ranks else 0
-    return ranks, sentence(ranks, left), found, scatter(found, of, settled)
+    moves = not settled or Outcome.TRANSIENT.value in list(table["outcome"])
+    return ranks, sentence(ranks, left, moves), found, scatter(found, of, settled and moves)
 
 
 def ranks_of(table: dict) -> dict:
@@ -40,9 +42,9 @@ def ranks_of(table: dict) -> dict:
     return table["ranks"]
 
 
-def sentence(ranks: dict, left: int = 0) -> str:
-    """Which keys matter how much for the first measure that is ranked, "" where none is; left: cases that have not
-    settled within the tolerance, which count as they ended."""
+def sentence(ranks: dict, left: int = 0, moves: bool = True) -> str:
+    """Which keys matter how much for the first measure that is ranked, "" where none is; left: cases that miss the
+    tolerance, or whose motion has not settled, where any `moves` on: they count as they ended."""
     name = next(iter(ranks), None)
     if name is None:
         return ""
@@ -51,7 +53,8 @@ def sentence(ranks: dict, left: int = 0) -> str:
     said += [f"then on {one.key} ({percent(one)})" for one in others[:NAMED - 1]]
     if len(others) >= NAMED:
         said.append(f"least on {others[-1].key} ({percent(others[-1])})")
-    ended = f"; {left} cases that have not settled count as they ended" if left else ""
+    why = "have not settled count as they ended" if moves else "miss the tolerance count with their values"
+    ended = f"; {left} cases that {why}" if left else ""
     return f"{label(name).capitalize()} {', '.join(said)}{ended}."
 
 

@@ -7,6 +7,7 @@ import pytest
 from command_line import cli
 from scene_texts import COULOMB, POINT, SHORT
 
+from patchfem.campaigns.sweeps.ranking import Share
 from patchfem.export.pages import peaks, ranked
 from patchfem.export.pages.lead import lead_of
 from patchfem.export.sweeps.page import read_table
@@ -113,3 +114,10 @@ def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
     assert lead.sentences()[0] == f"1 of {count} cases have no answer yet; what follows is of the others. {said}"
     assert lead.answer().startswith(lead.left) and "settled" not in lead.scatter
     assert lead_of(table | {"outcome": ["failed"] * count}).left == ""
+
+
+def test_static_cases_are_not_said_to_move():
+    """Of patches that only miss the tolerance nothing has to settle."""
+    ranks = {"pressure_peak": [Share("contact.load", 0.8, 0.9, 0.8, 1.0)]}
+    assert ranked.sentence(ranks, 3, False).endswith("; 3 cases that miss the tolerance count with their values.")
+    assert ranked.sentence(ranks, 3).endswith("; 3 cases that have not settled count as they ended.")
