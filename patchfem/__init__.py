@@ -36,6 +36,7 @@ and a module that is taken as a whole, as in `from .contact import unilateral`, 
 """
 
 import sys
+from importlib import import_module
 from types import ModuleType
 
 from .later import modules_of
@@ -77,6 +78,7 @@ __version__ = "0.4.0"
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
            "SceneError", "backbone", "build", "compare", "cost", "demo", "export", "fit", "load", "mesh", "new", "plan",
            "plot", "profile", "report", "run", "run_many", "sweep", "view"]
+_FOLDERS = ("export", "mesh")  # that are verbs too
 _later = modules_of(__name__, __path__)
 
 
@@ -84,8 +86,8 @@ def __getattr__(name: str):
     if name not in __all__:
         return _later(name)
     api = _later("api")
-    globals().update({each: getattr(api, each) for each in __all__})
-    return globals()[name]
+    globals().update({each: getattr(api, each) for each in __all__ if each not in _FOLDERS})
+    return globals()[name] if name not in _FOLDERS else import_module(f"{__name__}.{name}")
 
 
 def __dir__() -> list:
@@ -100,10 +102,10 @@ class _Folder(ModuleType):
 
 
 class _Package(ModuleType):
-    """This package, in which a folder that is imported takes the place of the verb of its name."""
+    """This package, whose folders of these names can be called."""
 
     def __setattr__(self, name: str, value) -> None:
-        if name in __all__ and isinstance(value, ModuleType):
+        if name in _FOLDERS:
             value.__class__ = _Folder
         super().__setattr__(name, value)
 

@@ -180,7 +180,7 @@ def gain(computed, reading: str, values) -> float | None:
     where it is none of them."""
     if computed.free_gain is not None:
         return rounded(float(values[computed.free_gain]), 6)
-    return rounded(computed.gain, 6) if reading == STUCK else None
+    return rounded(computed.gains[0], 6) if reading == STUCK else None
 
 
 def bootstrap(cells, logs, seen) -> dict:

@@ -77,7 +77,7 @@ def rig(cycles=60.0, title="a title", effects=("contact", "contact.coating", "st
         "window": {"time": late, "displacement": 1.4808e-5 * end, "acceleration": 50 * end, "base": 49 * end},
         "loop": {"slide": 1.4808e-5 * end, "force": 30 * np.cos(2 * np.pi * late / PERIOD), "time": late,
                  "period": PERIOD},
-        "measured": {"rows": rows, "frequency": 143.0, "gain": 1.0, "input": 5 * G_N}}
+        "measured": {"rows": rows, "frequency": 143.0, "gains": (1.0, 1.0), "input": 5 * G_N}}
 
 
 def bench() -> dict:

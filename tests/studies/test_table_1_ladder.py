@@ -71,7 +71,7 @@ def test_exact_the_gain_of_a_fold_comes_from_its_own_readings(fitting):
     assert gains.pop("without 143") == pytest.approx(1.25, rel=1e-12)
     assert list(gains.values()) == pytest.approx([9.9 / 8] * 5, rel=1e-12)
     seen = fitting.training(cells, "without 143")
-    assert fitting.computed_for("second path", fitting.STUCK, cells, seen).gain == pytest.approx(1.25, rel=1e-12)
+    assert fitting.computed_for("second path", fitting.STUCK, cells, seen).gains[0] == pytest.approx(1.25, rel=1e-12)
 
 
 def test_exact_rods_are_the_two_masses_that_they_stand_for(fitting):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from math import prod
 from pathlib import Path
 from tempfile import TemporaryFile
+from weakref import finalize
 
 import numpy as np
 
@@ -18,9 +19,11 @@ class OnDisk:
     """An array of floats in a file, which fills memory only while it is looked at: what is taken of it is mapped, and
     let go of with it."""
 
-    def __init__(self, file, shape: tuple):
-        self.file, self.shape = file, shape
+    def __init__(self, file, shape: tuple, whole: OnDisk | None = None):
+        self.file, self.shape, self.whole = file, shape, whole  # the file is closed with the array that it was made for
         self.file.truncate(8 * self.size)
+        if whole is None:
+            finalize(self, file.close)
 
     @property
     def size(self) -> int:
@@ -42,7 +45,7 @@ class OnDisk:
 
     def reshape(self, shape: tuple) -> OnDisk:
         """The same numbers in another shape."""
-        return OnDisk(self.file, tuple(shape))
+        return OnDisk(self.file, tuple(shape), self)
 
 
 @dataclass(eq=False, slots=True)
