@@ -38,6 +38,8 @@ import patchfem.__main__
 
 ask = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), getattr(signal, name)))
 for name in "SIGTERM", "SIGINT", "SIGHUP":
+    if signal.getsignal(getattr(signal, name)) is signal.SIG_IGN:
+        continue
     try:
         ask()
         for _ in range(100):

@@ -145,6 +145,7 @@ def test_runaways_the_sentence(tmp_path, capsys):
     assert ways.ANSWER in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_always_a_held_block_turns_about_one_point_and_not_on_a_patch():
     engaged = study("report/engaged.py")
     for mode, touches in engaged.CASES.items():

@@ -152,6 +152,7 @@ def test_always_what_misses_its_tolerance_is_exact(monkeypatch):
     assert all(one["engine"] == "exact" for one in many.answers(cases).numerics.values())
 
 
+@pytest.mark.slow
 def test_always_a_peak_of_force_that_lasts_as_long_as_the_slide_turns_is_within_both_bars():
     """LuGre near its break-away: by 128 steps a cycle, as by 64, the peak of the force was missed by 32 bars."""
     cases = models("lugre", 32003, 106)
