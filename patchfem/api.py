@@ -44,6 +44,7 @@ from .export.sweeps import run as sweep_run
 from .mesh import files as mesh_files
 from .model.model import Model
 from .model.model import build as build_model
+from .runs import joint
 from .runs.many import many, meshes
 from .runs.patch import result as patch_result
 from .runs.plan import Plan
@@ -173,7 +174,7 @@ def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "", amplitudes
     [Hz], `exponent_micro` and `exponent_gross` of the contact's loss, `flutter_amplitude` [m], where they are known;
     `missing`: why a method gave no curve. PatchfemError for a scene without a rig or friction, or no such mode.
     """
-    model = build(scene, **sets)
+    model = joint.freed(build(scene, **sets))
     ways = backbones.WAYS if method == "all" else (method,)
     if unknown := set(ways) - set(backbones.WAYS):
         raise PatchfemError(f"backbone: method {unknown.pop()!r}: one of {', '.join(backbones.WAYS)} or all")

@@ -21,6 +21,7 @@ from ..export import fit as fit_lines
 from ..export import fit_folder, results, wear_fit
 from ..export import fit_rows as written
 from ..model import model
+from ..runs import joint
 from ..scene import axes, ranges
 from ..scene import scene as scenes
 from .shared import (
@@ -83,7 +84,7 @@ def backbone(scene: Path, /, *, mode: word("a mode by its name, such as axial; o
 
     Example: patchfem backbone rig.toml --mode axial --amplitudes "0.1 um..1 mm:25"
     """
-    found = model_of(scene, set_)
+    found = joint.freed(model_of(scene, set_))
     ways = backbones.WAYS if method == ALL else (method,)
     one = backbones.backbone(found, mode, _lengths(amplitudes), ways,
                              None if quiet or json_ else lambda way: say(f"{way} ..."))

@@ -1,8 +1,9 @@
 """From the keys of [friction] to the law object: the record in `effects` names the module of every law."""
 
 from importlib import import_module
+from math import inf
 
-from ..effects import LAWS
+from ..effects import LAWS, has
 
 
 def law_from(friction, load: float = 1.0):
@@ -12,6 +13,19 @@ def law_from(friction, load: float = 1.0):
     `protocol` for what the object can do.
     """
     return import_module(LAWS[friction.law].module).from_keys(friction, load)
+
+
+def held_stiffness(friction, load: float) -> float:
+    """Tangential stiffness [N/m] of a law under a load [N] while nothing slips: infinite where it holds rigidly, 0
+    where it creeps."""
+    if has(friction.law, "creeps"):
+        return 0.0
+    if has(friction.law, "bonds"):
+        return friction.static * load / friction.bond_length
+    if has(friction.law, "averaged"):
+        return inf
+    one = law_from(friction, load).element(load)
+    return one.limit / one.length if one.length else inf
 
 
 def loop_from(friction, load: float, slide: float) -> tuple | None:

@@ -1,6 +1,8 @@
 """The rig that a scene asks for: modes, drive, start, interfaces and springs, built once. Nothing is solved."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -8,7 +10,7 @@ from ..core import ModalBasis, Start
 from ..structure.drive_sizes import decay_rate, omega_of, peak_speed
 from .drive import cycles_of, cycles_per_level, drive_of, levelled
 from .law import interface_laws_of, interface_names
-from .structure import acts, first_of, frequencies, modes_of, notes_of, own_modes, start_of, yaws
+from .structure import acts, first_of, frequencies, modes_of, notes_of, of_a_patch, own_modes, start_of, yaws
 
 BEYOND = 1e3  # m, past which nobody follows a motion that a mode of damping below 0 drives
 NOTHING = 1e-9  # of the largest slide of a mode: one below it is round-off
@@ -28,7 +30,8 @@ class Rig:
     own_frequency [Hz] of the first mode that is not rigid; frequencies (n,) [Hz]; by_modes: the scene lists modes;
     notes: on a structure file; parts (p, n): slide of the first interface in each of the scene's own modes, that first
     one before the others, per coordinate; contact_mass [kg]: modal mass of that mode over slide_1^2, 0 where it leaves
-    the interface at rest.
+    the interface at rest; stuck(stiffness [N/m]) -> the Rig without the joint, of modes that were measured with one
+    that a patch holds, which is not pressed yet; None of any other.
     """
 
     modes: ModalBasis
@@ -57,6 +60,7 @@ class Rig:
     parts: np.ndarray
     contact_mass: float
     onset: tuple = ("distortion", None)
+    stuck: Callable | None = None
 
     @property
     def speed(self) -> float:
@@ -92,9 +96,12 @@ class Rig:
         return self.cubic is not None or self.interlock is not None
 
 
-def rig_asked(scene) -> Rig:
-    """The rig of a scene with [structure] and [drive]; PatchfemError for files or starts that cannot be used."""
-    structure, asked, alone = scene.structure, scene.drive, own_modes(scene)
+def rig_asked(scene, joint: float | None = None) -> Rig:
+    """The rig of a scene with [structure] and [drive]; PatchfemError for files or starts that cannot be used.
+
+    joint: stiffness [N/m] of a pressed patch, taken off modes that were measured with it.
+    """
+    structure, asked, alone = scene.structure, scene.drive, own_modes(scene, joint)
     modes = modes_of(scene, alone)
     drive, bonded = drive_of(scene, modes), structure.bonded
     own, mass = first_of(scene, alone)
@@ -109,7 +116,9 @@ def rig_asked(scene) -> Rig:
                structure.stiffening.cubic if structure.stiffening is not None else None,
                (bonded.stiffness, bonded.wavelength) if bends else None,
                bonded.stiffness if bonded is not None else None, mass, own, frequencies(structure, modes),
-               bool(structure.mode), tuple(notes_of(scene)), *_contact(alone, modes), (asked.onset, asked.onset_length))
+               bool(structure.mode), tuple(notes_of(scene)), *_contact(alone, modes), (asked.onset, asked.onset_length),
+               partial(rig_asked, scene) if structure.measured == "stuck" and joint is None and of_a_patch(scene)
+               else None)
 
 
 def _contact(own: ModalBasis, modes: ModalBasis) -> tuple:

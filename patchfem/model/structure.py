@@ -4,16 +4,18 @@ Where a number is wanted before anything runs (`plan`), the functions here give 
 """
 
 from dataclasses import replace
-from math import pi
+from math import inf, pi
 
 import numpy as np
 
 from ..core import ModalBasis, PatchfemError, Start, frozen_array
-from ..effects import module_of
+from ..effects import has, module_of
+from ..friction import record
 from ..scene.keys.same import once
 from ..structure import masses, starts
 from ..structure.modes import basis
 from . import structure_files
+from .law import interface_laws_of
 
 
 def modes_of(scene, own: ModalBasis | None = None) -> ModalBasis:
@@ -55,8 +57,57 @@ def _over_strips(scene, found: ModalBasis) -> ModalBasis:
     return replace(found, faces=frozen_array(strip_rows(found, offsets)))
 
 
-def own_modes(scene) -> ModalBasis:
-    """Coordinates of [structure] without the bonded spring; of masses the eigenproblem is solved."""
+def own_modes(scene, joint: float | None = None) -> ModalBasis:
+    """Coordinates of [structure] without the bonded spring; of masses the eigenproblem is solved.
+
+    joint: stiffness [N/m] of the contact, taken off modes that were measured with it; left out, that of the laws.
+    """
+    found = _as_given(scene)
+    if scene.structure.measured == "free" or (joint is None and of_a_patch(scene)):
+        return found
+    bonded = scene.structure.bonded
+    held = np.array([joint] if joint is not None else joints(scene))
+    if bonded is not None and held.size:
+        held[0] += bonded.stiffness
+    try:
+        return module_of("structure.bonded").freed(found, held, 0.0 if bonded is None else bonded.damping)
+    except PatchfemError as error:
+        raise PatchfemError(f"{scene.where('structure.measured')}: {error}; give the frequencies of the bolted rig, a "
+                            "softer joint, or leave 'measured' out where they are those without the joint") from None
+
+
+def of_a_patch(scene) -> bool:
+    """Whether the stiffness of the joint is that of a pressed patch, which its laws alone do not tell."""
+    contact = scene.contact
+    return scene.friction is not None and contact is not None and bool(contact.gives_way or contact.load is None)
+
+
+def joints(scene) -> list:
+    """Stiffness [N/m] of every interface while nothing slips, of its law alone; PatchfemError of one that has none."""
+    load = scene.contact.load if scene.contact is not None else scene.normal.load if scene.normal is not None else 0.0
+    out = []
+    for one in interface_laws_of(scene):
+        try:
+            out.append(stiffness_of(one, load if one.load is None else one.load))
+        except PatchfemError as error:
+            raise PatchfemError(f"{scene.where('structure.measured')}: {error}") from None
+    return out
+
+
+def stiffness_of(one, load: float) -> float:
+    """Tangential stiffness [N/m] of an InterfaceLaw under a load [N]; PatchfemError where it has no one stiffness."""
+    f = one.numbers
+    held, curved = record.held_stiffness(f, load), has(f.law, "bonds") and (f.order, f.reading) != (1, "stretch")
+    if 0 < held < inf and not curved:
+        return held
+    why = "holds rigidly" if held == inf else "holds with no one stiffness" if curved else "holds nothing"
+    raise PatchfemError(f"{one.key}: law '{f.law}' {why} here, so its stiffness cannot be taken off the modes; name "
+                        "what gives way ([contact.shear], or a law with a stiffness such as iwan), or give the modes "
+                        "without the joint", "structure.measured")
+
+
+def _as_given(scene) -> ModalBasis:
+    """Coordinates of [structure] as it stands, without the bonded spring."""
     structure, drive = scene.structure, scene.drive
     forced = drive.kind == "force"
     if structure.mode:
@@ -135,7 +186,7 @@ def motions(found: ModalBasis, modal) -> np.ndarray:
 
 def frequencies(structure, modes: ModalBasis) -> np.ndarray:
     """Natural frequencies (n,) [Hz] of the coordinates, bonded spring included, rigid ones 0."""
-    if structure.mode and structure.bonded is None:
+    if structure.mode and structure.bonded is None and structure.measured == "free":
         return np.array([mode.frequency for mode in structure.mode])
     return modes.omega / (2 * pi)
 
@@ -149,8 +200,9 @@ def first_of(scene, found: ModalBasis) -> tuple:
     """
     structure = scene.structure
     if structure.mode:
-        held = [mode.frequency for mode in structure.mode if mode.frequency > 0]
-        return (held[0] if held else 0.0), structure.moving_mass
+        given = [mode.frequency for mode in structure.mode] if structure.measured == "free" else \
+            (found.omega / (2 * pi)).tolist()
+        return next((one for one in given if one > 0), 0.0), structure.moving_mass
     held = np.flatnonzero(found.omega > 0)
     k = held[0] if held.size else 0
     frequency = float(found.omega[k] / (2 * pi)) if held.size else 0.0

@@ -6,11 +6,12 @@ module imports its own entry of this list and the entries before it:
 1. `results`   what every run hands back, with its notes
 2. `patch`     a static patch: its grids, its pressure, its measures with errors
 3. `bench`     a prescribed slide of a patch or a point
-4. `rig`       a driven structure that rubs
-5. `wear`      a patch worn by a bench or a rig over many cycles
-6. `remedies`  the measures that miss the tolerance, and what cures them
-7. `memory`    what a run takes
-8. `plan`      what would run: engine, sizes, cost
-9. `run`      a plan becomes a result
-10. `many`     many models at once
+4. `joint`     a pressed patch taken off modes that were measured with it
+5. `rig`       a driven structure that rubs
+6. `wear`      a patch worn by a bench or a rig over many cycles
+7. `remedies`  the measures that miss the tolerance, and what cures them
+8. `memory`    what a run takes
+9. `plan`      what would run: engine, sizes, cost
+10. `run`      a plan becomes a result
+11. `many`     many models at once
 """

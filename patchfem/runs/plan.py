@@ -1,6 +1,7 @@
 """What a scene would run, before anything runs: engine, sizes, cost, stiffness chain and dimensionless groups."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import inf
 
 from .. import rates
 from ..core import Missing, PatchfemError, say
@@ -93,6 +94,8 @@ def _planned(model: Model, per_point: bool) -> Plan:
     unknowns, chain, groups = {}, {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}, {}
     engine, steps, seconds, more, said = "static", 0, 0.0, 0.0, [[], [], []]
     numerics, pressed = None, 0.0
+    if model.rig is not None and model.rig.stuck is not None:
+        model = replace(model, rig=of_rig.foreseen(model.rig, patch_plan.chain(model.patch) | _link(model)))
     if model.rig is not None:
         unknowns["modes"], chain = len(model.rig.frequencies), of_rig.chain(model.rig) | chain
         groups |= of_rig.groups(model) if model.kind == "rig" else {}
@@ -169,13 +172,8 @@ def _link(model: Model) -> dict:
 def _of_law(f, load: float) -> dict:
     """The link of a law under a load [N]."""
     rigid = "none: it creeps" if has(f.law, "creeps") else "rigid until it slips"
-    if has(f.law, "bonds"):
-        return {"bonds": f.static * load / f.bond_length}
-    if has(f.law, "averaged"):
-        return {"bonds": rigid}
-
-    one = record.law_from(f, load).element(load)
-    return {"bonds": one.limit / one.length if one.length else rigid}
+    held = record.held_stiffness(f, load)
+    return {"bonds": rigid if held == inf or has(f.law, "creeps") else held}
 
 
 def _law_groups(model: Model) -> dict:

@@ -15,7 +15,7 @@ from ..core import Measure, NotConverged, Outcome, PatchfemError
 from ..dynamics import resume
 from ..model.model import Model
 from ..model.source import placed
-from . import memory
+from . import joint, memory
 from .patch import result as patch_result
 from .plan import Plan, plan, refuse_size
 from .remedies import Finding, beyond_tolerance
@@ -64,6 +64,9 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
     if model.patch is not None:
         patch, *coarse = patch_result.solve_all(model.patch, model.accuracy.tolerance, estimate, fresh)
         seconds["contact"] = perf_counter() - begin
+        if model.rig is not None and model.rig.stuck is not None:
+            model = joint.freed(model, patch)
+            what = replace(what, model=model)
         warnings += [*patch_result.strained(model.patch, patch), *patch.notes]
         if estimate and coarse[0] is None:
             fewer = "split the elements of contact.mesh" if model.patch.mesh else "leave out contact.element_size"

@@ -136,6 +136,8 @@ def _lumped(scene: Scene) -> bool:
     structure, drive, law = scene.structure, scene.drive, scene.friction
     if scene.kind != "rig" or scene.contact or scene.wear or not scene.normal or scene.normal.grooves or not law:
         return False
+    if structure.measured != "free":
+        return False
     return bool(structure.mode) and not structure.interface and law.temperature is None and law.spread is None and \
         (drive.kind, drive.waveform, drive.duration) == ("base", "sine", None) and not files_of(scene)
 
@@ -151,6 +153,7 @@ def _pressed(scene: Scene) -> bool:
     law, drive = scene.friction, scene.drive
     return not rig or bool(law and law.temperature is None and law.spread is None and scene.structure.mode
                            and not scene.structure.interface and not scene.structure.bonded
+                           and scene.structure.measured == "free"
                            and drive.duration is None
                            and (drive.kind, drive.waveform) == ("base", "sine"))
 

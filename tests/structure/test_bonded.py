@@ -1,13 +1,15 @@
 """A bonded spring worked into the modes is the same structure as one that had the spring from the start."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.core import ModalBasis
+from patchfem.core import ModalBasis, PatchfemError
 from patchfem.structure import masses
-from patchfem.structure.bonded import bonded
+from patchfem.structure.bonded import bonded, freed
 from patchfem.structure.response import receptance
 
 
@@ -53,3 +55,36 @@ def test_exact_no_spring_changes_nothing():
     np.testing.assert_allclose(found.omega, base.omega, rtol=1e-15)
     np.testing.assert_allclose(np.abs(found.slide), np.abs(base.slide), rtol=1e-15)
     assert found.damping is None
+
+
+@given(st.integers(0, 10**6))
+def test_always_what_a_joint_adds_comes_off_again(seed):
+    """Springs along up to two interfaces and a damper worked into up to four modes, then taken off: the same basis."""
+    rng = np.random.default_rng(seed)
+    n, faces = int(rng.integers(1, 5)), int(rng.integers(1, 3))
+    rows, k, c = rng.uniform(-1, 1, (faces, n)), rng.uniform(0.1, 5, faces), rng.uniform(0, 0.3)
+    omega = np.sort(rng.uniform(1, 4, n))
+    base = ModalBasis(tuple("abcd"[:n]), omega, rng.uniform(0, 0.1, n), rows[0], rng.uniform(-1, 1, n),
+                      rng.uniform(-1, 1, n), 2.0, faces=rows)
+    held = bonded(base, k[0], c)
+    for row, one in zip(held.interfaces[1:], k[1:]):
+        held = replace(bonded(replace(held, faces=row[None]), one), faces=None)
+        held = replace(held, faces=rows @ held.shapes, slide=rows[0] @ held.shapes)
+    found = freed(held, k, c)
+    np.testing.assert_allclose(found.omega, omega, rtol=1e-10)
+    at = np.array([0.3, 1.1, 2.7])
+    np.testing.assert_allclose(receptance(found, at, found.interfaces, found.base),
+                               receptance(base, at, rows, base.base), rtol=1e-8)
+
+
+def test_exact_a_rigid_mode_that_a_joint_held_is_rigid_again():
+    held = bonded(one(omega=0.0, zeta=0.0), 5.0)
+    found = freed(held, [5.0])
+    assert found.omega[0] == 0.0 and freed(one(), [5.0]).shapes is None
+
+
+def test_refuses_a_joint_stiffer_than_the_modes():
+    with pytest.raises(PatchfemError, match=r"holds with 111\.1 % of the stiffness"):
+        freed(one(), [9 * 2 / 0.64 / 0.9])
+    with pytest.raises(PatchfemError, match=r"bonded\.damping is more than the damping"):
+        freed(one(), [5.0], 1.0)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from ...core import BaseSine, PatchfemError
 from ...effects import unbuilt
 from ...model.model import Model, build
+from ...runs import joint
 from ...scene.changed import Base
 from ...scene.scene import Scene, SceneError, loads
 
@@ -76,7 +77,7 @@ class Asked:
     def model(self, values) -> Model:
         """The model with values (n,) of the free keys, at the drive of the scene; SceneError where they make none."""
         try:
-            return build(self.base.changed([self.wanted[k].assigned(values[k]) for k in self.inner]))
+            return joint.freed(build(self.base.changed([self.wanted[k].assigned(values[k]) for k in self.inner])))
         except SceneError as error:
             raise PatchfemError(error.mistakes[0]) from None
 

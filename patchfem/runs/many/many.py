@@ -13,6 +13,7 @@ from ... import compiled
 from ...core import PatchfemError
 from ...model.alike import Alike, some
 from ...model.model import Model
+from .. import joint
 from . import one_by_one
 from .answers import Answers
 
@@ -95,6 +96,7 @@ def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = Non
     errors, where they run one by one (a batch has its errors from the same work); study: cases of the whole that these
     are a part of, 0 where they are all of it.
     """
+    models = models if isinstance(models, Alike) else [_freed(one) for one in models]
     found, groups = Answers.blank(len(models)), {}
     left, study = np.arange(len(models)), study or len(models)
     if keep is None:
@@ -109,6 +111,16 @@ def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = Non
         found.place(cases, _solved(batch, some(models, cases),
                                    partial(one_by_one.solve, keep=_of(keep, cases), estimate=estimate), say))
     return found
+
+
+def _freed(model: Model | PatchfemError) -> Model | PatchfemError:
+    """A model whose modes are those without the joint, or why there is none."""
+    if isinstance(model, PatchfemError) or model.rig is None or model.rig.stuck is None:
+        return model
+    try:
+        return joint.freed(model)
+    except PatchfemError as error:
+        return error
 
 
 def _by_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:

@@ -1,10 +1,12 @@
 """Sizes, cost and groups of a coupled run, before it runs."""
 
+from dataclasses import replace
 from math import inf, pi
 
 import numpy as np
 
 from ... import rates
+from ...core import PatchfemError
 from ...effects import has
 from ...friction.bonds import parameters
 from ...model.model import Model
@@ -32,6 +34,15 @@ def held_stiffness(chain: dict) -> float:
         return 0.0
     soft = sum(1 / link for link in links.values() if not isinstance(link, str) and link > 0)
     return 1 / soft if soft else inf
+
+
+def foreseen(rig, links: dict):
+    """A Rig whose modes were measured with a joint that a patch holds, without it by the links of a chain, until the
+    patch is pressed; as it was where these hold more than the modes have."""
+    try:
+        return replace(rig.stuck(held_stiffness(links)), stuck=rig.stuck)
+    except PatchfemError:
+        return rig
 
 
 def held_mode(modes, rows, stiffness, number: int) -> tuple:

@@ -193,6 +193,8 @@ class Structure(Table):
     moving_mass: key(Mass | None, "modal mass of every mode", "beside modes") = None
     travel: key(Length | None, "stop of the flexure: a motion beyond it ends the run; none unless given") = None
     mode: tuple[Mode, ...] = ()
+    measured: key(Literal["free", "stuck"], "'free': the modes are those without the joint; 'stuck': they were "
+                  "measured with it bolted, as are their dampings, and its stiffness is taken off them") = "free"
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
     masses: key(tuple[Mass, ...] | None, "masses of a rig of springs, in place of modes") = None

@@ -44,6 +44,8 @@ def check_structure(draft: Draft) -> None:
     _masses(draft, structure)
     _file(draft, structure)
     _bonded(draft, structure)
+    if structure.measured == "stuck":
+        _bolted(draft, structure)
     _start(draft, structure)
 
 
@@ -192,6 +194,24 @@ def _bonded(draft: Draft, structure: Any) -> None:
         return
     draft.say("structure.bonded", f"stands beside one contact, but there are {len(structure.interface or ())} "
                                   "interfaces; write a [[structure.spring]] between the same masses")  # fmt: skip
+
+
+def _bolted(draft: Draft, structure: Any) -> None:
+    """Modes that were measured with a joint of one stiffness."""
+    tables, key = draft.tables, "structure.measured"
+    under = tables.contact if tables.contact is not None else tables.normal
+    if tables.friction is None and not structure.interface:
+        draft.say(key, "'stuck' takes the stiffness of the joint off the modes, and this scene has no [friction]")
+    for reason, holds in (("structure.masses: masses and springs are not measured", structure.masses is not None),
+                          ("a spring of structure.bonded.wavelength", structure.bonded is not None
+                           and structure.bonded.wavelength is not None),
+                          ("grooves", under is not None and under.grooves is not None),
+                          ("a load that changes", bool(getattr(tables.normal, "amplitude", None)) or any(
+                              mode.normal or mode.pitch for mode in structure.mode or ())),
+                          ("strips that yaw", any(mode.yaw for mode in structure.mode or ()))):
+        if holds:
+            draft.say(key, f"'stuck' has no one stiffness to take off beside {reason}; give the modes without the "
+                           "joint")
 
 
 def _start(draft: Draft, structure: Any) -> None:

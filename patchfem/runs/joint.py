@@ -1,0 +1,41 @@
+"""The stiffness of a pressed patch taken off the modes of a rig that were measured with it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..effects import has
+from ..friction import record
+from ..model.model import Model
+from ..model.source import placed
+from ..model.structure import stiffness_of
+from .patch import result as patch_result
+from .patch.kept import elements, strip_elements
+
+
+def freed(model: Model, patch=None) -> Model:
+    """The model whose modes are those without the joint; of any other the model as it stands.
+
+    patch: the pressed Patch, pressed here unless given. PatchfemError where the patch holds more than the modes have.
+    """
+    if model.rig is None or model.rig.stuck is None:
+        return model
+    with placed(model.source):
+        if patch is None:
+            patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
+        held = patch_stiffness(model, patch) if patch.pressure.load > 0 else 0.0
+        return replace(model, rig=model.rig.stuck(held))
+
+
+def patch_stiffness(model: Model, patch) -> float:
+    """Tangential stiffness [N/m] of a pressed patch and its law while nothing slips."""
+    f, load = model.friction, patch.pressure.load
+    held = record.held_stiffness(f, load)
+    if not model.soft or (np.isfinite(held) and not has(f.law, "set-valued")):
+        held = stiffness_of(model.rig.interfaces[0], load)
+    if not model.soft:
+        return held
+    length = f.static * load / held  # 0 of a law that holds rigidly
+    if patch.strips is not None:
+        return float(sum(one[0].sum() for one in strip_elements(patch, f.static, length)))
+    return float(elements(patch, f.static, length).stiffness.sum())

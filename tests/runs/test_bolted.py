@@ -1,0 +1,124 @@
+"""Modes that a laboratory measured with the joint bolted: the joint's stiffness comes off them."""
+
+import numpy as np
+import pytest
+from scene_texts import DRIVE, FORCED, PAIR, POINT, friction_of, mistakes
+
+import patchfem as pf
+from patchfem.core import PatchfemError
+from patchfem.runs import joint
+
+MODES = """\
+[structure]
+moving_mass = "0.884 kg"
+%s
+[[structure.mode]]
+name = "axial"
+frequency = "%r Hz"
+damping = 0.003
+slide = %r
+output = %r
+"""
+SECOND = """\
+[[structure.mode]]
+name = "yaw"
+frequency = "%r Hz"
+damping = 0.003
+slide = %r
+output = %r
+base = 0.0
+"""
+SHEARED = """\
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "26 lbf"
+element_size = "0.5 mm"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.crown]
+radius = "1 m"
+[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.3
+"""
+STUCK = 'measured = "stuck"'
+
+
+@pytest.mark.parametrize("law", ["iwan", "bouc-wen", "lugre", "elastic-plastic", "nonlocal"])
+def test_exact_free_then_stuck_then_free(law):
+    """What `plan` says of the held mode, read as measured, gives the free mode that it began with."""
+    before = POINT + friction_of(law)
+    free = pf.plan(before + MODES % ("", 143.0, 0.8, 0.9) + DRIVE).as_json()["modes"][0]
+    stuck = pf.plan(before + MODES % (STUCK, free["stuck_frequency"], 0.8, 0.9) + DRIVE).as_json()["modes"][0]
+    assert stuck["free_frequency"] == pytest.approx(143.0, rel=1e-10) and stuck["name"] == "axial"
+    assert stuck["stuck_frequency"] == pytest.approx(free["stuck_frequency"], rel=1e-12)
+
+
+def test_exact_two_modes_and_a_bonded_spring():
+    """The held shapes of two modes, given as measured, turn back into the free ones; the spring stays where it was."""
+    spring = '[structure.bonded]\nstiffness = "4e5 N/m"\n'
+    tail = POINT + friction_of("iwan") + spring + DRIVE
+    text = tail + MODES % ("", 143.0, 0.8, 0.9) + SECOND % (400.0, 0.5, -0.2)
+    free = pf.build(text).rig.modes
+    rows, k = free.interfaces, 1e7
+    square, shapes = np.linalg.eigh(np.diag(free.omega**2) + k * rows.T @ rows / free.mass)
+    f, slide, output, base = (np.sqrt(square) / (2 * np.pi)).tolist(), (rows[0] @ shapes).tolist(), \
+        (free.output @ shapes).tolist(), (free.base @ shapes).tolist()
+    held = MODES % (STUCK, f[0], slide[0], output[0]) + f"base = {base[0]!r}\n" + (
+        SECOND % (f[1], slide[1], output[1])).replace("base = 0.0", f"base = {base[1]!r}")
+    found = pf.build(tail + held).rig.modes
+    assert found.omega == pytest.approx(free.omega, rel=1e-10)
+    for name in ("slide", "output", "base"):
+        assert np.abs(getattr(found, name)) == pytest.approx(np.abs(getattr(free, name)), rel=1e-9)
+    listed = pf.plan(tail + held).as_json()["modes"]
+    assert [one["stuck_frequency"] for one in listed] == pytest.approx(f, rel=1e-10)
+
+
+def test_exact_several_interfaces_of_a_file(tmp_path):
+    """Matrices of two coordinates with two joints: with both held and taken off as without."""
+    M, K, faces = np.diag([1.0, 2.0]), np.array([[5e5, -2e5], [-2e5, 4e5]]), np.array([[1.0, 0.0], [1.0, -1.0]])
+    joints = np.diag([1e5, 3e5])
+    np.savez(tmp_path / "free.npz", M=M, K=K, C=M * 2.0)
+    np.savez(tmp_path / "stuck.npz", M=M, K=K + faces.T @ joints @ faces, C=M * 2.0)
+    law = ('[[structure.interface]]\nbetween = %s\nload = "50 N"\nlaw = "iwan"\nstatic = 0.3\nstiffness = "%g N/m"\n'
+           'chi = -0.5\nbeta = 0.5\n')
+    both = law % ([1, 0], 1e5) + law % ([1, 2], 3e5) + DRIVE
+    made = [pf.build(pf.load(f'[structure]\nfile = "{(tmp_path / name).as_posix()}"\n{more}\n' + both))
+            for name, more in (("free.npz", ""), ("stuck.npz", STUCK))]
+    assert made[1].rig.modes.omega == pytest.approx(made[0].rig.modes.omega, rel=1e-10)
+    assert made[1].rig.modes.zeta == pytest.approx(made[0].rig.modes.zeta, rel=1e-10)
+
+
+def test_exact_a_patch_is_taken_off_as_it_is_pressed():
+    """The run has the measured frequency when nothing slips, whatever the plan foresaw of the pieces."""
+    asked = pf.build(SHEARED + MODES % (STUCK, 14300.0, 1.0, 1.0) + DRIVE.replace("143", "9000"))
+    model = joint.freed(asked)
+    patch, *_ = joint.patch_result.solve_all(model.patch, 1e-3)
+    held = np.sqrt(model.rig.modes.omega[0]**2 + joint.patch_stiffness(model, patch) / 0.884)
+    assert held / (2 * np.pi) == pytest.approx(14300.0, rel=1e-12)
+    assert pf.run(asked).plan.model.rig.modes.omega[0] == pytest.approx(model.rig.modes.omega[0], rel=1e-12)
+    listed = pf.plan(asked).as_json()["modes"][0]
+    assert listed["free_frequency"] < model.rig.modes.omega[0] / (2 * np.pi) < listed["stuck_frequency"]
+    soft = pf.run_many([asked]).outcome
+    assert "failed" not in [str(one) for one in soft]
+
+
+@pytest.mark.parametrize("text, said", [
+    (POINT + friction_of("iwan") + MODES % (STUCK, 14.0, 1.0, 1.0) + DRIVE, "holds with .* % of the stiffness"),
+    (POINT + friction_of("coulomb") + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE, "law 'coulomb' holds rigidly"),
+    (POINT + friction_of("tanh") + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE, "law 'tanh' holds nothing"),
+    (SHEARED + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE, "holds with .* % of the stiffness")])
+def test_refuses_a_joint_that_cannot_come_off(text, said):
+    with pytest.raises(PatchfemError, match=f"(?s)structure.measured.*{said}"):
+        pf.run(text)
+
+
+def test_refuses_what_has_no_joint_of_one_stiffness():
+    assert "no [friction]" in mistakes(MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE)[0]
+    told = mistakes(PAIR.replace("[structure]", "[structure]\n" + STUCK) + FORCED)
+    assert any("masses and springs are not measured" in one for one in told)
+    assert any("a load that changes" in one for one in mistakes(
+        POINT + 'amplitude = "10 N"\nfrequency = "50 Hz"\n' + friction_of("iwan") + MODES % (STUCK, 143.0, 1.0, 1.0)
+        + DRIVE))
