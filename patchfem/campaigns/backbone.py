@@ -37,7 +37,7 @@ from ..runs.patch import result as patch_result
 from ..runs.plan import plan
 from ..runs.rig import engines, interface, numerics
 from ..runs.rig.engines import ENGINES
-from ..runs.rig.plan import held_mode, held_stiffness
+from ..runs.rig.plan import held_stiffness
 from ..runs.rig.steady.balance import BalanceFinder
 from ..structure import drives
 
@@ -47,6 +47,7 @@ LEFT, MOST = 3.0, 65536  # changes at twice the harmonics that count as the erro
 DECADE = 8  # amplitudes a decade, unless given
 LOW, HIGH = 1e-2, 15.0  # their ends over the slide at which all of the contact slips
 MICRO, GROSS = 0.3, 3.0  # shares of that slide, below which the contact is in micro-slip, above which all of it slips
+SOFT, HARD = 0.7, 3.0  # of the amplitude at which a cubic spring has the mode's stiffness, the largest by default
 FREE = 2.0  # the first of rigid friction, over what friction deflects the mode by at rest
 CELLS = 4.0  # by which the change at four cells in one is divided, some 15 times the error
 SMALL = 1e-5  # of the slide at which all of the contact slips, one in which nothing slips
@@ -125,13 +126,16 @@ class Joint(NamedTuple):
 def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progress=None) -> Backbone:
     """Curves of a rig's mode, of its first where none is named.
 
-    amplitudes (k,) [m] at the output, rising; None: from a hundredth to 30 times the slide at which all of the contact
-    slips. progress: called with a way that begins. PatchfemError for a scene that has no rig with friction or with a
-    spring that bends, or no such mode.
+    amplitudes (k,) [m] at the output, rising; None: from a hundredth of the slide at which all of the contact slips to
+    15 times it, or to where the mode slides as if it were free. progress: called with a way that begins. PatchfemError
+    for a scene that has no rig with friction or with a spring that bends, or no such mode.
     """
     with placed(model.source):
         joint = _joint(model, mode)
         wanted = _default(joint) if amplitudes is None else np.asarray(amplitudes, float)
+        if wanted[-1] > joint.model.rig.travel:
+            raise PatchfemError(f"an amplitude of {say(wanted[-1], 3)} lies beyond it; give smaller ones by "
+                                "--amplitudes", "structure.travel")
         curves, missing = {}, {}
         for way in methods:
             if progress is not None:
@@ -140,7 +144,7 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
                 curves[way] = FIND[way](joint, wanted)
             except (NotConverged, PatchfemError) as reason:
                 missing[way] = str(reason).removeprefix("backbone: ")
-    return _put_together(joint, curves, missing)
+    return _put_together(joint, wanted, curves, missing)
 
 
 def _joint(model: Model, name: str) -> Joint:
@@ -158,7 +162,16 @@ def _joint(model: Model, name: str) -> Joint:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
     stiffness = _held_by(Joint(model, patch, coarse, number, (None, np.eye(modes.omega.size)[number]),
                                np.full(len(modes.interfaces), held_stiffness(plan(model).chain))))
-    return Joint(model, patch, coarse, number, held_mode(modes, modes.interfaces, stiffness, number), stiffness)
+    joint = Joint(model, patch, coarse, number, modes.held(modes.interfaces, stiffness, number), stiffness)
+    if not _limit(joint) and not model.rig.bends:
+        raise PatchfemError("no friction acts: the load or the coefficient of friction is 0, so frequency and damping "
+                            "do not change with the amplitude", "friction.static")
+    if not (modes.omega[number] or joint.held[0]):
+        raise PatchfemError("the mode has 0 Hz and friction that gives way nowhere: it has no frequency of its own")
+    if not joint.reach > 0:
+        raise PatchfemError("the mode does not move the output, so it has no amplitude there; give it an output, or "
+                            "another mode by --mode")
+    return joint
 
 
 def _number(rig, name: str) -> int:
@@ -202,8 +215,20 @@ def _limit(joint: Joint) -> float:
 
 def _default(joint: Joint) -> np.ndarray:
     """Amplitudes (k,) [m] at the output, from where the contact holds to where the mode slides as if it were free."""
-    low, high = _ends(joint)
-    return _amplitude_of(joint, np.geomspace(low, high, 1 + int(np.ceil(DECADE * np.log10(high / low)))))
+    low, high = _amplitude_of(joint, np.array(_ends(joint)))
+    high = min(high, _bound(joint))
+    low = min(low, LOW * high)
+    return np.geomspace(low, high, 1 + int(np.ceil(DECADE * np.log10(high / low))))
+
+
+def _bound(joint: Joint) -> float:
+    """Amplitude [m] at the output below the stop, and where a cubic spring is soft or a few times as stiff as the mode:
+    a soft one turns the block back no more from (k/|c|)^(1/2)."""
+    rig, modes = joint.model.rig, joint.modes
+    if not rig.cubic:
+        return rig.travel / BESIDE
+    own = np.sqrt(_spring(joint) / abs(rig.cubic)) / (abs(float(modes.output[joint.mode])) or joint.reach)
+    return min(rig.travel / BESIDE, own * (SOFT if rig.cubic < 0 else HARD))
 
 
 def _amplitude_of(joint: Joint, slide):
@@ -241,12 +266,16 @@ def _balanced(joint: Joint, amplitudes) -> Curve:
     group = _group(joint, joint.patch)
     found, error = _free(group, joint, amplitudes, LADDER[0]), None
     for harmonics in LADDER[1:]:
-        better = _free(group, joint, amplitudes, harmonics)
+        better = _free(group, joint, amplitudes, harmonics, int(np.isfinite(found[0]).sum()))
         error, found = LEFT * np.abs(better - found) + ROUND * np.abs(better), better
-        if (error[:2] <= model.accuracy.tolerance * np.abs(found[:2])).all():
+        known = np.isfinite(error[0])
+        if (error[:2] <= model.accuracy.tolerance * np.abs(found[:2]))[:, known].all():
             break
     error += _in_space(joint, lambda laws: _free(laws, joint, amplitudes, LADDER[0]))
-    swings = found[1] < 1  # a motion that loses more in a cycle does not swing
+    known = np.isfinite(found + error).all(axis=0)
+    if not known.any():
+        raise NotConverged("no free motion of these amplitudes was found")
+    swings = known & (found[1] < 1)  # a motion that loses more in a cycle does not swing
     if not swings.any():
         raise NotConverged("the mode does not swing at these amplitudes: its damping ratio is above 1")
     return Curve(amplitudes, found[0], error[0], found[1], error[1], found[2]).at(swings)
@@ -290,14 +319,19 @@ def _in_space(joint: Joint, read) -> np.ndarray:
     """Errors of what read(Group) gives from laws on the coarser mesh, and of a density of sliders from its cells: the
     largest change where four of them are one, which is some 15 times the error, and a share of the usual one, as a
     motion that turns where both have a border changes nothing."""
-    model, fine, error = joint.model, _group(joint, joint.patch), 0.0
+    model, error = joint.model, 0.0
+    celled = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
+    if not celled and (joint.coarse is None or not model.soft):
+        return error
+    fine = _group(joint, joint.patch)
     best = read(fine)
     if joint.coarse is not None and model.soft:
         error = error + np.abs(read(_group(joint, joint.coarse)) - best)
-    if any(has(one.numbers.law, "cells") for one in model.rig.interfaces):
+    if celled:
         apart = [np.abs(read(_joined(fine, *one)) - best) for one in engines.JOINED]
         gap = np.max(apart, axis=0) / CELLS
-        usual = np.median(gap / np.maximum(np.abs(best), 1e-300), axis=1, keepdims=True)
+        share = (gap / np.maximum(np.abs(best), 1e-300))[:, np.isfinite(gap).all(axis=0)]
+        usual = np.median(share, axis=1, keepdims=True) if share.size else 0.0
         error = error + np.maximum(gap, usual * np.abs(best))
     return error
 
@@ -316,19 +350,21 @@ def _joined(group: Group, count: int, first: int) -> Group:
     return other
 
 
-def _free(group: Group, joint: Joint, amplitudes, harmonics: int) -> np.ndarray:
-    """(frequency [Hz], damping, loss [J]) (3, k) of the free motions at amplitudes (k,) [m] of the output."""
-    k, out = np.arange(harmonics + 1), []
-    for one in _motions(group, joint, amplitudes, harmonics):
+def _free(group: Group, joint: Joint, amplitudes, harmonics: int, count=None) -> np.ndarray:
+    """(frequency [Hz], damping, loss [J]) (3, k) of the free motions at amplitudes (k,) [m] of the output, NaN from
+    where none is found, and from the number `count` on."""
+    k, out = np.arange(harmonics + 1), np.full((3, len(amplitudes)), np.nan)
+    for column, one in enumerate(_motions(group, joint, amplitudes[:count], harmonics)):
         loss = np.pi * float(np.sum(k * (np.conj(one.slides) * one.forces).imag))
-        out.append((one.omega / (2 * np.pi), one.zeta, loss))
-    return np.array(out).T
+        out[:, column] = one.omega / (2 * np.pi), one.zeta, loss
+    return out
 
 
 def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
-    """The `harmonic.backbone.Free` motions at amplitudes (k,) [m] of the output."""
+    """The `harmonic.backbone.Free` motions at amplitudes (k,) [m] of the output, as far as there is one near the one
+    before; NotConverged where there is none at all."""
     modes = joint.modes
-    omega, shape = held_mode(modes, group.rows, group.stiffness(), joint.mode)
+    omega, shape = modes.held(group.rows, group.stiffness(), joint.mode)
     reach = abs(float(modes.output @ shape))
     widest = np.abs(group.rows @ shape) * amplitudes[-1] / reach
     samples = (group.samples or group.samples_for(harmonics, widest)) * (harmonics // LADDER[0])**2
@@ -336,16 +372,22 @@ def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
     balance = equations.balance
     y = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
     y[:, 1] = balance.faces @ shape
-    x, out = np.append(harmonics_packed(y), [1.0, 0.0]), []
+    x, out, done = np.append(harmonics_packed(y), [1.0, 0.0]), [], 0.0
     for amplitude in amplitudes:
         here = amplitude / reach
-        for _ in range(6):
-            x, free = equations.solve(x, here)
-            size = _largest(free.modal @ modes.output)
-            if abs(size / amplitude - 1) < CLOSE:
+        try:
+            x = equations.towards(x, done, here) if out else x
+            for _ in range(6):
+                x, free = equations.solve(x, here)
+                size = _largest(free.modal @ modes.output)
+                if abs(size / amplitude - 1) < CLOSE:
+                    break
+                here *= amplitude / size
+        except NotConverged:
+            if out:
                 break
-            here *= amplitude / size
-        reach = amplitude / here
+            raise
+        done, reach = here, amplitude / here
         out.append(free)
     return out
 
@@ -391,7 +433,7 @@ def _static(joint: Joint, amplitudes) -> Curve:
         return _on_a_bench(joint, amplitudes)
 
     def read(laws, samples: int) -> np.ndarray:
-        held = held_mode(joint.modes, laws.rows, laws.stiffness(), joint.mode)
+        held = joint.modes.held(laws.rows, laws.stiffness(), joint.mode)
         reach = abs(float(joint.modes.output @ held[1]))
         return _rows(joint, quasi_static.along(joint.modes, laws, amplitudes / reach, held, samples))
 
@@ -456,7 +498,7 @@ def _loop(joint: Joint, slide: float, frequency: float) -> tuple:
 
 def _decayed(joint: Joint, amplitudes) -> Curve:
     """Curve of a release from the largest amplitude, read from turn to turn, as far as it comes down."""
-    model = released(joint, BESIDE * float(amplitudes[-1]))
+    model = released(joint, min(BESIDE * float(amplitudes[-1]), joint.model.rig.travel))
     for cycles in CYCLES:
         many = joint.modes.omega.size > 1
         what = replace(model, rig=replace(model.rig, cycles=min(cycles, DENSE) if many else cycles))
@@ -469,8 +511,9 @@ def _decayed(joint: Joint, amplitudes) -> Curve:
             break
     for _ in range(FINER + 1):
         best, reading, error = _with_errors(joint, what, how, found, amplitudes)
-        known = np.isfinite(best[0])
-        if (error[0][known] <= np.maximum(model.accuracy.tolerance * best[0], reading[0])[known]).all() or \
+        known = np.isfinite(best + error).all(axis=0)
+        small = error[0] <= np.maximum(model.accuracy.tolerance * best[0], reading[0])
+        if (known.any() and small[known].all()) or \
                 not engine.in_time(what, how, joint.patch) or "steps_per_cycle" in how.pinned:
             break
         how = how.finer()
@@ -500,9 +543,10 @@ def _start(joint: Joint, amplitude: float) -> Start:
             _refuse(joint, "balance")
             first = min(float(_amplitude_of(joint, LOW * _knee(joint))) or amplitude, amplitude)
             path = np.geomspace(first, amplitude, STARTS)
-            free = _motions(_group(joint, joint.patch), joint, np.unique(path), LADDER[0])[-1]
-            turn = 1j * free.omega * np.arange(LADDER[0] + 1)[:, None]
-            return Start(free.modal.real.sum(axis=0), (turn * free.modal).real.sum(axis=0))
+            found = _motions(_group(joint, joint.patch), joint, path := np.unique(path), LADDER[0])
+            if len(found) == path.size:
+                turn = 1j * found[-1].omega * np.arange(LADDER[0] + 1)[:, None]
+                return Start(found[-1].modal.real.sum(axis=0), (turn * found[-1].modal).real.sum(axis=0))
         except (NotConverged, PatchfemError):
             pass
     own = np.eye(still.size)[joint.mode]
@@ -542,24 +586,28 @@ def _with_errors(joint: Joint, what: Model, how, found, amplitudes) -> tuple:
         if way.runs:
             beside = best if way.beside is None else curve(way.beside)
             runs = way.runs if way.of == "cells" else way.runs[:1]
-            change = np.nan_to_num([np.abs(curve(one) - beside) for one in runs]).max(axis=0)
-            error += change
+            # NaN where one of them does not come down so far
+            error += np.max([np.abs(curve(one) - beside) for one in runs], axis=0)
     return best, reading, error
 
 
 FIND = {"balance": _balanced, "decay": _decayed, "quasi-static": _static}
 
 
-def _put_together(joint: Joint, curves: dict, missing: dict) -> Backbone:
-    """The Backbone of the curves found."""
+def _put_together(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone:
+    """The Backbone of the curves found at amplitudes (k,) [m] that were asked for."""
     modes = joint.model.rig.modes
-    name = modes.names[joint.mode] if modes.shapes is None else f"mode {joint.mode + 1}"
+    name = f"{joint.mode + 1}"
+    if joint.model.rig.by_modes:
+        own = np.eye(modes.omega.size) if modes.shapes is None else np.abs(modes.shapes)
+        name = modes.names[int(np.argmax(own[:, joint.mode]))]
     own = float(modes.omega[joint.mode]) / (2 * np.pi)
     stuck = None if joint.held[0] is None else joint.held[0] / (2 * np.pi)
     first = next((curves[way] for way in ("quasi-static", "balance") if way in curves), None)
     micro, gross = _exponents(joint, first) if first is not None else (None, None)
     edge = next((found for one in curves.values() if (found := _edge(one)) is not None), None)
-    return Backbone(name, own, stuck, curves, missing, micro, gross, edge, tuple(_differences(curves)))
+    return Backbone(name, own, stuck, curves, missing, micro, gross, edge,
+                    (*_gaps(wanted, curves), *_differences(curves), *_unworn(joint.model)))
 
 
 def _exponents(joint: Joint, one: Curve) -> tuple:
@@ -579,6 +627,25 @@ def _edge(one: Curve) -> float | None:
     k = int(falls[-1])
     share = one.damping[k] / (one.damping[k] - one.damping[k + 1])
     return float(one.amplitude[k] * (one.amplitude[k + 1] / one.amplitude[k])**share)
+
+
+def _unworn(model: Model) -> tuple:
+    return () if model.wear is None else ("the pieces count as new: [wear] is not carried into these curves",)
+
+
+LEFT_OUT = {"balance": "no free motion that swings was found there", "quasi-static": "the static curve ends there",
+            "decay": "the release, or one of the coarser runs beside it, did not swing there"}
+
+
+def _gaps(wanted, curves: dict) -> list:
+    """Sentences on the amplitudes (k,) [m] that a curve does not have."""
+    out = []
+    for way, one in curves.items():
+        lacks = wanted[~np.isin(wanted, one.amplitude)]
+        if lacks.size and one.amplitude.size < wanted.size:
+            out.append(f"{way} has {one.amplitude.size} of {wanted.size} points; those left out lie from "
+                       f"{say(lacks[0], 3)} to {say(lacks[-1], 3)}: {LEFT_OUT[way]}")
+    return out
 
 
 WHY = {"decay": "a decay shows the mean over a cycle, in which it loses {:.2g} of its swing there",

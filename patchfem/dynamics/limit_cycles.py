@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 from ..core import ModalBasis, NotConverged
 from . import propagator
-from .harmonic.backbone import Free, FreeBalance, stuck_mode, trace
+from .harmonic.backbone import Free, FreeBalance, trace
 from .harmonic.forces import Group
 from .harmonic.harmonic import pack
 from .harmonic.point import balance_of
@@ -81,8 +81,8 @@ def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int)
     A damping -g of every coordinate keeps the motion of `mode` up (extended periodic motion: Krack 2015); its ratio is
     g/(2 omega). row, forces (slides, holds) [N]: as of `of_relay`.
     """
-    def cycle(log_g: float):
-        lifted = replace(modes, damping=modes.dampers - np.exp(log_g) * np.eye(modes.omega.size))
+    def cycle(log_more: float):
+        lifted = replace(modes, damping=modes.dampers - (own + np.exp(log_more)) * np.eye(modes.omega.size))
         found = [one for one in _turning(lifted, row, forces, mode) if one.amplitude > 0]
         return min(found, key=lambda one: abs(one.omega - modes.omega[mode]), default=None)
 
@@ -92,15 +92,15 @@ def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int)
 
 
 def _balanced_at(cycle, amplitude: float, own: float, more: float) -> tuple | None:
-    """(Cycle, ratio) of a rate g near own + more [1/s]; by the method of secants on the logarithms."""
-    g = np.log([own + more, own + 1.01 * more])
+    """(Cycle, ratio) of a rate own + g near own + more [1/s], g > 0 what friction takes; by secants of logarithms."""
+    g = np.log([more, 1.01 * more])
     found = [cycle(one) for one in g]
     for _ in range(SECANTS):
         if None in found:
             return None
         off = [np.log(one.amplitude / amplitude) for one in found]
         if abs(off[1]) < ROUND or off[0] == off[1]:
-            return found[1], float(np.exp(g[1]) / (2 * found[1].omega))
+            return found[1], float((own + np.exp(g[1])) / (2 * found[1].omega))
         g = np.array([g[1], g[1] - off[1] * (g[1] - g[0]) / (off[1] - off[0])])
         found = [found[1], cycle(g[1])]
     return None
@@ -193,7 +193,7 @@ def _of_mode(modes: ModalBasis, group: Group, mode: int, size: float) -> list:
 
 def _crossings(modes: ModalBasis, group: Group, mode: int, amplitudes, harmonics: int) -> list:
     """Cycles along the free motions of a mode over its amplitudes (k,) [m], where their damping changes its sign."""
-    omega, shape = stuck_mode(modes, group.rows, group.stiffness(), mode)
+    omega, shape = modes.held(group.rows, group.stiffness(), mode)
     slides = np.abs(group.rows @ shape) * amplitudes[-1]
     balance = balance_of(modes, group, group.samples_for(harmonics, slides))
     equations = FreeBalance(balance, mode, harmonics, omega)

@@ -5,6 +5,7 @@ import pytest
 
 import patchfem as pf
 from patchfem.campaigns.backbone import backbone
+from patchfem.core import ModalBasis
 
 RIG = """
 [normal]
@@ -130,6 +131,72 @@ def test_refuses_what_has_no_backbone():
                           'amplitude = "1 mm"\nfrequency = "10 Hz"\n'))
     found = backbone(model('law = "tanh"\nreference_speed = "1 mm/s"'), "", [1e-2, 2e-2])
     assert "speed of the slide" in found.missing["quasi-static"] and set(found.curves) >= {"balance"}
+
+
+@pytest.mark.parametrize("scene, said", [
+    ((RIG % PLASTIC).replace("100 N", "0 N"), "load or the coefficient of friction is 0"),
+    ((RIG % PLASTIC).replace("slide = 1.0", "slide = 1.0\noutput = 0.0"), "does not move the output"),
+    ((RIG % 'law = "coulomb"').replace('frequency = "100 Hz"\ndamping', 'frequency = "0 Hz"\ndamping'),
+     "no frequency of its own")])
+def test_refuses_a_mode_without_an_answer(scene, said):
+    with pytest.raises(pf.PatchfemError, match=said):
+        backbone(pf.build(scene))
+
+
+def test_amplitudes_stay_within_the_stop():
+    stopped = pf.build((RIG % IWAN).replace("moving_mass", 'travel = "0.2 mm"\nmoving_mass'))
+    found = backbone(stopped, methods=("decay", "quasi-static"))
+    assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(0.2e-3 / 1.15)
+    assert 1.5e-4 < found.curves["decay"].amplitude[-1] < 0.2e-3
+    with pytest.raises(pf.PatchfemError, match=r"structure\.travel: an amplitude of 300 um lies beyond it"):
+        backbone(stopped, "", [1e-4, 3e-4])
+
+
+def test_exact_flutter_under_rigid_friction_from_both_sides():
+    """A damping of -.01 leaves the motions of .002 as they are; the ratio that is balanced falls by .012 * 100 Hz/f."""
+    scene = (RIG % 'law = "coulomb"').replace("damping = 0.002", "damping = -0.01")
+    a = np.geomspace(1e-3, 5e-2, 15)
+    one = backbone(pf.build(scene), "", a, ("balance",)).curves["balance"]
+    beside = backbone(model('law = "coulomb"'), "", a, ("balance",)).curves["balance"]
+    assert one.amplitude.size == 15 and one.damping[0] > 0 > one.damping[-1]
+    assert one.frequency == pytest.approx(beside.frequency, rel=1e-9)
+    assert one.damping + 1.2 / one.frequency == pytest.approx(beside.damping, rel=1e-8)
+
+
+def test_a_curve_that_bends_back_is_kept_as_far_as_it_goes():
+    """Two masses, of which the second slides on the first mode's coordinate: another motion takes over on the way."""
+    structure = """masses = ["0.5 kg", "0.3 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "200 kN/m"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "100 kN/m"
+[[structure.interface]]
+between = [1, 0]
+law = "elastic-plastic"
+bond_length = "10 um"
+static = 0.3
+load = "100 N"
+"""
+    rig = RIG % PLASTIC
+    found = backbone(pf.build("[structure]\n" + structure + rig[rig.index("[drive]"):]), methods=("balance",))
+    one = found.curves["balance"]
+    assert 10 < one.amplitude.size < 30 and (np.diff(one.amplitude) > 0).all()
+    assert "left out" in found.notes[0] and found.notes[0].endswith("no free motion that swings was found there")
+
+
+def test_exact_no_held_mode_is_slower_than_the_free_one():
+    """A mass of .3 kg on one of .5 kg that slides on the ground: 0 and 116 Hz free, 92 Hz and more with it held."""
+    k = np.array([[1e5, -1e5], [-1e5, 1e5]])
+    root = np.sqrt([0.5, 0.3])
+    values, vectors = np.linalg.eigh(k / np.outer(root, root))
+    omega, row = np.sqrt(np.maximum(values, 0)), (vectors / root[:, None])[0]
+    modes = ModalBasis(("1", "2"), omega, np.zeros(2), row, row, row, 1.0)
+    held = [modes.held(row[None], np.array([3e6]), k)[0] for k in range(2)]
+    exact = np.linalg.eigvalsh((k + np.diag([3e6, 0])) / np.outer(root, root))
+    assert np.square(held) == pytest.approx(exact, rel=1e-9) and held[1] > omega[1]
+    assert modes.held(row[None], np.array([np.inf]), 1)[0] is None
 
 
 def test_python_gives_a_dataset():

@@ -11,8 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import ModalBasis, NotConverged, say
+from ...core import NotConverged, say
 from .harmonic import Balance, LinearPart, System, damped, pack, unpack
+
+STEPS = 6  # halvings of the way from one amplitude to the next
 
 
 class Free(NamedTuple):
@@ -25,18 +27,6 @@ class Free(NamedTuple):
     slides: np.ndarray
     forces: np.ndarray
     modal: np.ndarray
-
-
-def stuck_mode(modes: ModalBasis, rows, stiffness, mode: int) -> tuple:
-    """(omega [rad/s], shape (n,)) of a mode when the rows (i, n) hold with stiffness (i,) [N/m]; shape[mode] = 1."""
-    k = np.diag(modes.omega**2) + rows.T * stiffness @ rows / modes.mass
-    values, vectors = np.linalg.eigh(k)
-    shape = vectors[:, mode]
-    if abs(shape[mode]) < 1e-6:  # modes have changed places: take the one with most of this coordinate
-        shape = vectors[:, int(np.argmax(np.abs(vectors[mode])))]
-        mode_value = values[int(np.argmax(np.abs(vectors[mode])))]
-        return float(np.sqrt(mode_value)), shape / shape[mode]
-    return float(np.sqrt(max(values[mode], 0.0))), shape / shape[mode]
 
 
 class FreeBalance:
@@ -83,11 +73,24 @@ class FreeBalance:
         none near."""
         found = damped(lambda v: self.system(v, amplitude), x, lambda _, left, size: np.linalg.norm(left) < 1e-7)
         if found is None:
-            raise NotConverged(f"backbone: no free motion of amplitude {say(amplitude, 3)} was found; give more "
-                               "amplitudes")
+            raise NotConverged(f"backbone: no free motion of amplitude {say(amplitude, 3)} was found near a "
+                               "smaller one")
         x, one = found[0], self.system(found[0], amplitude)
         slides = self.balance.lift @ unpack(x[:-2] * amplitude, self.balance.lift.shape[1])
         return x, Free(amplitude, x[-2] * self.scale, x[-1], slides, one.fold.force, one.modal)
+
+    def towards(self, x, done: float, target: float) -> np.ndarray:
+        """Unknowns (N,) near those at an amplitude `target` [m] from x (N,) at `done`, by steps in between where it is
+        too far. NotConverged where STEPS of them in a row are too."""
+        stops = [float(target)]
+        while stops:
+            try:
+                x, done = self.solve(x, stops[-1])[0], stops.pop()
+            except NotConverged:
+                if len(stops) > STEPS:
+                    raise
+                stops.append(float(np.sqrt(done * stops[-1])))
+        return x
 
 
 def _inverse(p) -> np.ndarray:
@@ -108,17 +111,10 @@ def trace(equations: FreeBalance, amplitudes, omega: float, shape) -> list:
     y = np.zeros((balance.lift.shape[1], h + 1), complex)
     y[:, 1] = balance.faces @ shape
     x = np.append(pack(y), [omega / equations.scale, 0.0])
-    done, out = 1.0, []
+    done, out = None, []
     for target in amplitudes:
-        stops = [float(target)]
-        while stops:
-            try:
-                x, free = equations.solve(x, stops[-1])
-            except NotConverged:
-                if len(stops) > 12 or not out:
-                    raise
-                stops.append(float(np.sqrt(done * stops[-1])))
-                continue
-            done = stops.pop()
+        x = equations.towards(x, done, target) if out else x
+        x, free = equations.solve(x, float(target))
+        done = float(target)
         out.append(free)
     return out

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core import BaseSine, NotConverged, PatchfemError
-from .backbone import FreeBalance, stuck_mode, trace
+from .backbone import FreeBalance, trace
 from .continuation import follow
 from .laws import synthesis
 from .point import LADDER, Periodic, balance_of, by_level, by_omega, cut, group_of, plain, point
@@ -173,7 +173,7 @@ def backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Bac
         raise PatchfemError(f"backbone: mode {mode}: there are {modes.omega.size}, counted from 0")
     samples = group.samples or group.samples_for(harmonics, np.full(len(group.rows), wanted[-1]))
     balance = balance_of(modes, group, samples)
-    omega, shape = stuck_mode(modes, group.rows, group.stiffness(), mode)
+    omega, shape = modes.held(group.rows, group.stiffness(), mode)
     found = trace(FreeBalance(balance, mode, harmonics, omega), wanted, omega, shape)
     k = np.arange(harmonics + 1)
     loss = [np.pi * float(np.sum(k * (np.conj(f.slides) * f.forces).imag)) for f in found]

@@ -45,16 +45,6 @@ def foreseen(rig, links: dict):
         return rig
 
 
-def held_mode(modes, rows, stiffness, number: int) -> tuple:
-    """(omega [rad/s], shape (n,)) of the mode with most of a coordinate when the rows (i, n) hold with stiffness (i,)
-    [N/m]; (None, the coordinate alone) where one is infinite. The coordinate's part of the shape is 1."""
-    if not np.isfinite(stiffness).all():
-        return None, np.eye(modes.omega.size)[number]
-    values, vectors = np.linalg.eigh(np.diag(modes.omega**2) + rows.T * stiffness @ rows / modes.mass)
-    k = int(np.argmax(np.abs(vectors[number])))
-    return float(np.sqrt(max(values[k], 0.0))), vectors[:, k] / vectors[number, k]
-
-
 def modes_of(rig, chain: dict) -> list:
     """Name, free and stuck frequency [Hz] of each mode: without the contact, and with it held by the links of a chain;
     None where nothing gives way, and without friction."""
@@ -63,7 +53,7 @@ def modes_of(rig, chain: dict) -> list:
     named = rig.by_modes and modes.shapes is None
     out = []
     for k, omega in enumerate(modes.omega):
-        held = held_mode(modes, rows, stiffness, k)[0]
+        held = modes.held(rows, stiffness, k)[0]
         out.append({"name": modes.names[k] if named else f"mode {k + 1}", "free_frequency": float(omega) / (2 * pi),
                     "stuck_frequency": None if held is None else held / (2 * pi)})
     return out

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from patchfem.core import G_N, BaseSine, ModalBasis, NotConverged, PatchfemError
-from patchfem.dynamics.harmonic.backbone import FreeBalance, stuck_mode, trace
+from patchfem.dynamics.harmonic.backbone import FreeBalance, trace
 from patchfem.dynamics.harmonic.balance import periodic_response
 from patchfem.dynamics.harmonic.branch import backbone, branches, levels, response
 from patchfem.dynamics.harmonic.continuation import follow
@@ -302,7 +302,7 @@ def test_exact_the_free_motion_balances_every_mode():
     """Coupled damping: the modal equations with the balancing negative damping, harmonic by harmonic."""
     modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
     group = Group(modes, Jenkins(*many(20)), 512)
-    omega, shape = stuck_mode(modes, group.rows, group.stiffness(), 1)
+    omega, shape = modes.held(group.rows, group.stiffness(), 1)
     for free in trace(FreeBalance(Balance(modes, group.rows, group), 1, 5, omega), [0.05, 0.3], omega, shape):
         for k in range(6):
             a = np.diag(modes.omega**2 - (k * free.omega)**2) + 1j * k * free.omega * (

@@ -8,7 +8,6 @@ from scipy.optimize import minimize
 
 from patchfem.core import ModalBasis, PatchfemError
 from patchfem.dynamics.harmonic import quasi_static
-from patchfem.dynamics.harmonic.backbone import stuck_mode
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.laws import Jenkins, OfSpeed, Spring
 from patchfem.friction.laws import tanh
@@ -24,7 +23,7 @@ STIFF, LIMIT = np.array([2e4, 1e4, 3e4]), np.array([1e-4, 2e-4, 4e-4])
 
 
 def held(modes, group):
-    return stuck_mode(modes, group.rows, group.stiffness(), 0)
+    return modes.held(group.rows, group.stiffness(), 0)
 
 
 def test_exact_one_mode_on_elastic_plastic_elements():
