@@ -1,6 +1,8 @@
 """One picture of a study: axes in the style of the package, saved as SVG with the same bytes for the same numbers."""
 
+import re
 from contextlib import contextmanager
+from io import StringIO
 from pathlib import Path
 
 from matplotlib import rc_context
@@ -20,4 +22,16 @@ def drawing(path: Path, size: tuple, rows: int = 1, columns: int = 1, saving: di
         figure = Figure(figsize=size)
         FigureCanvasSVG(figure)
         yield figure, figure.subplots(rows, columns, **how)
-        figure.savefig(path, metadata={"Date": None}, **(saving or {}))
+        text = StringIO()
+        figure.savefig(text, format="svg", metadata={"Date": None}, **(saving or {}))
+        Path(path).write_text(compact(text.getvalue()), "utf-8")
+
+
+def compact(text: str) -> str:
+    """A picture of matplotlib in half the lines: places to 0.01 pt, and a path, or a row of markers, is one line."""
+    def places(path) -> str:
+        return f'd="{" ".join(re.sub(r"-?[0-9]+[.][0-9]+", lambda one: f"{float(one[0]):.2f}", path[1]).split())}"'
+
+    text = re.sub(r"(?<= )d=\"([^\"]*)\"", places, text)
+    text = re.sub(r"font-family: [^;\"]*sans-serif", "font-family: 'DejaVu Sans', Verdana, sans-serif", text)
+    return re.sub(r"(?<=>)\s+(?=<(/|use|path|text|clipPath|rect|/clipPath))", "", text)

@@ -129,11 +129,11 @@ def picture(series: dict, found: dict, path: Path) -> Path:
 
 
 def _enveloped(column, frequency: float, seen) -> None:
-    """The band between the largest and the smallest value of each cycle."""
-    count = int(seen.time[-1] * frequency + 1e-6)
+    """The band between the largest and the smallest value of every two cycles."""
+    count = int(seen.time[-1] * frequency + 1e-6) // 2
     for axis, value in zip(column, (seen.base_acceleration / G, seen.acceleration / G, seen.output / MIL)):
-        rows = value[:count * 200].reshape(count, 200)
-        axis.fill_between((np.arange(count) + 0.5) / frequency, rows.min(1), rows.max(1), color=BLUE, lw=0)
+        rows = value[:count * 400].reshape(count, 400)
+        axis.fill_between((np.arange(count) + 0.5) * 2 / frequency, rows.min(1), rows.max(1), color=BLUE, lw=0)
         axis.axhline(0, color=GREY, lw=0.5)
 
 
