@@ -55,6 +55,7 @@ LOOPS = 3.0  # cycles of a loop on a bench, of which the last is read
 ROUND = 1e-9  # of a value, what round-off leaves
 SAMPLES = 4096  # of a cycle of a static loop, and that a largest motion is read from
 CLOSE = 1e-7  # of an amplitude, within which a free motion is at it
+PLAIN, BALANCED = (1e-6, 1e-3, 4), 8  # amplitudes [m] of a linear rig; steps to the damping that keeps it swinging
 CYCLES = (50.0, 200.0, 800.0)  # lengths of a decay that are tried
 STARTS = 12  # amplitudes on the way to the free motion that a release begins in
 DENSE = 400.0  # of them where several modes ring, whose samples are all kept
@@ -122,16 +123,24 @@ class Joint(NamedTuple):
         """The ModalBasis of the rig."""
         return self.model.rig.modes
 
+    @property
+    def linear(self) -> bool:
+        """Whether neither friction acts nor a spring bends."""
+        others = sum(one.numbers.static * (one.load or 0.0) for one in self.model.rig.interfaces[1:])
+        return not (_limit(self) or others or self.model.rig.bends)
+
 
 def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progress=None) -> Backbone:
     """Curves of a rig's mode, of its first where none is named.
 
     amplitudes (k,) [m] at the output, rising; None: from a hundredth of the slide at which all of the contact slips to
-    15 times it, or to where the mode slides as if it were free. progress: called with a way that begins. PatchfemError
-    for a scene that has no rig with friction or with a spring that bends, or no such mode.
+    15 times it, or to where the mode slides as if it were free. progress: called with a way that begins. Where no
+    friction acts and no spring bends the curves are level. PatchfemError for a scene that has no rig or no such mode.
     """
     with placed(model.source):
         joint = _joint(model, mode)
+        if joint.linear:
+            return _level(joint, amplitudes, methods)
         wanted = _default(joint) if amplitudes is None else np.asarray(amplitudes, float)
         if wanted[-1] > joint.model.rig.travel:
             raise PatchfemError(f"an amplitude of {say(wanted[-1], 3)} lies beyond it; give smaller ones by "
@@ -150,28 +159,50 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
 def _joint(model: Model, name: str) -> Joint:
     if model.rig is None:
         raise PatchfemError("a backbone is that of a rig: give the scene [structure] and [drive]", "structure")
-    modes = model.rig.modes
-    if model.friction is None and not model.rig.bends and not model.rig.interfaces:
-        raise PatchfemError("without friction, or a spring that bends, frequency and damping do not change with the "
-                            "amplitude", "friction")
-    number = _number(model.rig, name)
+    modes, number = model.rig.modes, _number(model.rig, name)
     patch, coarse = None, None
     if model.patch is not None:
         patch, coarse, *_ = *patch_result.solve_all(model.patch, model.accuracy.tolerance), None
-        if patch.pressure.outcome is Outcome.NO_CONTACT:
-            raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
-    stiffness = _held_by(Joint(model, patch, coarse, number, (None, np.eye(modes.omega.size)[number]),
-                               np.full(len(modes.interfaces), held_stiffness(plan(model).chain))))
-    joint = Joint(model, patch, coarse, number, modes.held(modes.interfaces, stiffness, number), stiffness)
-    if not _limit(joint) and not model.rig.bends:
-        raise PatchfemError("no friction acts: the load or the coefficient of friction is 0, so frequency and damping "
-                            "do not change with the amplitude", "friction.static")
+    alone = (None, np.eye(modes.omega.size)[number])
+    joint = Joint(model, patch, coarse, number, alone, np.zeros(len(modes.interfaces)))
+    if not joint.linear:
+        stiffness = _held_by(joint._replace(stiffness=np.full(len(modes.interfaces),
+                                                              held_stiffness(plan(model).chain))))
+        joint = joint._replace(held=modes.held(modes.interfaces, stiffness, number), stiffness=stiffness)
+    if not _limit(joint) and model.rig.bends and (model.friction is not None or model.rig.interfaces):
+        raise PatchfemError("the load or the coefficient of friction is 0, so no friction acts; leave out the tables "
+                            "of the contact for the backbone of the springs alone", "friction.static")
     if not (modes.omega[number] or joint.held[0]):
         raise PatchfemError("the mode has 0 Hz and friction that gives way nowhere: it has no frequency of its own")
     if not joint.reach > 0:
         raise PatchfemError("the mode does not move the output, so it has no amplitude there; give it an output, or "
                             "another mode by --mode")
     return joint
+
+
+def _level(joint: Joint, amplitudes, methods) -> Backbone:
+    """Of a linear rig: by balance and by a static force omega and zeta of the damping -g of every coordinate that
+    keeps a motion up, zeta = g/(2 omega); of a decay its own frequency omega (1 - zeta^2)^(1/2)."""
+    modes, n = joint.modes, joint.modes.omega.size
+    a = np.geomspace(*PLAIN) if amplitudes is None else np.asarray(amplitudes, float)
+
+    def root(g: float) -> complex:
+        """Of z'' + (D - g) z' + Omega^2 z = 0, that in which the coordinate moves most."""
+        values, vectors = np.linalg.eig(np.block([[np.zeros((n, n)), np.eye(n)],
+                                                  [-np.diag(modes.omega**2), g * np.eye(n) - modes.dampers]]))
+        return values[np.argmax(np.abs(vectors[joint.mode]) / np.linalg.norm(vectors[:n], axis=0))]
+
+    g = 0.0
+    for _ in range(BALANCED):
+        g -= 2 * root(g).real
+    kept, own = abs(root(g)), root(0.0)
+    steady, decay = (kept, g / (2 * kept)), (abs(own.imag), -own.real / abs(own))
+    curves = {}
+    for way in methods:
+        omega, zeta = decay if way == "decay" else steady
+        f, zeta = np.full(a.size, omega / (2 * np.pi)), np.full(a.size, zeta)
+        curves[way] = Curve(a, f, ROUND * f, zeta, ROUND * np.abs(zeta), np.full(a.size, np.nan))
+    return _put_together(joint, a, curves, {})
 
 
 def _number(rig, name: str) -> int:
@@ -209,8 +240,9 @@ def _limit(joint: Joint) -> float:
     model = joint.model
     if len(model.rig.interfaces) > 1 and joint.patch is None:
         return model.rig.interfaces[0].numbers.static * model.rig.interfaces[0].load
-    load = joint.patch.pressure.load if joint.patch is not None else model.nominal_load
-    return model.friction.static * load if model.friction is not None else 0.0
+    if model.friction is None:
+        return 0.0
+    return model.friction.static * (joint.patch.pressure.load if joint.patch is not None else model.nominal_load)
 
 
 def _default(joint: Joint) -> np.ndarray:
@@ -239,7 +271,7 @@ def _amplitude_of(joint: Joint, slide):
 def _knee(joint: Joint) -> float:
     """Slide [m] at which all of the contact slips, of rigid friction 0; of springs alone that at which they bend."""
     rig, stiffness = joint.model.rig, float(joint.stiffness[0])
-    if joint.model.friction is None and not rig.interfaces:  # it doubles the mode's stiffness, or has a wave behind it
+    if not _limit(joint):  # it doubles the mode's stiffness, or has a wave behind it
         return float(np.sqrt(_spring(joint) / rig.cubic)) if rig.cubic is not None else rig.interlock[1]
     return _limit(joint) / stiffness if stiffness else _limit(joint) / _spring(joint)
 
@@ -604,10 +636,11 @@ def _put_together(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone
     own = float(modes.omega[joint.mode]) / (2 * np.pi)
     stuck = None if joint.held[0] is None else joint.held[0] / (2 * np.pi)
     first = next((curves[way] for way in ("quasi-static", "balance") if way in curves), None)
-    micro, gross = _exponents(joint, first) if first is not None else (None, None)
+    micro, gross = _exponents(joint, first) if first is not None and not joint.linear else (None, None)
     edge = next((found for one in curves.values() if (found := _edge(one)) is not None), None)
     return Backbone(name, own, stuck, curves, missing, micro, gross, edge,
-                    (*_gaps(wanted, curves), *_differences(curves), *_unworn(joint.model)))
+                    (*_unrubbed(joint), *_gaps(wanted, curves), *([] if joint.linear else _differences(curves)),
+                     *_unworn(joint.model)))
 
 
 def _exponents(joint: Joint, one: Curve) -> tuple:
@@ -627,6 +660,12 @@ def _edge(one: Curve) -> float | None:
     k = int(falls[-1])
     share = one.damping[k] / (one.damping[k] - one.damping[k + 1])
     return float(one.amplitude[k] * (one.amplitude[k + 1] / one.amplitude[k])**share)
+
+
+def _unrubbed(joint: Joint) -> tuple:
+    rubs = joint.model.friction is not None or joint.model.rig.interfaces
+    return ("no friction acts, so frequency and damping do not change with the amplitude",) if joint.linear and rubs \
+        else ()
 
 
 def _unworn(model: Model) -> tuple:

@@ -124,8 +124,6 @@ slide = 0.1
 
 
 def test_refuses_what_has_no_backbone():
-    with pytest.raises(pf.PatchfemError, match="do not change with the"):
-        backbone(pf.build((RIG % PLASTIC)[(RIG % PLASTIC).index("[structure]"):]))
     with pytest.raises(pf.PatchfemError, match="that of a rig"):
         backbone(pf.build('[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\n'
                           'amplitude = "1 mm"\nfrequency = "10 Hz"\n'))
@@ -134,13 +132,47 @@ def test_refuses_what_has_no_backbone():
 
 
 @pytest.mark.parametrize("scene, said", [
-    ((RIG % PLASTIC).replace("100 N", "0 N"), "load or the coefficient of friction is 0"),
+    ((RIG % PLASTIC).replace("100 N", "0 N") + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n',
+     "leave out the tables of the contact"),
     ((RIG % PLASTIC).replace("slide = 1.0", "slide = 1.0\noutput = 0.0"), "does not move the output"),
     ((RIG % 'law = "coulomb"').replace('frequency = "100 Hz"\ndamping', 'frequency = "0 Hz"\ndamping'),
      "no frequency of its own")])
 def test_refuses_a_mode_without_an_answer(scene, said):
     with pytest.raises(pf.PatchfemError, match=said):
         backbone(pf.build(scene))
+
+
+@pytest.mark.parametrize("scene", [(RIG % PLASTIC)[(RIG % PLASTIC).index("[structure]"):],
+                                   (RIG % 'law = "coulomb"').replace("100 N", "0 N")])
+def test_exact_a_rig_in_which_no_friction_acts_has_level_curves(scene):
+    found = backbone(pf.build(scene))
+    for way, f in (("balance", 100.0), ("decay", 100 * np.sqrt(1 - 4e-6)), ("quasi-static", 100.0)):
+        assert found.curves[way].frequency == pytest.approx(f, rel=1e-12)
+        assert found.curves[way].damping == pytest.approx(0.002, rel=1e-9)
+    assert not found.missing and found.micro is None and len(found.notes) == ("coulomb" in scene)
+
+
+def test_exact_a_damper_between_masses_has_the_damping_that_keeps_a_motion_up():
+    """det((k - m w^2) + i w (c - 2 zeta w m)) = 0 at the frequency and the ratio of the balance."""
+    scene = """[structure]
+masses = ["0.5 kg", "0.3 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "200 kN/m"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "100 kN/m"
+[[structure.damper]]
+between = [1, 0]
+coefficient = "40 N s/m"
+""" + RIG[RIG.index("[drive]"):]
+    one = backbone(pf.build(scene), "2", [1e-4]).curves
+    k, m, c = np.array([[3e5, -1e5], [-1e5, 1e5]]), np.diag([0.5, 0.3]), np.diag([40.0, 0])
+    w, zeta = 2 * np.pi * one["balance"].frequency[0], one["balance"].damping[0]
+    assert abs(np.linalg.det(k - m * w**2 + 1j * w * (c - 2 * zeta * w * m))) < 1e-9 * np.linalg.det(k)
+    s = 2j * np.pi * one["decay"].frequency[0]
+    s -= s.imag * one["decay"].damping[0] / np.sqrt(1 - one["decay"].damping[0]**2)
+    assert abs(np.linalg.det(k + c * s + m * s**2)) < 1e-9 * np.linalg.det(k)
 
 
 def test_amplitudes_stay_within_the_stop():
