@@ -12,7 +12,7 @@ from .drive import cycles_of, cycles_per_level, drive_of, levelled
 from .law import interface_laws_of, interface_names
 from .structure import acts, first_of, frequencies, modes_of, notes_of, of_a_patch, own_modes, start_of, yaws
 
-BEYOND = 1e3  # m, past which nobody follows a motion that a mode of damping below 0 drives
+BEYOND = 1e3  # m, past which nobody follows a motion that a mode of damping below 0 or a softening spring drives
 NOTHING = 1e-9  # of the largest slide of a mode: one below it is round-off
 
 
@@ -25,13 +25,13 @@ class Rig:
     of each; onset: what their onset means, (kind, length [m] or None); cycles of the whole run; force [N] of a force
     drive, else None. interfaces: an InterfaceLaw each, none in a linear rig; names: of interfaces between masses.
     load_varies: the normal load changes with the motion or in time; strips_slide_apart: modes yaw a patch in strips.
-    travel [m], without a stop infinite, or BEYOND beside a mode that gains energy; cubic [N/m3] stiffening at the
-    output or None; interlock: (stiffness [N/m], wavelength [m]) of a bonded spring that bends, or None. mass [kg] and
-    own_frequency [Hz] of the first mode that is not rigid; frequencies (n,) [Hz]; by_modes: the scene lists modes;
-    notes: on a structure file; parts (p, n): slide of the first interface in each of the scene's own modes, that first
-    one before the others, per coordinate; contact_mass [kg]: modal mass of that mode over slide_1^2, 0 where it leaves
-    the interface at rest; stuck(stiffness [N/m]) -> the Rig without the joint, of modes that were measured with one
-    that a patch holds, which is not pressed yet; None of any other.
+    travel [m], without a stop infinite, or BEYOND beside a mode that gains energy or a spring that softens; cubic
+    [N/m3] stiffening at the output or None; interlock: (stiffness [N/m], wavelength [m]) of a bonded spring that bends,
+    or None. mass [kg] and own_frequency [Hz] of the first mode that is not rigid; frequencies (n,) [Hz]; by_modes: the
+    scene lists modes; notes: on a structure file; parts (p, n): slide of the first interface in each of the scene's own
+    modes, that first one before the others, per coordinate; contact_mass [kg]: modal mass of that mode over
+    slide_1^2, 0 where it leaves the interface at rest; stuck(stiffness [N/m]) -> the Rig without the joint, of modes
+    that were measured with one that a patch holds, which is not pressed yet; None of any other.
     """
 
     modes: ModalBasis
@@ -107,13 +107,14 @@ def rig_asked(scene, joint: float | None = None) -> Rig:
     own, mass = first_of(scene, alone)
     rows = levelled(asked)
     bends = bonded is not None and bonded.wavelength is not None
+    cubic = structure.stiffening.cubic if structure.stiffening is not None else None
     return Rig(modes, drive, start_of(scene, modes), asked.kind, asked.waveform, asked.frequency,
                tuple(part.amplitude for part in drive.segments) if rows else (),
                cycles_per_level(asked) if rows else 0.0, float(cycles_of(asked, drive)),
                asked.force if asked.kind == "force" else None, interface_laws_of(scene),
                tuple(interface_names(structure)),
-               acts(scene), yaws(scene), structure.travel or (BEYOND if decay_rate(modes) < 0 else np.inf),
-               structure.stiffening.cubic if structure.stiffening is not None else None,
+               acts(scene), yaws(scene),
+               structure.travel or (BEYOND if decay_rate(modes) < 0 or (cubic or 0.0) < 0 else np.inf), cubic,
                (bonded.stiffness, bonded.wavelength) if bends else None,
                bonded.stiffness if bonded is not None else None, mass, own, frequencies(structure, modes),
                bool(structure.mode), tuple(notes_of(scene)), *_contact(alone, modes), (asked.onset, asked.onset_length),

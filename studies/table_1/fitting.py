@@ -178,8 +178,8 @@ def bounds(wanted, values) -> list:
 def gain(computed, reading: str, values) -> float | None:
     """The factor of the accelerometer that came from training readings, by a fit or as that of a stuck block; None
     where it is none of them."""
-    if computed.free_gain is not None:
-        return rounded(float(values[computed.free_gain]), 6)
+    if computed.free_gains[0] is not None:
+        return rounded(float(values[computed.free_gains[0]]), 6)
     return rounded(computed.gains[0], 6) if reading == STUCK else None
 
 

@@ -160,9 +160,10 @@ def variants() -> list:
     return sorted(found, key=_place)
 
 
-FOLDS = (("spring and yaw", ROOT2), ("path of Fig. 27", STUCK), ("second path", STUCK),
-         ("yaw in the accelerometer", STUCK), ("path of Fig. 27", "peak x gain"), ("path of Fig. 27", ROOT2),
-         ("path of Fig. 27, yaw not seen", ROOT2), ("damper, yaw seen", STUCK))  # those that are left out first
+FOLDS = (("spring and yaw", ROOT2), ("path of Fig. 27", STUCK), ("spring and yaw", STUCK),
+         ("path of Fig. 27, yaw not seen", ROOT2), ("path of Fig. 27", ROOT2), ("path of Fig. 27", "peak x gain"),
+         ("damper, yaw seen", STUCK), ("second path", STUCK), ("second path", ROOT2),
+         ("yaw in the accelerometer", STUCK), ("yaw in the accelerometer", "peak x gain"))  # left out in this order
 SMALL = ("patch", "weight on its cable", "spring and yaw", "path of Fig. 27, yaw not seen", "path of Fig. 27",
          "damper, yaw seen", "second path", "yaw in the accelerometer")  # what others contain goes first
 SLOW = "spring and yaw, worn", "second path, patch", "rods, spring and yaw", "rigid Coulomb", "grooves, lift and yaw", \
@@ -171,13 +172,15 @@ SLOW = "spring and yaw, worn", "second path, patch", "rods, spring and yaw", "ri
 
 def _place(variant: tuple) -> tuple:
     """When a variant is worked through by a campaign that may be stopped: 143 Hz of what is quick, the first two of
-    FOLDS, 143 Hz of what is slow, the other FOLDS, free gains, the other folds, all rows, placebos."""
+    FOLDS, 143 Hz of what is slow, the other FOLDS, free gains, the other folds, all rows, placebos, what is slow."""
     rung, reading, protocol, placebo = variant
     slow = SLOW.index(rung) + 1 if rung in SLOW else 0
     first = FOLDS.index((rung, reading)) if (rung, reading) in FOLDS else len(FOLDS)
+    size = SMALL.index(rung) if rung in SMALL else 0, READING.index(reading)
     if protocol == "143" and not placebo:
-        rank = 1.5 if slow else 2.5 if reading.endswith("gain") else 0
-        return rank, slow, SMALL.index(rung) if rung in SMALL else 0, READING.index(reading)
+        return 1.5 if slow else 2.5 if reading.endswith("gain") else 0, slow, *size
+    if slow and not placebo:
+        return 6 + (protocol == "all"), slow, *size
     if protocol == "all" or placebo:
-        return 4 + bool(placebo), slow, 0, 0
-    return 1 if first < 2 else 2 if first < len(FOLDS) else 3, slow + first, 0, 0
+        return 4 + bool(placebo), slow, *size
+    return 1 if first < 2 else 2 if first < len(FOLDS) else 3, first, 0, 0

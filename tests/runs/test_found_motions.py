@@ -151,3 +151,16 @@ def test_always_a_joint_that_never_slips_as_a_whole_has_more_than_one_steady_mot
     text = RIG.format(law=law, frequency=120, drive=drive, method='method = "harmonic"')
     found = pf.run(loads(text.replace('load = "10 N"', 'load = "100 N"')))
     assert any("the steady motion is not unique" in note for note in found.notes) == said
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("stop", "outcome"), [('travel = "5 mm"\n', "exceeds_travel"), ("", "grows")])
+def test_always_a_step_beyond_the_barrier_of_a_softening_spring_ends_the_run_before_it(stop, outcome):
+    """Its force over a step is cubic in what the step moves: one across the barrier ended at 1e160 m."""
+    text = RIG.format(law='law = "coulomb"', frequency=143.0, method="",
+                      drive='kind = "base"\nfrequency = "143 Hz"\nacceleration = "60 g"\ncycles = 20')
+    text = text.replace("[structure]\n", f"[structure]\n{stop}") + '[structure.stiffening]\ncubic = "-1e14 N/m^3"\n'
+    result = pf.run(loads(text))
+    assert result.outcome.value == outcome
+    assert result.measures["relative_displacement_amplitude"].value < 0.05
+    assert any("barrier" in text for text in result.warnings)

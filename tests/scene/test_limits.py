@@ -28,13 +28,12 @@ REFUSED = [
     (RIG, [SHEAR, COULOMB, "friction.kinetic=0.2"], "friction.kinetic", "0.2 below static = 0.3 beside"),
     (PATCH_BENCH, ["contact.crown.radius=1 m", LOWER], "contact.tilt.on", "put all shapes on one piece; not yet"),
     (RIG, ["contact.crown.radius=1 m", "contact.crown.on=lower"], "contact.crown.on", "on one piece; not yet built"),
-    (RIG, ["contact.crown.radius=1 m", LOWER, SHEAR], "contact.tilt.on", "on the upper piece; not yet built"),
-    (RIG, [SHEAR, LOWER], "contact.tilt.on", "'lower' beside [contact.shear]: put the shapes on the upper piece"),
+    (RIG, ["contact.crown.radius=1 m", LOWER, SHEAR], "contact.tilt.on", "put all shapes on one piece; not yet built"),
+    (RIG, [SHEAR, COULOMB, LOWER], "contact.tilt.on", "'lower' beside [contact.shear] with law 'coulomb': put the"),
+    (RIG, [SHEAR, "friction.breakaway=0.1", LOWER], "contact.tilt.on", "'lower' beside friction.breakaway and"),
     (PATCH_BENCH, [SHEAR, LOWER], "contact.tilt.on", "'lower' beside [contact.shear]"),
     (RIG, [COULOMB, LOWER], "contact.tilt.on", "'lower' in a rig with law 'coulomb': put the shapes on the upper"),
     (RIG, [PLASTIC, LOWER], "contact.tilt.on", "'lower' in a rig with law 'elastic-plastic'"),
-    (RIG, ["friction.reading=report", LOWER], "contact.tilt.on", "'lower' in a rig with reading 'report'"),
-    (RIG, ["friction.order=0.5", LOWER], "contact.tilt.on", "'lower' in a rig with order = 0.5"),
     (POINT_RIG, [COULOMB, STEADY, "structure.stiffening.cubic=1e9 N/m^3"], "accuracy.method", "use 'march', or law"),
     (POINT_RIG, [COULOMB, STEADY, "structure.bonded.stiffness=1e6 N/m", "structure.bonded.wavelength=80 um"],
      "accuracy.method", "'harmonic' with a law that jumps beside structure.bonded.wavelength"),
@@ -62,19 +61,19 @@ def test_refuses_what_no_run_can_do(text, sets, key, says):
 
 
 def test_refuses_at_the_line_of_the_file():
-    text = RIG.replace("[friction]", "[contact.shear]\n[friction]")
+    text = RIG.replace("[friction]", "[contact.shear]\n[friction]\nbreakaway = 0.1")
     text = text.replace('angle = "0.1 mrad"', 'angle = "0.1 mrad"\non = "lower"')
     text += '[accuracy]\nmethod = "exact"\n'
     assert mistakes(text) == [
-        f"a.toml:{line_of(text, 'on =')}: contact.tilt.on: 'lower' beside [contact.shear]: put the shapes on the upper "
-        "piece; not yet built",
+        f"a.toml:{line_of(text, 'on =')}: contact.tilt.on: 'lower' beside friction.breakaway and [contact.shear]: put "
+        "the shapes on the upper piece; not yet built",
         f"a.toml:{line_of(text, 'method')}: accuracy.method: no exact solution exists for law 'nonlocal' beside "
         "[contact.shear]; use 'march' or leave method out",
     ]
 
 
 def test_refuses_combinations_beside_the_list_of_keys():
-    found = mistakes(RIG, SHEAR, LOWER, "contact.strips.count=8")
+    found = mistakes(RIG, SHEAR, LOWER, "contact.strips.count=8", "friction.breakaway=0.1")
     assert sorted(message.split(": ")[1] for message in found) == ["contact.strips", "contact.tilt.on"]
 
 
@@ -102,6 +101,10 @@ ALLOWED = [
     (PATCH_BENCH, [LOWER], "bench"),
     (PATCH_BENCH, [LOWER, PLASTIC, "friction.bond_length=1 um"], "bench"),
     (PATCH_BENCH, [LOWER, *REPORT, "friction.order=-0.5"], "bench"),
+    (RIG, ["friction.reading=report", LOWER], "rig"),
+    (RIG, ["friction.order=0.5", LOWER, SHEAR], "rig"),
+    (PATCH_BENCH, [LOWER, SHEAR, *REPORT], "bench"),
+    (RIG, ["friction.reading=report", "structure.mode.second.pitch=1 rad/m", SHEAR], "rig"),
     (RIG, ["friction.order=0"], "rig"),
     (RIG, ["friction.order=0", "friction.reading=report"], "rig"),
     (RIG, [SHEAR, PLASTIC], "rig"),

@@ -1,12 +1,15 @@
 """Equation 2.17 behind [contact.shear] summed by hand, for random benches and rigs, and what of their bars holds.
 
-`python printed_bars.py bench 7000 24` scores 24 benches from seed 7000 on, `rig` as many rigs that begin at rest.
+`python printed_bars.py bench 7000 24` scores 24 benches from seed 7000 on, `rig` as many rigs that begin at rest; from
+seed 8000 on the pressure may lie on the lower piece, and modes may heave and rock the patch up to lift-off.
 
 The sum is plain NumPy, written from 2.10-2.17 without the compiled lists: every node of a mesh for a tenth of the
 tolerance keeps every bond of its own path, in strips of 0.2 bond lengths, each with the midpoint rule and the share of
 it on either side of u = 0; the pieces are the whole compliance, s_i = q - sum_j C_ij F_j(s_j) at the end of each step,
 by Newton's method on all nodes; a mode moves by the trapezoidal rule, which adds beta to every C_ij. Nothing of it
-averages a force over a step, merges bonds, drops modes or reduces points.
+averages a force over a step, merges bonds, drops modes or reduces points. A bond forms under the pressure of the place,
+or the load, half way along its part of the step; heave and rotation press the nodes by the whole normal compliance, of
+which those that would pull are left out one set after the other.
 """
 
 import sys
@@ -21,7 +24,7 @@ from patchfem.runs import run as runs
 from patchfem.runs.patch import ladder as patches
 from patchfem.scene.scene import loads
 
-MOST, FIRST_WIDE = 40.0, 1e-6  # bond lengths: age of a bond that counts; half width of the first bonds
+MOST, FIRST_WIDE = 25.0, 1e-6  # bond lengths: age of a bond that counts; half width of the first bonds
 FINEST, MOST_PARTS = 0.2, 60  # bond lengths of a strip; of a step, whose parts are more where it is longer
 COMPARED = {"bench": ("loop_area", "friction_force_peak", "friction_ratio_end", "friction_work", "slip_amplitude"),
             "rig": ("relative_displacement_amplitude", "loop_area", "friction_force_peak", "friction_work",
@@ -45,6 +48,12 @@ MOTION = {"bench": '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "100
           "rig": '[structure]\nmoving_mass = "0.884 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n'
                  'damping = 0.02\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\n'
                  'cycles = 3\n'}
+
+
+HEAVE = '[[structure.mode]]\nname = "heave"\nfrequency = "{:.4g} Hz"\ndamping = 0.02\nslide = 0.0\nnormal = 1.0\n' \
+        'base = {:.3g}\n'
+ROCK = '[[structure.mode]]\nname = "rock"\nfrequency = "{:.4g} Hz"\ndamping = 0.02\nslide = 0.0\n' \
+       'pitch = "{:.3g} rad/m"\nbase = {:.3g}\n'
 
 
 def scene_of(kind: str, seed: int):
@@ -76,7 +85,17 @@ def scene_of(kind: str, seed: int):
                  "friction.slip_growth": f"{length * 10 ** draw.uniform(-1, 0):.4g} um",
                  "friction.rest_growth": f"{speed * frequency * 10 ** draw.uniform(-1, 1):.4g} m/s^2",
                  "friction.rest_speed": f"{floor:.4g} m/s"}
-    return loads(PIECES + MOTION[kind], "random.toml", [f"{key}={value}" for key, value in sets.items()])
+    motion = MOTION[kind]
+    if seed >= 8000:  # the pressure on the lower piece, or a load that changes: heave, or rocking that lifts the ends
+        what = draw.choice(["upper", "lower", "lower"] if kind == "bench" else ["upper", "lower", "heave", "rock"])
+        if what == "lower" and shape != "flat":
+            sets[f"contact.{shape}.on"] = "lower"
+        if what in ("heave", "rock") and reading == "report":
+            pitch = 10 ** draw.uniform(0.8, 1.8)
+            mode = HEAVE.format(draw.uniform(150, 400), draw.uniform(0.1, 0.4)) if what == "heave" else \
+                ROCK.format(draw.uniform(150, 400), pitch, draw.uniform(0.1, 0.4))
+            motion = motion.replace("slide = 1.0\n", "slide = 1.0\nbase = 0.9\n" + mode)
+    return loads(PIECES + motion, "random.toml", [f"{key}={value}" for key, value in sets.items()])
 
 
 class Bonds:
@@ -86,7 +105,9 @@ class Bonds:
         self.f, self.floor, self.mu = f, floor, f.static
         self.at, self.path, self.harm, self.eps = (np.zeros(size), np.zeros(size), np.zeros(size),
                                                    np.full(size, f.bond_length))
-        self.low, self.high, self.when, self.hurt, self.born, self.lag = (np.zeros((0, size)) for _ in range(6))
+        self.low, self.high, self.when, self.hurt, self.born, self.lag, self.dense = (
+            np.zeros((0, size)) for _ in range(7))
+        self.first, self.forming = np.ones(size), lambda places, part: np.ones_like(places)
 
     def grown(self, moved, dt):
         """(mature length after the step, factor on the distance of a bond from it, length half way) at |v| = moved/dt,
@@ -120,23 +141,29 @@ class Bonds:
         born = np.vstack([self.born, np.tile(middle, (parts, 1))])
         gone = np.zeros_like(moved) + left
         lag = np.vstack([self.lag * gone, middle * gone ** back])  # how far a bond's own length is behind, 2.10 from 0
+        dense = np.vstack([self.dense, self.forming((ends[1:] + ends[:-1]) / 2, 1 - back)])
         age = path - when
         if f.reading == "report":
             own = np.maximum(eps - lag, 1e-9 * eps) if f.rest_growth is not None else e0
             x = age / own
             each = np.where(size > 0, x ** p * np.exp(-x), 0.0) * size / (e0 * norm)
             first = f.initial_bonds / norm * np.where(path > 0, (path / e0) ** p, float(p == 0)) * np.exp(-path / e0)
-            first = first * np.clip(s / (FIRST_WIDE * e0), -1, 1)
+            first = first * self.first * np.clip(s / (FIRST_WIDE * e0), -1, 1)
         else:
             u = np.abs(s - (low + high) / 2)
             each = (u / born) ** p * np.exp(-(harm - hurt)) * size / (e0 * norm)
-            first = f.initial_bonds / norm * (np.abs(s) / e0) ** p * np.exp(-harm) * np.sign(s)
+            first = f.initial_bonds / norm * (np.abs(s) / e0) ** p * np.exp(-harm) * np.sign(s) * self.first
+        each = each * dense
         if keep:
             on = (age / e0 < MOST).any(axis=1)
-            self.low, self.high, self.when, self.hurt, self.born, self.lag = (
-                one[on] for one in (low, high, when, hurt, born, lag))
+            self.low, self.high, self.when, self.hurt, self.born, self.lag, self.dense = (
+                one[on] for one in (low, high, when, hurt, born, lag, dense))
             self.at, self.path, self.harm, self.eps = s, path, harm, eps
         return (each * side).sum(axis=0) + first
+
+    def lift(self, off):
+        """Break the bonds of points that nothing presses, off (m,) bool."""
+        self.dense[:, off], self.first[off] = 0.0, 0.0
 
 
 def settled(bonds: Bonds, limit, c, q: float, dt: float, guess):
@@ -144,12 +171,12 @@ def settled(bonds: Bonds, limit, c, q: float, dt: float, guess):
     s, tiny = guess.copy(), 1e-7 * bonds.f.bond_length
     force = limit * bonds.weight(s, dt)
     miss = s - q + c @ force
-    for _ in range(60):
-        if np.abs(miss).max() < 1e-10 * (abs(q) + bonds.f.bond_length):
+    for _ in range(25):
+        if np.abs(miss).max() < 1e-9 * (abs(q) + bonds.f.bond_length):
             break
         slope = limit * (bonds.weight(s + tiny, dt) - bonds.weight(s - tiny, dt)) / (2 * tiny)
         step = np.linalg.solve(np.eye(s.size) + c * slope, miss)
-        for part in 0.5 ** np.arange(12):
+        for part in 0.5 ** np.arange(8):
             new = s - part * step
             there = limit * bonds.weight(new, dt)
             left = new - q + c @ there
@@ -159,51 +186,112 @@ def settled(bonds: Bonds, limit, c, q: float, dt: float, guess):
     return s, force
 
 
+class Pressed:
+    """Nodal forces (m,) of a patch whose upper holder heaves and turns, by the whole normal compliance."""
+
+    def __init__(self, patch):
+        self.force = patch.pieces.interface.weight * patch.pressure.sigma_n
+        self.c, self.x = patch.pieces.normal, patch.x
+        self.load, self.moment = self.force.sum(), self.force @ self.x
+        self.opening, self.inverses = patch.pressure.gap - self.c @ self.force, {}
+
+    def at(self, heave: float, turn: float):
+        """(nodal forces (m,) [N], their slopes over heave and turn (m, 2)) with force >= 0 and gap >= 0, from the set
+        found last: nodes that pull leave it, nodes that would overlap join it."""
+        on, open_ = self.force > 0, self.opening + heave + turn * self.x
+        for _ in range(200):
+            force, slopes = np.zeros_like(self.x), np.zeros((self.x.size, 2))
+            if on.any():
+                if on.tobytes() not in self.inverses:
+                    self.inverses[on.tobytes()] = np.linalg.inv(self.c[np.ix_(on, on)])
+                sides = np.stack([open_, np.ones_like(open_), self.x], axis=1)
+                found = self.inverses[on.tobytes()] @ sides[on]
+                force[on], slopes[on] = -found[:, 0], -found[:, 1:]
+            wanted = np.where(on, force >= 0, open_ + self.c @ force < -1e-16)
+            if (wanted == on).all():
+                break
+            on = wanted
+        self.force = force
+        return force, slopes
+
+
 def by_hand(scene, steps: int = 500) -> dict:
     """Measures of a scene by the sum by hand, at `steps` a cycle."""
     model = build(scene)
     patch = patches.solve_all(model.patch, 0.1 * model.accuracy.tolerance, False, False)[0]
-    f = model.friction
-    area = patch.pieces.interface.weight * patch.pressure.sigma_n
-    on = np.flatnonzero(area > 0)
-    limit, c = f.static * area[on], patch.giving[np.ix_(on, on)]
-    bonds = Bonds(f, on.size, model.bonds.rest_speed)
-    if model.rig is None:
-        omega, cycles = 2 * pi * scene.slide.frequency, int(scene.slide.cycles)
-    else:
-        omega, cycles = 2 * pi * scene.drive.frequency, int(scene.drive.cycles)
+    f, rig = model.friction, model.rig
+    area, sigma, lower = patch.pieces.interface.weight, patch.pressure.sigma_n, model.side == "lower"
+    varies = rig is not None and rig.load_varies
+    on = np.flatnonzero(sigma > 0) if not (lower or varies) else np.arange(sigma.size)
+    measure = patch.pressure.load / area[sigma > 0].sum()
+    under = np.full(on.size, measure) if lower or varies else sigma[on]
+    limit, c, x = f.static * area[on] * under, patch.giving[np.ix_(on, on)], patch.x[on]
+    bonds, press = Bonds(f, on.size, model.bonds.rest_speed), Pressed(patch)
+    bonds.first = sigma[on] / under
+    force_now = area * sigma
+    if lower:
+        bonds.forming = lambda places, part: np.interp(x + places, patch.x, sigma / measure, left=0.0, right=0.0)
+    omega, cycles = (2 * pi * scene.slide.frequency, int(scene.slide.cycles)) if rig is None else \
+        (2 * pi * scene.drive.frequency, int(scene.drive.cycles))
     dt = 2 * pi / omega / steps
     slide, force, slip = (np.zeros(cycles * steps + 1) for _ in range(3))
-    s, before, state, beta = np.zeros(on.size), np.zeros(on.size), np.zeros(3), 0.0
-    if model.rig is not None:
-        modes = model.rig.modes
-        own, zeta, mass = modes.omega[0], modes.zeta[0], modes.mass
+    s, before, beta = np.zeros(on.size), np.zeros(on.size), 0.0
+    if rig is not None:
+        modes = rig.modes
+        own, zeta, mass = modes.omega, modes.zeta, modes.mass
+        rows = np.stack([np.zeros(own.size) if one is None else np.asarray(one, float)
+                         for one in (modes.slide, modes.normal, modes.pitch)])
         stiff = own**2 + 4 / dt**2 + 4 * zeta * own / dt
-        beta = 1 / (mass * stiff)
+        beta, state = float((rows[0]**2 / stiff).sum() / mass), np.zeros((3, own.size))
     for k in range(1, slide.size):
         t = k * dt
-        if model.rig is None:
+        if rig is None:
             free = scene.slide.amplitude * np.sin(omega * t)
         else:  # average acceleration: z'' = 4 (z - z0)/dt^2 - 4 v0/dt - a0
             z, v, a = state
-            push = -scene.drive.acceleration * np.sin(omega * t)
-            free = (push + 4 * z / dt**2 + 4 * v / dt + a + 2 * zeta * own * (2 * z / dt + v)) / stiff
+            push = -modes.base * scene.drive.acceleration * np.sin(omega * t)
+            free_z = (push + 4 * z / dt**2 + 4 * v / dt + a + 2 * zeta * own * (2 * z / dt + v)) / stiff
+            old, pull = force_now, np.zeros(own.size)
+            if varies:
+                force_now, pull = balanced(press, rows, free_z, stiff * mass, z)
+                bonds.forming = lambda places, part, a=old[on], b=force_now[on]: np.broadcast_to(
+                    (a + part * (b - a)) / (measure * area[on]), places.shape)
+            free_z = free_z + pull
+            free = rows[0] @ free_z
         new, there = settled(bonds, limit, c + beta, free, dt, 2 * s - before)
         before, s = s, new
         bonds.weight(s, dt, keep=True)
+        here = np.interp(x + s, patch.x, sigma, left=0.0, right=0.0) * area[on] if lower else force_now[on]
+        bonds.lift(here <= 0)
         force[k] = there.sum()
         slide[k] = free - beta * force[k]
-        slip[k] = (limit @ s - f.bond_length * force[k]) / limit.sum()
-        if model.rig is not None:
-            z1 = slide[k]
+        slip[k] = (here @ s - f.bond_length / f.static * force[k]) / here.sum() if here.sum() > 0 else slide[k]
+        if rig is not None:
+            z1 = free_z - rows[0] * force[k] / (stiff * mass)
             a1 = 4 * (z1 - z) / dt**2 - 4 * v / dt - a
             state = np.array([z1, v + dt / 2 * (a + a1), a1])
     work = np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(slide))])
     last = slice(-steps - 1, None)
     pulled = np.abs(force[last if beta else slice(None)])
     return {"loop_area": work[-1] - work[-steps - 1], "friction_force_peak": pulled.max(), "friction_work": work[-1],
-            "friction_ratio_end": force[-1] / area.sum(), "slip_amplitude": np.ptp(slip[last]) / 2,
+            "friction_ratio_end": force[-1] / patch.pressure.load, "slip_amplitude": np.ptp(slip[last]) / 2,
             "relative_displacement_amplitude": np.ptp(slide[last]) / 2}
+
+
+def balanced(press: Pressed, rows, free, stiff, guess) -> tuple:
+    """(nodal forces (m,) [N], coordinates (n,) by which they push the modes beyond `free`) where heave and turn press
+    the contact as much as it pushes back, by Newton's method; stiff (n,) [N/m]: of the modes in the step."""
+    up = rows[1:] / stiff  # what one newton, one newton metre does to the coordinates
+    place, rest = rows[1:] @ guess, rows[1:] @ free
+    for _ in range(60):
+        force, slopes = press.at(*place)
+        pull = np.array([force.sum() - press.load, force @ press.x - press.moment])
+        miss = place - rest - rows[1:] @ (up.T @ pull)
+        if np.abs(miss / np.array([1.0, 1 / np.ptp(press.x)])).max() < 1e-15:
+            break
+        arms = np.stack([np.ones_like(press.x), press.x])
+        place = place - np.linalg.solve(np.eye(2) - rows[1:] @ up.T @ (arms @ slopes), miss)
+    return force, up.T @ pull
 
 
 def misses(kind: str, seed: int) -> tuple:
@@ -211,7 +299,7 @@ def misses(kind: str, seed: int) -> tuple:
     bar and what these differ by; energy balance)."""
     scene = scene_of(kind, seed)
     found = runs.run(pf.plan(scene)).measures
-    rough, fine = by_hand(scene, 300), by_hand(scene, 600)
+    rough, fine = by_hand(scene, 200), by_hand(scene, 400)
     out = {}
     for name in COMPARED[kind]:
         if found[name].value is None or found[name].error is None:

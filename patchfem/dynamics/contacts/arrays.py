@@ -70,12 +70,12 @@ def sheared(weight, length: float, growth, psi, kappa, lanes: int = 1, load=None
             "hess": np.zeros((2, size, size)), "ready": np.zeros(2)}
 
 
-class Rub(namedtuple("Rub", ("force", "memory", "before", "now", "modes", "under", *Sheared._fields))):
+class Rub(namedtuple("Rub", ("force", "memory", "pressed", "modes", "under", *Sheared._fields))):
     """Points of a law under a load that changes, `pressed_points_kernels`.
 
     force (6,): mu_s, mu_k, bond length [m], initial density m_0, kind of the law as in `shear_points_kernels`, goal of
-    the solve [N]; memory (3, m): elastic-plastic traction/mu and springs [N]; bonds m, z, s2 [N, N m, N m2]; before,
-    now (m,): nodal forces at the ends of the step [N]; modes (r, m): shear modes at all points, none of pieces that are
+    the solve [N]; memory (3, m): elastic-plastic traction/mu and springs [N]; bonds m, z, s2 [N, N m, N m2]; pressed
+    (2, m): nodal forces at both ends of the step [N]; modes (r, m): shear modes at all points, none of pieces that are
     rigid in shear; under (m,): numbers of the points under load, in the order in which they come in the rest, which is
     as of `Sheared`; there they have the memory after half of the change of load, and the mean load.
     """
@@ -113,7 +113,7 @@ class Flanked(NamedTuple):
 
 
 class BondList(NamedTuple):
-    """One list of bonds for a slide that all share: force = mu_s N [N]; bondlist (10, capacity), now (6,), tally (14,),
+    """One list of bonds for a slide that all share: force = mu_s N [N]; bondlist (10, capacity), now (6,), tally (16,),
     law (24,), table (k,) as in friction.bonds.list_kernels; growth (6,) of eq. 2.10; last (2,) slide increments [m];
     bound (1,): largest force [N]."""
 
@@ -129,12 +129,15 @@ class BondList(NamedTuple):
 
 
 class ShearedLists(namedtuple("ShearedLists", ("bondlist", "now", "tally", "law", "table", "nows", "tallies", "time",
-                                               *Sheared._fields))):
+                                               "pressed", "pattern", "places", *Sheared._fields))):
     """Points (m,) behind shear modes of which each is a list of bonds, `shear_list_kernels`.
 
-    bondlist (10, m capacity): the lists beside each other; nows (m, 6), tallies (m, 14): of each, and now, tally of the
+    bondlist (10, m capacity): the lists beside each other; nows (m, 6), tallies (m, 16): of each, and now, tally of the
     one that is looked at; law, table: as of `BondList`; time (1,): length of the step [s]; the rest is as of `Sheared`,
-    weight (m,) the friction limits [N] and the first two rows of points as `shear_lists_kernels` has them.
+    weight (m,) the friction limits [N] and the first four rows of points as `shear_lists_kernels` has them. pressed
+    (2, m): nodal forces at both ends of the step [N], over those of the limits in the row LOAD of points, (2, 0) where
+    they stay; pattern (2, k): of the lower piece, places [m] and pressures over that of the limits, places (m,) [m]: of
+    the points at rest; (2, 0), (0,) where the pressure rides on the upper one.
     """
 
     __slots__ = ()
@@ -226,7 +229,7 @@ def carried(contact, element=None) -> list | None:
         return memory_rows(element, contact.mem[0])
     if isinstance(contact, Sheared):
         return [contact.eps, contact.b, contact.flow[1:], *contact.points[:5]]
-    return [contact.eps, contact.b, contact.now, *contact.memory] if isinstance(contact, Rub) else None
+    return [contact.eps, contact.b, contact.pressed[1], *contact.memory] if isinstance(contact, Rub) else None
 
 
 def memory_rows(element, memory) -> list:

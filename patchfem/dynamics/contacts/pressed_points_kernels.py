@@ -3,8 +3,8 @@
 As on a bench: half of the change of load, the slide under the mean load, the other half. A changing load alone never
 gives energy, and no point keeps more than mu times its load. It leaves the points out of balance with pieces that give
 way in shear, which a mean alone would keep and turn about in every step; so a step ends with the pieces springing back
-while the holder stands. Whoever presses the points writes the nodal forces at both ends of the step, `before` and
-`now`. The functions without `rub` in front are those that `march.loop_kernels` asks of every contact.
+while the holder stands. Whoever presses the points writes the nodal forces at both ends of the step, `pressed`. The
+functions without `rub` in front are those that `march.loop_kernels` asks of every contact.
 """
 
 from ...compiled.inner import njit
@@ -22,8 +22,8 @@ TIGHT = 0.01  # share of the goal down to which pieces that give way are solved:
 def load_points(part, rub):
     """Gather the points under load that share of the way through the step, their loads and the modes there."""
     count, under, same = 0, rub.under, True
-    for j in range(rub.now.size):
-        load = (1 - part) * rub.before[j] + part * rub.now[j]
+    for j in range(rub.pressed.shape[1]):
+        load = (1 - part) * rub.pressed[0, j] + part * rub.pressed[1, j]
         if load > 0.0:
             same = same and under[count] == j
             under[count] = j
@@ -47,7 +47,7 @@ def press_all(kind, rub):
             points[DENSITY, i], points[STRETCH, i] = press_springs(memory[0, j], memory[1, j], points[LOAD, i])
         else:
             points[DENSITY, i], points[STRETCH, i], points[SQUARE, i] = press_point(
-                memory[0, j], memory[1, j], memory[2, j], rub.before[j], points[LOAD, i], rub.force[INITIAL],
+                memory[0, j], memory[1, j], memory[2, j], rub.pressed[0, j], points[LOAD, i], rub.force[INITIAL],
                 rub.force[LENGTH])
 
 
@@ -109,12 +109,12 @@ def rub_commit(dq, used, v0, v1, dt, kind, rub):
         j, load, xi = rub.under[i], points[LOAD, i], points[SLIDE, i]
         if kind == PLASTIC:
             y, springs = spring_step(points[DENSITY, i], points[STRETCH, i], load, xi, length)
-            memory[0, j], memory[1, j] = press_springs(y, springs, rub.now[j])
+            memory[0, j], memory[1, j] = press_springs(y, springs, rub.pressed[1, j])
         else:
             lost += 0.5 * rub.weight[i] * (memory[2, j] - points[SQUARE, i])
             m, z, s2, part = bond_step(points[DENSITY, i], points[STRETCH, i], points[SQUARE, i], xi, load, rub.eps[1])
-            memory[0, j], memory[1, j], memory[2, j] = press_point(m, z, s2, load, rub.now[j], rub.force[INITIAL],
-                                                                   length)
+            memory[0, j], memory[1, j], memory[2, j] = press_point(m, z, s2, load, rub.pressed[1, j],
+                                                                   rub.force[INITIAL], length)
             lost += 0.5 * rub.weight[i] * (part + s2 - memory[2, j])
     went_on(rub)
     if kind == PLASTIC:

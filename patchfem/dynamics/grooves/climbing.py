@@ -249,5 +249,4 @@ class ClimbingRun(FlankRun):
     def _pressed(self, share: float) -> None:
         c = self.contact
         c.memory[:] *= share
-        c.before[:] *= share
-        c.now[:] *= share
+        c.pressed[:] *= share

@@ -27,7 +27,7 @@ def begun(c, v, dt):
 
 @njit(error_model="numpy", **LEAN)
 def drag(ds, flat, end, dt, c):
-    """(mean force [N] along the flank over the path ds [m] in dt [s], its slope [N/m]); c.now become the shares of the
+    """(mean force [N] along the flank over the path ds [m] in dt [s], its slope [N/m]); c.pressed become shares of the
     normal force flat + f end at the end, on a slope `end`, where f is the force there."""
     kind, pulled, gain, at, gives = int(c.flank[KIND]), 0.0, 0.0, c.now_at, c.kappa.size > 0
     close = (1e-12 if gives else 1e-14) * c.flank[LOAD]
@@ -58,8 +58,8 @@ def drag(ds, flat, end, dt, c):
 def load(c, normal):
     """Put the normal force [N] on the points."""
     c.now_at[NORMAL] = normal
-    for j in range(c.now.size):
-        c.now[j] = c.share[j] * normal
+    for j in range(c.pressed.shape[1]):
+        c.pressed[1, j] = c.share[j] * normal
 
 
 @njit(error_model="numpy", **LEAN)
@@ -95,8 +95,8 @@ def commit(ds, along, v0, v1, dt, c):
     if c.kappa.size:
         more, count = spring_back(kind, c, c.force[0] * c.flank[LOAD] * 1e-11)
         lost, fine = lost + more, count > 0
-    for j in range(c.now.size):
-        c.before[j] = c.now[j]
+    for j in range(c.pressed.shape[1]):
+        c.pressed[0, j] = c.pressed[1, j]
     return lost, fine
 
 

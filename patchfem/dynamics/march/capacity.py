@@ -34,7 +34,7 @@ def keep(contact, *others) -> Kept | None:
 
 
 def _tallies(contact) -> np.ndarray:
-    """The tallies (m, 14) of the lists of a contact."""
+    """The tallies (m, 16) of the lists of a contact."""
     return contact.tallies if hasattr(contact, "tallies") else contact.tally[None]
 
 

@@ -37,7 +37,8 @@ def loop_of(kind: tuple, laws: tuple = (), load: str = STEADY, there: bool = Tru
     its place; load: STEADY, WHOLE or POINTS; there: whether the contact is; several: whether more than one rub."""
     contact, named = contact_of(kind), {}
     flags = {"MANY": bool(laws), "STOPS": COULOMB in laws, "SMOOTH": {*laws} > {COULOMB} or COULOMB not in laws,
-             "THERE": there, "SEVERAL": several, "PRESSED": load != STEADY, "POINTED": load == POINTS}
+             "THERE": there, "SEVERAL": several, "PRESSED": load != STEADY, "POINTED": load == POINTS,
+             "LISTED": kind[0] == SHEARED_LISTS}
     text = '"""Parts of a loop, written by patchfem.dynamics.march.instances."""\n\n' + "".join(
         f"{name} = {value}\n" for name, value in flags.items())
     parts = compiled.written(f"{HERE}.parts_{compiled.digest(text)}_kernels", text)

@@ -16,7 +16,7 @@ from . import faces_kernels as faces
 from . import parts_kernels as parts
 from . import pressing_kernels as pressing
 
-MANY, STOPS, PRESSED = parts.MANY, parts.STOPS, parts.PRESSED  # names by which numba leaves branches out
+MANY, STOPS, PRESSED, LISTED = parts.MANY, parts.STOPS, parts.PRESSED, parts.LISTED  # numba leaves branches out
 UNFIT = 4  # status where no contact set fits
 
 
@@ -109,7 +109,7 @@ def march(first, steps, motion, plant, table, c, j, n, travel, ledger, rows):
             lost, ok = contact.commit(dq, used, q, v, after, dt, c)
         ledger[3] += lost
         if not ok:
-            if PRESSED:
+            if PRESSED and not LISTED:
                 ledger[7] += 1.0
             else:
                 return i, 2

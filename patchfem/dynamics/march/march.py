@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ...compiled import load
-from ...core import BaseSine, ModalBasis, Outcome, Response
+from ...core import BaseSine, ModalBasis, Outcome, Response, say
 from ..contacts import arrays
 from ..contacts.arrays import ModalArrays
 from ..cycles import extremes_of, phasors_of, thinned
@@ -23,6 +23,7 @@ from .faces import GOAL, faces_of
 from .models import ContactModel, free_model, load_kernels
 
 FULL, UNFIT = 2, 4  # status of a loop whose list of bonds is full, and where no contact set fits the motion
+FLUNG = 10.0  # times beyond its stop that no step ends which followed the motion
 EACH = 5  # columns of an element in a row, as of `faces_kernels`
 AT_ONCE, PIECES = 8000, 16  # steps and cycles of a piece of a run of which nothing is kept
 PASSING = "dynamics.march.passing_kernels"
@@ -443,11 +444,17 @@ class Run:
         for piece in np.diff(edges) if size else [0]:
             rows = np.empty((piece + 1, self.width))
             rows[-1] = 0.0  # what belongs to the step after the last one is nothing yet
-            kept = keep(self.contact, *self._moving())
+            kept, begin = keep(self.contact, *self._moving()), self._before_a_fling()
             did, status = self._steps(int(piece), rows)
             while status == FULL:
                 self.contact = lengthened(self.contact, kept, f"at step {self.done + did}", *self._moving())
                 did, status = self._steps(int(piece), rows)
+            if begin and self._flung(rows[:did + 1]):
+                for array, old in zip((*self.contact, *self._moving()), begin):
+                    array[...] = old
+                did, status = self._steps(did - 1, rows)[0], 1
+                self.message = (f"a step from {say(self._out(rows[did]), 3)} on flings the motion out of all bounds: "
+                                "beyond a softening spring's barrier nothing holds it; the run ended before that step")
             self.done += did
             parts.append(rows[:did + 1])
             self._judge(status)
@@ -458,6 +465,20 @@ class Run:
         rows = np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:]) if len(parts) > 1 else parts[0]
         self.second += self._sampled(rows).sum(), np.abs(self._works(rows)).sum()
         return rows
+
+    def _before_a_fling(self) -> tuple:
+        """Copies of all that steps change, beside a spring that bends."""
+        springs = any(one.potential is not None for one in self.model.joints)
+        return tuple(array.copy() for array in (*self.contact, *self._moving())) if springs else ()
+
+    def _flung(self, rows) -> bool:
+        """Whether the last step of the rows ends FLUNG times beyond the stop, or nowhere."""
+        return len(rows) > 1 and not (self._out(rows[-1]) <= FLUNG * self.travel and np.isfinite(rows[-1]).all())
+
+    def _out(self, row) -> float:
+        """Distance of the output from rest [m] in a row."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            return abs(float(self.modes.output @ row[:self.modes.omega.size]))
 
     def _steps(self, count: int, rows) -> tuple:
         """March `count` steps into rows (count + 1, width): (steps done, status)."""

@@ -94,7 +94,8 @@ class ContactModel:
             return {}
         if hasattr(contact, "bondlist"):
             load, share = contact.points[4], contact.tallies[:, 5]  # as if all bonds of a point were stretched alike
-            return {"bonds": np.stack([load, self.length * load * share, share, contact.nows[:, 0], 0 * share]),
+            here = load * pressures_of(contact)
+            return {"bonds": np.stack([here, self.length * load * share, share, contact.nows[:, 0], 0 * share]),
                     "b": contact.b.copy()}
         m, z, s2, play = contact.points[:4, :self.reduction.points.size]
         return {"bonds": np.stack([m, z, s2, contact.flow[1] - self.reduction.shape @ contact.b, play]),
@@ -153,19 +154,48 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
     return ContactModel(f"{HERE}.shear_kernels", limit, fields, law.length, "", shear, None, arrays.Sheared)
 
 
-def lists_model(law, limit, sigma, shear, reach: float, merge: float) -> ContactModel:
+def lists_model(law, limit, sigma, shear, reach: float, merge: float, under: dict | None = None) -> ContactModel:
     """Lists of bonds behind shear modes, one a point: any order, either reading. limit: mu_s N (m,) [N] of the points
-    of the ShearModes `shear`, sigma: their pressures (m,) [Pa]; reach, merge: as `list_model` has them."""
+    of the ShearModes `shear`, None of pieces that are rigid in shear; sigma: their pressures (m,) [Pa]; reach, merge:
+    as `list_model` has them; under: `under_the_lower` or `under_loads` of a pressure that changes, of which limit and
+    sigma are then a measure."""
     limit = np.asarray(limit, float)
+    shape, stiffness = (np.zeros((limit.size, 0)), ()) if shear is None else (np.asarray(shear.shape), shear.stiffness)
     room = min(numbers.room(law, reach, merge), MOST_AT_FIRST + numbers.STRIP * int(min(reach, numbers.NOTHING_LEFT)))
-    fields = arrays.sheared(limit, law.length, growth_numbers(law), np.asarray(shear.shape), shear.stiffness)
-    fields["points"][4], fields["drag"][2, 1:] = sigma, np.asarray(shear.shape).T @ limit / limit.sum()
+    fields = arrays.sheared(limit, law.length, growth_numbers(law), shape, stiffness)
+    fields["points"][4], fields["drag"][2, 1:] = sigma, shape.T @ limit / limit.sum()
     fields |= {"bondlist": np.zeros((10, limit.size * room)), "tally": numbers.tally_of(room), "time": np.ones(1),
                "tallies": numbers.tally_of(room, limit.size), "now": numbers.now_of(law),
                "nows": np.tile(numbers.now_of(law), (limit.size, 1)), "table": numbers.share_table(law),
-               "law": numbers.law_numbers(law, reach, merge, WIDE)}
+               "law": numbers.law_numbers(law, reach, merge, WIDE), "pressed": np.zeros((2, 0)),
+               "pattern": np.zeros((2, 0)), "places": np.zeros(0)}
+    if under is not None:
+        at_first = under.pop("at first")
+        fields |= under
+        fields["tallies"][:, 14:] = at_first[:, None]
+        limit = limit * at_first
     return ContactModel(f"{HERE}.shear_list_kernels", float(limit.sum()), fields, law.length, "", shear,
                         None, arrays.ShearedLists)
+
+
+def under_the_lower(x, sigma, measure: float) -> dict:
+    """What `lists_model` asks of points at x (m,) [m] under the pressure sigma (m,) [Pa] of the lower piece, that stays
+    there; measure [Pa]: the pressure of their limits."""
+    return {"pattern": np.stack([x, sigma / measure]), "places": np.array(x, float), "at first": sigma / measure}
+
+
+def under_loads(force, measure) -> dict:
+    """What `lists_model` asks of points under nodal forces that change; force (m,) [N]: at the start, measure (m,) [N]:
+    those of their limits, which are its `sigma` as well."""
+    return {"pressed": np.stack([force, force]), "at first": force / measure}
+
+
+def pressures_of(contact) -> np.ndarray:
+    """Pressures (m,) of the points of a `ShearedLists` as they stand, over those of their limits."""
+    if contact.pattern.size:
+        x, pressure = contact.pattern
+        return np.interp(contact.places + contact.nows[:, 0], x, pressure, left=0.0, right=0.0)
+    return contact.pressed[1] / contact.points[4] if contact.pressed.size else np.ones(contact.weight.size)
 
 
 def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:

@@ -10,3 +10,4 @@ THERE = True  # the contact; it is not where elements take its place
 SEVERAL = False  # of elements and contact more than one
 PRESSED = False  # a load that changes
 POINTED = False  # points that bear their own share of it
+LISTED = False  # points that are lists of bonds

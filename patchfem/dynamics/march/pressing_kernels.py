@@ -106,7 +106,7 @@ def weigh(before, after, c, j, n):
     """
     if POINTED:
         for i in range(n.now.size):
-            c.now[i] = n.now[i]
+            c.pressed[1, i] = n.now[i]
     elif STOPS:
         faces.limited(before, after, n.force, j)
     else:
@@ -173,7 +173,7 @@ def agreed(i, q, v, motion, plant, table, at, c, j, n):
         n.now[0] = after
     if POINTED:
         for k in range(n.now.size):
-            c.before[k] = c.now[k]
+            c.pressed[0, k] = c.pressed[1, k]
     for outer in range(1, 2 * MOST + 1):
         if moves:
             end, its, wrong = press_step(n, n.slot[0], begin, heave - beta[1, 0] * guess, pitch - beta[2, 0] * guess,

@@ -21,11 +21,13 @@ from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
 from ..contacts import arrays
 from ..contacts.dispatch import COULOMB as COULOMB_LAW
 from .faces import GOAL
+from .instances import SHEARED_LISTS
 from .march import Run
 from .march import march as run
-from .models import IDLE, Joint, element_model
+from .models import IDLE, Joint, element_model, lists_model, under_loads
 
-COULOMB, PLASTIC, POINTS, RATE = 0, 1, 2, 4
+COULOMB, PLASTIC, POINTS, LISTS, RATE = range(5)
+SETTLED = 1e4  # times the goal: the residual that sums over bonds keep
 FLOOR = 1.0  # least pressure of a node in the weights of the shear modes, over the mean of the preload
 PRESS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
@@ -33,13 +35,15 @@ PRESS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 @dataclass(frozen=True, eq=False, slots=True)
 class Rubbing:
     """A law of friction under a load that changes: its kind and the first numbers of `contacts.arrays.Rub`, v_0 of a
-    rate law in place of mu_k; static: mu_s, which times the preload is the scale of the residuals."""
+    rate law in place of mu_k; static: mu_s, which times the preload is the scale of the residuals; summed: the
+    `friction.bonds.parameters.Bonds` of a list with its cut-off and its merge width, as `list_model` has them."""
 
     kind: int
     static: float
     force: tuple
     growth: tuple = (-1.0, 1.0, 1.0, 1.0, 1.0, 0.0)
     length: float = 0.0
+    summed: tuple = ()
 
 
 def coulomb(static: float, kinetic: float | None = None) -> Rubbing:
@@ -64,6 +68,15 @@ def bonds(law) -> Rubbing:
 
     return Rubbing(POINTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
                    law.length)
+
+
+def lists(law, reach: float, merge: float) -> Rubbing:
+    """The printed reading of friction.bonds.parameters.Bonds, a list of bonds at every point: bonds keep the pressure
+    that they formed under. PatchfemError for the other, of which bonds are let go as the load falls."""
+    if law.reading != "report":
+        raise PatchfemError(unbuilt("friction: such bonds beside a load that changes", "recursion"))
+    return Rubbing(LISTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
+                   law.length, (law, reach, merge))
 
 
 def sets_of(patch, spring: float = 0.0) -> ContactSets:
@@ -98,7 +111,7 @@ def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
     memory[1 if plastic else 0] = normal if plastic else normal * law.force[3]
     psi, kappa = (np.zeros((size, 0)), ()) if shear is None else (shear.shape, shear.stiffness)
     weight = np.full(size, law.static / (1.0 if plastic else law.length))
-    return (np.array([*law.force, law.kind, GOAL * limit]), memory, normal.copy(), normal.copy(),
+    return (np.array([*law.force, law.kind, GOAL * limit]), memory, np.stack([normal, normal]),
             np.array(psi.T, order="C"), np.arange(size),
             *arrays.sheared(weight, law.length, law.growth, psi, kappa).values())
 
@@ -150,7 +163,7 @@ class VaryingLoadModel:
     @property
     def pointed(self) -> bool:
         """Whether points bear their own share of the load."""
-        return self.law.kind in (PLASTIC, POINTS)
+        return self.law.kind in (PLASTIC, POINTS, LISTS)
 
     @property
     def loading(self) -> str:
@@ -171,6 +184,8 @@ class VaryingLoadModel:
     @property
     def kind(self) -> tuple:
         """(contact, law) of what rubs beside the joints: what `instances` takes an instance of the loop for."""
+        if self.law.kind == LISTS:
+            return SHEARED_LISTS, ""
         if self.pointed:
             return "dynamics.contacts.pressed_points_kernels", ""
         return IDLE if self.set_valued else (IDLE[0], "friction.laws.tanh_kernels")
@@ -179,9 +194,17 @@ class VaryingLoadModel:
         """The contact with arrays of its own, under the preload."""
         law = self.law
         if self.pointed:
-            now = np.full(1 if self.load is not None else self.sets.x.size, self.preload)
-            return arrays.Rub(*rub_of(law, now, self.shear, self.limit))
+            return self.points(np.full(1 if self.load is not None else self.sets.x.size, self.preload))
         return element_model(Rate(law.static, law.force[1] if law.kind == RATE else 1.0).element(self.preload)).build()
+
+    def points(self, force):
+        """Fresh points under nodal forces (m,) [N], those of the preload."""
+        law = self.law
+        if law.kind != LISTS:
+            return arrays.Rub(*rub_of(law, force, self.shear, self.limit))
+        measure = force + FLOOR * force.mean()
+        return lists_model(law.summed[0], law.static * measure, measure, self.shear, *law.summed[1:],
+                           under_loads(force, measure)).build()
 
     def shown(self, contact) -> dict:
         """Nothing: its memory is that of the run."""
@@ -207,7 +230,7 @@ def shear_of(giving, law: Rubbing, force, weight, count: int | None = None, tole
 def model_of(modes: ModalBasis, law: Rubbing, sets: ContactSets | None, load=None, shear=None) -> VaryingLoadModel:
     """The model of a basis on contact sets, or under a prescribed load on one point, which no heave or pitch can move.
     shear: ShearModes of an elastic-plastic law or of bonds; PatchfemError beside any other."""
-    if shear is not None and law.kind not in (PLASTIC, POINTS):
+    if shear is not None and law.kind not in (PLASTIC, POINTS, LISTS):
         raise PatchfemError(unbuilt("friction.law: this one beside a load that changes and [contact.shear]", "stiff"))
     if shear is not None and shear.points.size != sets.x.size:
         raise PatchfemError("contact.shear: under a load that changes the shear modes must span every node")
@@ -231,10 +254,15 @@ class VaryingLoadRun(Run):
             slot = press.locate(self.sets, press.begin(self.sets, model.sets.name(parts)), -heave, turn)
             press.press_state(self.sets, slot, -heave, turn, now)
         if model.pointed:
-            self.contact = arrays.Rub(*rub_of(model.law, now, model.shear, model.limit))
+            self.contact = model.points(now)
+        goal = GOAL * model.limit * (SETTLED if model.law.kind == LISTS else 1.0)
         return arrays.Pressing((), np.ascontiguousarray(model.rows, float), self.prop.beta.copy(),
                                np.array([float(np.ptp(x) / 2) or 1.0]), np.array(model.law.force[:2]), now, np.zeros(0),
-                               np.array([slot]), np.zeros(1), np.array([GOAL * model.limit]), np.zeros(22))
+                               np.array([slot]), np.zeros(1), np.array([goal]), np.zeros(22))
+
+    def _moving(self) -> tuple:
+        press = self.load
+        return *super()._moving(), press.now, press.slot, press.mean, press.few
 
     def _load(self, count: int) -> arrays.Pressing:
         loads = self.load.loads
@@ -260,8 +288,12 @@ class VaryingLoadRun(Run):
     def _snapshot(self, row) -> dict:
         nodal = self.load.now.copy()
         found = {"b": np.zeros(0), "memory": np.zeros((3, nodal.size)), "bend": 0.0}
-        if self.model.pointed:
-            c = self.contact
+        c = self.contact
+        if self.model.law.kind == LISTS:  # as if all bonds of a point were stretched alike
+            force, law = self.model.law.static * c.points[4] * c.tallies[:, 5], self.model.law
+            found = {"b": c.b.copy(), "memory": np.stack([nodal, law.length / law.static * force, 0 * nodal]),
+                     "bend": c.b @ c.psi}
+        elif self.model.pointed:
             found = {"b": c.b.copy(), "memory": c.memory.copy(), "bend": c.b @ c.modes}
         return super()._snapshot(row) | {"heave": row[-2], "turn": row[-1], "nodal": nodal} | found
 

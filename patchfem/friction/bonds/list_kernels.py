@@ -6,10 +6,11 @@ engines of `accuracy.quadrature` of it: the cut-off that drops old strips (`trun
 
 c: a named tuple with the arrays of a list, such as `dynamics.contacts.arrays.BondList`: bondlist (10, capacity), the
 rows of `list_sum_kernels`; law (24,) of `list_numbers.law_numbers`; growth (6,) of eq. 2.10; table (k,) of
-`list_numbers.share_table`; now (6,): q, path, damage, growth J, mature length, ref; tally (14,): first strip, end,
+`list_numbers.share_table`; now (6,): q, path, damage, growth J, mature length, ref; tally (16,): first strip, end,
 spread ones, length after the last merge, stored energy [m], force [1], created and dissipated [m], pieces beyond one
 per step, strips merged although their places differ, largest length, energy owed [m] (`dynamics.contacts`), first and
-last entry + 1 of its room in the array, which several lists may share.
+last entry + 1 of its room in the array, which several lists may share, pressure under which bonds form, and that which
+the first bonds formed under, over that of the friction limit.
 """
 
 from math import ceil, exp, expm1
@@ -99,7 +100,7 @@ def list_state(dq, c, v0, dt):
     q, path, damage, _, _, _ = _after(dq, c.now, c.growth, v0, v0, dt)
     first, stored = first_bonds(q, path, damage, c.law)
     force, energy = later_state(dq, c, v0, dt)
-    return first + force, stored + energy
+    return c.tally[15] * first + force, c.tally[15] * stored + energy
 
 
 @njit(error_model="numpy", **LEAN)
@@ -131,7 +132,7 @@ def later_state(dq, c, v0, dt):
             young = _young(size, now[4], eps, age - now[3], middle, law)
         else:
             young = formed(size, middle if law[1] <= POWER else law[2], law)
-    return force + np.copysign(young, dq), energy
+    return force + np.copysign(tally[14] * young, dq), energy
 
 
 @njit(error_model="numpy", **LEAN)
@@ -148,7 +149,7 @@ def list_energy(dq, c, v0, dt):
     """Energy [m] of all bonds, those of the increment too, after the straight increment dq in the stretch reading."""
     middle = _after(dq, c.now, c.growth, v0, v0, dt)[5]
     young = middle * middle / c.law[2] * share(c.law[0] + 1, abs(dq) / middle)
-    return young + list_state(dq, c, v0, dt)[1]
+    return c.tally[14] * young + list_state(dq, c, v0, dt)[1]
 
 
 @njit(error_model="numpy", **LEAN)
@@ -204,7 +205,7 @@ def list_mean(dq, c, v0, dt):
     if short:
         last = _force(dq, c, v0, dt)
     mean = _path_mean(False, short, last, dq, c, v0, dt)
-    return mean + first_mean(dq, now[0], now[1], law) if law[1] >= SHARES else mean
+    return mean + tally[15] * first_mean(dq, now[0], now[1], law) if law[1] >= SHARES else mean
 
 
 @njit(error_model="numpy", **LEAN)
@@ -216,7 +217,7 @@ def _path_mean(energy, short, last, dq, c, v0, dt):
             return (c.tally[4] + 4 * half + last) / 6
         half, before = _force(0.5 * dq, c, v0, 0.5 * dt), c.tally[5]
         if c.law[1] >= SHARES:
-            before -= first_bonds(c.now[0], c.now[1], c.now[2], c.law)[0]
+            before -= c.tally[15] * first_bonds(c.now[0], c.now[1], c.now[2], c.law)[0]
         return (before + 4 * half + last) / 6
     size = abs(dq) / c.now[4]
     if size <= 0.5:
@@ -237,9 +238,9 @@ def list_slope(dq, c, v0, dt):
     """
     tally, now, law = c.tally, c.now, c.law
     m, z, _ = moments_of(now[0], exp(now[5] - now[2]), c.bondlist, int(tally[0]), int(tally[1]))
-    first = law[3] * exp(-now[2])
+    first = tally[15] * law[3] * exp(-now[2])
     middle, _ = grow(now[4], v0, v0, abs(dq) / 2, dt / 2, c.growth)
-    mean, slope = bond_mean(m + first, z + first * now[0], dq, 1.0, middle)
+    mean, slope = bond_mean(m + first, z + first * now[0], dq, tally[14], middle)
     return mean / law[2], slope / law[2]
 
 
@@ -256,8 +257,9 @@ def list_step(dq, c, v0, v1, dt):
     now[0], now[1], now[2], now[3], now[4] = q, path, damage, grown, eps
     _rescale(bonds, tally, now, law)
     size, done = abs(dq), True
-    if size > 0:
+    if size > 0 and tally[14] > 0:
         done = _append(dq, place, way, harm, before, grown - age, middle, bonds, tally, now, law)
+    if size > 0:
         _cut(bonds, tally, now, law)
         # a merge passes over the whole list: wait until it has grown by a fifth
         if law[5] > 0 and tally[1] - tally[0] > 1.2 * tally[3] + 12:
@@ -285,14 +287,15 @@ def _rescale(bonds, tally, now, law):
 @njit(error_model="numpy", **LEAN)
 def _append(dq, place, way, harm, before, more, middle, bonds, tally, now, law):
     """Strips of the increment dq that began at `place`; False when there is no room."""
-    mode, size, end = law[1], abs(dq), int(tally[1])
+    mode, size, end, dense = law[1], abs(dq), int(tally[1]), tally[14]
     if mode == SHARES and end > tally[0] + tally[2] and (bonds[1, end - 1] - bonds[0, end - 1]) * dq > 0 \
-            and bonds[9, end - 1] == way:
+            and bonds[9, end - 1] == way and bonds[5, end - 1] == dense:
         k = end - 1
         bonds[1, k] = now[0]
         bonds[2, k] = bonds[9, k] = now[1]
         bonds[3, k] += size
-        bonds[4, k] = bonds[8, k] = bonds[3, k]
+        bonds[8, k] = bonds[3, k]
+        bonds[4, k] = dense * bonds[3, k]
         return True
     count, kept = (1, 1) if mode == SHARES else _pieces(size, middle, more, law)
     if mode == MOMENTS:
@@ -309,13 +312,15 @@ def _append(dq, place, way, harm, before, more, middle, bonds, tally, now, law):
         bonds[0, end], bonds[1, end] = now[0] - far * dq, now[0] - near * dq
         bonds[7, end] = 1.0
         bonds[8, end], bonds[9, end] = size / count, now[1] - near * size
-        bonds[2, end], bonds[3, end], bonds[4, end] = bonds[9, end], bonds[8, end], bonds[8, end]
+        bonds[2, end], bonds[3, end], bonds[4, end] = bonds[9, end], bonds[8, end], dense * bonds[8, end]
+        bonds[5, end] = dense
         if mode == MOMENTS:
             _as_moments(bonds, end, dq, middle, now)
+            bonds[5, end] *= dense
         elif mode == POWER:
             span = (now[2] - harm) / count
             bonds[2, end], bonds[3, end] = now[2] - near * (now[2] - harm), span
-            bonds[4, end] = size / count * middle ** (-law[0])
+            bonds[4, end] = dense * (size / count * middle ** (-law[0]))
             bonds[5, end] = 0.5 * bonds[4, end] * exp(bonds[2, end] - FIRST * span - now[5])
             bonds[6, end] = 0.5 * bonds[4, end] * exp(bonds[2, end] - SECOND * span - now[5])
         elif mode == AGED:

@@ -32,8 +32,10 @@ def merge(bonds, tally, now, law):
                 _join_moments(bonds, last, k)
                 continue
             if narrow and not spread and last >= head + many and bonds[1, last] == bonds[0, k] \
-                    and (bonds[1, last] - bonds[0, last]) * (bonds[1, k] - bonds[0, k]) > 0 and law[1] != SHARES \
-                    and (law[1] != POWER or law[0] >= 1.0 or _as_dense(bonds, last, k, limit, eps0)):
+                    and (bonds[1, last] - bonds[0, last]) * (bonds[1, k] - bonds[0, k]) > 0 \
+                    and (law[1] != SHARES or bonds[5, last] != bonds[5, k]) \
+                    and (law[1] == AGED or (law[1] == POWER and law[0] >= 1.0)
+                         or _as_dense(bonds, last, k, limit, eps0)):
                 _join_ends(bonds, last, k, now, law)
                 continue
             grown = law[1] != AGED or _gone(bonds, k, now)
@@ -150,6 +152,8 @@ def _join_ends(bonds, i, k, now, law):
     _join_clock(bonds, i, k)
     if law[1] == AGED:
         bonds[5, i], bonds[6, i] = c0, c1
+    elif law[1] == SHARES:
+        bonds[5, i] = bonds[4, i] / bonds[3, i]
     else:
         for half in range(2):
             part = FIRST if half == 0 else SECOND
@@ -190,3 +194,5 @@ def _join_spread(bonds, i, k, spread, now, law):
         bonds[6, i] = _aged_at(SECOND * (left + right), left, right, bonds, i, k, now)
         bonds[5, i] = c0
     _join_clock(bonds, i, k)
+    if law[1] == SHARES:
+        bonds[5, i] = bonds[4, i] / bonds[3, i]

@@ -52,10 +52,11 @@ def law_numbers(law: Bonds, reach: float, merge: float, wide: float = 0.0) -> np
 
 
 def tally_of(room: int, count: int | None = None) -> np.ndarray:
-    """The tally (14,) of an empty list in an array of `room` entries; (count, 14) of lists one after the other."""
-    out = np.zeros((count or 1, 14))
+    """The tally (16,) of an empty list in an array of `room` entries; (count, 16) of lists one after the other."""
+    out = np.zeros((count or 1, 16))
     out[:, 12] = out[:, 0] = out[:, 1] = room * np.arange(count or 1)
     out[:, 13] = out[:, 12] + room
+    out[:, 14:] = 1.0
     return out if count else out[0]
 
 

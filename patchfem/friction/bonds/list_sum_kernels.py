@@ -4,8 +4,9 @@ Forms of the sum, `law[1]`: MOMENTS stretch with p = 1 (three sums, exact), POWE
 printed law at constant bond length (differences of P(p + 1, R/eps), exact), AGED the printed law with growing bonds.
 
 Rows of `bonds` (10, capacity): 0, 1 place at the start and at the end of the strip (MOMENTS: centre, variance);
-2, 3 clock at its end and width on the clock (stretch: damage; report: path); 4 weight (POWER: path/eps^p; else path);
-5, 6 at its two Gauss points: scaled weight (stretch; MOMENTS: one scaled weight) or scaled starting length (AGED);
+2, 3 clock at its end and width on the clock (stretch: damage; report: path); 4 weight (POWER: path/eps^p; else path)
+times the pressure that it formed under, over that of the friction limit; 5, 6 at its two Gauss points: scaled weight
+(stretch; MOMENTS: one scaled weight) or scaled starting length (AGED); of SHARES 5 is that pressure;
 7 one pass of the slide (1) or several over the same range of places (0, uniform over it); 8, 9 path covered, path at
 its end. Scaled: times exp(clock - ref), so that ageing multiplies the whole sum by one number.
 """
@@ -179,10 +180,11 @@ def _shares_closed(q, path, bonds, first, end, p, eps0):
         sx, sy = (1 + one * x * (1 + two * x)) * ex, (1 + one * y * (1 + two * y)) * ey
         sz = (1 + one * z * (1 + two * z)) * ez
         share = 2 * sy - sx - sz
+        dense = bonds[5, k]
         lx, ly = ex * x * (top + x * (mid + x * most)), ey * y * (top + y * (mid + y * most))
         lever = (p + 1) * share + 2 * ly - lx - ez * z * (top + z * (mid + z * most))
-        force += g * share
-        energy += g * (q - b - g * near) * share + eps0 * lever
+        force += dense * (g * share)
+        energy += dense * (g * (q - b - g * near) * share + eps0 * lever)
     return force, energy
 
 
@@ -216,12 +218,12 @@ def shares_sums(q, path, bonds, head, many, end, p, eps0, table, norm):
                 sy = tabled(p, y, table, norm)
                 ly = _lever(p, y, sy, norm)
             share = before - 2 * sy + sx
-            force += g * share
-            energy += g * (q - bonds[1, k] - g * near) * share + eps0 * (lever - 2 * ly + lx)
+            force += bonds[5, k] * (g * share)
+            energy += bonds[5, k] * (g * (q - bonds[1, k] - g * near) * share + eps0 * (lever - 2 * ly + lx))
     for k in range(head, first):
         near = path - bonds[2, k]
         part, far = spread_over(q, bonds[0, k], bonds[1, k], 0.0)
-        own = tabled(p, (near + bonds[3, k]) / eps0, table, norm) - tabled(p, near / eps0, table, norm)
+        own = bonds[5, k] * (tabled(p, (near + bonds[3, k]) / eps0, table, norm) - tabled(p, near / eps0, table, norm))
         force += part * own
         energy += far * own
     return force, energy
@@ -246,7 +248,7 @@ def _aged(q, path, psi, length, bonds, first, end, p):
             u, v = q - b + FIRST * step, q - b + SECOND * step
             x = (near + FIRST * wide) / max(length - psi * bonds[5, k], least)
             y = (near + SECOND * wide) / max(length - psi * bonds[6, k], least)
-            f, g = wide * x * fexp(-x), wide * y * fexp(-y)
+            f, g = bonds[4, k] * x * fexp(-x), bonds[4, k] * y * fexp(-y)
             force += np.copysign(f, u) + np.copysign(g, v)
             energy += f * abs(u) + g * abs(v)
     else:
@@ -256,7 +258,7 @@ def _aged(q, path, psi, length, bonds, first, end, p):
             u, v = q - b + FIRST * step, q - b + SECOND * step
             x = max(near + FIRST * wide, 1e-300) / max(length - psi * bonds[5, k], least)
             y = max(near + SECOND * wide, 1e-300) / max(length - psi * bonds[6, k], least)
-            f, g = wide * fexp(p * flog(x) - x), wide * fexp(p * flog(y) - y)
+            f, g = bonds[4, k] * fexp(p * flog(x) - x), bonds[4, k] * fexp(p * flog(y) - y)
             force += np.copysign(f, u) + np.copysign(g, v)
             energy += f * abs(u) + g * abs(v)
     return 0.5 * force, 0.5 * energy
@@ -344,13 +346,15 @@ def aged_sums(q, path, psi, length, bonds, head, many, end, p, coarse):
             more, higher = part * own, far * own
         else:
             more, higher = _aged_split(q, path, psi, length, a, b, bonds[2, k], wide, bonds[5, k], bonds[6, k], p)
+            dense = bonds[4, k] / wide
+            more, higher = dense * more, dense * higher
         force += more - less
         energy += higher - lower
     for k in range(head, first):
         near, dl = path - bonds[2, k], bonds[3, k]
         x = max(near + FIRST * dl, 1e-300) / max(length - psi * bonds[5, k], 1e-9 * length)
         y = max(near + SECOND * dl, 1e-300) / max(length - psi * bonds[6, k], 1e-9 * length)
-        own = 0.5 * dl * (fexp(p * flog(x) - x) + fexp(p * flog(y) - y))
+        own = 0.5 * bonds[4, k] * (fexp(p * flog(x) - x) + fexp(p * flog(y) - y))
         part, far = spread_over(q, bonds[0, k], bonds[1, k], 0.0)
         force += part * own
         energy += far * own

@@ -55,7 +55,7 @@ def bench_engine(model, slide, points: int = 1, choice: Choice | None = None) ->
     if soft and (has(f.law, "bonds") or model.grooves is not None):
         modes = model.accuracy.shear_modes or shear_modes.SHEAR_MODES
         varies = model.grooves is not None or pressure_changes(model)
-        if model.grooves is None and (listed(f) or model.accuracy.quadrature not in ("auto", "recursion")):
+        if model.grooves is None and (listed(f) or engine_named(model) not in ("auto", "recursion")):
             return _summed(model, slide, points, choice or sum_of(model, slide), points)
         return BenchEngine(POINTS, rates.behind_modes(points, modes, varies))
     if soft:
@@ -92,7 +92,16 @@ def sum_of(model, slide) -> Choice:
     stroke = max(stroke / law.length, 1e-9)
     goal = accuracy.tolerance * min(1.0, stroke)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
-    return choose_sum(law, goal, stroke, steps, accuracy.quadrature, tail, accuracy.merge)
+    return choose_sum(law, goal, stroke, steps, engine_named(model), tail, accuracy.merge)
+
+
+def engine_named(model) -> str:
+    """The engine of a sum that the scene names, or "auto". Where every point has a list of its own, and bonds keep the
+    pressure that they formed under while it changes, each step leaves a strip: they are merged."""
+    named, f = model.accuracy.quadrature, model.friction
+    rig = model.rig is not None
+    apart = (model.side == "lower" and (model.soft or (rig and listed(f)))) or (rig and model.load_varies and listed(f))
+    return "merged" if apart and named in ("auto", "recursion") else named
 
 
 def smooth_sum_of(model, slide) -> Choice | None:

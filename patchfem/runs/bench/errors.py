@@ -19,12 +19,14 @@ MERGED = 2.0  # times its change: where merging is of second order 4/3 would do
 
 
 class Pass(NamedTuple):
-    """A pass beside: steps per cycle, on the coarser mesh or not, how bonds are summed, the springs of a `Watch`."""
+    """A pass beside: steps per cycle, on the coarser mesh or not, how bonds are summed, springs and modes of a `Watch`.
+    """
 
     steps: int
     rough: bool
     choice: object
     springs: Callable | None = None
+    modes: int | None = None
 
 
 def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
@@ -32,7 +34,8 @@ def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
     `ladder_of`; coarse: the patch on the coarser mesh or None."""
     def solve(variant: Pass):
         on = coarse if variant.rough else patch
-        return bench.run(model, on, variant.steps, watch=Watch(variant.choice, say, springs=variant.springs))
+        watch = Watch(variant.choice, say, springs=variant.springs, modes=variant.modes)
+        return bench.run(model, on, variant.steps, watch=watch)
 
     ladder, made = ladder_of(model, patch, coarse, fine, steps), {}
     errors, seconds = estimate(solve, fine.values, ladder, made)
@@ -45,7 +48,7 @@ def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
 
 def ladder_of(model, patch, coarse, fine, steps: int) -> list:
     """The coarser runs of a bench: half and a quarter of the steps; at a quarter of them the coarser mesh, where there
-    is one, and for a merged list of bonds narrower strips."""
+    is one, half the shear modes behind which bonds slide, and for a merged list of bonds narrower strips."""
     choice = fine.engine.choice
     half, few = Pass(max(4, steps // 8 * 4), False, choice), Pass(max(4, steps // 16 * 4), False, choice)
     times = 2.0 if model.load_varies else 1.0  # first order
@@ -57,7 +60,10 @@ def ladder_of(model, patch, coarse, fine, steps: int) -> list:
     if meshed and slips_by_elements(model):
         out.append(shear.coarser_elements(model, patch, coarse, few))
     elif meshed:
-        out.append(coarser_space(few._replace(rough=True), few))
+        count = shear.modes_of(model, patch)  # one change at a time
+        out.append(coarser_space(few._replace(rough=True, modes=count), few))
+        if count:
+            out.append(coarser_space(few._replace(modes=max(1, count // 2)), few, "modes"))
     if fine.engine.kind in (LIST, LISTS) and choice.merge > 0:
         narrow = few._replace(choice=replace(choice, merge=FINER * choice.merge))
         out.append(Coarser((narrow,), lambda a, b: {name: MERGED * gap for name, gap in change(a, b).items()}, few,

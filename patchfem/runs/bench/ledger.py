@@ -68,12 +68,14 @@ def _length(model) -> float:
 class Watch:
     """What a pass is told from outside. choice: how bonds are summed, None to choose; say: called with one line when
     something compiles; progress: called with the done share; springs: function of the (stiffness, yield slide) of the
-    elements of partial slip -> those that move, None: they do."""
+    elements of partial slip -> those that move, None: they do; modes: how many shear modes stand for pieces that give
+    way, None: by the scene."""
 
     choice: object = None
     say: object = None
     progress: object = None
     springs: object = None
+    modes: int | None = None
 
     def tell(self, share: float) -> None:
         """Pass the done share (0 to 1) on to `progress`, if there is one."""

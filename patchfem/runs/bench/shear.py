@@ -4,7 +4,7 @@ leaves open of the former: its change, its grain and its stiffness."""
 import numpy as np
 
 from ...core import NotConverged
-from ...dynamics.march.models import jenkins_model, lists_model, points_model
+from ...dynamics.march.models import jenkins_model, lists_model, points_model, under_the_lower
 from ...effects import has
 from ...friction.record import law_from
 from ...response.coarser import Coarser
@@ -16,6 +16,7 @@ from .follow import follow_path
 from .ledger import Slid, Watch
 from .rigid import climbing
 
+OPEN = 1e-3  # of the mean pressure, under which nodes count that the lower piece does not press at first
 GRAIN, STIFF = 1.5, 0.5  # times the change by the grain of the nodes and by that of the stiffness (tests/README.md)
 
 
@@ -73,15 +74,49 @@ def climbed_fields(patch, contact, states) -> tuple:
 
 def _points(model, patch, time, slide, frames, watch, engine) -> Slid:
     """Bond points behind the shear modes, or lists of bonds."""
-    law = model.bonds
-    weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
-    shear = shear_of(patch, law, model.accuracy.shear_modes, 0.1 * model.accuracy.tolerance)
-    found = engine.choice
-    contact = points_model(law, weight, sigma, shear) if found is None else lists_of(patch, law, shear, found)
+    law, shear, found = model.bonds, reduced(model, patch, watch.modes), engine.choice
+    if model.side == "lower":
+        contact = on_the_lower(model, patch, found, shear)
+    else:
+        weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
+        contact = points_model(law, weight, sigma, shear) if found is None else lists_of(patch, law, shear, found)
     done = follow_path(contact, time, slide, frames, watch, law.grows)
     refuse_missed(done)
-    tau, local = point_fields(patch, law, shear, done.states)
+    tau, local = point_fields(patch, law, contact.reduction, done.states)
     return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)
+
+
+def reduced(model, patch, count: int | None = None):
+    """ShearModes of the points of a sum over bonds: `count` of them, or as many as scene and tolerance ask for.
+
+    Under the pressure of the lower piece they are those of all nodes; one that nothing presses at first counts as under
+    OPEN of the mean pressure of the others.
+    """
+    law, sigma, tolerance = model.bonds, patch.pressure.sigma_n, 0.1 * model.accuracy.tolerance
+    count = count or model.accuracy.shear_modes
+    if model.side != "lower":
+        return shear_of(patch, law, count, tolerance)
+    shear_of(patch, law, 1, 1.0)  # refuses a patch that could jump by itself
+    return shear_of(patch, law, count, tolerance, sigma=np.maximum(sigma, OPEN * mean_pressure(patch)))
+
+
+def mean_pressure(patch) -> float:
+    """Load over the nodal areas that carry it [Pa]."""
+    return patch.pressure.load / float(patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0))
+
+
+def modes_of(model, patch) -> int | None:
+    """How many shear modes stand behind the bonds of a bench; None where there are none."""
+    behind = model.soft and has(model.friction.law, "bonds") and model.grooves is None
+    return reduced(model, patch).stiffness.size if behind else None
+
+
+def on_the_lower(model, patch, found, shear):
+    """Lists of bonds, one a node, under the pressure of the lower piece, summed as the Choice `found` has it; shear:
+    ShearModes on every node, None of pieces that are rigid in shear."""
+    law, sigma, mean = model.bonds, patch.pressure.sigma_n, mean_pressure(patch)
+    return lists_model(law, law.static * mean * patch.pieces.interface.weight, np.full(sigma.size, mean), shear,
+                       found.reach(law.order), found.merge, under_the_lower(patch.x, sigma, mean))
 
 
 def lists_of(patch, law, shear, found, force=None):

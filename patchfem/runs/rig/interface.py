@@ -96,7 +96,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
     if f is None:
         return models.free_model()
     if model.rig.load_varies:
-        return varying_load.varying_load_model(model, patch, numerics.shear_modes)
+        return varying_load.varying_load_model(model, numerics, patch)
     load = patch.pressure.load if patch is not None else model.point.load
     if has(f.law, "bonds"):
         return _bonds(model, numerics, patch, load)
@@ -115,6 +115,9 @@ def contact_model(model: Model, numerics: Numerics, patch):
 def _bonds(model: Model, numerics: Numerics, patch, load: float):
     """The contact of a sum over bonds: a list of them, points behind shear modes, points of a field, or one point."""
     law, found, limit = model.bonds, quadrature_of(model, numerics), model.friction.static * load
+    if model.side == "lower" and (model.soft or found.engine != "recursion"):
+        return shear.on_the_lower(model, patch, found, shear.reduced(model, patch, numerics.shear_modes) if model.soft
+                                  else None)
     if found.engine != "recursion" and not model.soft:
         return models.list_model(law, limit, found.reach(law.order), found.merge)
     if model.soft:

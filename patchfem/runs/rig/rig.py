@@ -94,7 +94,7 @@ def _settled(run: Coupled) -> Coupled:
     rig = run.model.rig
     outcome, found = settle(run.raw, found, run.model.accuracy.tolerance, run.drive, rig.level_cycles,
                             decay_rate(rig.modes))
-    if outcome is Outcome.EXCEEDS_TRAVEL and rig.travel == BEYOND:  # no stop: a mode that gains energy
+    if outcome is Outcome.EXCEEDS_TRAVEL and rig.travel == BEYOND:  # no stop, but nothing holds it
         outcome, found = Outcome.GROWS, without_bars(found)
     return replace(run, outcome=outcome, measures=found)
 

@@ -2,10 +2,13 @@
 
 
 from ...dynamics.march import varying_load as march
+from ...effects import listed
 from ...model.model import Model
+from .lists import quadrature_of
+from .numerics import Numerics
 
 
-def rubbing_of(model: Model):
+def rubbing_of(model: Model, numerics: Numerics):
     """The dynamics.march.varying_load.Rubbing of the law of a model."""
     f = model.friction
     if f.law == "coulomb":
@@ -14,16 +17,18 @@ def rubbing_of(model: Model):
         return march.rate(f.static, f.reference_speed)
     if f.law == "elastic-plastic":
         return march.plastic(f.static, f.bond_length)
-    return march.bonds(model.bonds)
+    if not listed(f):
+        return march.bonds(model.bonds)
+    found = quadrature_of(model, numerics)
+    return march.lists(model.bonds, found.reach(f.order), found.merge)
 
 
-def varying_load_model(model: Model, patch, count: int | None = None):
-    """The VaryingLoadModel of a rig whose load changes; patch: the solved Patch or None under [normal]; count: how many
-    shear modes stand for pieces that give way, None: by the tolerance."""
+def varying_load_model(model: Model, numerics: Numerics, patch):
+    """The VaryingLoadModel of a rig whose load changes; patch: the solved Patch or None under [normal]."""
     load, sets = (model.point.at, None) if patch is None else (None, march.sets_of(patch, model.patch.spring))
-    law, shear = rubbing_of(model), None
+    law, shear = rubbing_of(model, numerics), None
     if model.soft:
         weight = patch.pieces.interface.weight
-        shear = march.shear_of(patch.giving, law, patch.pressure.sigma_n * weight, weight, count,
-                                model.accuracy.tolerance)
+        shear = march.shear_of(patch.giving, law, patch.pressure.sigma_n * weight, weight, numerics.shear_modes,
+                               model.accuracy.tolerance)
     return march.model_of(model.rig.modes, law, sets, load, shear)

@@ -129,7 +129,8 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
     carried = "grooves" if climbed(draft.tables) else "varying-load"
     if not has(law.law, "bonds") and not carries(law, carried):
         draft.say("friction.law", f"'{law.law}' {beside}: {refusal(carried)}")
-    elif listed(law) or (has(law.law, "bonds") and law.breakaway):
+    elif has(law.law, "bonds") and (law.breakaway or (listed(law) and (climbed(draft.tables) or
+                                                                      law.reading != "report"))):
         key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
         draft.say(f"friction.{key}", unbuilt(beside, "recursion"))
     if shear and has(law.law, "set-valued") and carries(law, "shear"):
@@ -164,15 +165,13 @@ def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:
 
 def _only_on_upper(kind: str, law: Friction, shear: str) -> str:
     """What keeps the pressure of such a run on the upper piece; empty where it may lie on the lower one as well."""
+    if has(law.law, "bonds"):
+        return "beside friction.breakaway and " + shear if shear and law.breakaway else ""
     if shear:
-        return f"beside {shear}"
+        return f"beside {shear} with law '{law.law}'"
     if kind == "bench":
         return f"with law '{law.law}'" if _still(law) else ""
-    if not has(law.law, "bonds"):
-        return f"in a rig with law '{law.law}'"
-    if law.reading == "report":
-        return "in a rig with reading 'report'"
-    return f"in a rig with order = {law.order:g}" if listed(law) else ""
+    return f"in a rig with law '{law.law}'"
 
 
 def _still(law: Friction) -> bool:

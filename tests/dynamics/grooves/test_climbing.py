@@ -134,7 +134,7 @@ def test_exact_a_motion_may_start_on_a_flank(law):
     model = ClimbingModel(grooves, LOAD, LAWS[law][0](2e-6))
     on = fresh(BASIS, DRIVE, model, 100, start=Start(np.array([place]), np.zeros(1))).contact
     flat = ClimbingModel(Grooves(80e-6, 0.0), normal, LAWS[law][0](2e-6)).build()
-    for there, here in zip((on.before, on.now, on.memory), (flat.before, flat.now, flat.memory)):
+    for there, here in zip((*on.pressed, on.memory), (*flat.pressed, flat.memory)):
         np.testing.assert_allclose(there, here, rtol=1e-14)
 
 

@@ -1,5 +1,6 @@
 """Lists of bonds behind shear modes, one a point: 2.17 of any order and reading where the patch slips part by part."""
 
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,9 +9,13 @@ from printed_bars import Bonds as BondsByHand
 from printed_bars import settled
 from scipy.optimize import brentq
 from scipy.special import gammainc
+from varying_load_cases import modes
 
-from patchfem.dynamics.march.models import list_model, lists_model, load_kernels
+from patchfem.core import BaseSine
+from patchfem.dynamics.march import varying_load
+from patchfem.dynamics.march.models import list_model, lists_model, load_kernels, under_the_lower
 from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.quadrature import Quadrature
 
 LIMIT = np.array([0.7, 1.3, 2.0, 0.4])
 RIGID = SimpleNamespace(shape=np.zeros((4, 0)), stiffness=np.zeros(0), points=np.arange(4))
@@ -120,3 +125,59 @@ def test_always_a_step_has_the_balance_downhill_where_bonds_weaken():
     work, lost = np.cumsum(forces[:-1, 1] * np.diff(path)), np.cumsum(energies[:-1, 0])
     assert bad == 0 and np.abs(work - lost - energies[1:, 1]).max() < 1e-12 * work[-1]
     assert contact.tallies[0, 6] <= 1e-6 * contact.tallies[0, 7]
+
+
+@pytest.mark.parametrize(("reading", "order"), PRINTED)
+def test_order_points_under_the_pressure_of_the_lower_piece_are_the_numpy_sum(reading, order):
+    """Rigid pieces slide a wedge of pressure that ends in the path: points enter it and leave it. A bond forms under
+    the pressure half way through its step there, under the mean of both ends here, and a point is freed at a sample."""
+    law = Bonds(0.4, 1e-6, order, reading, initial=0.5)
+    x, sigma = np.linspace(0, 12e-6, 5), np.array([0.0, 0.6, 1.2, 0.7, 0.0])
+    steps = 300
+    path = turning(steps)
+    model = lists_model(law, 0.4 * LIMIT[:1].repeat(5), np.ones(5), None, 40.0, 0.01, under_the_lower(x, sigma, 1.0))
+    forces, energies, bad, contact = follow(model, path)
+    twin, weight = Quadrature(law, 0.0), LIMIT[0]
+    state, before, found, stored = twin.start(sigma), sigma, [0.0], [0.0]
+    for here, after in pairwise(path):
+        now = np.interp(x + after, x, sigma, left=0.0, right=0.0)
+        state = twin.carried(state, after - here, before, now, 1e-3)
+        before = now
+        found.append(weight * twin.traction(state).sum())
+        stored.append(weight * twin.stored(state).sum())
+    away = np.abs(path) > 1e-8  # of the place of the first bonds, which have a width behind shear
+    assert bad == 0 and contact.tallies[0, 15] == contact.tallies[4, 15] == 0.0
+    assert np.abs(forces[:, 0] - found)[away].max() < 6e-3 * model.limit
+    assert np.abs(energies[:, 1] - stored)[away].max() < 6e-3 * model.limit * 1e-6
+    work, lost = np.cumsum(forces[:-1, 1] * np.diff(path)), np.cumsum(energies[:-1, 0])
+    assert np.abs(work - lost - energies[1:, 1]).max() < 1e-12 * np.abs(np.diff(work)).sum()
+
+
+@pytest.mark.parametrize(("order", "grows"), [(0.0, False), (1.0, False), (0.5, True)])
+def test_order_two_a_prescribed_load_is_that_of_the_numpy_sum(order, grows):
+    """One point of the print under a load that falls to zero and rises again: the force at every sample is that of the
+    sum along the slides of the run, and what is lost as it lifts off is dissipated."""
+    more = {"ratio": 0.8, "rest_growth": 0.1, "slip_growth": 3e-7, "rest_speed": 1e-3} if grows else {}
+    law = Bonds(0.3, 2e-6, order, "report", initial=0.5 if order > 0 else 0.0, **more)  # where nothing jumps
+
+    def load(t):
+        return np.maximum(60 + 70 * np.cos(2 * np.pi * 90 * np.asarray(t)), 0.0)
+
+    basis = modes([143.0], [1.0], [0.0], [0.0], 0.02)
+    gaps = []
+    for steps in (400, 800):
+        done = varying_load.march(basis, BaseSine(30.0, 2 * np.pi * 143), None, varying_load.lists(law, 30.0, 0.01), 2,
+                                  steps, 2, load=load)
+        response, dt = done.response, 1 / 143 / steps
+        twin = Quadrature(law, 0.0)
+        loads = load(dt * np.arange(2 * steps + 1))
+        assert response.extra["normal_load"] == pytest.approx(loads, abs=1e-9)
+        state, found = twin.start(loads[:1]), [0.0]
+        for k, dq in enumerate(np.diff(response.slide)):
+            state = twin.carried(state, dq, loads[k:k + 1], loads[k + 1:k + 2], dt)
+            found.append(twin.traction(state)[0])
+        gaps.append(np.abs(response.force - found).mean() / 39)
+        book = done.ledger
+        balance = book["work_in"] - book["viscous"] - book["friction"] - book["stored"]
+        assert abs(balance) < 1e-9 * book["power"] and (loads == 0).sum() > 50
+    assert gaps[1] < 2e-4
