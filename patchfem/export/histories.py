@@ -31,6 +31,8 @@ def contents(result: Result) -> netcdf.Contents:
         data = netcdf.with_events(data, e.time, e.interface, e.kind, e.slide, e.count, MEANINGS, e.source)
     if "curve" in extra:
         data = netcdf.with_curve(data, extra["curve"])
+    if "decay" in extra:
+        data = netcdf.with_decay(data, extra["decay"])
     if "wear" in extra:
         data = netcdf.with_wear(data, extra["wear"], {name: m.unit for name, m in result.measures.items()})
     if "regime" in extra:

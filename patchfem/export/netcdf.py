@@ -178,6 +178,21 @@ def with_curve(data: Contents, curve: dict) -> Contents:
     return data.also(out)
 
 
+DECAY = {"amplitude": ("m", "half of a swing of the released output"),
+         "frequency": ("Hz", "frequency of the decay"), "damping": ("1", "damping ratio of the decay")}
+
+
+def with_decay(data: Contents, decay) -> Contents:
+    """The contents with a `response.decay_curve.DecayCurve` over decay_time."""
+    over, out = "decay_time", {}
+    for name, (unit, text) in DECAY.items():
+        out[f"decay_{name}"] = (over, getattr(decay, name), {"units": unit, "long_name": text})
+        if name != "amplitude":
+            out[f"decay_{name}_error"] = (over, getattr(decay, f"{name}_error"), {
+                "units": unit, "long_name": f"half-width of the interval of the {text}"})
+    return data.also(out, {over: (over, decay.time, {"units": "s", "long_name": "time of the middle of a swing"})})
+
+
 def with_surfaces(data: Contents, gap) -> Contents:
     """The contents with the gap (m,) [m] of the unloaded surfaces, wear included; of strips (s, m), as each has it."""
     return data.also({"unloaded_gap": (("strip", "x")[-np.ndim(gap):], np.asarray(gap), _attributes("unloaded_gap"))})

@@ -104,6 +104,13 @@ def _curve(data: dict) -> Picture | None:
         f" {text[0].upper()}{text[1:]}." if text else ""))
 
 
+def _decay(data: dict) -> Picture | None:
+    if "decay" not in data:
+        return None
+    return Picture(charts.decay, (data["decay"],), "Frequency and damping ratio of the released output over half its "
+                   "swing, structure and friction together; bars are what the reading and the numerics leave open.")
+
+
 def _levels(data: dict) -> Picture | None:
     if "levels" not in data:
         return None
@@ -225,8 +232,8 @@ def _measured(data: dict) -> Picture | None:
 
 
 # in the order of the page
-PICTURES = {"wear": _wear, "worn": _worn_map, "curve": _curve, "levels": _levels, "pressure": _interface,
-            "bodies": _bodies, "loop": _loop, "history": _histories, "measured": _measured}
+PICTURES = {"wear": _wear, "worn": _worn_map, "curve": _curve, "decay": _decay, "levels": _levels,
+            "pressure": _interface, "bodies": _bodies, "loop": _loop, "history": _histories, "measured": _measured}
 
 
 def _factors(measured: dict) -> tuple:

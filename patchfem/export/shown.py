@@ -35,6 +35,8 @@ def report_data(result: Result) -> dict:
             "means": {name: one.text for name, one in result.measures.items()}}
     if "curve" in result.extra:
         data["curve"] = result.extra["curve"]
+    if "decay" in result.extra:
+        data["decay"] = result.extra["decay"]
     if "wear" in result.extra:
         count, period = result.extra["wear_shown"]["states"], result.extra["wear_shown"]["period"]
         data["wear"] = {"history": result.extra["wear"], "period": period,

@@ -5,11 +5,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core import PatchfemError
+from ..response.decay_curve import DecayCurve, curve_of
 from ..structure import places as structure_places
 from ..structure.places import Shapes
 from .decay import decay
 from .driven_modes import POWER, SAMPLES, Modes, driven_modes
 from .frequency_response import Estimate, even_step, h1
+from .swings import half_swings
 
 INPUTS = ("force", "base_acceleration")
 PLACES = ("slide", "output", "base", "normal", "pitch")
@@ -118,15 +120,33 @@ def _noted(found: Modes, estimate: Estimate, step: float) -> list:
     return notes
 
 
-def of_decay(values: dict, begin: float | None = None) -> Listed:
-    """Modes of a free decay from `begin` [s] of its times on, unless given from its largest value."""
+def _freely(values: dict, begin: float | None) -> tuple:
+    """(times, values, name) of the one response from `begin` [s] on, unless given from its largest value."""
     name = response_of(values)
     if "time" not in values:
         raise PatchfemError("a free decay wants time; choose by --map")
     time, value = values["time"], values[name]
     start = int(np.argmax(np.abs(value - value[-value.size // 20:].mean()))) if begin is None else \
         int(np.searchsorted(time, begin))
-    found = decay(time[start:], value[start:])
+    return time[start:], value[start:], name
+
+
+def decay_curve(values: dict, begin: float | None = None) -> DecayCurve:
+    """Frequency and damping over the amplitude [m] of a free decay of a displacement, velocity or acceleration from
+    `begin` [s] on, unless given from its largest value.
+
+    A velocity is divided by the undamped omega of its own point, an acceleration by its square. PatchfemError where no
+    decay stands out of the noise.
+    """
+    time, value, name = _freely(values, begin)
+    found = curve_of(half_swings(time, value))
+    omega = 2 * np.pi * found.frequency / np.sqrt(1 - found.damping**2)
+    return found._replace(amplitude=found.amplitude / omega**POWER[name])
+
+
+def of_decay(values: dict, begin: float | None = None) -> Listed:
+    """Modes of a free decay from `begin` [s] of its times on, unless given from its largest value."""
+    found = decay(*_freely(values, begin)[:2])
     about = [f"damping {zeta:.4g} +- {error:.1g}, logarithmic decrement {fall:.4g}" for zeta, error, fall in
              zip(found.damping, found.error, found.decrement())]
     notes = ["a free decay tells no mass and no share of each mode: set moving_mass, slide, base and output"]

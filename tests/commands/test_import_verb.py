@@ -130,7 +130,7 @@ def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
 
 
 @pytest.mark.parametrize("words, says", [
-    (["-o", "a.xlsx"], "modes as .toml"), (["-o", "a.csv", "--decay"], "belong to modes"),
+    (["-o", "a.xlsx"], "modes as .toml"), (["-o", "a.csv", "--segment", "2 s"], "belong to modes"),
     (["-o", "a.toml", "--zero"], "--zero belongs to a table"), (["-o", "a.uff", "--decay"], "belong to modes"),
     (["-o", "a.toml", "--segment", "2"], "--segment 2:"), (["-o", "a.toml", "--window", "flat"], "hann or none"),
     (["-o", "a.toml", "--band", "20 Hz"], "two rising frequencies"),

@@ -349,6 +349,21 @@ def curve(found: dict) -> list:
     return out
 
 
+def decay(found) -> list:
+    """Frequency and damping ratio of a released output over half of its swing, with bars; found: a
+    `response.decay_curve.DecayCurve`."""
+    unit, scale = axis_unit(found.amplitude, "m")
+    out = []
+    for name, label, of in (("frequency", "frequency", "Hz"), ("damping", "damping ratio", "")):
+        error, y = getattr(found, f"{name}_error"), getattr(found, name)
+        known = np.isfinite(error)
+        x = found.amplitude[known] * scale
+        out.append(chart(f"{label.capitalize()} of the decay", axis("half of a swing", unit, True), axis(label, of), [
+            line(x, y[known], "accent"),
+            mark("dots", "accent", "", x=x, y=y[known], errors=error[known], shape="circle")] * bool(known.any())))
+    return out
+
+
 def levels(rows: list) -> list:
     """Amplitude after every level, in the order of the test, with arrows upwards and downwards; over more than three
     decades on a logarithmic axis, on which a level without any motion is not drawn.

@@ -7,6 +7,9 @@ from ...disk.whole import whole
 from . import ENDINGS, matlab, modes, table, universal
 from .series import histories_of
 
+DECAY = {"time": "s", "amplitude": "m", "frequency": "Hz", "frequency_error": "Hz", "damping": "1",
+         "damping_error": "1"}  # columns of a decay, behind "decay_"
+
 
 def export(folder: Path, out: Path) -> str:
     """Write the histories and loops of a results folder; one line on what was written.

@@ -4,9 +4,10 @@ import numpy as np
 
 from ...core import say
 from ...runs.results.result import Result
-from ...scales import short
+from ...scales import short, told
 
 RESTS = 1e-2  # of the largest distance from where it ends: within it an output has come to rest
+FEWEST = 5  # amplitudes of a decay whose frequency and damping are told in the sentence
 NOTHING = 1e-9  # of the largest output: an end so near 0 is what is left of a decay to 0
 
 
@@ -15,7 +16,18 @@ def released(result: Result) -> str:
     rig, r = result.plan.model.rig, result.response
     if rig is None or rig.kind != "free" or r is None or r.time.size < 2:
         return ""
-    return swung(r.time, r.output)
+    return swung(r.time, r.output) + _told(result.extra.get("decay"))
+
+
+def _told(decay) -> str:
+    """Frequency and damping of the first swings whose errors are known and of the last, as words behind a sentence."""
+    known = [] if decay is None else np.flatnonzero(np.isfinite(decay.damping_error + decay.frequency_error)).tolist()
+    if len(known) < FEWEST:
+        return ""
+    parts = [f"{told(decay.frequency[k], decay.frequency_error[k], unit='Hz')}, damping ratio "
+             f"{told(decay.damping[k], decay.damping_error[k])} at {short(float(decay.amplitude[k]), 'm', 3)}"
+             for k in dict.fromkeys((known[1], known[-1]))]
+    return f"; it decays at {', and at '.join(parts)}"
 
 
 def swung(time, output) -> str:

@@ -17,7 +17,7 @@ from ...response.settling import slip_period
 from ...structure.drive_sizes import decay_rate, sinusoidal
 from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_errors
 from ..results.travel import outcome_on_piece
-from . import flutter, levels, lists, remarks, start_ring
+from . import decays, flutter, levels, lists, remarks, start_ring
 from .costs import MOST_STEPS
 from .engines import ENGINES, Variant, unbalanced
 from .fields import fields_of
@@ -140,6 +140,8 @@ def _extra(run: Coupled, notes: list) -> dict:
         out["elements" if hasattr(reduced, "yield_slide") else "shear_modes"] = int(np.size(reduced.stiffness))
     if raw.summed is not None:
         out["quadrature"] = raw.summed.engine
+    if rig.kind == "free" and run.estimated and (decay := decays.decay_of(raw)) is not None:
+        out["decay"] = decay
     return out | {"still_rings": run.rings.remedies, "book": raw.book, "period": run.drive.period, "notes": notes}
 
 
@@ -172,11 +174,12 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         measures = with_errors(found.values, *time, *space, least=engine.least, size=size)
         if numerics.pairs and not errors_met(measures, model.accuracy.tolerance):
             return _solved(model, numerics.finer(), patch, coarse, seconds, say, progress, estimated)
-        if found.levels:
+        if found.levels or model.rig.kind == "free":
             apart = [one for one in (*ways, *meshed) if one.runs or found.errors is None]  # else levels have their own
-            found = replace(found, levels=levels.levels_with_errors(found.levels, apart, made),
-                            coarser=tuple((made[one.runs[0]], one.beside and made[one.beside]) for one in apart
-                                          if one.runs and one.runs[0].numerics.choice is None))  # a list has its bound
+            of_levels = levels.levels_with_errors(found.levels, apart, made) if found.levels else ()
+            found = replace(found, levels=of_levels, coarser=tuple(
+                (made[one.runs[0]], one.beside and made[one.beside]) for one in apart
+                if one.runs and one.runs[0].numerics.choice is None))  # a list has its bound
         bars.append(measures["relative_displacement_amplitude"].error or 0.0)
         if _enough(model, numerics, found, measures, bars) or not time:
             if spent:

@@ -1,0 +1,131 @@
+"""Frequency and damping of a decay over its amplitude with intervals, from its half swings, computed or measured.
+
+Half swing k has a middle t_k and a size S_k, from turn to turn. Over 2 m + 1 of them the slope of ln S_k tells the
+logarithmic decrement of half a cycle, pi zeta/(1 - zeta^2)^(1/2), the slope of t_k half a period. Of a viscous decay
+both are exact for any m, of any other they are means over the span. What noise leaves falls with m^(-3/2), what the
+bend leaves grows with m^2: the span is the longest whose value those of all shorter ones allow (Lepski 1991).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+SPANS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # half swings m on both sides of a point
+APART = 2.0  # standard deviations by which the values of two spans may differ
+SURE = 2.5  # standard deviations of an interval of 95 %, with what choosing the span adds
+BESIDE = 8  # half swings on both sides whose third differences show noise
+FEWEST = 3  # half swings of a curve
+ROUND = 1e-12  # of a value, what round-off leaves
+
+
+class HalfSwings(NamedTuple):
+    """Half swings of a decay: middle (k,) [s], size (k,) [m], from one turn to the next, and the standard deviations
+    (k,) that noise leaves in both, 0 of a computed motion."""
+
+    middle: np.ndarray
+    size: np.ndarray
+    middle_noise: np.ndarray
+    size_noise: np.ndarray
+
+
+class DecayCurve(NamedTuple):
+    """Of a decay, largest amplitude first: time (k,) [s], amplitude (k,) [m], frequency (k,) [Hz] as it is seen and
+    damping ratio (k,) [1], each with the half-width (k,) of its interval of 95 %."""
+
+    time: np.ndarray
+    amplitude: np.ndarray
+    frequency: np.ndarray
+    frequency_error: np.ndarray
+    damping: np.ndarray
+    damping_error: np.ndarray
+
+    def at(self, pick) -> "DecayCurve":
+        """Some of its points."""
+        return DecayCurve(*(part[pick] for part in self))
+
+
+def of_turns(times, places) -> HalfSwings:
+    """Half swings between the turns (k,) [s], (k,) [m] of a computed motion, as far as each is smaller than the one
+    before."""
+    size = np.abs(np.diff(places))
+    rises = np.flatnonzero((size[1:] >= size[:-1]) | (size[1:] <= 1e-9 * size.max(initial=0.0)))
+    count = int(rises[0]) + 1 if rises.size else size.size
+    still = np.zeros(count)
+    return HalfSwings((times[1:] + times[:-1])[:count] / 2, size[:count], still, still)
+
+
+def curve_of(swings: HalfSwings) -> DecayCurve:
+    """Frequency and damping over the amplitude, at points whose spans overlap by half, of a computed
+    motion at every half swing; without a point where there are
+    fewer than FEWEST half swings."""
+    count, log = swings.size.size, np.log(swings.size)
+    noise = _at_least(swings.size_noise / swings.size, log)
+    wide = _at_least(swings.middle_noise, swings.middle)
+    out, k = [], 1
+    while k < count - 1:
+        fall, fall_error, span = _slope(log, noise, k)
+        half, half_error, other = _slope(swings.middle, wide, k)
+        fall, size = -fall, _level(log, k, span)
+        tilt = np.hypot(np.pi, fall)
+        out.append((swings.middle[k], np.exp(size) / 2, 0.5 / half, 0.5 * half_error / half**2, fall / tilt,
+                    fall_error * np.pi**2 / tilt**3))
+        k += max(1, min(span, other)) if wide.any() else 1
+    return DecayCurve(*(np.array(part) for part in zip(*out))) if out else DecayCurve(*np.empty((6, 0)))
+
+
+def smoothed(values, noise) -> np.ndarray:
+    """Slopes (n,) per half swing of values (n,) with standard deviations (n,); at both ends that of the neighbour."""
+    inner = [_slope(values, noise, k)[0] for k in range(1, values.size - 1)]
+    return np.array([inner[0], *inner, inner[-1]])
+
+
+def _slope(values, noise, k: int) -> tuple:
+    """(slope per half swing, half-width of its interval, span m) at place k of values (n,) with standard deviations
+    (n,)."""
+    room, found = min(k, values.size - 1 - k), []
+    for m in SPANS:
+        if m > room:
+            break
+        part, x = slice(k - m, k + m + 1), np.arange(-m, m + 1)
+        weight = x / (x @ x)
+        slope, spread = float(weight @ values[part]), float(np.sqrt(weight**2 @ noise[part]**2))
+        if any(abs(slope - one) > APART * np.sqrt(max(wide**2 - spread**2, 0.0)) + ROUND * abs(one)
+               for one, wide, _ in found):
+            break
+        found.append((slope, spread, m))
+    slope, spread, m = found[-1]
+    return slope, SURE * spread + _bend(values, k, room, found) + ROUND * abs(slope), m
+
+
+def _bend(values, k: int, room: int, found: list) -> float:
+    """What the slope of the last span found may be off by as it is a mean: its change over the next longer span, of
+    whose bias it has a share (m/m')^2, less what noise makes of it; at the ends, over the shorter one."""
+    slope, spread, m = found[-1]
+    wider = next((one for one in SPANS if m < one <= room), 0)
+    if wider:
+        x = np.arange(-wider, wider + 1)
+        change = abs(float(x @ values[k - wider:k + wider + 1]) / float(x @ x) - slope)
+        return change / ((wider / m)**2 - 1) if spread else change
+    if len(found) > 1:
+        return max(abs(slope - found[-2][0]) - found[-2][1], 0.0)
+    low = values[max(k - 1, 0):k + 2]
+    return abs(float(low[2] - 2 * low[1] + low[0])) / 2 if not spread else 0.0
+
+
+def _at_least(noise, values) -> np.ndarray:
+    """Standard deviations (n,), not below what third differences of values (n,) show, of which a parabola has none, and
+    white noise 20 times its variance; of values without noise 0."""
+    if not noise.any() or values.size < 4:
+        return noise
+    seen = np.diff(values, 3)**2 / 20
+    low, high = (np.clip(np.arange(values.size) - 1 + side, 0, seen.size) for side in (-BESIDE, BESIDE))
+    whole = np.concatenate([[0.0], np.cumsum(seen)])
+    return np.sqrt(np.maximum(noise**2, (whole[high] - whole[low]) / np.maximum(high - low, 1)))
+
+
+def _level(log, k: int, m: int) -> float:
+    """The parabola over a span at its middle."""
+    x = np.arange(-m, m + 1)
+    x2, n = x**2, x.size
+    weight = (np.sum(x2**2) - np.sum(x2) * x2) / (n * np.sum(x2**2) - np.sum(x2)**2) if m > 1 else (x == 0) * 1.0
+    return float(weight @ log[k - m:k + m + 1])

@@ -1,0 +1,75 @@
+"""Frequency and damping over the amplitude of measured decays: the truth lies in the intervals."""
+
+import numpy as np
+import pytest
+
+from patchfem.core import PatchfemError
+from patchfem.identify.measured_modes import decay_curve
+from patchfem.identify.swings import half_swings
+from patchfem.response.decay_curve import curve_of
+
+
+def viscous(rng):
+    """(times, values, frequency(A), ratio(A)) of a decay that is exponential."""
+    f, zeta, per = 10**rng.uniform(1, 2.5), 10**rng.uniform(-2.5, -1.2), 10**rng.uniform(1.2, 2)
+    t, own = np.arange(int(rng.uniform(12, 60) * per)) / (per * f), np.sqrt(1 - zeta**2)
+    w = 2 * np.pi * f
+    y = np.exp(-zeta * w * t) * np.cos(w * own * t + rng.uniform(0, 6))
+    return t, y, lambda a: f * own + 0 * a, lambda a: zeta + 0 * a
+
+
+def rubbed(rng):
+    """The same of a block that Coulomb friction alone brings to rest."""
+    f, h, per = 10**rng.uniform(1, 2.5), 10**rng.uniform(-2.3, -1.3), 10**rng.uniform(1.2, 2)
+    t = np.arange(int(min(0.45 / h, 120) / 2 * per)) / (per * f)
+    k = np.floor(2 * f * t)
+    return t, (1 - 2 * h * k - h) * np.cos(2 * np.pi * f * t) + h * (-1.0)**k, lambda a: f + 0 * a, \
+        lambda a: 2 * h / (np.pi * a)
+
+
+def covered(kind, seeds) -> np.ndarray:
+    """(p, 2) whether frequency and ratio of every point lie in their intervals."""
+    out = []
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        t, y, frequency, ratio = kind(rng)
+        found = curve_of(half_swings(t, y + 10**rng.uniform(-4, -1.5) * rng.normal(size=t.size)))
+        out += zip(np.abs(found.frequency - frequency(found.amplitude)) <= found.frequency_error,
+                   np.abs(found.damping - ratio(found.amplitude)) <= found.damping_error)
+    return np.array(out)
+
+
+@pytest.mark.parametrize("kind", [viscous, rubbed])
+def test_intervals_hold(kind):
+    held = covered(kind, range(9000, 9004))
+    assert len(held) > 30 and held.mean() > 0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [viscous, rubbed])
+def test_intervals_hold_on_many_seeds(kind):
+    assert (covered(kind, range(9100, 9180)).mean(axis=0) > 0.93).all()
+
+
+@pytest.mark.parametrize("name, power", [("displacement", 0), ("velocity", 1), ("acceleration", 2)])
+def test_exact_any_trace_tells_the_amplitude_of_the_displacement(name, power):
+    """Without noise: a displacement A leaves A w in the velocity, A w^2 in the acceleration."""
+    zeta, w = 0.02, 500.0
+    t = np.arange(2000) / 10000
+    pole = w * complex(-zeta, np.sqrt(1 - zeta**2))
+    found = decay_curve({"time": t, name: (pole**power * 1e-3 * np.exp(pole * t)).real})
+    assert found.damping == pytest.approx(zeta, rel=2e-3)
+    exact = 1e-3 * np.exp(-zeta * w * found.time)
+    assert found.amplitude == pytest.approx(exact, rel=2e-3)
+
+
+def test_refuses_what_holds_no_decay():
+    rng, t = np.random.default_rng(0), np.arange(500) / 1000
+    with pytest.raises(PatchfemError, match=r"stand out of the noise|samples of a cycle"):
+        half_swings(t, rng.normal(size=t.size))
+    with pytest.raises(PatchfemError, match="rows of a free decay"):
+        half_swings(t[:9], t[:9])
+    with pytest.raises(PatchfemError, match="nothing in the record swings"):
+        half_swings(t, 0 * t)
+    with pytest.raises(PatchfemError, match="samples of a cycle"):
+        half_swings(t, np.cos(2 * np.pi * 300 * t))

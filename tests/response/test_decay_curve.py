@@ -1,0 +1,60 @@
+"""Frequency and damping of a decay over its amplitude, from half swings without noise."""
+
+import numpy as np
+import pytest
+from scene_texts import DRIVE, KILOGRAM, POINT, friction_of
+
+import patchfem as pf
+from patchfem.response.decay_curve import curve_of, of_turns
+
+RELEASED = DRIVE[:DRIVE.index('kind')] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
+
+
+@pytest.mark.parametrize("zeta", [1e-4, 0.02, 0.3])
+def test_exact_a_viscous_decay_has_one_frequency_and_one_ratio(zeta):
+    k, own = np.arange(30), 700.0 * np.sqrt(1 - zeta**2)
+    found = curve_of(of_turns(np.pi * k / own, (-1.0)**k * np.exp(-zeta * 700.0 * np.pi * k / own)))
+    assert found.damping == pytest.approx(zeta, rel=1e-9)
+    assert found.frequency == pytest.approx(own / (2 * np.pi), rel=1e-12)
+    assert found.amplitude.size > 6 and (np.diff(found.amplitude) < 0).all()
+
+
+def test_exact_a_block_on_rigid_friction():
+    """h = F/k: half swings 2 (A - h), 2 (A - 3 h) ...: the decrement over two of them is ln((A + 2 h)/(A - 2 h)), and
+    the loss of a cycle over 2 pi times its energy, 2 h/(pi A), lies inside the interval."""
+    h, k = 0.01, np.arange(30)
+    found = curve_of(of_turns(np.pi * k, (-1.0)**k * (1 - 2 * h * k)))
+    a = found.amplitude
+    fall = np.log((a + 2 * h) / (a - 2 * h)) / 2
+    assert found.damping == pytest.approx(fall / np.hypot(np.pi, fall), rel=1e-9)
+    assert (np.abs(found.damping - 2 * h / (np.pi * a)) < found.damping_error)[1:].all()
+    assert found.frequency == pytest.approx(1 / (2 * np.pi), rel=1e-12)
+
+
+def test_too_few_swings_or_one_that_grows_end_it():
+    assert curve_of(of_turns(np.arange(3.0), np.array([1.0, -0.5, 0.2]))).time.size == 0
+    assert of_turns(np.arange(5.0), np.array([1.0, -0.5, 0.2, -0.9, 0.1])).size.size == 2
+
+
+def test_exact_a_release_under_coulomb_friction():
+    """The decay_ columns of result.nc: one frequency, the ratio in closed form, errors that hold."""
+    data = pf.run(POINT + friction_of("coulomb") + KILOGRAM.replace("0.003", "0.0") + RELEASED).to_xarray()
+    h, a = 0.3 * 115.6541 / (286 * np.pi)**2, data.decay_amplitude.values
+    assert data.decay_frequency.values == pytest.approx(143.0, rel=1e-8)
+    off = np.abs(data.decay_damping.values - 2 * h / (np.pi * a))
+    assert a.size > 8 and (off < data.decay_damping_error.values)[1:].all()
+    assert set(data.decay_time.dims) == {"decay_time"} and "decay_frequency_error" in data
+
+
+def test_a_release_of_an_iwan_joint_follows_its_balance():
+    """The closed loop of the static curve misses what a swing that loses 2 pi zeta of itself leaves open: 4 zeta."""
+    text = POINT + friction_of("iwan") + KILOGRAM + RELEASED.replace("2 mm", "5 um").replace("30", "20")
+    data = pf.run(text, **{"friction.stiffness": "1e6 N/m"}).to_xarray()
+    k = slice(4, -3)
+    a = data.decay_amplitude.values[k]
+    beside = pf.backbone(text, amplitudes=a, method="quasi-static", **{"friction.stiffness": "1e6 N/m"})
+    for name in ("frequency", "damping"):
+        ours, bar = data[f"decay_{name}"].values[k], data[f"decay_{name}_error"].values[k]
+        other = beside[f"quasi_static_{name}"].values[::-1]
+        assert np.isfinite(bar).all() and (
+            np.abs(ours - other) < bar + 4 * beside.quasi_static_damping.values[::-1] * other).all()
