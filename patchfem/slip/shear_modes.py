@@ -212,6 +212,12 @@ def fewest_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, 
     return spectrum.modes(most)
 
 
+def beside(count: int) -> int:
+    """How many modes a run beside one of `count` has, whose change tells what they leave out: half as many. Of two or
+    three in a symmetric patch none but the first acts: four times as many."""
+    return count // 2 if count >= SHEAR_MODES else 4 * count
+
+
 def gathered(found: ShearModes, x: np.ndarray, tolerance: float) -> tuple:
     """(modes of few points in place of all, limits (k,) of these [N]): for a motion whose fields nobody asks for.
 

@@ -33,3 +33,22 @@ def test_exact_a_motion_on_too_few_elements_has_no_bars(kind):
     assert all(coarse.measures[name].error is None for name in ("loop_area", "friction_force_peak", "pressure_peak"))
     rigid = pf.run(loads(text.replace("[contact.shear]", ""), "few.toml", ["contact.element_size=8 mm"]))
     assert rigid.measures["loop_area"].error is not None  # 4 mu N A, or a motion under mu N, whatever the mesh
+
+
+def test_always_bonds_of_a_bench_behind_too_few_shear_modes_say_how_many_cure_it():
+    """Half of the modes is a run of the bars: of twenty benches six lay beyond bars that knew nothing of it."""
+    text = pf.new("joint").partition("[friction]")[0] + '''[friction]
+law = "nonlocal"
+static = 0.3
+bond_length = "1 um"
+[slide]
+kind = "sine"
+amplitude = "1 um"
+frequency = "100 Hz"
+'''
+    few, more = (pf.run(loads(text, "few.toml", ["accuracy.tolerance=1e-2", f"accuracy.shear_modes={count}"]))
+                 for count in (2, 16))
+    gap = abs(few.measures["loop_area"].value - more.measures["loop_area"].value)
+    assert 0 < gap <= few.measures["loop_area"].error and few.extra["shear_modes"] == 2
+    assert more.measures["loop_area"].error < 0.1 * few.measures["loop_area"].error
+    assert any("set accuracy.shear_modes = 8" in one for one in few.warnings)

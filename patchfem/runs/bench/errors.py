@@ -9,6 +9,7 @@ import numpy as np
 from ...effects import listed
 from ...response.coarser import Coarser, coarser_space, estimate, left_open
 from ...response.errors import change, step_error
+from ...slip import shear_modes
 from . import bench, shear
 from .engine import LIST, LISTS, PLANE, STEPPED, slips_by_elements
 from .law import tail_of
@@ -48,7 +49,7 @@ def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
 
 def ladder_of(model, patch, coarse, fine, steps: int) -> list:
     """The coarser runs of a bench: half and a quarter of the steps; at a quarter of them the coarser mesh, where there
-    is one, half the shear modes behind which bonds slide, and for a merged list of bonds narrower strips."""
+    is one, other shear modes behind which bonds slide, and for a merged list of bonds narrower strips."""
     choice = fine.engine.choice
     half, few = Pass(max(4, steps // 8 * 4), False, choice), Pass(max(4, steps // 16 * 4), False, choice)
     times = 2.0 if model.load_varies else 1.0  # first order
@@ -60,10 +61,10 @@ def ladder_of(model, patch, coarse, fine, steps: int) -> list:
     if meshed and slips_by_elements(model):
         out.append(shear.coarser_elements(model, patch, coarse, few))
     elif meshed:
-        count = shear.modes_of(model, patch)  # one change at a time
+        count = shear.modes_of(model, patch) if model.soft else None  # one change at a time
         out.append(coarser_space(few._replace(rough=True, modes=count), few))
         if count:
-            out.append(coarser_space(few._replace(modes=max(1, count // 2)), few, "modes"))
+            out.append(coarser_space(few._replace(modes=shear_modes.beside(count)), few, "modes"))
     if fine.engine.kind in (LIST, LISTS) and choice.merge > 0:
         narrow = few._replace(choice=replace(choice, merge=FINER * choice.merge))
         out.append(Coarser((narrow,), lambda a, b: {name: MERGED * gap for name, gap in change(a, b).items()}, few,

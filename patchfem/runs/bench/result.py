@@ -9,7 +9,7 @@ from ...response.rows import judged
 from ..results.notes import climbing_as_one, of_growth, unbounded_bonds, unripe, warming, work_check_warning
 from ..results.result import FRAMES, Result, frames_of, on_a_mesh_of_known_error, without_errors
 from ..results.travel import FAR, largest_slide, outcome_on_piece, travelled
-from . import bench
+from . import bench, shear
 from .engine import steps_of
 from .errors import errors_of
 from .ledger import Watch
@@ -46,8 +46,10 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     notes = [*notes, *climbing_as_one(model, patch)]
     known = estimate and on_a_mesh_of_known_error(model, patch, coarse)
     found = judged(without_errors(found, known), model.accuracy.tolerance)
+    count = shear.modes_of(model, patch) if model.soft else None
     return Result(what, outcome, found, fine, fine, patch, fields, seconds, warnings,
-                  {"engine": fine.engine.name, "steps": steps, "notes": notes, "left_open": left})
+                  {"engine": fine.engine.name, "steps": steps, "notes": notes, "left_open": left}
+                  | ({"shear_modes": count} if count else {}))
 
 
 def _overhang(asked, patch, fine) -> list:

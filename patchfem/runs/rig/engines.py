@@ -20,6 +20,7 @@ from ...response.coarser import Coarser, coarser_space
 from ...response.errors import cells_error, change, pieces_error, step_error, tolerance_error
 from ...scene.rules import methods
 from ...scene.rules.draft import acts, pinned
+from ...slip import shear_modes
 from .costs import dear_elements, dear_events, not_smooth, pieces_per_cycle
 from .solution import gauged
 
@@ -210,7 +211,8 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     climbs, gathers = model.grooves is not None, model.patch is not None and model.patch.gathers
     pointed = coarse is not None and not gathers  # few points state themselves what their modes leave out
     if shape is not None and (varies or climbs or (pointed and has(model.friction.law, "bonds"))):
-        out.append(coarser_space(Variant(replace(few, shear_modes=max(1, shape.size // 2)), patch), quarter, "modes"))
+        other = replace(few, shear_modes=shear_modes.beside(shape.size))
+        out.append(coarser_space(Variant(other, patch), quarter, "modes"))
     return [*out, *_summed(model, few, patch, solution)]
 
 
