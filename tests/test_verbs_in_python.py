@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from scene_texts import shaken
 
 import patchfem as pf
 
@@ -12,25 +13,7 @@ BLOCK = {"title": "a block", "normal": {"load": "100 N"}, "friction": {"law": "c
          "structure": {"moving_mass": 0.5, "mode": [{"name": "axial", "frequency": 100.0, "damping": 0.002,
                                                      "slide": 1.0}]},
          "drive": {"kind": "base", "frequency": 100.0, "acceleration": "9 g", "cycles": 50}}
-TEXT = """title = "a block"
-[normal]
-load = "100 N"
-[friction]
-law = "coulomb"
-static = 0.3
-[structure]
-moving_mass = "0.5 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "100 Hz"
-damping = 0.002
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "100 Hz"
-acceleration = "9 g"
-cycles = 50
-"""
+TEXT = 'title = "a block"\n' + shaken('law = "coulomb"', "9 g", 50)
 PIECES = """[contact]
 length = "10 mm"
 width = "10 mm"

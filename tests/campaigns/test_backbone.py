@@ -2,37 +2,18 @@
 
 import numpy as np
 import pytest
+from scene_texts import IWAN, shaken
 
 import patchfem as pf
 from patchfem.campaigns.backbone import backbone
 from patchfem.core import ModalBasis
 
-RIG = """
-[normal]
-load = "100 N"
-[friction]
-%s
-static = 0.3
-[structure]
-moving_mass = "0.5 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "100 Hz"
-damping = 0.002
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "100 Hz"
-acceleration = "1 g"
-cycles = 20
-"""
-IWAN = 'law = "iwan"\nchi = -0.5\nbeta = 0.5\nstiffness = "20 kN/m"'
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
 OMEGA = 200 * np.pi
 
 
 def model(law: str, **sets):
-    return pf.build(RIG % law, **sets)
+    return pf.build(shaken(law), **sets)
 
 
 def segalman(u):
@@ -82,7 +63,7 @@ def test_exact_rigid_friction_by_balance_and_by_decay():
 
 def test_exact_a_cubic_spring_has_duffings_backbone():
     """omega^2 = omega_0^2 + 3 k3 A^2/(4 m) to the first order of k3 A^2/k, and the damping of the structure alone."""
-    scene = RIG % PLASTIC
+    scene = shaken(PLASTIC)
     scene = scene[scene.index("[structure]"):] + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n'
     a = np.array([1e-5, 1e-4])
     found = backbone(pf.build(scene), "", a, ("balance", "quasi-static"))
@@ -95,9 +76,9 @@ def test_exact_a_cubic_spring_has_duffings_backbone():
 
 def test_a_mode_that_gains_energy_has_the_amplitude_of_flutter():
     """Where the balance falls through 0 is the limit cycle that does not last."""
-    one = pf.build(RIG % PLASTIC, **{"structure.mode.axial.damping": -0.01})
+    one = pf.build(shaken(PLASTIC), **{"structure.mode.axial.damping": -0.01})
     found = backbone(one, "", np.geomspace(2e-3, 2e-2, 25), ("balance",))
-    free = (RIG % PLASTIC).replace('kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"',
+    free = shaken(PLASTIC).replace('kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"',
                                    'kind = "free"\ndisplacement = "1 mm"')
     told = pf.run(free, **{"structure.mode.axial.damping": -0.01}).measures["flutter_amplitude"]
     assert found.flutter == pytest.approx(told.value, rel=0.01)
@@ -105,7 +86,7 @@ def test_a_mode_that_gains_energy_has_the_amplitude_of_flutter():
 
 def test_two_modes_are_told_by_name_and_held_by_shape():
     """The held mode with most of the axial coordinate is the axial one, whatever its place among the frequencies."""
-    scene = (RIG % 'law = "elastic-plastic"\nbond_length = "1 um"').replace("[drive]", """[[structure.mode]]
+    scene = shaken('law = "elastic-plastic"\nbond_length = "1 um"').replace("[drive]", """[[structure.mode]]
 name = "yaw"
 frequency = "80 Hz"
 damping = 0.01
@@ -132,18 +113,18 @@ def test_refuses_what_has_no_backbone():
 
 
 @pytest.mark.parametrize("scene, said", [
-    ((RIG % PLASTIC).replace("100 N", "0 N") + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n',
+    (shaken(PLASTIC).replace("100 N", "0 N") + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n',
      "leave out the tables of the contact"),
-    ((RIG % PLASTIC).replace("slide = 1.0", "slide = 1.0\noutput = 0.0"), "does not move the output"),
-    ((RIG % 'law = "coulomb"').replace('frequency = "100 Hz"\ndamping', 'frequency = "0 Hz"\ndamping'),
+    (shaken(PLASTIC).replace("slide = 1.0", "slide = 1.0\noutput = 0.0"), "does not move the output"),
+    (shaken('law = "coulomb"').replace('frequency = "100 Hz"\ndamping', 'frequency = "0 Hz"\ndamping'),
      "no frequency of its own")])
 def test_refuses_a_mode_without_an_answer(scene, said):
     with pytest.raises(pf.PatchfemError, match=said):
         backbone(pf.build(scene))
 
 
-@pytest.mark.parametrize("scene", [(RIG % PLASTIC)[(RIG % PLASTIC).index("[structure]"):],
-                                   (RIG % 'law = "coulomb"').replace("100 N", "0 N")])
+@pytest.mark.parametrize("scene", [shaken(PLASTIC)[shaken(PLASTIC).index("[structure]"):],
+                                   shaken('law = "coulomb"').replace("100 N", "0 N")])
 def test_exact_a_rig_in_which_no_friction_acts_has_level_curves(scene):
     found = backbone(pf.build(scene))
     for way, f in (("balance", 100.0), ("decay", 100 * np.sqrt(1 - 4e-6)), ("quasi-static", 100.0)):
@@ -165,7 +146,7 @@ stiffness = "100 kN/m"
 [[structure.damper]]
 between = [1, 0]
 coefficient = "40 N s/m"
-""" + RIG[RIG.index("[drive]"):]
+""" + shaken(PLASTIC)[shaken(PLASTIC).index("[drive]"):]
     one = backbone(pf.build(scene), "2", [1e-4]).curves
     k, m, c = np.array([[3e5, -1e5], [-1e5, 1e5]]), np.diag([0.5, 0.3]), np.diag([40.0, 0])
     w, zeta = 2 * np.pi * one["balance"].frequency[0], one["balance"].damping[0]
@@ -176,7 +157,7 @@ coefficient = "40 N s/m"
 
 
 def test_amplitudes_stay_within_the_stop():
-    stopped = pf.build((RIG % IWAN).replace("moving_mass", 'travel = "0.2 mm"\nmoving_mass'))
+    stopped = pf.build(shaken(IWAN).replace("moving_mass", 'travel = "0.2 mm"\nmoving_mass'))
     found = backbone(stopped, methods=("decay", "quasi-static"))
     assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(0.2e-3 / 1.15)
     assert 1.5e-4 < found.curves["decay"].amplitude[-1] < 0.2e-3
@@ -186,7 +167,7 @@ def test_amplitudes_stay_within_the_stop():
 
 def test_exact_flutter_under_rigid_friction_from_both_sides():
     """A damping of -.01 leaves the motions of .002 as they are; the ratio that is balanced falls by .012 * 100 Hz/f."""
-    scene = (RIG % 'law = "coulomb"').replace("damping = 0.002", "damping = -0.01")
+    scene = shaken('law = "coulomb"').replace("damping = 0.002", "damping = -0.01")
     a = np.geomspace(1e-3, 5e-2, 15)
     one = backbone(pf.build(scene), "", a, ("balance",)).curves["balance"]
     beside = backbone(model('law = "coulomb"'), "", a, ("balance",)).curves["balance"]
@@ -211,7 +192,7 @@ bond_length = "10 um"
 static = 0.3
 load = "100 N"
 """
-    rig = RIG % PLASTIC
+    rig = shaken(PLASTIC)
     found = backbone(pf.build("[structure]\n" + structure + rig[rig.index("[drive]"):]), methods=("balance",))
     one = found.curves["balance"]
     assert 10 < one.amplitude.size < 30 and (np.diff(one.amplitude) > 0).all()
@@ -232,10 +213,10 @@ def test_exact_no_held_mode_is_slower_than_the_free_one():
 
 
 def test_python_gives_a_dataset():
-    found = pf.backbone(RIG % IWAN, amplitudes=[1e-3, 1e-4], method="quasi-static")
+    found = pf.backbone(shaken(IWAN), amplitudes=[1e-3, 1e-4], method="quasi-static")
     assert found["quasi_static_amplitude"].values == pytest.approx([1e-4, 1e-3], rel=1e-9)
     assert found["quasi_static_frequency"].attrs["units"] == "Hz" and found.attrs["mode"] == "axial"
     with pytest.raises(pf.PatchfemError, match="one of balance"):
-        pf.backbone(RIG % IWAN, method="static")
+        pf.backbone(shaken(IWAN), method="static")
     with pytest.raises(pf.PatchfemError, match="above 0"):
-        pf.backbone(RIG % IWAN, amplitudes=[0.0])
+        pf.backbone(shaken(IWAN), amplitudes=[0.0])

@@ -5,38 +5,17 @@ import json
 
 import pytest
 import xarray as xr
+from scene_texts import IWAN, shaken
 
 from patchfem.__main__ import main
 
-SCENE = """
-[normal]
-load = "100 N"
-[friction]
-law = "iwan"
-static = 0.3
-chi = -0.5
-beta = 0.5
-stiffness = "20 kN/m"
-[structure]
-moving_mass = "0.5 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "100 Hz"
-damping = 0.002
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "100 Hz"
-acceleration = "1 g"
-cycles = 20
-"""
 COLUMNS = ["method", "amplitude [m]", "frequency [Hz]", "frequency_error [Hz]", "damping", "damping_error"]
 
 
 @pytest.fixture
 def scene(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "joint.toml").write_text(SCENE, "utf-8")
+    (tmp_path / "joint.toml").write_text(shaken(IWAN), "utf-8")
     return tmp_path
 
 
@@ -66,7 +45,7 @@ def test_exact_files_and_the_answer_hold_the_same_numbers(scene, capsys):
 
 
 def test_the_screen_answers_in_sentences_and_names_what_is_not_known(scene, capsys):
-    rigid = SCENE.replace('"iwan"', '"coulomb"').replace("chi = -0.5\nbeta = 0.5\n", "")
+    rigid = shaken(IWAN).replace('"iwan"', '"coulomb"').replace("chi = -0.5\nbeta = 0.5\n", "")
     (scene / "joint.toml").write_text(rigid.replace('stiffness = "20 kN/m"\n', ""), "utf-8")
     assert run("backbone", "joint.toml", "--amplitudes", "2 mm,5 mm", "--no-page", "-q") == 0
     shown = capsys.readouterr().out

@@ -48,6 +48,33 @@ slide = 1.0
 KILOGRAM = MODE.replace("0.884 kg", "1 kg")
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 30\n'
 
+IWAN = 'law = "iwan"\nchi = -0.5\nbeta = 0.5\nstiffness = "20 kN/m"'  # of `shaken`
+
+
+def shaken(law: str, acceleration: str = "1 g", cycles: int = 20) -> str:
+    """A block of half a kilogram and 100 Hz that rubs under 100 N by a law, the lines of its keys, shaken at its
+    frequency."""
+    return f"""\
+[normal]
+load = "100 N"
+[friction]
+{law}
+static = 0.3
+[structure]
+moving_mass = "0.5 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "100 Hz"
+damping = 0.002
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "100 Hz"
+acceleration = "{acceleration}"
+cycles = {cycles}
+"""
+
+
 # two masses, an elastic-plastic interface between the first and the base, one between them
 PAIR = """\
 [structure]
