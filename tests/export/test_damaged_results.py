@@ -14,7 +14,7 @@ from scene_texts import BENCH, COATED, COULOMB
 OTHER = {"bytes": np.array([b"a"]), "scalar": np.float64(1.0), "three": np.zeros((2, 2, 2)), "short": np.zeros(1),
          "empty": np.zeros(0), "huge": np.full(3, 1e300), "complex": np.zeros(3, complex), "none": np.full(5, np.nan)}
 SLIDE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
-SHARE = 193  # one of so many is always tried
+SHARE = 571  # one of so many is always tried
 
 
 @pytest.fixture(scope="module")

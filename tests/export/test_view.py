@@ -127,6 +127,7 @@ def test_exact_a_picture_needs_no_opengl(bench, tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
 
 
+@pytest.mark.slow
 def test_exact_the_window_shows_the_pieces_where_opengl_draws(bench):
     if why := view.no_opengl():
         pytest.skip(why)

@@ -35,7 +35,8 @@ def test_always_no_text_asks_for_an_engine_by_its_name():
     assert asks_by_name(ast.parse('engine not in ("exact", other)')) == [1]
     for path in PACKAGE.rglob("*.py"):
         if not path.relative_to(PACKAGE).as_posix().startswith(OWN):
-            assert not asks_by_name(ast.parse(path.read_text("utf-8"))), path
+            text = path.read_text("utf-8")
+            assert "engine" not in text or not asks_by_name(ast.parse(text)), path
 
 
 def test_always_every_engine_has_a_row_of_what_it_takes():

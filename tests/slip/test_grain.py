@@ -51,7 +51,7 @@ def test_exact_what_yields_together_stays_together():
     assert k.tolist() == [3.0] and y.tolist() == [2e-7]
 
 
-@pytest.mark.share(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("amplitude", ["0.02 um", "0.05 um", "0.5 um"])
 def test_always_the_bars_of_a_bolted_joint_hold_in_deep_microslip(tmp_path, amplitude):
     """Its mesh saw no slip at .02 and .05 um and said 0 +- 1e-11 J; where slip is resolved it is 3.4e-9 and 5.6e-8."""

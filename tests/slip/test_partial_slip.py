@@ -282,7 +282,7 @@ def test_always_more_modes_never_worsen_the_backbone(angle, length):
 def test_always_short_bonds_have_the_modes_that_they_need(angle):
     """Bonds a hundredth and a thousandth of the slide at which the patch lets go: shares of the limit that fall with
     the modes; where the bonds are too short to tell, all that are allowed."""
-    pair, limit = coated_pair(100), friction_limit(100, angle)
+    pair, limit = coated_pair(60), friction_limit(60, angle)
     reach = limit.sum() / tangential_stiffness(pair.tangential, limit > 0)
     for share, most in ((1e-2, 1e-3), (1e-3, 5e-3)):
         errors = [shear_modes(pair.tangential, limit, share * reach, n).backbone_error for n in (4, 8, 16, 32)]

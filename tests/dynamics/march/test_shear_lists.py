@@ -89,6 +89,7 @@ def test_exact_the_ledger_closes(reading, order, grows):
     assert made < 1e-6 * contact.tallies[:, 7].sum() if reading == "stretch" else made >= 0
 
 
+@pytest.mark.share(1, 3)
 @pytest.mark.parametrize(("reading", "order", "grows"), [("report", 1.0, False), ("report", 1.0, True),
                                                         ("report", 0.5, True), ("stretch", 2.0, True)])
 def test_always_points_follow_the_sum_by_hand(reading, order, grows):

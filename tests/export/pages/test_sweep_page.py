@@ -107,7 +107,7 @@ def test_always_many_cases_are_thinned_to_a_page_below_three_megabytes_with_all_
         assert {np.argmin(one["values"]), np.argmax(one["values"])} <= set(cases)
 
 
-@pytest.mark.parametrize("counts", [(1000, 200), (30, 5, 40, 30), pytest.param((400_000,), marks=pytest.mark.slow),
+@pytest.mark.parametrize("counts", [(500, 100), (20, 5, 20, 15), pytest.param((400_000,), marks=pytest.mark.slow),
                                     pytest.param((3,) * 11, marks=pytest.mark.slow)])
 def test_always_a_grid_is_thinned_to_a_grid_with_the_extremes_of_its_first_measure(table, counts):
     places = [one.ravel() for one in np.meshgrid(*map(np.arange, counts), indexing="ij")]

@@ -26,11 +26,13 @@ def missed(found, ones) -> int:
                for case, some in enumerate(rows(found, ones)))
 
 
-def held(law: str, seed: int, count: int) -> None:
+def held(law: str, seed: int, count: int, most: int | None = None) -> None:
+    """most: of the cases in lanes so many are compared; all without it."""
     cases = models(law, seed, count)
     found = many.answers(cases)
     mine = [case for case in range(count) if found.numerics[case]["engine"] == "lanes"]
     assert len(mine) > count / 3 and not any("lanes said" in one for notes in found.notes.values() for one in notes)
+    mine = mine[:most]
     some = [cases[case] for case in mine]
     ones = lumped_answers(some) if law in EXACT else one_by_one.solve(some)
     assert missed(found.some(np.array(mine)), ones) <= 0.03 * len(mine)
@@ -49,7 +51,8 @@ def lumped_answers(cases):
 @pytest.mark.share(0, 1, 2, 4, 5)  # each other law is a loop in lanes and one of single runs to compile
 @pytest.mark.parametrize("law", LAWS)
 def test_always_97_of_100_cases_lie_within_both_bars(law):
-    held(law, 1, 150 if law in EXACT[:3] else 80)  # what stands beside Iwan or in single runs takes seconds
+    few = law not in EXACT[:3]  # what stands beside Iwan or in single runs takes seconds
+    held(law, 1, 64 if few else 150, 20 if few else None)
 
 
 @pytest.mark.slow

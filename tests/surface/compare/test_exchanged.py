@@ -29,6 +29,7 @@ def called(count: int) -> tuple:
     return tuple(np.mean(pairs, axis=0))
 
 
+@pytest.mark.slow
 def test_always_the_order_of_made_traces_is_known():
     wrong, right = called(1)
     assert wrong == 0 and right >= 5 / 6

@@ -36,11 +36,11 @@ def scores(count: int) -> tuple:
 
 
 def test_always_a_pair_of_one_place_is_registered_within_the_targets():
-    """Asked for: 0.05 um of shift and 0.06 um of depth, sigma 6 um, tilt 10 mrad, shift 25 um, noise 20 nm. Of eight
-    pairs at 95 % three or more misses have a chance of 0.6 %."""
-    rms, held = scores(8)
+    """Asked for: 0.05 um of shift and 0.06 um of depth, sigma 6 um, tilt 10 mrad, shift 25 um, noise 20 nm. Of four
+    pairs at 95 % two or more misses have a chance of 1.4 %."""
+    rms, held = scores(4)
     assert rms[0] < 0.01 * UM and rms[1] < 0.003 * UM and rms[2] < 0.06 * UM, rms
-    assert (held >= 6 / 8).all(), held
+    assert (held >= 3 / 4).all(), held
 
 
 @pytest.mark.slow
@@ -109,18 +109,17 @@ def test_always_unworn_traces_of_one_place_show_no_wear(count):
         assert "none shown" in verdicts([found])[1][0] and "at most" not in verdicts([found])[1][0]
 
 
-@pytest.mark.share(0)
-@pytest.mark.parametrize("rows", [4, 8])
-def test_always_surfaces_that_wear_each_other_have_their_depth_or_none(rows):
+@pytest.mark.parametrize("high, rows", [(128, 4), pytest.param(512, 8, marks=pytest.mark.slow)])
+def test_always_surfaces_that_wear_each_other_have_their_depth_or_none(high, rows):
     """Wear by 3 um leaves valleys that both traces share; by 6 um hardly any, and no depth may be claimed. The wear
     runs out slowly between worn and unworn heights here, and only about half of the intervals hold the truth."""
     step, count = 2 * UM, 512
-    pieces = [report_area((count, count), step, seed)[2] for seed in (0, 1)]
+    pieces = [report_area((high, count), step, seed)[2] for seed in (0, 1)]
     x, random = np.arange(count) * step, np.random.default_rng(1)
     for worn, registered in ((3 * UM, True), (6 * UM, False)):
         lower = rub(*pieces, step, 3 * step, 2 * worn, bite=0.05 * UM).lower
         errors = []
-        for k in range(0, count, count // rows):
+        for k in range(0, high, high // rows):
             noise = 0.02 * UM * random.standard_normal((2, count))
             found = compared(Profile(x, frozen_array(pieces[0][k] + noise[0] - 0.003 * x), "before"),
                              Profile(x, frozen_array(lower[k] + noise[1] + 0.004 * x), "after"))
@@ -180,7 +179,7 @@ def groove(seed: int, depth: float, rough: float) -> tuple:
 
 
 @pytest.mark.share(0)
-@pytest.mark.parametrize("count", [2, pytest.param(10, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [1, pytest.param(10, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("depth, rough, rms", [(10 * UM, 1 * UM, 0.1), (20 * UM, 0.5 * UM, 0.04)])
 def test_always_a_groove_between_unworn_flanks_has_its_area(depth, rough, rms, count):
     held, errors = [], []

@@ -14,10 +14,10 @@ from patchfem.export.results import FILES
 from patchfem.export.surfaces.areal import write_x3p
 from patchfem.surface.areal import Areal, filled
 from patchfem.surface.files.read import read_surface
-from patchfem.surface.scans import change
+from patchfem.surface.scans import change, search
 from patchfem.surface.scans.search import rotation, variant
 
-STEP, COUNT = 1e-6, 200
+STEP, COUNT, COARSE, FULL = 1e-6, 200, 112, search.SIZE
 SIDE = STEP * (COUNT - 1)
 
 
@@ -55,6 +55,14 @@ def common(angle, shift, worn):
     at = np.tensordot(rotation(angle), np.stack([x, y]) - SIDE / 2, 1) + SIDE / 2 + np.reshape(shift, (2, 1, 1))
     inside = ((at >= 0) & (at <= SIDE)).all(axis=0)
     return float(worn(x, y, 0.0)[inside].sum()) * (STEP / 5)**2
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarser():
+    """Half the pixels a side in the search, a quarter of its work; pairs of the independent program have all."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search, "SIZE", COARSE)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -219,7 +227,10 @@ def test_always_a_refused_place_names_the_likeness_that_it_wants(grooved, worn, 
 def independent(seed):
     """(kind, result, truth, spacing [m]) of a pair made by an independent program, which is laid once."""
     kind, *sides, truth = make(seed)
-    return kind, change.changed(*(Areal(*map(np.asarray, one), "a scan") for one in sides)), truth, sides[0][0][1]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search, "SIZE", FULL)
+        found = change.changed(*(Areal(*map(np.asarray, one), "a scan") for one in sides))
+    return kind, found, truth, sides[0][0][1]
 
 
 @pytest.mark.share(1)
