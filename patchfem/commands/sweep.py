@@ -100,7 +100,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     target, tells = placed(out, f"{scene.stem}-sweep"), "json" if json_ else "faults" if quiet else "words"
     told = Told(target, not no_page, tells, begin)
     signed = "" if by.collect or part or keep not in (None, "none") else receipt.sign(
-        scene, (what or Over()).words(*set_, f"page={not no_page}"))
+        scene, (what or Over()).words(*set_, f"page={not no_page}"), what and what.cases)
     if resume and (written := receipt.read(target, signed)):  # all of it is there
         _answer(written["cases"]["count"], {}, written, told)
         return

@@ -2,5 +2,6 @@
 
 In: a path and what writes it. Out: the file or folder in its place, or Missing that names path, need and room, with the
 older one untouched. `whole` writes files, `claim` says who writes a folder, `exchange` puts a folder in its place,
-`opened` opens what is read, `installed` says which packages are there. Read `whole` first.
+`opened` opens what is read, `named` signs the files that texts name, `installed` says which packages are there. Read
+`whole` first.
 """

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ... import __version__
 from ...core import PatchfemError
+from ...disk.named import signs, texts
 from ...model.alike import Alike
 from ...model.model import Model, build
 from ...scene.changed import Base
-from ...scene.scene import Scene, SceneError, axes_of, is_there, loads, with_files
+from ...scene.scene import Scene, SceneError, axes_of, loads, with_files
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,7 @@ class Asked:
     def digest(self) -> str:
         """Sign of what all cases share: the version, the tables as written but for [sweep], what is set, the files."""
         tables = {name: value for name, value in tomllib.loads(self.text).items() if name != "sweep"}
-        files = [self.content(text) for text in _texts(tables)]
+        files = signs([*texts(tables), *self.sets], self.path.parent)
         return sha256(json.dumps([__version__, tables, self.sets, files], sort_keys=True,
                                  default=str).encode()).hexdigest()
 
@@ -113,9 +113,8 @@ class Asked:
         return any(key.startswith("contact.") for key in given) and not {"contact.element_size", "contact.mesh"} & given
 
     def content(self, text: str) -> str:
-        """Sign of the content of the file that a text names; "" where it names none."""
-        path = self.path.parent / text
-        return sha256(path.read_bytes()).hexdigest() if is_there(path) else ""
+        """Sign of the content of the files that a value names; "" where it names none."""
+        return " ".join(sign for _, sign in signs([text], self.path.parent))
 
 
 @lru_cache(maxsize=2)
@@ -136,12 +135,3 @@ def _first(asked: Asked) -> dict[tuple, tuple | None]:
 def _of_case(error: SceneError) -> list[str]:
     """The mistakes of a case; one in a value that was set has no place but its key."""
     return [text.removeprefix("--set: ") for text in error.mistakes]
-
-
-def _texts(value: Any) -> Iterator[str]:
-    """Every text in the tables of a scene, in their order."""
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, dict | list):
-        for one in value.values() if isinstance(value, dict) else value:
-            yield from _texts(one)

@@ -8,29 +8,31 @@ differs, the sweep looks at its cases.
 import json
 import os
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
 
 from ... import __version__
 from ...disk import whole
+from ...disk.named import signs, texts
 
 NAME = "chunks/whole.json"
 TABLES = "sweep.csv", "sweep.nc", "sweep.json", "report.html"
 
 
-def sign(path: Path, words: Sequence[str]) -> str:
-    """Sign of all that a sweep is made of: the scene at a path, the words of the command, the files that either may
-    name, this program; "" where it cannot be told."""
+def sign(path: Path, words: Sequence[str], cases: Path | None = None) -> str:
+    """Sign of all that a sweep is made of: the scene at a path, the words of the command, the table of its cases, the
+    files that any of these may name, this program; "" where it cannot be told."""
     try:
-        text = path.read_bytes()
-        named = [*_texts(tomllib.loads(text.decode())), *(part for word in words for part in _parts(word))]
-        places = [place for name in dict.fromkeys(named) for place in (path.parent / name, Path(name))]
-        files = [sha256(place.read_bytes()).hexdigest() if place.is_file() else "" for place in places]
+        text = path.read_bytes().decode()
+        if cases is not None and not cases.is_file():  # a pipe is read once, by the sweep
+            return ""
+        cells = [] if cases is None else [cases.read_text("utf-8-sig")]
+        files = signs([*texts(tomllib.loads(text)), *words, *cells], path.parent, Path())
         program = sorted(_marks(Path(__file__).parents[2].rglob("*.py")))
     except (OSError, ValueError):
         return ""
-    return sha256(json.dumps([__version__, program, text.decode(), list(words), files]).encode()).hexdigest()
+    return sha256(json.dumps([__version__, program, text, cells, list(words), files]).encode()).hexdigest()
 
 
 def write(folder: Path, signed: str) -> None:
@@ -58,19 +60,3 @@ def _files(folder: Path) -> list:
 def _marks(paths) -> list:
     """[path, bytes, time of the last change in ns] of each."""
     return [[str(path), (at := path.stat()).st_size, at.st_mtime_ns] for path in paths]
-
-
-def _parts(word: str) -> Iterator[str]:
-    """What of `table.key=v1,v2,...`, or of the name of a file, may name a file."""
-    values = word.partition("=")[2] or word
-    for one in values.split(","):
-        yield one.strip().strip("\"'")
-
-
-def _texts(value) -> Iterator[str]:
-    """Every text in the tables of a scene."""
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, dict | list):
-        for one in value.values() if isinstance(value, dict) else value:
-            yield from _texts(one)

@@ -1,5 +1,6 @@
 """A whole sweep that is resumed is there at once, and only while nothing it is made of has changed."""
 
+import csv
 import os
 import subprocess
 import sys
@@ -73,3 +74,32 @@ def test_exact_a_sweep_with_a_failed_case_has_no_receipt(swept, tmp_path):
     scene, *_ = swept
     assert cli("sweep", scene, "--over", "friction.static=0.2,-1", "--keep", "none", "-o", tmp_path / "out").code == 3
     assert not (tmp_path / "out" / receipt.NAME).exists()
+
+
+BENCH = POINT + COULOMB + '[slide]\nkind = "file"\nfile = "one.csv"\n'
+
+
+@pytest.mark.parametrize("table, words", [
+    ('[sweep]\n"slide.file" = "one.csv,two.csv"\n', ()), ("", ("--cases", "cases.csv")),
+    ("", ("--set", "slide.file=two.csv", "--over", "friction.static=0.2,0.3")),
+    ("", ("--over", "slide={kind = 'file', file = 'two.csv'}"))], ids=["sweep", "cases", "set", "table"])
+@pytest.mark.parametrize("whole", [True, False])
+def test_always_a_file_that_a_sweep_names_anywhere_counts(tmp_path, monkeypatch, table, words, whole):
+    """The older answers were told after two.csv had changed."""
+    monkeypatch.chdir(tmp_path)
+    rows = "time [s],displacement [um]\n0,0\n1,{}\n2,0\n"
+    for name, text in (("rig.toml", BENCH + table), ("one.csv", rows.format(10)), ("two.csv", rows.format(10)),
+                       ("cases.csv", "slide.file\none.csv\ntwo.csv\n")):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+
+    def last() -> float:
+        done = cli("sweep", "rig.toml", *words, "--keep", "none", "-o", "out", "--resume")
+        assert done.code == 0, done.err
+        with open("out/sweep.csv", encoding="utf-8", newline="") as file:
+            return float(list(csv.DictReader(file))[-1]["slip_amplitude"])
+
+    first = last()
+    (tmp_path / "two.csv").write_text(rows.format(20), encoding="utf-8")
+    if not whole:
+        (tmp_path / "out" / receipt.NAME).unlink()
+    assert last() == pytest.approx(2 * first, rel=1e-9)
