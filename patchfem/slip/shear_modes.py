@@ -225,16 +225,23 @@ def gathered(found: ShearModes, x: np.ndarray, tolerance: float) -> tuple:
     shapes are read between the nodes; as many of GATHERED as leave the backbone within `tolerance` of the limit, all
     points where that is more than half of them. Their numbers count from 0.
     """
-    of, r = found.of, found.stiffness.size
-    whole = of.backbone(r)
     for count in GATHERED:
         if 2 * count > x.size:
             break
-        place, share = gauss(x, of.limit, count)
-        shape = np.stack([np.interp(place, x, one) for one in found.shape.T], axis=1)
-        if of.share(whole, of.backbone(r, shape, share)) <= tolerance:
-            return replace(found, points=frozen_array(np.arange(count), np.int64), shape=frozen_array(shape)), share
-    return replace(found, points=frozen_array(np.arange(x.size), np.int64)), of.limit
+        few, share, error = on_gauss(found, x, count)
+        if error <= tolerance:
+            return few, share
+    return replace(found, points=frozen_array(np.arange(x.size), np.int64)), found.of.limit
+
+
+def on_gauss(found: ShearModes, x: np.ndarray, count: int) -> tuple:
+    """(modes on `count` Gauss points, their limits [N], share of the limit by which their backbone misses that of all);
+    arguments as of `gathered`."""
+    of, r = found.of, found.stiffness.size
+    place, share = gauss(x, of.limit, count)
+    shape = np.stack([np.interp(place, x, one) for one in found.shape.T], axis=1)
+    error = of.share(of.backbone(r), of.backbone(r, shape, share))
+    return replace(found, points=frozen_array(np.arange(count), np.int64), shape=frozen_array(shape)), share, error
 
 
 def gauss(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:

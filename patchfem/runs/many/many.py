@@ -64,7 +64,7 @@ BATCHES: tuple[Batch, ...] = (_batch("patches", "patch", compile=6.0, columns=Tr
                               _batch("lumped.lanes", "rig", compile=6.0, least=64, columns=True, together=64),
                               _batch("lumped.lumped", "rig", compile=12.0),
                               _batch("lumped.sheared", "rig", 0.4, 12.0, together=64),
-                              _batch("gathered", "rig", 0.2, least=32, together=8))
+                              _batch("gathered", "rig", 0.05, 10.0, least=32, together=128))
 
 
 def batch_compile_seconds(batch: Batch, model: Model) -> float:

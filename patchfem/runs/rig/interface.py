@@ -15,7 +15,7 @@ from ...friction.record import law_from
 from ...model.law import InterfaceLaw, bonds_of
 from ...model.model import Model
 from ...slip.fields import shear_of
-from ...slip.shear_modes import gathered
+from ...slip.shear_modes import FEW, gathered, on_gauss
 from ...structure.drive_sizes import omega_of
 from ..bench import averaged, rigid, shear
 from ..patch.kept import elements, strip_elements
@@ -144,6 +144,21 @@ def _shear_modes(patch, law, count: int | None, model) -> tuple:
             force = force / law.static
         made[law, count, tolerance, few] = found, force
     return made[law, count, tolerance, few]
+
+
+def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple | None:
+    """(ShearModes of so many points, their limits [N], share of the friction limit by which they miss the backbone of
+    the patch) with the fewest modes, `modes` at most, that miss it by less than a tolerance; None where it takes
+    more."""
+    made, key = _MADE.setdefault(patch, {}), (law.static, law.length, law.ratio, tolerance, points, modes)
+    if key not in made:
+        found, made[key] = shear_of(patch, law, None, tolerance, True), None
+        if found.stiffness.size <= modes:
+            few, limit, error = on_gauss(found, patch.x[found.points], points)
+            whole = found.of.backbone(max(FEW, 4 * modes))
+            error += found.of.share(whole, found.of.backbone(found.stiffness.size))
+            made[key] = (few, limit, error) if error <= 2 * tolerance else None
+    return made[key]
 
 
 _MADE = WeakKeyDictionary()  # Patch -> shear modes by what they are made of, for as long as it lives

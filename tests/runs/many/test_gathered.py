@@ -1,5 +1,7 @@
 """Patches with bonds behind shear, few points in place of all their nodes, beside the same cases run by themselves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scene_texts import COATED, MODE, SECOND, SHEAR
@@ -8,6 +10,7 @@ import patchfem as pf
 from patchfem.runs.many import gathered, many, one_by_one, patches
 from patchfem.runs.many.meshes import meshed
 from patchfem.runs.patch import static
+from patchfem.runs.rig.numerics import choose
 
 BONDS = '[friction]\nlaw = "nonlocal"\nreading = "stretch"\nstatic = 0.3\nkinetic = 0.3\nbond_length = "1 um"\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
@@ -71,3 +74,26 @@ def test_exact_patches_that_are_alike_are_pressed_once():
                                                                        other.measures.items()}
         np.testing.assert_array_equal(one.patches[0].pressure.sigma_n, other.patches[0].pressure.sigma_n)
     assert pressed[0].measures["pressure_peak"].value < 0.9 * pressed[1].measures["pressure_peak"].value
+
+
+def test_always_steps_that_are_not_pinned_are_doubled_in_lanes(monkeypatch):
+    """Where the displacement asks for more steps than a case begins with."""
+    free = SCENE.replace("steps_per_cycle = 200\n", "").replace("tolerance = 1e-2", "tolerance = 2e-3")
+    cases = meshed([pf.build(free, **{"drive.acceleration": 9.81 * level}) for level in (2.0, 3.5)])
+    monkeypatch.setattr(gathered, "choose", lambda model: replace(choose(model), steps=240))
+    found, real = gathered.solve(cases), one_by_one.solve(cases)
+    name, steps = "relative_displacement_amplitude", [found.numerics[k]["steps_per_cycle"] for k in range(2)]
+    assert max(steps) > 240 and {*steps} <= {240, 480, 960}
+    assert (found.errors[name] <= 2e-3 * found.values[name] + found.floors[name]).all()
+    assert beside(found, real)[2] == 0
+
+
+def test_always_what_lanes_do_not_take_runs_by_itself():
+    """A case that its bonds hold, and one whose bonds do not fill their places at first."""
+    held_fast = pf.build(SCENE, **{"drive.acceleration": 1e-4})
+    fewer = pf.build(SCENE, **{"friction.initial_bonds": 0.5})
+    assert gathered.group(fewer) is None and gathered.group(held_fast) is not None
+    for one in (held_fast, fewer):
+        cases = meshed([one, one])[:1]
+        found, real = gathered.solve(cases), one_by_one.solve(cases)
+        assert (found.outcome == real.outcome).all() and beside(found, real)[2] == 0

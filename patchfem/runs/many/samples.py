@@ -1,0 +1,197 @@
+"""Measures of many marches under one sine from the samples of their last cycles, side by side: those of `response.rows`
+on the samples of one run, as columns.
+
+Samples (s, n) of n runs are equally spaced over whole cycles.
+"""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from ...core import Response
+from ...dynamics.work_check import gap
+from ...response.loops import half_range, interface_loops, secant_stiffness, turns_of
+from ...response.measures import REST, ROUND, SHARE, SMOOTH
+from ...response.spectrum import PLACES, WEIGHTS, distorted
+
+
+class Samples:
+    """The last `window` cycles of runs at `steps` steps each: motion z, rate (s, m, n) of the modes of a rig, force [N]
+    and slip [m] (s, n); amplitude (n,) [m s-2] of the sine of the base, omega [rad/s]; worked (n,) [J]: friction work
+    of these cycles."""
+
+    def __init__(self, found, modes, omega: float, amplitude, steps: int, window: int):
+        self.found, self.modes, self.omega, self.amplitude = found, modes, omega, amplitude
+        self.steps, self.window, self.period = steps, window, 2 * np.pi / omega
+        self.dt, self.angle = self.period / steps, 2 * np.pi * np.arange(steps * window + 1) / steps
+        self.slide, self.speed = (_along(modes.slide, one) for one in (found.z, found.rate))
+        self.span = window * self.period
+
+    def acceleration(self) -> np.ndarray:
+        """Absolute acceleration of the output (s, n) [m s-2]."""
+        modes, found = self.modes, self.found
+        out = np.multiply.outer((1 - modes.base @ modes.output) * np.sin(self.angle), self.amplitude)
+        for k, rate in enumerate(2 * modes.zeta * modes.omega):
+            out -= modes.output[k] * (rate * found.rate[:, k] + modes.omega[k]**2 * found.z[:, k])
+        return out - modes.output @ modes.slide / modes.mass * found.force
+
+    def values(self, book: dict, stiffness, load) -> dict:
+        """Measures by name, (n,) each, NaN where a run has none; book: energies of the runs as `energy_balance` takes
+        them, with what `sampled`, `booked` and `passed` say of the friction work; stiffness (n,) [N/m]: of the first
+        mode as the contact meets it, 0 where no damping ratio refers to it; load (n,) [N]."""
+        first, third = (self.harmonic(number) for number in (1, 3))
+        out = {"absolute_acceleration_peak": peaks(np.abs(self.acceleration()))[0],
+               "friction_force_peak": np.abs(self.found.force).max(axis=0), "normal_load": load,
+               "drift_per_cycle": self.drift(), "friction_work": book["booked"], "energy_dissipated": book["gone"],
+               "energy_created": book["created"],
+               "work_check": gap(book["sampled"], book["booked"], book["passed"], book["power"] + book["peak_stored"])}
+        waves = [np.abs(self.gain(self.modes.output, one, number) - (1j * self.amplitude if number == 1 else 0.0))
+                 for number, one in ((1, first), (3, third))]
+        out |= {"absolute_acceleration_fundamental": waves[0], "acceleration_distortion": distorted(*waves, 0.0)}
+        return out | self.slips() | self.loops(first, stiffness)
+
+    def harmonic(self, number: int) -> np.ndarray:
+        """First Fourier coefficients (m, n) [m] of the modes at so many times the frequency of the drive, as
+        `spectrum.motion_harmonic` has them of cubics."""
+        h, n, s, found = self.dt, number, PLACES, self.found
+        wave, part = np.exp(-1j * n * self.angle[:-1]), WEIGHTS * h * np.exp(-1j * n * self.omega * h * s)
+        left, right = part @ (1 - 3 * s**2 + 2 * s**3), part @ (3 * s**2 - 2 * s**3)
+        leaves, comes = h * (part @ (s - 2 * s**2 + s**3)), h * (part @ (s**3 - s**2))
+        at = np.append(left * wave, 0.0) + np.append(0.0, right * wave)
+        of_rate, shape = np.append(leaves * wave, 0.0) + np.append(0.0, comes * wave), found.z.shape[1:]
+        flat = [one.reshape(len(at), -1) for one in (found.z, found.rate)]
+        return 2 / self.span * sum(weight.real @ one + 1j * (weight.imag @ one)
+                                   for weight, one in zip((at, of_rate), flat)).reshape(shape)
+
+    def ends(self) -> tuple:
+        """What motion and rate of the modes (m, n) gain over the cycles."""
+        return self.found.z[-1] - self.found.z[0], self.found.rate[-1] - self.found.rate[0]
+
+    def gain(self, row, first, number: int) -> np.ndarray:
+        """Fourier coefficient (n,) of the second derivative of row . modes from that (m, n) of the modes, by parts."""
+        omega, (moved, faster) = number * self.omega, self.ends()
+        return row @ (2 / self.span * (faster + 1j * omega * moved) - omega**2 * first)
+
+    def loops(self, first, stiffness) -> dict:
+        """Measures of the loop; first (m, n) [m]: coefficients of the modes."""
+        modes, omega, (moved, _) = self.modes, self.omega, self.ends()
+        rates = 2 / self.span * moved + 1j * omega * first
+        rest = np.array([-base * (-1j * self.amplitude) - self.gain(unit, first, 1) for base, unit in zip(
+            modes.base, np.eye(len(modes.base)))])
+        rest -= (2 * modes.zeta * modes.omega)[:, None] * rates + (modes.omega**2)[:, None] * first
+        pull = modes.mass * (modes.slide @ rest) / (modes.slide @ modes.slide)
+        turns, moves = self.turns(), np.ptp(self.slide, axis=0) > REST
+        half = np.array([half_range(one) for one in turns]) * moves
+        secants = [secant_stiffness(one) for one in turns]
+        secant = np.where(moves, [np.nan if one is None else one for one in secants], np.nan)
+        return interface_loops(half, modes.slide @ first, pull, self.found.worked * self.period / self.span,
+                               stiffness) | {"secant_stiffness": secant}
+
+    def turns(self) -> list:
+        """What `loops.turns_of` gives of each run."""
+        steps, size = self.steps, self.slide.shape[1]
+        rows, out = np.arange(size), np.empty((2, 2, self.window, size))
+        for number in range(self.window):
+            part = slice(number * steps, (number + 1) * steps + 1)
+            slide, speed, force = self.slide[part], self.speed[part], self.found.force[part]
+            for k, way in enumerate((-1, 1)):
+                out[k, :, number] = _turned(way * slide, way * speed, force, rows, self.dt) * np.array([[way], [1]])
+        time = self.angle / self.omega
+        turn = [[tuple(SimpleNamespace(slide=out[k, 0, c, run], force=out[k, 1, c, run]) for k in range(2))
+                 for c in range(self.window)] for run in range(size)]
+        for run in np.flatnonzero(np.isnan(out[:, 1]).any(axis=(0, 1))):  # it turns at an end of a cycle
+            turn[run] = turns_of(time, self.slide[:, run], self.speed[:, run], self.found.force[:, run], self.period,
+                                 "slide")
+        return turn
+
+    def drift(self) -> np.ndarray:
+        """Motion per cycle (n,) [m] as `loops.drift` has it, of two cycles or more."""
+        means, h = [], self.dt
+        for first in (0, (self.window - 1) * self.steps):
+            y, v = (one[first:first + self.steps + 1] for one in (self.slide, self.speed))
+            inside = (y[1:-1] - y[0]).sum(axis=0) + (y[-1] - y[0]) / 2
+            means.append(y[0] + (h * inside + h * h / 12 * (v[0] - v[-1])) / self.period)
+        return (means[1] - means[0]) / max(self.window - 1, 1)
+
+    def slips(self) -> dict:
+        """Measures of the slip as `measures.slip_measures` has them of runs that slide."""
+        slip, steps = self.found.slip, np.abs(np.diff(self.slide, axis=0))
+        still = steps <= ROUND * np.abs(self.slide).max(axis=0)
+        above = np.where(still, 0.0, np.abs(np.diff(slip, axis=0)) / np.where(still, 1.0, steps)) - SHARE
+        before, after = above[:-1], above[1:]
+        rise, low, high = np.abs(after - before), np.minimum(before, after), np.maximum(before, after)
+        below = np.where(high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0)))
+        at, run = np.nonzero((before < 0) & (after >= 0))
+        phase = self.angle[at] + 2 * np.pi / self.steps * (0.5 - before[at, run] / rise[at, run])
+        count, sums = np.bincount(run, minlength=slip.shape[1]), [
+            np.bincount(run, wave(2 * phase), slip.shape[1]) for wave in (np.cos, np.sin)]
+        start = np.where(count > 0, np.arctan2(sums[1], sums[0]) / 2 % np.pi, np.nan)
+        return {"slip_amplitude": np.ptp(slip, axis=0) / 2, "stick_fraction": below.mean(axis=0),
+                "slip_start_phase": start}
+
+    def window_of(self, run: int, acceleration) -> Response:
+        """The samples of one run with its acceleration (s,) [m s-2], as far as what rings in them is asked for."""
+        z, rate = self.found.z[:, :, run], self.found.rate[:, :, run]
+        return Response(self.angle / self.omega, z, rate, self.slide[:, run], self.speed[:, run], z @ self.modes.output,
+                        rate @ self.modes.output, acceleration, 0 * acceleration, self.found.force[:, run],
+                        self.found.slip[:, run])
+
+    def longest_stick(self, share: float) -> np.ndarray:
+        """Longest time (n,) [s] in which the slip is slower than this share of its fastest in the same cycle."""
+        rate = np.abs(np.diff(self.found.slip, axis=0)).reshape(self.window, self.steps, -1)
+        slow = (rate < share * rate.max(axis=1, keepdims=True)).reshape(self.window * self.steps, -1)
+        row = np.arange(len(slow))[:, None]
+        last = np.maximum.accumulate(np.where(slow, -1, row), axis=0)
+        return ((row - last).max(axis=0, initial=0) + 2) * self.dt
+
+
+def _along(row, motion) -> np.ndarray:
+    """row . modes (s, n) of a motion (s, m, n)."""
+    out = row[0] * motion[:, 0]
+    for k in range(1, len(row)):
+        out += row[k] * motion[:, k]
+    return out
+
+
+def _turned(slide, speed, force, rows, h: float) -> np.ndarray:
+    """(largest slide, force there) (2, n) of a cycle of samples, as `loops.turns_of` reads it by the slide; the force
+    is NaN where it is largest at an end of the cycle."""
+    top = slide.argmax(axis=0)
+    best, at, share = slide[top, rows], top.copy(), np.zeros(len(rows))
+    for k in (top - 1, top):
+        here = np.clip(k, 0, len(slide) - 2)
+        a, p, q = slide[here, rows], speed[here, rows] * h, speed[here + 1, rows] * h
+        rise = slide[here + 1, rows] - a
+        mid, big = 3 * rise - 2 * p - q, p + q - 2 * rise
+        root = np.sqrt(np.maximum(mid**2 - 3 * big * p, 0.0))
+        s = np.divide(p, root - mid, out=np.zeros(len(rows)), where=root > mid)
+        value = a + s * (p + s * (mid + s * big))
+        good = (k == here) & (p > 0) & (q < 0) & (s >= 0) & (s <= 1) & (value > best)
+        best, at, share = np.where(good, value, best), np.where(good, here, at), np.where(good, s, share)
+    up = np.minimum(at + 1, len(slide) - 1)
+    last = at + ((share > 0) & (slide[up, rows] > slide[at, rows]))
+    before = np.maximum(at - 1, 0)
+    rise = np.where((share > 0) & (at > 0), slide[last, rows] - slide[before, rows], 0.0)
+    pull = force[last, rows]
+    slope = np.divide(pull - force[before, rows], rise, out=np.zeros(len(rows)), where=rise > 0)
+    pull = pull + slope * (best - slide[last, rows])
+    ends = (share == 0.0) & ((at == 0) | (at == len(slide) - 1))
+    return np.array([best, np.where(ends, np.nan, pull)])
+
+
+def peaks(size) -> tuple:
+    """((n,) largest of samples (s, n) as `measures.acceleration_peak` reads it; what it may lie above them, as
+    `measures.peaks_between` says)."""
+    rows, top = np.arange(size.shape[1]), size.argmax(axis=0)
+    inside = (top > 0) & (top < len(size) - 1)
+    near = np.clip(top + np.arange(-2, 3)[:, None], 0, len(size) - 1)
+    five = size[near, rows]
+    bends = -(five[2:] - 2 * five[1:-1] + five[:-2])
+    bends[0], bends[2] = np.where(top >= 2, bends[0], bends[1]), np.where(top <= len(size) - 3, bends[2], bends[1])
+    smooth = bends.min(axis=0) * SMOOTH >= bends.max(axis=0)
+    left, mid, right = five[1:4]
+    bend = -bends[1]
+    with np.errstate(all="ignore"):
+        rise = np.where(bend < 0, -(right - left)**2 / (8 * bend), 0.0)
+    value = np.where(inside & smooth & (rise < 0.01 * mid), mid + rise, mid)
+    return value, np.where(inside & ~smooth, mid - np.maximum(left, right), 0.0)

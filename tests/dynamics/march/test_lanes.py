@@ -1,0 +1,123 @@
+"""Bonds behind shear modes in lanes against the march of each case by itself, and what is read off their samples."""
+
+import numpy as np
+import pytest
+from march_paths import OMEGA
+from test_march_loop import half_plane
+
+from patchfem.compiled import load
+from patchfem.core import BaseSine, ModalBasis, Response
+from patchfem.dynamics.march import lanes
+from patchfem.dynamics.march.march import march
+from patchfem.dynamics.march.models import points_model
+from patchfem.friction.bonds import recursion
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.response import loops, measures, spectrum
+from patchfem.runs.many.samples import Samples, peaks
+from patchfem.slip.shear_modes import shear_modes
+
+ONE = ModalBasis(("a",), np.array([OMEGA]), np.full(1, 0.05), np.ones(1), np.ones(1), np.ones(1), 1.0)
+TWO = ModalBasis(("a", "b"), OMEGA * np.array([1.0, 0.9]), np.full(2, 0.05), np.array([1.0, 0.2]), np.ones(2),
+                 np.array([1.0, -0.5]), 1.0)
+PUSHES, CYCLES, STEPS, WINDOW = (5.0, 20.0, 49.0, 300.0), 12, 80, 3
+LAW, DRIVE = Bonds(0.4, 1e-6), BaseSine(1.0, OMEGA)
+BOOKS = {"work_in": "work_in", "viscous": "viscous", "power": "power", "lost": "friction", "peak": "peak_stored",
+         "booked": "booked", "sampled": "sampled", "passed": "passed", "stored": "stored"}
+
+
+def patch(points: int = 6):
+    """(area (p,), pressure (p,), modes) of a patch that a tilt presses harder at one end."""
+    compliance, x = half_plane(points, 1e-7)
+    area, sigma = np.full(points, 1 / points), 60.0 * (1 + 0.8 * x)
+    return area, sigma, shear_modes(compliance, LAW.static * area * sigma, LAW.length, 2)
+
+
+def both(basis, cycles: int = CYCLES) -> tuple:
+    """(lanes of a case per push, march of each by itself)."""
+    area, sigma, modes = patch()
+    cases = [lanes.Points(LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, push) for push in PUSHES]
+    return lanes.march(basis, DRIVE, cases, cycles, STEPS, WINDOW), [
+        march(basis, BaseSine(push, OMEGA), points_model(LAW, area, sigma, modes), cycles, STEPS, WINDOW)
+        for push in PUSHES]
+
+
+@pytest.fixture(scope="module")
+def pairs() -> tuple:
+    return both(TWO)
+
+
+def near(one, other, rel: float):
+    np.testing.assert_allclose(one, other, rtol=rel, atol=rel * np.abs(other).max())
+
+
+@pytest.mark.parametrize("basis", [ONE, TWO], ids=["one mode", "two modes"])
+def test_exact_lanes_take_the_steps_of_a_march(basis):
+    """Sticking, slipping and dragging cases side by side; to what Newton's last step leaves, 1e-9 of the limit."""
+    found, alone = both(basis)
+    assert not found.bad.any()
+    for k, one in enumerate(alone):
+        near(found.extremes[k], one.amplitudes, 1e-7)
+        near(found.phasors[k], one.phasors, 1e-7)
+        near(found.force[:, k], one.window.force, 1e-7)
+        near(found.slip[:, k], one.window.slip, 1e-6)
+        near(found.z[:, :, k], one.window.modal, 1e-7)
+        near(found.worked[k], one.window_work, 1e-7)
+        ledger = one.response.extra["ledger"][:, -1]
+        near(found.book["gone"][k], ledger[2], 1e-7)
+        assert found.book["created"][k] <= 1e-9 * ledger[2] >= ledger[3]
+        for mine, name in BOOKS.items():
+            assert found.book[mine][k] == pytest.approx(one.ledger[name], rel=1e-7), name
+        gap = found.book["work_in"][k] - sum(found.book[name][k] for name in ("stored", "lost", "viscous"))
+        assert abs(gap) < 1e-9 * found.book["power"][k]
+
+
+def test_exact_a_case_does_not_hang_on_those_beside_it():
+    area, sigma, modes = patch()
+    cases = [lanes.Points(LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, push)
+             for push in np.geomspace(5.0, 300.0, 40)]
+    many, one = (lanes.march(TWO, DRIVE, part, 4, STEPS, 1) for part in (cases, cases[17:18]))
+    near(many.extremes[17], one.extremes[0], 1e-11)
+    assert many.extremes.shape == (40, 4, 2)
+
+
+@pytest.mark.parametrize("far", [False, True])
+def test_exact_shape_functions_of_a_slide(far):
+    x = np.append(0.0, np.geomspace(1e-9, 500.0 if far else 0.5, 400))
+    shape = load(lanes.KERNELS).shape.function()
+    np.testing.assert_allclose(np.array([shape(one, far) for one in x]).T,
+                               np.array([*recursion.shape_functions(x)[:2], np.exp(-x)]), rtol=2e-13, atol=1e-17)
+
+
+def test_exact_what_is_read_off_samples_side_by_side(pairs):
+    """Each as the readers of one run have it, of the same samples."""
+    found, alone = pairs
+    seen = Samples(found, TWO, OMEGA, np.array(PUSHES), STEPS, WINDOW)
+    book = {"peak_stored": found.book["peak"]} | found.book
+    values = seen.values(book, np.full(4, 1e5), np.full(4, 60.0))
+    for k, one in enumerate(alone):
+        w, drive = one.window, BaseSine(PUSHES[k], OMEGA)
+        here = Response(w.time, found.z[:, :, k], found.rate[:, :, k], seen.slide[:, k], seen.speed[:, k],
+                        found.z[:, :, k] @ TWO.output, found.rate[:, :, k] @ TWO.output, seen.acceleration()[:, k],
+                        w.base_acceleration, found.force[:, k], found.slip[:, k])
+        near(here.acceleration, w.acceleration, 1e-7)
+        turns = loops.turns_of(w.time, here.slide, here.slide_rate, here.force, drive.period, "slide")
+        loop = loops.interface_loop(loops.half_range(turns), spectrum.motion_harmonic(
+            w.time, here.slide, here.slide_rate, OMEGA), spectrum.friction_harmonic(here, TWO, drive),
+            found.worked[k] / WINDOW, 1e5)
+        expected = {"absolute_acceleration_peak": measures.acceleration_peak(here),
+                    "drift_per_cycle": loops.drift(w.time, here.slide, here.slide_rate, drive.period),
+                    "secant_stiffness": loops.secant_stiffness(turns)} | measures.slip_measures(here, drive, STEPS) \
+            | spectrum.wave_measures(*spectrum.odd_harmonics(here, drive)) | loop
+        for name, value in expected.items():
+            size = np.abs(here.slide).max() if name == "drift_per_cycle" else abs(value)
+            assert values[name][k] == pytest.approx(value, abs=1e-9 * size), (name, PUSHES[k])
+
+
+def test_exact_peaks_side_by_side():
+    r = np.random.default_rng(1)
+    size = np.abs(np.cumsum(np.cumsum(r.normal(size=(40, 200)), axis=0), axis=0))
+    value, above = peaks(size)
+    for k in range(200):
+        one = Response(*[np.zeros(40)] * 7, size[:, k], *[np.zeros(40)] * 3)
+        assert value[k] == pytest.approx(measures.acceleration_peak(one), rel=1e-13)
+        assert above[k] == pytest.approx(measures.peaks_between(one).get("absolute_acceleration_peak", 0.0), rel=1e-13)
