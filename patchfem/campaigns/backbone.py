@@ -298,7 +298,7 @@ def _balanced(joint: Joint, amplitudes) -> Curve:
     group = _group(joint, joint.patch)
     found, error = _free(group, joint, amplitudes, LADDER[0]), None
     for harmonics in LADDER[1:]:
-        better = _free(group, joint, amplitudes, harmonics, int(np.isfinite(found[0]).sum()))
+        better = _free(group, joint, amplitudes, harmonics, 1 + int(np.isfinite(found[0]).nonzero()[0].max(initial=-1)))
         error, found = LEFT * np.abs(better - found) + ROUND * np.abs(better), better
         known = np.isfinite(error[0])
         if (error[:2] <= model.accuracy.tolerance * np.abs(found[:2]))[:, known].all():
@@ -383,18 +383,20 @@ def _joined(group: Group, count: int, first: int) -> Group:
 
 
 def _free(group: Group, joint: Joint, amplitudes, harmonics: int, count=None) -> np.ndarray:
-    """(frequency [Hz], damping, loss [J]) (3, k) of the free motions at amplitudes (k,) [m] of the output, NaN from
-    where none is found, and from the number `count` on."""
+    """(frequency [Hz], damping, loss [J]) (3, k) of the free motions at amplitudes (k,) [m] of the output, NaN where
+    none is found, and from the number `count` on."""
     k, out = np.arange(harmonics + 1), np.full((3, len(amplitudes)), np.nan)
     for column, one in enumerate(_motions(group, joint, amplitudes[:count], harmonics)):
+        if one is None:
+            continue
         loss = np.pi * float(np.sum(k * (np.conj(one.slides) * one.forces).imag))
         out[:, column] = one.omega / (2 * np.pi), one.zeta, loss
     return out
 
 
 def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
-    """The `harmonic.backbone.Free` motions at amplitudes (k,) [m] of the output, as far as there is one near the one
-    before; NotConverged where there is none at all."""
+    """The `harmonic.backbone.Free` motions at amplitudes (k,) [m] of the output from the first that is found, None
+    before it, as far as there is one near the one before."""
     modes = joint.modes
     omega, shape = modes.held(group.rows, group.stiffness(), joint.mode)
     reach = abs(float(modes.output @ shape))
@@ -408,7 +410,7 @@ def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
     for amplitude in amplitudes:
         here = amplitude / reach
         try:
-            x = equations.towards(x, done, here) if out else x
+            x = equations.towards(x, done, here) if any(out) else x
             for _ in range(6):
                 x, free = equations.solve(x, here)
                 size = _largest(free.modal @ modes.output)
@@ -416,9 +418,10 @@ def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
                     break
                 here *= amplitude / size
         except NotConverged:
-            if out:
+            if any(out):
                 break
-            raise
+            out.append(None)
+            continue
         done, reach = here, amplitude / here
         out.append(free)
     return out
@@ -576,7 +579,7 @@ def _start(joint: Joint, amplitude: float) -> Start:
             first = min(float(_amplitude_of(joint, LOW * _knee(joint))) or amplitude, amplitude)
             path = np.geomspace(first, amplitude, STARTS)
             found = _motions(_group(joint, joint.patch), joint, path := np.unique(path), LADDER[0])
-            if len(found) == path.size:
+            if len(found) == path.size and found[-1] is not None:
                 turn = 1j * found[-1].omega * np.arange(LADDER[0] + 1)[:, None]
                 return Start(found[-1].modal.real.sum(axis=0), (turn * found[-1].modal).real.sum(axis=0))
         except (NotConverged, PatchfemError):
