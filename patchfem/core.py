@@ -163,8 +163,8 @@ class ModalBasis:
 
     def held(self, rows, stiffness, number: int) -> tuple:
         """(omega [rad/s], shape (n,)) of a mode when rows (i, n) hold with stiffness (i,) [N/m]; omega None where one
-        is infinite. Each coordinate has a held mode of its own, those of most overlap first, none slower than its own
-        frequency, as a spring lowers none. The coordinate `number` of the shape is 1."""
+        is infinite. Each coordinate has a held mode of its own, of most overlap, none slower than its own frequency,
+        as a spring lowers none. The coordinate `number` of the shape is 1."""
         if not np.isfinite(stiffness).all():
             return None, np.eye(self.omega.size)[number]
         values, vectors = np.linalg.eigh(np.diag(self.omega**2) + rows.T * stiffness @ rows / self.mass)
@@ -172,19 +172,15 @@ class ModalBasis:
         return float(np.sqrt(max(values[k], 0.0))), vectors[:, k] / vectors[number, k]
 
 
-def _partners(least, values, overlap) -> dict:
-    """A value (n,) of its own for each number (n,) `least` that it is not below, by falling overlap (n, n) of both;
-    such that the others find theirs, too, which they do where both hold once sorted."""
-    out, left = {}, list(range(values.size))
-    for flat in np.argsort(-overlap, axis=None):
-        i, k = divmod(int(flat), values.size)
-        if i in out or k not in left or values[k] < least[i]:
-            continue
-        rest = [one for one in range(values.size) if one not in out and one != i]
-        if (np.sort(values[[one for one in left if one != k]]) >= np.sort(least[rest])).all():
-            out[i] = k
-            left.remove(k)
-    return out
+def _partners(least, values, overlap) -> np.ndarray:
+    """A value (n,) of its own for each number (n,) `least` that it is not below, such that the product of the overlaps
+    (n, n) of all is largest."""
+    if values.size == 1:
+        return np.zeros(1, int)
+    from scipy.optimize import linear_sum_assignment
+
+    cost = np.where(values >= least[:, None], -np.log(np.maximum(overlap, 1e-30)), 1e6)
+    return linear_sum_assignment(cost)[1]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from ..compiled import load
 from ..core import NotConverged, Outcome, PatchfemError, Start, say
@@ -51,9 +52,11 @@ SOFT, HARD = 0.7, 3.0  # of the amplitude at which a cubic spring has the mode's
 FREE = 2.0  # the first of rigid friction, over what friction deflects the mode by at rest
 CELLS = 4.0  # by which the change at four cells in one is divided, some 15 times the error
 SMALL = 1e-5  # of the slide at which all of the contact slips, one in which nothing slips
-LOOPS = 3.0  # cycles of a loop on a bench, of which the last is read
+LOOPS, MOST_LOOPS = 3.0, 192.0  # cycles of a first loop on a bench, of which the last is read, and the most
+LOOP = ("secant_stiffness", "loop_area")
 ROUND = 1e-9  # of a value, what round-off leaves
 SAMPLES = 4096  # of a cycle of a static loop, and that a largest motion is read from
+SLIDES = 60  # tries of the slides whose static motion has the amplitudes that are asked for
 CLOSE = 1e-7  # of an amplitude, within which a free motion is at it
 PLAIN, BALANCED = (1e-6, 1e-3, 4), 8  # amplitudes [m] of a linear rig; steps to the damping that keeps it swinging
 CYCLES = (50.0, 200.0, 800.0)  # lengths of a decay that are tried
@@ -119,6 +122,12 @@ class Joint(NamedTuple):
         return abs(float(self.model.rig.modes.output @ self.held[1]))
 
     @property
+    def face(self) -> int:
+        """Number of the interface whose force on the held mode rises most."""
+        slides = np.abs(self.modes.interfaces @ self.held[1])
+        return int(np.argmax(slides * np.where(np.isfinite(self.stiffness) & (self.stiffness > 0), self.stiffness, 1)))
+
+    @property
     def modes(self):
         """The ModalBasis of the rig."""
         return self.model.rig.modes
@@ -126,7 +135,8 @@ class Joint(NamedTuple):
     @property
     def linear(self) -> bool:
         """Whether neither friction acts nor a spring bends."""
-        others = sum(one.numbers.static * (one.load or 0.0) for one in self.model.rig.interfaces[1:])
+        others = sum(one.numbers.static * (one.load or 0.0) for one in self.model.rig.interfaces) \
+            if len(self.model.rig.interfaces) > 1 else 0.0
         return not (_limit(self) or others or self.model.rig.bends)
 
 
@@ -139,12 +149,12 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
     """
     with placed(model.source):
         joint = _joint(model, mode)
-        if joint.linear:
-            return _level(joint, amplitudes, methods)
-        wanted = _default(joint) if amplitudes is None else np.asarray(amplitudes, float)
+        wanted = _default(joint) if amplitudes is None else np.unique(np.asarray(amplitudes, float))
         if wanted[-1] > joint.model.rig.travel:
             raise PatchfemError(f"an amplitude of {say(wanted[-1], 3)} lies beyond it; give smaller ones by "
                                 "--amplitudes", "structure.travel")
+        if joint.linear:
+            return _level(joint, wanted, methods)
         curves, missing = {}, {}
         for way in methods:
             if progress is not None:
@@ -174,6 +184,9 @@ def _joint(model: Model, name: str) -> Joint:
                             "of the contact for the backbone of the springs alone", "friction.static")
     if not (modes.omega[number] or joint.held[0]):
         raise PatchfemError("the mode has 0 Hz and friction that gives way nowhere: it has no frequency of its own")
+    if not (joint.linear or model.rig.bends or np.abs(modes.interfaces @ joint.held[1]).max() > 0):
+        raise PatchfemError("the mode does not move the contact, so no friction acts on it; name another by --mode, or "
+                            "give it a slide")
     if not joint.reach > 0:
         raise PatchfemError("the mode does not move the output, so it has no amplitude there; give it an output, or "
                             "another mode by --mode")
@@ -184,7 +197,6 @@ def _level(joint: Joint, amplitudes, methods) -> Backbone:
     """Of a linear rig: by balance and by a static force omega and zeta of the damping -g of every coordinate that
     keeps a motion up, zeta = g/(2 omega); of a decay its own frequency omega (1 - zeta^2)^(1/2)."""
     modes, n = joint.modes, joint.modes.omega.size
-    a = np.geomspace(*PLAIN) if amplitudes is None else np.asarray(amplitudes, float)
 
     def root(g: float) -> complex:
         """Of z'' + (D - g) z' + Omega^2 z = 0, that in which the coordinate moves most."""
@@ -197,12 +209,15 @@ def _level(joint: Joint, amplitudes, methods) -> Backbone:
         g -= 2 * root(g).real
     kept, own = abs(root(g)), root(0.0)
     steady, decay = (kept, g / (2 * kept)), (abs(own.imag), -own.real / abs(own))
+    if not (own.imag and steady[1] < 1):
+        return _put_together(joint, amplitudes, {}, dict.fromkeys(methods, "the mode does not swing: its damping ratio "
+                                                                           "is 1 or more"))
     curves = {}
     for way in methods:
         omega, zeta = decay if way == "decay" else steady
-        f, zeta = np.full(a.size, omega / (2 * np.pi)), np.full(a.size, zeta)
-        curves[way] = Curve(a, f, ROUND * f, zeta, ROUND * np.abs(zeta), np.full(a.size, np.nan))
-    return _put_together(joint, a, curves, {})
+        f, zeta = np.full(amplitudes.size, omega / (2 * np.pi)), np.full(amplitudes.size, zeta)
+        curves[way] = Curve(amplitudes, f, ROUND * f, zeta, ROUND * np.abs(zeta), np.full(f.size, np.nan))
+    return _put_together(joint, amplitudes, curves, {})
 
 
 def _number(rig, name: str) -> int:
@@ -232,14 +247,15 @@ def _held_by(joint: Joint) -> np.ndarray:
         if chain.size > 1:
             return chain
         small = SMALL * _limit(joint) / chain[0]
-        return np.array([_loop(joint, small, model.rig.own_frequency)[0].values["secant_stiffness"]])
+        return np.array([_settled(joint, small, model.rig.own_frequency)[0].values["secant_stiffness"]])
 
 
 def _limit(joint: Joint) -> float:
-    """Largest friction [N] of the first interface; 0 without friction."""
+    """Largest friction [N] of the interface that counts; 0 without friction."""
     model = joint.model
     if len(model.rig.interfaces) > 1 and joint.patch is None:
-        return model.rig.interfaces[0].numbers.static * model.rig.interfaces[0].load
+        one = model.rig.interfaces[joint.face]
+        return one.numbers.static * one.load
     if model.friction is None:
         return 0.0
     return model.friction.static * (joint.patch.pressure.load if joint.patch is not None else model.nominal_load)
@@ -247,6 +263,8 @@ def _limit(joint: Joint) -> float:
 
 def _default(joint: Joint) -> np.ndarray:
     """Amplitudes (k,) [m] at the output, from where the contact holds to where the mode slides as if it were free."""
+    if joint.linear:
+        return np.geomspace(*PLAIN) * min(1.0, joint.model.rig.travel / PLAIN[1])
     low, high = _amplitude_of(joint, np.array(_ends(joint)))
     high = min(high, _bound(joint))
     low = min(low, LOW * high)
@@ -265,14 +283,14 @@ def _bound(joint: Joint) -> float:
 
 def _amplitude_of(joint: Joint, slide):
     """Amplitude [m] at the output of the held mode whose interface slides by `slide` [m]."""
-    return joint.reach / (abs(float(joint.modes.interfaces[0] @ joint.held[1])) or 1.0) * slide
+    return joint.reach / (abs(float(joint.modes.interfaces[joint.face] @ joint.held[1])) or 1.0) * slide
 
 
 def _knee(joint: Joint) -> float:
     """Slide [m] at which all of the contact slips, of rigid friction 0; of springs alone that at which they bend."""
-    rig, stiffness = joint.model.rig, float(joint.stiffness[0])
+    rig, stiffness = joint.model.rig, float(joint.stiffness[joint.face])
     if not _limit(joint):  # it doubles the mode's stiffness, or has a wave behind it
-        return float(np.sqrt(_spring(joint) / rig.cubic)) if rig.cubic is not None else rig.interlock[1]
+        return float(np.sqrt(_spring(joint) / abs(rig.cubic))) if rig.cubic is not None else rig.interlock[1]
     return _limit(joint) / stiffness if stiffness else _limit(joint) / _spring(joint)
 
 
@@ -283,7 +301,7 @@ def _spring(joint: Joint) -> float:
 
 def _ends(joint: Joint) -> tuple:
     """Smallest and largest slide [m] of the default amplitudes."""
-    knee, stiffness, free = _knee(joint), float(joint.stiffness[0]), _limit(joint) / _spring(joint)
+    knee, stiffness, free = _knee(joint), float(joint.stiffness[joint.face]), _limit(joint) / _spring(joint)
     if 0 < stiffness < np.inf or not free:
         return LOW * knee, HIGH * max(knee, free)
     return FREE * free, HIGH * HIGH * free
@@ -470,12 +488,24 @@ def _static(joint: Joint, amplitudes) -> Curve:
     def read(laws, samples: int) -> np.ndarray:
         held = joint.modes.held(laws.rows, laws.stiffness(), joint.mode)
         reach = abs(float(joint.modes.output @ held[1]))
-        return _rows(joint, quasi_static.along(joint.modes, laws, amplitudes / reach, held, samples))
+        along = joint.modes.output / float(joint.modes.output @ held[1])
+        return _rows(joint, quasi_static.along(joint.modes, laws, amplitudes / reach, held, samples, along))
 
     best = read(group, SAMPLES)
     error = np.abs(best - read(group, SAMPLES // 2)) + ROUND * np.abs(best)
     error += _in_space(joint, lambda laws: read(laws, SAMPLES))
-    return Curve(best[0], best[1], error[1], best[2], error[2], best[3])
+    return _rising(best, error)
+
+
+def _rising(best, error) -> Curve:
+    """The Curve of (amplitude, frequency, damping, loss) (4, k) and their errors, as far as its force rises with the
+    amplitude: beyond that nothing stands still."""
+    force = best[1]**2 * best[0]
+    whole = np.isfinite(best + error).all(axis=0) & (np.diff(force, prepend=0.0) > 0)
+    count = whole.size if whole.all() else int(np.argmin(whole))
+    if not count:
+        raise NotConverged("no static force along the mode has an equilibrium at these amplitudes")
+    return Curve(best[0], best[1], error[1], best[2], error[2], best[3]).at(slice(count))
 
 
 def _in_closed_form(joint: Joint, amplitudes) -> Curve | None:
@@ -484,13 +514,19 @@ def _in_closed_form(joint: Joint, amplitudes) -> Curve | None:
     if model.friction is None or model.soft or model.rig.bends or len(model.rig.interfaces) > 1:
         return None
     slides = np.abs(modes.interfaces[0] @ joint.held[1]) * amplitudes / joint.reach
-    found = [loop_from(model.friction, _limit(joint) / model.friction.static, float(one)) for one in slides]
-    if None in found:
-        return None
-    best = _rows(joint, quasi_static.through(modes, modes.interfaces[0], joint.held, slides,
-                                             [quasi_static.Loops(*one) for one in found]))
-    error = ROUND * np.abs(best)
-    return Curve(best[0], best[1], error[1], best[2], error[2], best[3])
+    for _ in range(SLIDES):
+        found = [loop_from(model.friction, _limit(joint) / model.friction.static, float(one)) for one in slides]
+        if None in found:
+            return None
+        best = _rows(joint, quasi_static.through(modes, modes.interfaces[0], joint.held, slides,
+                                                 [quasi_static.Loops(*one) for one in found]))
+        if (np.abs(best[0] / amplitudes - 1) < CLOSE).all():
+            break
+        slides = slides * amplitudes / best[0]  # other shapes at the output than that of the held mode
+    at = np.abs(best[0] / amplitudes - 1) < CLOSE
+    best = np.where(at, best, np.nan)
+    best[0] = amplitudes
+    return _rising(best, (ROUND + CLOSE * (modes.omega.size > 1)) * np.abs(best))
 
 
 def _rows(joint: Joint, found: list) -> np.ndarray:
@@ -505,11 +541,11 @@ def _on_a_bench(joint: Joint, amplitudes) -> Curve:
     slides = np.abs(row @ joint.held[1]) * amplitudes / joint.reach
     found, errors = [], []
     for slide in slides:
-        fine, alone, steps = _loop(joint, float(slide), joint.held[0] / (2 * np.pi))
+        fine, alone, steps, change = _settled(joint, float(slide), joint.held[0] / (2 * np.pi))
         bars = with_errors(fine.values, *errors_of(alone, joint.patch, joint.coarse, fine, steps)[0], least=1e-10)
-        tip, area = (fine.values[name] for name in ("secant_stiffness", "loop_area"))
-        found.append(quasi_static.Loops(tip * slide, area))
-        errors.append(quasi_static.Loops(bars["secant_stiffness"].error * slide, bars["loop_area"].error))
+        tip, area = ((fine.values[name], bars[name].error + off) for name, off in zip(LOOP, change))
+        found.append(quasi_static.Loops(tip[0] * slide, area[0]))
+        errors.append(quasi_static.Loops(tip[1] * slide, area[1]))
 
     def read(loops) -> np.ndarray:
         return _rows(joint, quasi_static.through(modes, row, joint.held, slides, loops))
@@ -520,12 +556,26 @@ def _on_a_bench(joint: Joint, amplitudes) -> Curve:
         moved = [quasi_static.Loops(one.tip + change[0] * off.tip, one.area + change[1] * off.area)
                  for one, off in zip(found, errors)]
         error += np.abs(read(moved) - best)
-    return Curve(best[0], best[1], error[1], best[2], error[2], best[3])
+    return _rising(best, error)
 
 
-def _loop(joint: Joint, slide: float, frequency: float) -> tuple:
-    """(BenchRun, its Model, its steps) of a few cycles of the contact alone under a sine of amplitude `slide` [m]."""
-    path = SlidePath("sine", slide, frequency, None, 0.0, LOOPS, None, None)
+def _settled(joint: Joint, slide: float, frequency: float) -> tuple:
+    """(BenchRun, its Model, its steps, what the later half of its cycles changed of LOOP) of a loop that has settled,
+    or of the most cycles that are tried."""
+    tolerance, cycles = joint.model.accuracy.tolerance, LOOPS
+    found = _loop(joint, slide, frequency, cycles)
+    while True:
+        cycles *= 2
+        before, found = found[0].values, _loop(joint, slide, frequency, cycles)
+        values = found[0].values
+        change = [abs(values[name] - before[name]) for name in LOOP]
+        if cycles >= MOST_LOOPS or all(off <= tolerance * abs(values[name]) for name, off in zip(LOOP, change)):
+            return *found, change
+
+
+def _loop(joint: Joint, slide: float, frequency: float, cycles: float) -> tuple:
+    """(BenchRun, its Model, its steps) of some cycles of the contact alone under a sine of amplitude `slide` [m]."""
+    path = SlidePath("sine", slide, frequency, None, 0.0, cycles, None, None)
     alone = replace(_steady(joint.model), kind="bench", rig=None, slide=path)
     steps = steps_of(alone)
     return bench.run(alone, joint.patch, steps), alone, steps
@@ -544,11 +594,11 @@ def _decayed(joint: Joint, amplitudes) -> Curve:
         read = _read(joint, found)[0]
         if found.outcome is Outcome.STUCK or not read.whole or read.amplitude[-1] < amplitudes[0]:
             break
-    for _ in range(FINER + 1):
+    for tried in range(FINER + 1):
         best, reading, error = _with_errors(joint, what, how, found, amplitudes)
         known = np.isfinite(best + error).all(axis=0)
-        small = error[0] <= np.maximum(model.accuracy.tolerance * best[0], reading[0])
-        if (known.any() and small[known].all()) or \
+        small = (error <= np.maximum(model.accuracy.tolerance * np.abs(best), reading)).all(axis=0)
+        if (known.any() and small[known].all()) or tried == FINER or \
                 not engine.in_time(what, how, joint.patch) or "steps_per_cycle" in how.pinned:
             break
         how = how.finer()
@@ -591,13 +641,15 @@ def _start(joint: Joint, amplitude: float) -> Start:
 
 
 def _read(joint: Joint, found) -> tuple:
-    """(RingDown of every swing, of every third one) of a Solution; beside other modes of the part of the motion along
-    the held shape."""
+    """(RingDown of every swing, of every third one) of a Solution; beside other modes it turns when the part of the
+    motion along the held shape does, which rings least."""
     motion, shape = found.response, joint.held[1]
     place, rate = motion.output, motion.output_rate
     if shape.size > 1:
-        place, rate = (part @ shape * joint.reach / (shape @ shape) for part in (motion.modal, motion.modal_rate))
+        place, rate = (part @ shape for part in (motion.modal, motion.modal_rate))
     times, places = ring_down.turns(motion.time, place, rate)
+    if shape.size > 1 and times.size:
+        places = CubicHermiteSpline(motion.time, motion.output, motion.output_rate)(times)
     return tuple(ring_down.ring_down(times, places, every) for every in DOWN)
 
 
@@ -636,7 +688,7 @@ def _put_together(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone
     if joint.model.rig.by_modes:
         own = np.eye(modes.omega.size) if modes.shapes is None else np.abs(modes.shapes)
         name = modes.names[int(np.argmax(own[:, joint.mode]))]
-    own = float(modes.omega[joint.mode]) / (2 * np.pi)
+    own = _free_frequency(joint)
     stuck = None if joint.held[0] is None else joint.held[0] / (2 * np.pi)
     first = next((curves[way] for way in ("quasi-static", "balance") if way in curves), None)
     micro, gross = _exponents(joint, first) if first is not None and not joint.linear else (None, None)
@@ -646,13 +698,27 @@ def _put_together(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone
                      *_unworn(joint.model)))
 
 
+def _free_frequency(joint: Joint) -> float:
+    """Of the mode [Hz] without the contact and with the bonded spring, one that bends as stiff as it is at rest."""
+    modes, spring = joint.modes, joint.model.rig.interlock
+    omega = float(modes.omega[joint.mode])
+    if spring is not None:
+        omega = modes.held(modes.interfaces[:1], np.array([spring[0]]), joint.mode)[0]
+    return omega / (2 * np.pi)
+
+
 def _exponents(joint: Joint, one: Curve) -> tuple:
-    """Slopes of the logarithm of the loss over that of the amplitude between the first two points, where they lie in
-    micro-slip, and between the last two, where all of the contact slips; None elsewhere."""
+    """Slopes of the logarithm of the loss over that of the amplitude between the first two points, where both lie in
+    micro-slip, and between the last two, where all of the contact slips at both; None elsewhere, and of a loss that is
+    round-off of the energy of the swing."""
     a, loss, knee = one.amplitude, one.loss, _amplitude_of(joint, _knee(joint))
-    ends = (a[0] < MICRO * knee, (0, 1)), (a[-1] > GROSS * knee, (-2, -1))
+    if a.size < 2 or not _limit(joint):
+        return None, None
+    swing = joint.modes.mass * (2 * np.pi * one.frequency * a / joint.reach)**2
+    ends = (a[1] < MICRO * knee, (0, 1)), (a[-2] > GROSS * knee, (-2, -1))
     return tuple(float(np.log(loss[j] / loss[i]) / np.log(a[j] / a[i]))
-                 if there and a.size > 1 and loss[i] > 0 and loss[j] > 0 else None for there, (i, j) in ends)
+                 if there and loss[i] > ROUND * swing[i] and loss[j] > ROUND * swing[j] else None
+                 for there, (i, j) in ends)
 
 
 def _edge(one: Curve) -> float | None:
@@ -691,25 +757,25 @@ def _gaps(wanted, curves: dict) -> list:
 
 
 WHY = {"decay": "a decay shows the mean over a cycle, in which it loses {:.2g} of its swing there",
-       "quasi-static": "the static curve takes the stiffness from tip to tip, the balance the first harmonic of the "
-                       "force"}
+       "quasi-static": "the static curve takes the stiffness from tip to tip and, of several modes, keeps the shape of "
+                       "the force; the balance follows the first harmonic"}
 
 
 def _differences(curves: dict) -> list:
-    """Sentences on where the decay and the static curve leave the balance beyond their errors, and why."""
+    """Sentences on where the decay and the static curve leave the balance beyond their errors at the same amplitudes,
+    and why."""
     if "balance" not in curves:
         return []
     out, best = [], curves["balance"]
     for way, why in WHY.items():
         if way not in curves:
             continue
-        one, x = curves[way], np.log(best.amplitude)
-        inside = np.clip(np.log(one.amplitude), x[0], x[-1])
-        inside = np.abs(inside - np.log(one.amplitude)) < CLOSE
+        one, here, there = curves[way], *np.intersect1d(curves[way].amplitude, best.amplitude, return_indices=True)[1:]
+        one, other = one.at(here), best.at(there)
         for what in ("frequency", "damping"):
-            beside, bar = (np.interp(np.log(one.amplitude), x, getattr(best, part)) for part in (what, f"{what}_error"))
+            beside, bar = getattr(other, what), getattr(other, f"{what}_error")
             off = np.abs(getattr(one, what) - beside)
-            share = np.where(inside & (off > bar + getattr(one, f"{what}_error")), off / np.abs(beside), 0.0)
+            share = np.where(off > bar + getattr(one, f"{what}_error"), off / np.abs(beside), 0.0)
             if share.size and share.max() > 0:
                 k = int(np.argmax(share))
                 lost = -np.expm1(-2 * np.pi * one.damping[k])

@@ -47,7 +47,8 @@ def contents(found: Backbone, title: str = "") -> Contents:
             variables[f"{name}_{of}"] = (f"{name}_amplitude", getattr(one, of), {
                 "units": unit, "long_name": f"{words}, by {way}"})
     numbers = {"free_frequency": found.free, "stuck_frequency": found.stuck, "exponent_micro": found.micro,
-               "exponent_gross": found.gross, "flutter_amplitude": found.flutter}
+               "exponent_gross": found.gross, "flutter_amplitude": found.flutter,
+               "notes": "; ".join(found.notes) or None}
     return Contents(variables, coordinates, {"title": title, "patchfem": __version__, "mode": found.mode} | (
         {"missing": "; ".join(f"{way}: {text}" for way, text in found.missing.items())} if found.missing else {}) | {
         name: value for name, value in numbers.items() if value is not None})
@@ -75,7 +76,7 @@ def drawn(found: Backbone) -> list:
     unit, scale = scales.axis_unit(np.concatenate([one.amplitude for one in found.curves.values()]), "m")
     out = []
     for name, label, of, log in (("frequency", "frequency", "Hz", False), ("damping", "damping ratio", "", True)):
-        marks = []
+        log, marks = log and all((one.damping > 0).all() for one in found.curves.values()), []
         for way, one in found.curves.items():
             x, y = one.amplitude * scale, getattr(one, name)
             shown = (y > 0) | (not log)

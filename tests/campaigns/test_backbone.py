@@ -5,6 +5,7 @@ import pytest
 from scene_texts import IWAN, shaken
 
 import patchfem as pf
+from patchfem.campaigns import backbone as backbone_module
 from patchfem.campaigns.backbone import backbone
 from patchfem.core import ModalBasis
 
@@ -210,6 +211,71 @@ def test_exact_no_held_mode_is_slower_than_the_free_one():
     exact = np.linalg.eigvalsh((k + np.diag([3e6, 0])) / np.outer(root, root))
     assert np.square(held) == pytest.approx(exact, rel=1e-9) and held[1] > omega[1]
     assert modes.held(row[None], np.array([np.inf]), 1)[0] is None
+
+
+def test_held_modes_of_pairs_that_do_not_touch_stay_with_their_pair():
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        omega, rows = rng.uniform(100, 1000, 4), np.zeros((2, 4))
+        rows[0, :2], rows[1, 2:] = rng.normal(size=(2, 2))
+        modes = ModalBasis(tuple("abcd"), omega, np.zeros(4), rows[0], rows[0], rows[0], 1.0, None, rows)
+        for k in range(4):
+            w, shape = modes.held(rows, 10 ** rng.uniform(3, 7, 2), k)
+            assert np.isfinite(shape).all() and w >= omega[k] * (1 - 1e-9)
+            assert not np.abs(shape[2:] if k < 2 else shape[:2]).any()
+
+
+TWO = (RIG % PLASTIC.replace("1 mm", "1 um")).replace("[drive]", """[[structure.mode]]
+name = "second"
+frequency = "470 Hz"
+damping = 0.003
+slide = 0.8
+output = 0.6
+[drive]""")
+
+
+def test_two_modes_in_gross_slip_lose_the_same_by_decay_and_by_balance():
+    """The decay of two modes is that of the output: 4 F/(2 pi k A) and the structure's own, less than 2 % apart where
+    the damping is small; the static curve is at the amplitudes asked for."""
+    a = np.array([2e-3, 4e-3])
+    curves = backbone(pf.build(TWO), "", a).curves
+    plain = 0.002 + 4 * 30 / (2 * np.pi * 0.5 * OMEGA**2 * a)
+    assert curves["balance"].damping == pytest.approx(plain, rel=0.02)
+    assert curves["decay"].damping == pytest.approx(np.interp(curves["decay"].amplitude, a, plain), rel=0.02)
+    assert curves["decay"].amplitude.size == 2 and curves["quasi-static"].amplitude == pytest.approx(a, rel=1e-6)
+
+
+def test_exponents_only_where_both_points_lie_in_a_regime_and_the_loss_is_no_round_off():
+    sparse = backbone(model(IWAN), "", [1e-8, 1e-2], ("quasi-static",))
+    assert sparse.micro is None and sparse.gross is None
+    held = backbone(model(PLASTIC.replace("1 mm", "1 um")), "", [1e-9, 2e-9], ("balance",))
+    assert held.micro is None
+
+
+def test_a_loop_that_remembers_is_read_when_it_has_settled():
+    """Three cycles of bonds of order 2 are not their loop yet: the curve is that of thirty, within both bars."""
+    bonds = 'law = "nonlocal"\nreading = "stretch"\norder = 2\nbond_length = "1 um"'
+    joint = backbone_module._joint(model(bonds), "")
+    few, many = (backbone_module._loop(joint, 3e-7, 400.0, cycles)[0].values for cycles in (3.0, 96.0))
+    *_, found = (backbone_module._settled(joint, 3e-7, 400.0),)
+    name = "secant_stiffness"
+    assert abs(few[name] / many[name] - 1) > 1e-3
+    assert abs(found[0].values[name] / many[name] - 1) < 2e-3
+
+
+def test_a_static_curve_ends_where_its_force_falls():
+    """An interlock gives way at a quarter of its wave: 20 um of 80."""
+    bonded = '[structure.bonded]\nstiffness = "4.6e6 N/m"\nwavelength = "80 um"\n[[structure.mode]]'
+    scene = (RIG % PLASTIC)[(RIG % PLASTIC).index("[structure]"):].replace("[[structure.mode]]", bonded, 1)
+    found = backbone(pf.build(scene), "", np.array([5e-6, 1e-5, 1.5e-5, 5e-5]), ("quasi-static",))
+    assert found.curves["quasi-static"].amplitude.size == 3 and "the static curve ends there" in found.notes[0]
+    assert found.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
+
+
+def test_a_linear_mode_that_does_not_swing_has_no_curve():
+    scene = (RIG % PLASTIC)[(RIG % PLASTIC).index("[structure]"):].replace("0.002", "1.5")
+    found = backbone(pf.build(scene))
+    assert not found.curves and "ratio is 1 or more" in found.missing["decay"]
 
 
 def test_python_gives_a_dataset():

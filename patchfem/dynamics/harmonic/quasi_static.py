@@ -71,19 +71,20 @@ def follows_speed(group: Group, u: float) -> bool:
     return False
 
 
-def along(modes: ModalBasis, group: Group, shares, held: tuple, samples: int = 4096) -> list:
+def along(modes: ModalBasis, group: Group, shares, held: tuple, samples: int = 4096, of=None) -> list:
     """Static motions (k,) of a mode at shares (k,) [m] of its shape when the contact holds.
 
     modes: as they are without the contact; group: laws on the rows; held: (omega [rad/s], shape (n,)) of the mode;
-    samples: of a cycle, for laws without a closed form. PatchfemError where a law follows the speed, NotConverged where
-    no equilibrium is found.
+    samples: of a cycle, for laws without a closed form; of (n,): what the shares are given of, 1 for the shape itself,
+    such as the motion at the output; the part along the shape unless given. PatchfemError where a law follows the
+    speed, NotConverged where no equilibrium is found.
     """
     if follows_speed(group, float(np.abs(group.rows).max()) * float(np.max(shares))):
         raise PatchfemError(RATE)
     (omega, shape), out = held, []
-    near = np.append(shape, 1.0)
+    near, of = np.append(shape, 1.0), shape / (shape @ shape) if of is None else of
     for share in shares:
-        near = _balanced(modes, group, held, float(share), near, samples)
+        near = _balanced(modes, group, (*held, of), float(share), near, samples)
         z, alpha = near[:-1] * share, float(near[-1]) * omega**2 * share
         loss = sum(loops(laws, abs(one), samples).area for one, laws in zip(group.rows @ z, group.laws))
         out.append(_read(modes, shape, (z, alpha, loss)))
@@ -103,21 +104,21 @@ def through(modes: ModalBasis, row, held: tuple, slides, found) -> list:
 
 
 def _balanced(modes, group, held: tuple, share: float, near, samples: int) -> np.ndarray:
-    """(z/share, alpha/(omega^2 share)) of the equilibrium at a share [m], from one nearby."""
-    (omega, shape), m, n = held, modes.mass, modes.omega.size
+    """(z/share, alpha/(omega^2 share)) of the equilibrium at a share [m], from one nearby; held: omega, shape, `of`."""
+    (omega, shape, of), m, n = held, modes.mass, modes.omega.size
     stiff = np.diag(modes.omega**2) / omega**2
 
     def left(x):
         u = group.rows @ x[:n] * share
         force = np.array([np.sign(one) * loops(laws, abs(one), samples).tip for one, laws in zip(u, group.laws)])
         return np.append(stiff @ x[:n] + group.rows.T @ force / (m * omega**2 * share) - x[n] * shape,
-                         shape @ x[:n] / (shape @ shape) - 1)
+                         of @ x[:n] - 1)
 
     def slopes(x):
         u = np.abs(group.rows @ x[:n] * share)
         rise = [_slope(laws, one, samples) for one, laws in zip(u, group.laws)]
         top = stiff + group.rows.T * rise @ group.rows / (m * omega**2)
-        return np.block([[top, -shape[:, None]], [shape[None] / (shape @ shape), np.zeros((1, 1))]])
+        return np.block([[top, -shape[:, None]], [of[None], np.zeros((1, 1))]])
 
     for start in (near, np.append(shape, 1.0)):
         found = root(left, start, jac=slopes, tol=1e-13)
@@ -136,7 +137,7 @@ def _read(modes, shape, motion: tuple) -> Static:
     """The Static of (z (n,) [m], alpha [m s-2], loss [J])."""
     z, alpha, loss = motion
     share = float(shape @ z / (shape @ shape))
-    omega = float(np.sqrt(alpha / share))
+    omega = float(np.sqrt(alpha / share)) if alpha * share > 0 else np.nan
     viscous = np.pi * omega * modes.mass * float(z @ modes.dampers @ z)
     work = 2 * np.pi * alpha * share * modes.mass * float(shape @ shape)
     return Static(share, omega, (loss + viscous) / work, z, float(loss))
