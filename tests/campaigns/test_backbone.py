@@ -225,7 +225,7 @@ def test_held_modes_of_pairs_that_do_not_touch_stay_with_their_pair():
             assert not np.abs(shape[2:] if k < 2 else shape[:2]).any()
 
 
-TWO = (RIG % PLASTIC.replace("1 mm", "1 um")).replace("[drive]", """[[structure.mode]]
+TWO = shaken(PLASTIC.replace("1 mm", "1 um")).replace("[drive]", """[[structure.mode]]
 name = "second"
 frequency = "470 Hz"
 damping = 0.003
@@ -266,14 +266,14 @@ def test_a_loop_that_remembers_is_read_when_it_has_settled():
 def test_a_static_curve_ends_where_its_force_falls():
     """An interlock gives way at a quarter of its wave: 20 um of 80."""
     bonded = '[structure.bonded]\nstiffness = "4.6e6 N/m"\nwavelength = "80 um"\n[[structure.mode]]'
-    scene = (RIG % PLASTIC)[(RIG % PLASTIC).index("[structure]"):].replace("[[structure.mode]]", bonded, 1)
+    scene = shaken(PLASTIC)[shaken(PLASTIC).index("[structure]"):].replace("[[structure.mode]]", bonded, 1)
     found = backbone(pf.build(scene), "", np.array([5e-6, 1e-5, 1.5e-5, 5e-5]), ("quasi-static",))
     assert found.curves["quasi-static"].amplitude.size == 3 and "the static curve ends there" in found.notes[0]
     assert found.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
 
 
 def test_a_linear_mode_that_does_not_swing_has_no_curve():
-    scene = (RIG % PLASTIC)[(RIG % PLASTIC).index("[structure]"):].replace("0.002", "1.5")
+    scene = shaken(PLASTIC)[shaken(PLASTIC).index("[structure]"):].replace("0.002", "1.5")
     found = backbone(pf.build(scene))
     assert not found.curves and "ratio is 1 or more" in found.missing["decay"]
 
