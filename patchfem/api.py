@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from .campaigns import backbone as backbones
 from .campaigns import cost as cost_curves
 from .campaigns import fit as loop_fits
+from .campaigns import fit_decay as decay_fits
 from .campaigns import fit_path, wear_coefficient
 from .campaigns.rows import asked as row_asked
 from .campaigns.rows import fit as row_fits
@@ -28,6 +29,7 @@ from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
 from .export import backbone as backbone_files
 from .export import cost as cost_files
 from .export import fit_folder, fit_rows, histories, results, shown, wear_fit
+from .export import fitted_decay as decay_written
 from .export import folder as results_folder
 from .export import lab as lab_files
 from .export import reports as page_of_several
@@ -244,7 +246,8 @@ def fit(scene: str | Path | Scene, /, *, to: str | Path, free: Mapping[str, Any]
         out: str | Path | None = None, say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
     """Values of keys of a scene from what was measured, with intervals: the dict that fit.json holds, in SI.
 
-    scene and sets as `load` takes them. to: a loop of a bench, rows of a rig, a worn depth of a scene with [wear].
+    scene and sets as `load` takes them. to: a loop of a bench, rows of a rig or its frequency and damping over the
+    amplitude, a worn depth of a scene with [wear].
     free: key -> (low, high), texts as in a scene or numbers in SI. hold: rows that are only predicted, such as
     "frequency=135 Hz,150 Hz"; offset, warm_up: of a loop; leave_out: a column of which each value is left out in turn;
     starts, seed: of the search over rows. out: the folder that `patchfem fit -o` writes. say: called with one line
@@ -261,6 +264,8 @@ def fit(scene: str | Path | Scene, /, *, to: str | Path, free: Mapping[str, Any]
         if found.kind not in ("rig", "linear"):
             options = fit_path.LoopOptions(tuple(offset), warm_up)
             return fit_folder.fit_into(loop_fits.fit_loop(found, Path(to), asked, tuple(hold), tell, options), target)
+        if decay_fits.is_curve(to):
+            return decay_written.fit_into(decay_fits.fit_decay(found, Path(to), asked, tell), target)
         wanted, wrong = ranges.ranges(asked)
         if wrong:
             raise SceneError(wrong)

@@ -18,7 +18,7 @@ from house import DEFS, circles, graph_of, imports, nodes_of, sources
 
 HERE = Path(__file__).parents[1]
 SCENE = ("", "__main__", "api", "commands.*", "scene", "scene.*", "model", "model.*")  # may know a Scene
-SCENE_ALSO = ("campaigns.fit", "campaigns.fit_model",  # and so may these, each named with its reason
+SCENE_ALSO = ("campaigns.fit", "campaigns.fit_decay", "campaigns.fit_model",  # and so may these, each with its reason
               "campaigns.sweeps.asked", "campaigns.rows.asked")  # one scene asked again with other values of its keys
 OUTSIDE = {"numba": ("*kernels", "compiled", "compiled.*"), "pyvista": ("export.drawing.view",),
            "meshio": ("mesh.files", "export.*")}

@@ -106,7 +106,7 @@ def _refined(bench, residual, wanted, say) -> tuple:
     """The fit, and the change of the model when its steps are halved; steps are halved until they change the fit too
     little."""
     low, high = [one.low for one in wanted], [one.high for one in wanted]
-    start, starts, before, agreed = _own_values(bench.scene, wanted), 3, (0, 0, ""), 0
+    start, starts, before, agreed = own_values(bench.scene, wanted), 3, (0, 0, ""), 0
     while True:
         found = fit(residual, low, high, start=start, starts=starts, bars="series" if bench.exact else "")
         agreed = found.agreed if starts > 1 else agreed
@@ -134,7 +134,7 @@ def _counted(found: Fit, before: tuple) -> Fit:
                    reason=before[2] or found.reason)
 
 
-def _own_values(scene: Scene, wanted: list) -> list:
+def own_values(scene: Scene, wanted: list) -> list:
     """Starting values: what the scene itself says, or the middle of the range; held inside the range."""
     out = []
     for one in wanted:

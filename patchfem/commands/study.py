@@ -11,6 +11,7 @@ from .. import scales
 from ..campaigns import backbone as backbones
 from ..campaigns import cost as cost_curves
 from ..campaigns import fit as loop_fits
+from ..campaigns import fit_decay as fit_decays
 from ..campaigns import fit_path, wear_coefficient
 from ..campaigns.rows import asked as asking
 from ..campaigns.rows import fit as row_fits
@@ -20,6 +21,7 @@ from ..export import cost as cost_files
 from ..export import fit as fit_lines
 from ..export import fit_folder, results, wear_fit
 from ..export import fit_rows as written
+from ..export import fitted_decay as decay_written
 from ..model import model
 from ..runs import joint
 from ..scene import axes, ranges
@@ -136,8 +138,8 @@ class Rows:
 
 def fit(scene: Path, /, *, to: Annotated[str, Parameter(
             help='what was measured: loop.csv of a bench ("time [s],displacement [um],force [N]", or what export '
-                 'writes), rows.csv of a rig, compare.json or "worn_depth_max=2.5 um..3.5 um" of a scene with '
-                 '[wear]')],
+                 'writes), rows.csv of a rig or its decay.csv (import --decay), compare.json or "worn_depth_max=2.5 '
+                 'um..3.5 um" of a scene with [wear]')],
         free: texts('a key to find and its range, such as "friction.static=0.1..0.6"; may be repeated'),
         hold: texts('rows that are only predicted, such as "frequency=135 Hz,150 Hz"') = (),
         offset: texts("of a loop, free besides, such as force (what the record adds to it), displacement (how far its "
@@ -146,7 +148,8 @@ def fit(scene: Path, /, *, to: Annotated[str, Parameter(
         rows: Annotated[Rows, Parameter(name="*")] = Rows(),
         out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
     """Find values of keys of SCENE from what was measured: a bench from a friction loop, a rig from rows of frequency,
-    input, acceleration and displacement, the coefficient of [wear] from a worn depth.
+    input, acceleration and displacement or from frequency and damping over the amplitude, the coefficient of [wear]
+    from a worn depth.
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
@@ -154,6 +157,14 @@ def fit(scene: Path, /, *, to: Annotated[str, Parameter(
     if found.kind in ("rig", "linear") and found.wear is None:
         if offset or warm_up:
             raise Refused("--offset and --warm-up belong to a loop of a bench, and this scene is a rig")
+        if fit_decays.is_curve(to):
+            if hold or rows != Rows():
+                raise Refused("--hold, --leave-out, --starts, --seed, --unstable, --placebo and --resume belong to "
+                              f"rows of frequency and input, and {to} is a curve over the amplitude")
+            fitted = fit_decays.fit_decay(found, Path(to), free, None if quiet or json_ else say)
+            target = placed(out, f"{found.path.stem}-fit")
+            _print_fit(decay_written.fit_into(fitted, target), decay_written.lines_of, target, json_)
+            return
         _fit_rows(found, to, (free, hold, rows), out, json_, quiet)
         return
     if rows != Rows():

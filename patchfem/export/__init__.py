@@ -22,9 +22,10 @@ In: a `Result`. Out: files. A module imports its own entry of this list and the 
 18. `cost`      error against time of the knobs of a scene
 19. `fit`       a fitted loop on paper
 20. `fit_folder` a fit on disk
-21. `fit_rows`  a rig fitted to rows
-22. `wear_fit`  a fitted wear coefficient on disk
-23. `backbone`  frequency and damping over the amplitude on disk
+21. `fitted_decay` a rig fitted to frequency and damping over the amplitude
+22. `fit_rows`  a rig fitted to rows
+23. `wear_fit`  a fitted wear coefficient on disk
+24. `backbone`  frequency and damping over the amplitude on disk
 
 Read `folder` first.
 """

@@ -1,0 +1,54 @@
+"""A fitted decay on disk: its object, rows, and the fitted scene, which runs."""
+
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__
+from ..campaigns.fit_decay import FittedDecay
+from ..disk.whole import write_rows, write_text
+from ..scene.scene import loads
+from . import fit_folder
+from .fit import line_of
+from .results import Folder
+from .summary import write_json
+
+HEAD = ("amplitude [m]", "frequency [Hz]", "frequency_error [Hz]", "damping", "damping_error",
+        "frequency_fitted [Hz]", "damping_fitted")
+
+
+def answer_of(fitted: FittedDecay) -> dict:
+    """The object of fit.json, in SI."""
+    found = fitted.found
+    off = (fitted.model - fitted.measured) / np.abs(fitted.measured)
+    rms = np.sqrt(np.mean(off**2, axis=1)).tolist()
+    return {"patchfem": __version__, "title": fitted.scene.title, "measured": fitted.path.name, "quantity": "decay",
+            "outcome": str(fitted.outcome), "method": fitted.method, "rows": int(fitted.amplitude.size),
+            "values": {one.key: fit_folder.value_of(one, found, k) for k, one in enumerate(fitted.free)},
+            "rms": {"frequency": rms[0], "damping": rms[1]}, "evaluations": found.evaluations,
+            "failures": found.failures, "descents_agreed": found.agreed, "warnings": fitted.warnings,
+            "seconds": round(fitted.seconds, 6)}
+
+
+def fit_into(fitted: FittedDecay, target: Path) -> dict:
+    """Write the results folder of a fit, fit.json, fit.csv and scene.fitted.toml, and return the object of fit.json."""
+    answer = answer_of(fitted)
+    whole = loads(fitted.scene.text, fitted.scene.path, [*fitted.scene.sets, *fitted.sets])
+    with Folder(target) as folder:
+        write_json(answer, folder.path / "fit.json")
+        write_text(folder.path / "scene.fitted.toml", fit_folder.scene_text(whole, fitted.free, fitted.found,
+                                                                            fitted.path, folder.target))
+        rows = zip(fitted.amplitude, fitted.measured[0], 2 * fitted.error[0], fitted.measured[1], 2 * fitted.error[1],
+                   *fitted.model)
+        write_rows(folder.path / "fit.csv", [HEAD, *([repr(float(one)) for one in row] for row in rows)])
+    return answer
+
+
+def lines_of(answer: dict) -> list:
+    """The answer as lines of text: one per value with its interval, then what is left over."""
+    rms = answer["rms"]
+    return [f"{answer['outcome']}: {answer['rows']} amplitudes of {answer['measured']} by {answer['method']}, "
+            f"{answer['evaluations']} evaluations",
+            *(line_of(f"{key:<26}", one) for key, one in answer["values"].items()),
+            f"  rms of what is left over   {100 * rms['frequency']:.2g} % of the frequency, {100 * rms['damping']:.2g} "
+            "% of the damping ratio"]
