@@ -4,12 +4,13 @@
 seed 8000 on the pressure may lie on the lower piece, and modes may heave and rock the patch up to lift-off.
 
 The sum is plain NumPy, written from 2.10-2.17 without the compiled lists: every node of a mesh for a tenth of the
-tolerance keeps every bond of its own path, in strips of 0.2 bond lengths, each with the midpoint rule and the share of
-it on either side of u = 0; the pieces are the whole compliance, s_i = q - sum_j C_ij F_j(s_j) at the end of each step,
-by Newton's method on all nodes; a mode moves by the trapezoidal rule, which adds beta to every C_ij. Nothing of it
-averages a force over a step, merges bonds, drops modes or reduces points. A bond forms under the pressure of the place,
-or the load, half way along its part of the step; heave and rotation press the nodes by the whole normal compliance, of
-which those that would pull are left out one set after the other.
+tolerance keeps every bond of its own path, in strips of 80 bond lengths over the steps of a cycle (0.2 at 400, which
+alone leaves 4e-4 of the friction limit), each with the midpoint rule and the share of it on either side of u = 0; the
+pieces are the whole compliance, s_i = q - sum_j C_ij F_j(s_j) at the end of each step, by Newton's method on all nodes;
+a mode moves by the trapezoidal rule, which adds beta to every C_ij. Nothing of it averages a force over a step, merges
+bonds, drops modes or reduces points. A bond forms under the pressure of the place, or the load, half way along its part
+of the step; heave and rotation press the nodes by the whole normal compliance, of which those that would pull are left
+out one set after the other.
 """
 
 import sys
@@ -25,7 +26,7 @@ from patchfem.runs.patch import ladder as patches
 from patchfem.scene.scene import loads
 
 MOST, FIRST_WIDE = 25.0, 1e-6  # bond lengths: age of a bond that counts; half width of the first bonds
-FINEST, MOST_PARTS = 0.2, 60  # bond lengths of a strip; of a step, whose parts are more where it is longer
+FINEST, MOST_PARTS = 80.0, 60  # bond lengths of a strip times steps a cycle; parts of a step
 COMPARED = {"bench": ("loop_area", "friction_force_peak", "friction_ratio_end", "friction_work", "slip_amplitude"),
             "rig": ("relative_displacement_amplitude", "loop_area", "friction_force_peak", "friction_work",
                     "slip_amplitude")}
@@ -101,8 +102,8 @@ def scene_of(kind: str, seed: int):
 class Bonds:
     """Bonds of m points, each along its own path, by 2.10 and 2.14-2.17."""
 
-    def __init__(self, f, size: int, floor: float):
-        self.f, self.floor, self.mu = f, floor, f.static
+    def __init__(self, f, size: int, floor: float, steps: int = 400):
+        self.f, self.floor, self.mu, self.finest = f, floor, f.static, FINEST / steps
         self.at, self.path, self.harm, self.eps = (np.zeros(size), np.zeros(size), np.zeros(size),
                                                    np.full(size, f.bond_length))
         self.low, self.high, self.when, self.hurt, self.born, self.lag, self.dense = (
@@ -129,7 +130,7 @@ class Bonds:
         moved, norm = np.abs(s - self.at), gamma(self.f.order + 1)
         eps, left, middle = self.grown(moved, dt)
         path, harm = self.path + moved, self.harm + moved / middle
-        parts = int(np.ceil(moved.max() / (FINEST * e0 * (f.kinetic or f.static) / f.static))) or 1
+        parts = int(np.ceil(moved.max() / (self.finest * e0 * (f.kinetic or f.static) / f.static))) or 1
         parts = min(parts, MOST_PARTS)
         ends = self.at + np.arange(parts + 1)[:, None] / parts * (s - self.at)
         back = 1 - (np.arange(parts)[:, None] + 0.5) / parts  # of the step, from its end to the middle of a part
@@ -226,7 +227,7 @@ def by_hand(scene, steps: int = 500) -> dict:
     measure = patch.pressure.load / area[sigma > 0].sum()
     under = np.full(on.size, measure) if lower or varies else sigma[on]
     limit, c, x = f.static * area[on] * under, patch.giving[np.ix_(on, on)], patch.x[on]
-    bonds, press = Bonds(f, on.size, model.bonds.rest_speed), Pressed(patch)
+    bonds, press = Bonds(f, on.size, model.bonds.rest_speed, steps), Pressed(patch)
     bonds.first = sigma[on] / under
     force_now = area * sigma
     if lower:
