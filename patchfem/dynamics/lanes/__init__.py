@@ -5,7 +5,8 @@ a cycle in all; a march by half the steps tells the error. `loop_kernels` is the
 as of many; its law is a part of it: `rigid_kernels` (Coulomb), `yielding_kernels` (elastic-plastic), of which a step
 without a stop, a yield or a release in it is exact and one with it finds its place to the fourth order,
 `flowing_kernels` (laws of one stretch, from their own kernels: tanh, Bouc-Wen, LuGre, bonds) and `masing_kernels`
-(Iwan's sliders, without cells), of which every step is of that order. Read `loop_kernels` first, then `run`, which
-decides where the loop is compiled (`cuda_kernels`: for a graphics processor); `reading` gives the numbers of a run from
-event to event (`events`), whose measures are taken off them.
+(sliders of one first loading: Iwan's by `power_curve_kernels`, without cells, a patch's by `table_curve_kernels`), of
+which every step is of that order, behind a table of the second at its yields. Read `loop_kernels` first, then `run`,
+which decides where the loop is compiled (`cuda_kernels`: for a graphics processor); `reading` gives the numbers of a
+run from event to event (`events`), whose measures are taken off them.
 """

@@ -13,6 +13,7 @@ from ...friction.flags_kernels import FAST, LEAN
 from ...friction.laws import tanh_kernels as friction
 from .names_kernels import FIRST_OF_LAW, LANES, MIDDLE, OWN, PLACE, WAY, D, H, P, V, W, X
 from .rigid_kernels import crossing
+from .rigid_kernels import foretell as foretell
 
 RESTS = TURNS_HELD = False  # it never holds
 # of its own state: friction, mean square of the stretches, friction work of the last step

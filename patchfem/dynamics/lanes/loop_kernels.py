@@ -128,6 +128,7 @@ def cycle(room, marked, table, h):
     """Move all lanes over a cycle of the drive; table (2, n + 1): sine and cosine at the steps."""
     for k in range(table.shape[1] - 1):
         s0, c0, s1, c1 = table[0, k], table[1, k], table[0, k + 1], table[1, k + 1]
+        law.foretell(room, s0, c0)
         for i in range(LANES):
             glide(room, i, s0, c0, s1, c1)
         for j in range(happens(room, marked)):
@@ -397,6 +398,7 @@ def read(cases, order, motion, table, cycles, history, ended, shown, room, marke
                 open_cycle(i, room)
             for j in range(steps):
                 s0, c0, s1, c1 = table[0, j], table[1, j], table[0, j + 1], table[1, j + 1]
+                law.foretell(room, s0, c0)
                 for i in range(LANES):
                     watch(room, i, s0, c0, s1, c1, h)
                 for i in range(happens(room, marked)):

@@ -1,98 +1,86 @@
-"""A step of one mode behind sliders side by side (Segalman's Iwan law), of one case: of the fourth order between turns
-of the slide and closings of its loops, each found inside its step.
+"""A step of one mode behind sliders side by side, of one case: of the fourth order between turns of the slide and
+closings of its loops, each found inside its step.
 
 Equation, in the angle of the drive: x'' + D x' + W x = P sin - f. Since the slide turned at FROM with the friction HELD
 it is f = HELD + side m G(|x - FROM|/m), where m = 2 (Masing's rule), and m = 1 from the start, and where
 
-    G(u) = K LENGTH w (1 - q w^(chi + 1)/(chi + 2)), w = u/LENGTH up to 1
+    G(u) = K LENGTH g(u/LENGTH)
 
-is the force of a first loading: no cells. A loop that closes is forgotten. The place of a case is its friction. Twin:
-many elements, from event to event (`dynamics.events`).
+is the force of a first loading, g the `curve`: a power (`power_curve_kernels`, Segalman's Iwan law) or a table
+(`table_curve_kernels`, a set of Jenkins elements). A loop that closes is forgotten. The place of a case is its
+friction. Twin: many elements, from event to event (`dynamics.events`).
 """
-
-import numpy as np
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
-from .names_kernels import FIRST_OF_LAW, GK, LANES, LENGTH, OWN, PLACE, WAY, D, H, K, P, V, W, X
+from . import power_curve_kernels as curve
+from .names_kernels import CURVE, GK, HALF, LANES, LENGTH, OWN, PLACE, WAY, WHERE, D, H, K, P, V, W, X
 from .rigid_kernels import begin, sticking
 
-__all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "held", "path", "rise", "slid",
-           "sticking"]
+__all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "foretell", "held", "path", "rise",
+           "slid", "sticking"]
 
 RESTS = False  # it never holds
 TURNS_HELD = True  # an event may leave a stick as it is
-EXPONENT, SHARE, HALF = range(FIRST_OF_LAW, FIRST_OF_LAW + 3)  # numbers: chi + 1, q, w from which half slips
 # of its own state: sign of the motion; m; slide, friction, irreversible slide and energy at the last turn; slide at
 # which something happens next; stiffness now, and in the step: at its begin, before and after its event, at its end;
 # path of slip in the step; friction at the last turn that was; whether it ever slipped, whether the first loading is
 # remembered, whether all sliders slip; largest gap of a loop that was dropped for want of room, over its size; number
-# of points behind
+# of points behind; share of the step up to its event in which it sticks
 (SIDE, M, FROM, HELD, SLIP_FROM, ENERGY_FROM, NEXT, STIFF, STIFF_0, STIFF_1, STIFF_2, STIFF_3, GONE, AT_TURN, EVER,
- VIRGIN, ALL, DROPPED, BEHIND) = range(OWN, OWN + 19)
-STACK, EACH, DEPTH = OWN + 19, 4, 64  # those points: slide, friction, irreversible slide and energy of each
-OWN_STATE = 19 + EACH * DEPTH
+ VIRGIN, ALL, DROPPED, BEHIND, STUCK_IN) = range(OWN, OWN + 20)
+STACK, EACH = OWN + 20, 4  # those points: slide, friction, irreversible slide and energy of each
+DEPTH = (CURVE - STACK) // EACH
+OWN_STATE = CURVE - OWN + curve.ROOM
 LEAST = 1e-30  # of w
-MOST = 8  # events of a step
+MOST = 32  # events of a step
 NOTHING, PASSES, TURNS, SLIPS = 0, 1, 2, 3  # what happens, what counts more last
 FAR = 1e300
 
 
-@njit(error_model="numpy", forceinline=True, **LEAN)
-def power(w, a):
-    """w^a to 3e-13 for LEAST <= w <= 2 and 0 < a <= 1, by the bits of a number: no branch and no call, so that a
-    compiler takes several lanes at once; no fast-math, as its roundings are meant."""
-    bits = np.float64(w).view(np.int64)
-    part = np.int64((bits & 0xFFFFFFFFFFFFF) | 0x3FF0000000000000).view(np.float64)
-    more = 1.0 if part > 1.4142135623730951 else 0.0
-    part = part * (1 - 0.5 * more)
-    t = (part - 1) / (part + 1)
-    z = t * t
-    log = 2.8853900817779268 * t * (1 + z * (1 / 3 + z * (1 / 5 + z * (1 / 7 + z * (1 / 9 + z * (1 / 11 + z * (
-        1 / 13 + z * (1 / 15 + z / 17))))))))
-    y = a * (((bits >> 52) - 1023) + more + log)
-    whole = y + 6755399441055744.0  # 1.5 of 2^52: its last bits are the whole number next to y
-    g = 0.6931471805599453 * (y - (whole - 6755399441055744.0))
-    e = 1 + g * (1 + g * (1 / 2 + g * (1 / 6 + g * (1 / 24 + g * (1 / 120 + g * (1 / 720 + g * (1 / 5040 + g * (
-        1 / 40320 + g * (1 / 362880 + g / 3628800)))))))))
-    return np.int64(np.float64(e).view(np.int64) + (np.float64(whole).view(np.int64) << 52)).view(np.float64)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def place_of(x, room, i):
+    """Slide since the last turn at x, over that of all sliders there."""
+    return room[SIDE * LANES + i] * (x - room[FROM * LANES + i]) / (room[M * LANES + i] * room[LENGTH * LANES + i])
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def friction(x, room, i):
-    """(f, its slope over the slide) at x; up to twice the slide at which all slip as if they did not yet, which tells a
-    step beyond it where that is."""
-    m, side, length = room[M * LANES + i], room[SIDE * LANES + i], room[LENGTH * LANES + i]
-    stiff, share, e = room[K * LANES + i], room[SHARE * LANES + i], room[EXPONENT * LANES + i]
-    far = side * (x - room[FROM * LANES + i]) / (m * length)
-    every = room[ALL * LANES + i]
-    w = min(max(far, LEAST), 2.0 - every)
-    p = share * power(w, e)
-    return room[HELD * LANES + i] + side * m * stiff * length * w * (1 - p / (e + 1)), \
-        (1.0 - every) * stiff * (1 - p)
+def within(x, room, i):
+    """The place of x on the curve; up to twice the slide at which all slip as if they did not yet, which tells a step
+    beyond it where that is."""
+    return min(max(place_of(x, room, i), LEAST), 2.0 - room[ALL * LANES + i])
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def slid(x, place, room, i):
-    """Irreversible part of the slide, the mean over the sliders by what each carries at most."""
+def friction(x, room, i, when=curve.ASKED):
+    """(f, its slope over the slide) at x; when: as of the curve."""
+    m, side, stiff = room[M * LANES + i], room[SIDE * LANES + i], room[K * LANES + i]
+    g, slope = curve.force(within(x, room, i), room, i, when)
+    return room[HELD * LANES + i] + side * m * stiff * room[LENGTH * LANES + i] * g, \
+        (1.0 - room[ALL * LANES + i]) * stiff * slope
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def slid(x, place, room, i, when=curve.ASKED):
+    """Irreversible part of the slide, the mean over the sliders by what each carries at most; when: as of the
+    curve."""
     m, side, length = room[M * LANES + i], room[SIDE * LANES + i], room[LENGTH * LANES + i]
-    stiff, e = room[K * LANES + i], room[EXPONENT * LANES + i]
-    u = side * (x - room[FROM * LANES + i]) / (m * length)
+    whole = room[K * LANES + i] * length
+    u = place_of(x, room, i)
     w = min(u, 1.0)
-    missing = w - side * (place - room[HELD * LANES + i]) / (m * stiff * length)  # q w^(chi + 2)/(chi + 2)
-    return room[SLIP_FROM * LANES + i] + side * m * length * (
-        stiff * length / room[GK * LANES + i] * e / (e + 2) * w * missing + (u - w))
+    slips = curve.slipped(w, side * (place - room[HELD * LANES + i]) / (m * whole), room, i, when)
+    return room[SLIP_FROM * LANES + i] + side * m * length * (whole / room[GK * LANES + i] * slips + (u - w))
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def energy(x, place, room, i):
     """Elastic energy of the sliders [m^2]: what the friction took since the last turn without what slip lost."""
     m, side, length = room[M * LANES + i], room[SIDE * LANES + i], room[LENGTH * LANES + i]
-    stiff, e, far = room[K * LANES + i], room[EXPONENT * LANES + i], side * (x - room[FROM * LANES + i])
+    whole, far = room[K * LANES + i] * length, side * (x - room[FROM * LANES + i])
     held, most = side * room[HELD * LANES + i], room[GK * LANES + i]
     w = min(far / (m * length), 1.0)
-    missing = w - (side * place - held) / (m * stiff * length)
-    work = m * m * (stiff * length**2 * w * (w / 2 - missing / (e + 2)) + most * (far / m - w * length))
+    work = m * m * (whole * length * curve.work(w, (side * place - held) / (m * whole), room, i)
+                    + most * (far / m - w * length))
     lost = most * side * (slid(x, place, room, i) - room[SLIP_FROM * LANES + i])
     return room[ENERGY_FROM * LANES + i] + held * far + work - lost
 
@@ -117,9 +105,11 @@ def at_turn(x, way, place, turned, room, i):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def held(begin, end, way, room, i, h):
-    """(1 where less than half of the friction slips; 2, as a slip begins with an event; irreversible part of the slide
-    at the end of a part of a step)."""
-    return 1.0 if way == 0.0 else 0.0, 2.0, slid(end[0], end[3], room, i)
+    """(share of a part of a step in which less than half of the friction slips; 1 where a slip begins at its end
+    without an event there, else 2; irreversible part of the slide at its end)."""
+    within_slips = room[STUCK_IN * LANES + i] if way != 0.0 else 0.0
+    room[STUCK_IN * LANES + i] = 0.0  # it is of the first part
+    return 1.0 if way == 0.0 else within_slips, 1.0 if within_slips > 0.0 else 2.0, slid(end[0], end[3], room, i)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -129,14 +119,33 @@ def path(place, pe, place1, v1, room, i):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def flow(x, v, f, k, s0, c0, s1, c1, h, room, i):
-    """(x, x', f, its slope) after an angle h, by the rule of Hermite on the acceleration and its rate at both ends: its
-    law is asked for at a place that Taylor foretells, and followed from there by its slope."""
+def rates(x, v, f, k, s0, c0, room, i):
+    """The acceleration and its rate."""
     damp, square, push = room[D * LANES + i], room[W * LANES + i], room[P * LANES + i]
     a0 = push * s0 - damp * v - square * x - f
-    j0 = push * c0 - damp * a0 - (square + k) * v
+    return a0, push * c0 - damp * a0 - (square + k) * v
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def foretell(room, s0, c0):
+    """Find the curves of all lanes where Taylor foretells their slides at the end of the next step."""
+    if curve.FORETELLS:
+        for i in range(LANES):
+            x, v, h = room[X * LANES + i], room[V * LANES + i], room[H * LANES + i]
+            a0, j0 = rates(x, v, room[PLACE * LANES + i], room[STIFF * LANES + i], s0, c0, room, i)
+            room[WHERE * LANES + i] = within(x + h * (v + h * (a0 / 2 + h * j0 / 6)), room, i)
+        for i in range(LANES):
+            curve.find(room, i)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def flow(x, v, f, k, s0, c0, s1, c1, h, room, i, when=curve.ASKED):
+    """(x, x', f, its slope) after an angle h, by the rule of Hermite on the acceleration and its rate at both ends: its
+    law is asked for at a place that Taylor foretells, and followed from there by its slope; when: as of the curve."""
+    damp, square, push = room[D * LANES + i], room[W * LANES + i], room[P * LANES + i]
+    a0, j0 = rates(x, v, f, k, s0, c0, room, i)
     ahead_x, v1 = x + h * (v + h * (a0 / 2 + h * j0 / 6)), v + h * (a0 + h * j0 / 2)
-    ahead_f, k1 = friction(ahead_x, room, i)
+    ahead_f, k1 = friction(ahead_x, room, i, when)
     x1 = ahead_x
     for _ in range(2):
         a1 = push * s1 - damp * v1 - square * x1 - ahead_f - k1 * (x1 - ahead_x)
@@ -147,24 +156,33 @@ def flow(x, v, f, k, s0, c0, s1, c1, h, room, i):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def ends_at(x, room, i):
+    """Slide at which something happens next of a step that begins at x: as far as a step may go, at the latest."""
+    side, next_one = room[SIDE * LANES + i], room[NEXT * LANES + i]
+    far = x + side * room[M * LANES + i] * room[LENGTH * LANES + i] * (curve.PART + FAR * room[ALL * LANES + i])
+    return min(next_one, far) if side > 0.0 else max(next_one, far)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def ahead(room, i, s0, c0, s1, c1, reads):
     """(x, x', friction after a step without a turn or a closing in it; whether there is one); reads: as of
     `rigid_kernels`."""
     x, v, f, k = room[X * LANES + i], room[V * LANES + i], room[PLACE * LANES + i], room[STIFF * LANES + i]
     side = room[SIDE * LANES + i]
-    x1, v1, f1, k1 = flow(x, v, f, k, s0, c0, s1, c1, room[H * LANES + i], room, i)
-    event = side * v1 < 0.0 or side * (x1 - room[NEXT * LANES + i]) > 0.0 or (reads and v1 == 0.0)
+    x1, v1, f1, k1 = flow(x, v, f, k, s0, c0, s1, c1, room[H * LANES + i], room, i, curve.FOUND)
+    event = side * v1 < 0.0 or side * (x1 - ends_at(x, room, i)) > 0.0 or (reads and v1 == 0.0)
     if reads:
         room[STIFF_0 * LANES + i], room[STIFF_3 * LANES + i] = k, k1
     room[STIFF * LANES + i] = k if event else k1
-    room[GONE * LANES + i] = side * (slid(x1, f1, room, i) - slid(x, f, room, i))
+    room[GONE * LANES + i] = side * (slid(x1, f1, room, i, curve.FOUND) - slid(x, f, room, i, curve.HERE))
+    curve.go_on(room, i, event)
     return x1, v1, f1, event
 
 
 @njit(error_model="numpy", **LEAN)
 def first_event(x, v, a0, x1, v1, a1, h, room, i):
     """(share of a step at which something happens first, 1 where nothing does; what)."""
-    side, next_one = room[SIDE * LANES + i], room[NEXT * LANES + i]
+    side, next_one = room[SIDE * LANES + i], ends_at(x, room, i)
     # the speed as a cubic over the step, the slide as its integral
     m0, m1 = h * a0, h * a1
     c2, c3 = 3 * (v1 - v) - 2 * m0 - m1, m0 + m1 - 2 * (v1 - v)
@@ -238,13 +256,12 @@ def close(x, f, room, i):
     if side * (x - closing(room, i)) < 0.0 or k == 0:
         return
     if k == 1 and room[VIRGIN * LANES + i] == 0.0:
-        slip, stiff, e = slid(x, f, room, i), room[K * LANES + i], room[EXPONENT * LANES + i]
-        most, share = room[GK * LANES + i], room[SHARE * LANES + i]
+        slip, most, whole = slid(x, f, room, i), room[GK * LANES + i], room[K * LANES + i] * length
+        gone, work = curve.slipped(1.0, most / whole, room, i, curve.ASKED), curve.work(1.0, most / whole, room, i)
         room[BEHIND * LANES + i], room[M * LANES + i] = 0.0, 2.0
         room[FROM * LANES + i], room[HELD * LANES + i] = x - side * 2 * length, -side * most
-        gone = stiff * length / most * e / (e + 2) * share / (e + 1)
-        room[SLIP_FROM * LANES + i] = slip - side * 2 * length * gone
-        room[ENERGY_FROM * LANES + i] = stiff * length * length * (0.5 - share / (e + 2))
+        room[SLIP_FROM * LANES + i] = slip - side * 2 * length * whole / most * gone
+        room[ENERGY_FROM * LANES + i] = whole * length * (work - gone)
     else:
         recall(k - 1 if k == 1 else k - 2, room, i)
 
@@ -282,7 +299,8 @@ def advance(room, i, s0, c0, s1, c1, h):
     damp, square, push = room[D * LANES + i], room[W * LANES + i], room[P * LANES + i]
     s, c, left, gone, weight = s0, c0, h, 0.0, NOTHING
     room[STIFF_0 * LANES + i] = k
-    u, xe, ve, fe, turn, turned = 1.0, x, v, f, x, False
+    u, xe, ve, fe, turn, turned, stuck = 1.0, x, v, f, x, False, 0.0
+    room[STUCK_IN * LANES + i] = 0.0
     for events in range(MOST + 1):
         x1, v1, f1, k1 = flow(x, v, f, k, s, c, s1, c1, left, room, i)
         share, what = first_event(x, v, push * s - damp * v - square * x - f, x1, v1,
@@ -296,7 +314,7 @@ def advance(room, i, s0, c0, s1, c1, h):
         x, v, f, k = flow(x, v, f, k, s, c, se, ce, t, room, i)
         f, before = friction(x, room, i)
         gone += abs(slid(x, f, room, i) - begun)
-        s, c, left = se, ce, left - t
+        s, c, left, stuck = se, ce, left - t, stuck + (t if was == 0.0 else 0.0)
         if what == TURNS:
             v, turn, turned = 0.0, x, True
             turn_round(x, f, room, i)
@@ -308,8 +326,10 @@ def advance(room, i, s0, c0, s1, c1, h):
         if now >= weight:
             weight, u, xe, ve, fe = now, 1 - left / h, x, v, f
             room[STIFF_1 * LANES + i], room[STIFF_2 * LANES + i] = before, k
+            room[STUCK_IN * LANES + i] = stuck / (h - left) if now == SLIPS else 0.0
     room[GONE * LANES + i] = gone + abs(slid(x1, f1, room, i) - slid(x, f, room, i))
     room[STIFF * LANES + i] = room[STIFF_3 * LANES + i] = k1
+    curve.begin_at(within(x1, room, i), room, i)
     if weight == NOTHING:
         xe, ve, fe = x1, v1, f1
         room[STIFF_1 * LANES + i] = room[STIFF_2 * LANES + i] = k1

@@ -32,3 +32,8 @@ SHOWN = 28
 # which case a lane has, -1 none, its cycle and where that began
 CASE, CYCLE, WAS_X, WAS_V, WAS_PLACE = range(SHOW + SHOWN, SHOW + SHOWN + 5)
 OWN = SHOW + SHOWN + 5  # from here on what the state of a law has besides; it stands behind STATE in a motion
+
+# of Masing's rule: the number from which half of its friction slips, over LENGTH; from where on its curve has a table,
+# and the place on it that is to be found
+HALF, CURVE = FIRST_OF_LAW + 2, OWN + 276
+WHERE = CURVE

@@ -5,7 +5,7 @@ import numpy as np
 from ..events import names_kernels as of
 from ..events.reading import Reading
 from . import names_kernels as at
-from .run import Cases, Marched, flows, own_of, own_state
+from .run import MASING, Cases, Marched, flows, own_of, own_state
 
 
 def books(law: str, cases: Cases, found: Marched, energy) -> dict:
@@ -31,7 +31,7 @@ def books(law: str, cases: Cases, found: Marched, energy) -> dict:
 def _held(law: str, cases: Cases, motion) -> np.ndarray:
     """Friction where the drive passes 0."""
     x, place, way = (motion[:, k] for k in (at.X, at.PLACE, at.WAY))
-    if law == "masing":
+    if law in MASING:
         return place
     if flows(law):
         return own_of(law, motion, "FELT")
@@ -40,21 +40,28 @@ def _held(law: str, cases: Cases, motion) -> np.ndarray:
 
 def _elastic(law: str, cases: Cases, motion) -> np.ndarray:
     """Energy in the contact."""
-    if law == "masing":
-        return _of_sliders(cases, motion)
+    if law in MASING:
+        return _of_sliders(law, cases, motion)
     square = own_of(law, motion, "SQUARE") if flows(law) else (motion[:, at.X] - motion[:, at.PLACE])**2
     return 0.5 * cases.spring * square
 
 
-def _of_sliders(cases: Cases, motion) -> np.ndarray:
+def _of_sliders(law: str, cases: Cases, motion) -> np.ndarray:
     """Energy in the sliders of Masing's rule, as `masing_kernels.energy` has it."""
-    own = own_state("masing")
+    own = own_state(law)
     side, m, begun, held, _, energy = (motion[:, k - at.OWN + at.STATE] for k in range(own.SIDE, own.ENERGY_FROM + 1))
-    e, far, force = cases.law[:, 0], side * (motion[:, at.X] - begun) / m, side * (motion[:, at.PLACE] - held) / m
+    far, force = side * (motion[:, at.X] - begun) / m, side * (motion[:, at.PLACE] - held) / m
     w, whole = np.minimum(far / cases.length, 1.0), cases.spring * cases.length**2
-    missing = w - force / (cases.spring * cases.length)
-    work = whole * w * (w / 2 - missing / (e + 2)) + cases.slip * (far - w * cases.length)
-    lost = whole * e / (e + 2) * w * missing + cases.slip * (far - w * cases.length)
+    g = force / (cases.spring * cases.length)
+    if law == "masing":
+        e = cases.law[:, 0]
+        work, lost = w * (w / 2 - (w - g) / (e + 2)), e / (e + 2) * w * (w - g)
+    else:
+        table = cases.law[:, 3:].reshape(len(w), own.curve.YIELDS, own.curve.COLUMNS)
+        last = np.sum(table[:, 1:, own.curve.YIELD] <= w[:, None], axis=1)
+        full, moment = (table[np.arange(len(w)), last, column] for column in (own.curve.FORCE, own.curve.MOMENT))
+        work, lost = (w * (g + full) - moment) / 2, full * w - moment
+    work, lost = (whole * one + cases.slip * (far - w * cases.length) for one in (work, lost))
     return energy + m * (side * held * far + m * work - lost)
 
 
@@ -117,6 +124,6 @@ def _bends(law: str, cases: Cases, begun, motion) -> tuple:
     if flows(law):
         return -cases.damp * v - cases.square * x, 0 * v
     a = -cases.damp * v - cases.square * x - _held(law, cases, begun) + _held(law, cases, motion)
-    one, other = (m[:, at.V] * (own_of(law, m, "STIFF") if law == "masing" else cases.spring * (m[:, at.WAY] == 0))
+    one, other = (m[:, at.V] * (own_of(law, m, "STIFF") if law in MASING else cases.spring * (m[:, at.WAY] == 0))
                   for m in (begun, motion))
     return a, -cases.damp * a - cases.square * v - one + other

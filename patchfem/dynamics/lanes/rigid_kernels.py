@@ -40,6 +40,11 @@ def rise(v, a, way, place, room, i, when):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def foretell(room, s0, c0):
+    """Find nothing ahead of a step."""
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def slid(x, place, room, i):
     """Irreversible part of the slide."""
     return place

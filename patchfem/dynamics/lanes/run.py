@@ -9,7 +9,9 @@ from ...compiled import instance, load
 from . import names_kernels as at
 
 HERE = "dynamics.lanes"
+MASING = "masing", "table"  # laws of Masing's rule, by the curve of their first loading
 TERMS = 24  # of a Taylor series over a step; what is left falls below round-off for rates up to 2 a step
+BEYOND = 1e300  # place of a yield that there is not
 ONCE = 3  # cycles that are read of a motion that repeats
 
 
@@ -19,8 +21,8 @@ class Cases(NamedTuple):
     damp, square, push (n,): D, W, P; slip, stick (n,): f in a slip and the most of a stick; spring (n,): slope of f in
     a stick, 0 of a rigid contact, length (n,) [m] over which it yields; out, base (n,) [m s-2]: acceleration of the
     output over x'' and of the base over the sine; x, v (n,): start; law (n, k): what else a law asks for, of a law of a
-    stretch as its `flowing` takes it, of Masing's chi + 1, q and the share of `length` at which half of the friction
-    slips.
+    stretch as its `flowing` takes it, of Masing's two numbers of its curve, chi + 1 and q of a power, the share of
+    `length` at which half of the friction slips, and the table of a table (`tables_of`).
     """
 
     damp: np.ndarray
@@ -59,13 +61,15 @@ def flows(law: str) -> bool:
 
 
 def kernels(law: str, device: str = "cpu"):
-    """The loop of a law, "rigid", "yielding", "masing" or one of a stretch, of a device: the one place that decides
-    what compiles it and where its arrays are, "cpu" or "cuda"."""
+    """The loop of a law, "rigid", "yielding", "masing", "table" or one of a stretch, of a device: the one place that
+    decides what compiles it and where its arrays are, "cpu" or "cuda"."""
     if device == "cuda":
         return import_module(f"patchfem.{HERE}.cuda_kernels").kernels(law)  # it brings numba
     loop = f"{HERE}.loop_kernels"
     if flows(law):
         return instance(loop, {"law": instance(f"{HERE}.flowing_kernels", {"friction": law})})
+    if law == "table":
+        return instance(loop, {"law": own_state(law)})
     return load(loop) if law == "rigid" else instance(loop, {"law": f"{HERE}.{law}_kernels"})
 
 
@@ -73,7 +77,26 @@ def own_state(law: str):
     """The kernels that name what a law has of its own in the state of a case; None where it has nothing."""
     if law in ("rigid", "yielding"):
         return None
+    if law == "table":
+        return instance(f"{HERE}.masing_kernels", {"curve": f"{HERE}.table_curve_kernels"})
     return load(f"{HERE}.{'flowing' if flows(law) else law}_kernels")
+
+
+def tables_of(groups) -> np.ndarray:
+    """(n, m) what Masing's rule asks for of n sets of elements, each (stiffness (t,) [N/m], yield slide (t,) [m],
+    rising): two numbers of no meaning, the share of the last yield slide at which half of the friction slips, the table
+    of `table_curve_kernels`, which says how many they may be."""
+    of = load(f"{HERE}.table_curve_kernels")
+    head, out = np.ones((len(groups), 3)), np.zeros((len(groups), of.YIELDS, of.COLUMNS))
+    out[:, 1:, of.YIELD], out[:, 0, of.SLOPE] = BEYOND, 1.0
+    for first, one, (k, y) in zip(head, out, groups):
+        w, part, t = y / y[-1], k / k.sum(), len(k)
+        one[1:t + 1, of.YIELD] = w
+        for column, values in ((of.FORCE, part * w), (of.MOMENT, part * w * w)):
+            one[1:, column] = np.append(np.cumsum(values), np.zeros(of.YIELDS - 1 - t))
+        one[1:t, of.SLOPE] = np.cumsum(part[:0:-1])[::-1]  # of those that are left: the last has none
+        first[2] = w[np.searchsorted(one[1:t, of.FORCE], 0.5 * one[t, of.FORCE])]
+    return np.concatenate([head, out.reshape(len(groups), -1)], axis=1)
 
 
 def scales(law: str, force, omega) -> np.ndarray:
@@ -106,7 +129,7 @@ def numbers_of(law: str, cases: Cases, steps: int) -> np.ndarray:
         found[:, at.H - at.NUMBER], found[:, at.MIDDLE - at.NUMBER] = h, 0.5 / np.cos(h / 2)
         first = at.FIRST_OF_LAW - at.NUMBER
         found[:, first:first + at.OF_LAW] = 1.0
-        found[:, first:first + cases.law.shape[1]] = cases.law
+        found[:, first:first + min(at.OF_LAW, cases.law.shape[1])] = cases.law[:, :at.OF_LAW]
         return found
     sine, cosine = ([float(np.round(wave(k * np.pi / 2))) for k in range(TERMS)] for wave in (np.sin, np.cos))
     for stiff, first in ((0.0, at.A11), (cases.spring, at.B11)):
@@ -134,7 +157,7 @@ def begun_at(law: str, cases: Cases) -> np.ndarray:
     motion[:, at.WAY] = np.sign(cases.v) * (cases.spring == 0)
     if flows(law):
         motion[:, at.WAY], motion[:, at.PLACE] = np.where(cases.v == 0, np.sign(cases.push), np.sign(cases.v)), 0.0
-    if law == "masing":
+    if law in MASING:
         way = np.sign(np.select([cases.v != 0, cases.x != 0], [cases.v, -cases.x], cases.push))
         way[way == 0] = 1.0
         first, half = way * cases.length, cases.law[:, 2]
@@ -142,6 +165,8 @@ def begun_at(law: str, cases: Cases) -> np.ndarray:
                              (own.STIFF, cases.spring), (own.NEXT, cases.x + first * half)):
             motion[:, place - at.OWN + at.STATE] = value
         motion[:, at.PLACE] = 0.0
+        table = cases.law[:, 3:]
+        motion[:, motion.shape[1] - table.shape[1]:] = table
     motion[:, at.HIGH] = motion[:, at.LOW] = cases.x
     return motion
 

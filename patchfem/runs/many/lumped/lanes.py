@@ -9,7 +9,7 @@ its tolerance, rings in shorter sticks are to be told, or a motion grows. So doe
 contradict one of a few, under a law of a stretch twice: by its steps and by as many again.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
 from time import perf_counter
@@ -24,7 +24,7 @@ from ....effects import has, listed
 from ....friction.laws.iwan import largest as largest_slide
 from ....model.alike import Alike, columns_of, some
 from ....model.model import Model
-from ....response.errors import APART, GAPS, MAIN, ROUND
+from ....response.errors import APART, GAPS, MAIN, ROUND, pieces_error
 from ....response.measures import energy_balance
 from ....response.ringing import FAINT, PER_PERIOD, WIDEST, ringing
 from ....response.rows import TABLE, first_harmonic, larger_term
@@ -46,11 +46,12 @@ TOGETHER = 4096  # cases of one compiled call
 KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "iwan": "masing", "tanh": "friction.laws.tanh_kernels",
          "bouc-wen": "friction.laws.bouc_wen_kernels", "lugre": "friction.laws.lugre_kernels",
          "nonlocal": "friction.laws.stretch_kernels"}
-MARCH_ON = "yielding", "masing"  # whose motions march on until they settle
+MARCH_ON = "yielding", *march.MASING  # whose motions march on until they settle
 SMOOTH, CALM = (128, 256, 512, 1024, 2048), 0.5  # steps of a cycle under a law of a stretch, its rate in a step then
 PASSES = 0.75  # of the time in which a slide that turns passes the speed of Stribeck, over that of a rate
 RINGING = 512  # steps of a cycle under a law of a stretch from which a ring that is not found is none
 RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
+OF_TABLE = ((10.0, 96), (20.0, 192), (40.0, 384), (80.0, 768))  # the same behind sliders that are a patch
 # of the change at half the steps, of that of the main measures, and of the measure itself, as both marches can miss an
 # event alike: 2 of 4077 random cases had an error beyond
 OF_CHANGE, OF_TYPICAL, OF_SIZE = 2.0, 1.0, 2e-5
@@ -83,8 +84,11 @@ def no_lanes(model: Model) -> str:
         return "its cycles are too few or too many, or nothing rubs"
     if model.friction.law not in KINDS:
         return "its law does not march in lanes"
-    if why := _manifold(model.friction):
-        return why
+    return _manifold(model.friction) or asks_more(model)
+
+
+def asks_more(model: Model) -> str:
+    """Why the accuracy that a model asks for is not that of lanes; "" where it is."""
     if model.accuracy.method != "auto" or pinned(model.accuracy) or model.accuracy.tolerance < TIGHTEST:
         return "it asks for another method, or for more than lanes state"
     return ""
@@ -122,10 +126,21 @@ def of_law(model: Model) -> tuple:
 
 def steps_of(models: Sequence[Model]) -> np.ndarray:
     """Steps per cycle (n,) of models of one law, 0 where they would be too many."""
-    rate, = columns_of(models, _rate)
     smooth = march.flows(KINDS[models[0].friction.law])
     ends = [(CALM * steps / (2 * np.pi), steps) for steps in SMOOTH] if smooth else RATES
+    return steps_at(columns_of(models, _rate)[0], ends)
+
+
+def steps_at(rate, ends) -> np.ndarray:
+    """Steps per cycle (n,) at fastest rates (n,) over that of the drive; ends: up to which rate how many."""
     return np.append([steps for _, steps in ends], 0)[np.searchsorted([end for end, _ in ends], rate)]
+
+
+def rate_of(model: Model, stiffness):
+    """Fastest rate of a model behind a spring of this stiffness [N/m] over that of its drive."""
+    modes = model.rig.modes
+    return (np.sqrt(modes.omega[0]**2 + stiffness * modes.slide[0]**2 / modes.mass) + modes.dampers[0, 0]) \
+        / model.rig.drive.omega
 
 
 def _rate(model: Model) -> tuple:
@@ -134,7 +149,7 @@ def _rate(model: Model) -> tuple:
     scale = modes.slide[0]**2 / modes.mass
     stiff = _contact(model)[0] * scale
     if not march.flows(KINDS[model.friction.law]):
-        return (np.sqrt(modes.omega[0]**2 + stiff) + damper) / omega,
+        return rate_of(model, _contact(model)[0]),
     rate = damper
     if model.friction.law == "tanh":
         rate = model.limits(model.point.load)[0] / model.friction.reference_speed * scale + damper
@@ -186,59 +201,82 @@ def solve(models: Sequence[Model], say=None) -> Answers:
 
 
 def _solved(models: Sequence[Model], say) -> Answers:
-    """Answers of models, a few of which are held against the exact engine. Where these contradict the others, a law of
-    a stretch marches by twice the steps; where they still do, all are exact."""
-    begin, law, (cases, c) = perf_counter(), models[0].friction.law, cases_of(models)
-    found, exact, steps = _side_by_side(models, cases, c, steps_of(models))
+    """Answers of models, as `answered` gives them."""
+    law = models[0].friction.law
+
+    def exact(places, check: bool) -> Answers:
+        return exactly(some(models, places), say, FINER_CELLS if law == "iwan" and check else 0)
+
+    found, others, _ = answered(models, (*cases_of(models), None), steps_of(models), exact)
+    for case in np.flatnonzero(~others).tolist() if law == "tanh" else ():
+        if notes := creeping_note(models[case].friction):
+            found.notes[case] = notes
+    return found
+
+
+def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) -> tuple:
+    """(Answers of models, (n,) which are not of lanes, (n,) furthest the output was [m]); a few of them are held
+    against the exact engine. Where these contradict the others, a law of a stretch marches by twice the steps; where
+    they still do, all are exact.
+
+    cases: as of `cases_of`, and what a coarser mesh makes of them, None without one; steps (n,); exactly(places, check)
+    -> exact Answers of some, for a check or for themselves.
+    """
+    begin, law = perf_counter(), kind_of(models[0])
+    found, exact, steps, reach = _side_by_side(models, cases, steps)
     found.seconds[:] = (perf_counter() - begin) / len(models)
-    looked = checked(np.column_stack(cases), ~exact)
-    ones = exactly(some(models, looked), say, FINER_CELLS if law == "iwan" else 0) if looked else None
-    times, again = SHORT if law == "iwan" else 1.0, np.flatnonzero(~exact & (2 * steps <= SMOOTH[-1]))
+    looked = checked(np.column_stack(cases[0]), ~exact)
+    ones = exactly(looked, True) if looked else None
+    times, again = SHORT if law == "masing" else 1.0, np.flatnonzero(~exact & (2 * steps <= SMOOTH[-1]))
     wrong = contradicted(found, ones, looked, exact, times)
-    if wrong and again.size and march.flows(KINDS[law]):
-        finer, exact[again], _ = _side_by_side(some(models, again), _of(cases, again), _of(c, again), 2 * steps[again])
+    if wrong and again.size and march.flows(law):
+        finer, exact[again], *_ = _side_by_side(some(models, again), _of(cases, again), 2 * steps[again])
         lumped.take_out(found, again)
         found.place(again, finer)
         wrong = contradicted(found, ones, looked, exact, times)
-    for case in range(len(models)) if law == "tanh" else ():
-        if notes := creeping_note(models[case].friction):
-            found.notes[case] = notes
     if wrong:
         exact[:] = True
         note = f"lanes said {wrong} otherwise than the exact engine in a check of {len(looked)} cases, so all are exact"
     if (places := np.flatnonzero(exact)).size:
         lumped.take_out(found, places)
-        found.place(places, exactly(some(models, places), say))
+        found.place(places, exactly(places.tolist(), False))
         for case in places.tolist() if wrong else ():
             found.notes[case] = [*found.notes.get(case, ()), note]
-    return found
+    return found, exact, reach
 
 
-def _side_by_side(models: Sequence[Model], cases: tuple, c: dict, steps) -> tuple:
-    """(Answers of models, (n,) which must be run otherwise, steps a cycle (n,) of each) from steps (n,) on that many
-    more are made of where bars miss the tolerance; all that march by the same steps do so together, those for whose
-    errors it is too."""
+def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
+    """(Answers of models, (n,) which must be run otherwise, steps a cycle (n,) of each, furthest (n,) [m] their output
+    was) from steps (n,) on that many more are made of where bars miss the tolerance; all that march by the same steps
+    do so together, those for whose errors it is too. What a coarser mesh changes is told by the fewest steps."""
     found, exact, steps = Answers.blank(len(models)), np.zeros(len(models), bool), steps.copy()
-    law = models[0].friction.law
-    shares = (2, 4) if march.flows(KINDS[law]) else (2,)
+    reach = np.zeros(len(models))
+    law, cycles, meshed = kind_of(models[0]), group(models[0])[0], {}
+    shares = (2, 4) if march.flows(law) else (2,)
     fewest, coarser = steps // shares[-1], {}
     now = int(fewest.min())
     while (steps >= now).any():
         here = np.flatnonzero((fewest <= now) & (steps >= now))
         if here.size:
-            part, ready = (_of(cases, here), _of(c, here)), np.flatnonzero(steps[here] == now)
-            seen, places = _measured(KINDS[law], *part, *group(models[0])[:1], now), here[ready]
+            part, ready = _of(cases, here), np.flatnonzero(steps[here] == now)
+            seen, places = _measured(law, *part[:2], cycles, now), here[ready]
             coarser[now] = here, seen[0]
+            first = np.flatnonzero(fewest[here] == now) if part[2] is not None else []
+            if len(first):
+                rough = _measured(law, *_of(part[2], first), cycles, now)[0]
+                for name, error in _of_mesh(_of(seen[0], first), rough).items():
+                    meshed.setdefault(name, np.zeros(len(models)))[here[first]] = error
         if here.size and ready.size:
             fewer = [_of(values, np.searchsorted(whose, places)) for whose, values in (
                 coarser[now // share] for share in shares)]
-            answers, exact[places], finer = _marched(some(models, places), _of(part, ready), now, _of(seen, ready),
-                                                     fewer)
+            answers, exact[places], finer = _marched(some(models, places), (*_of(part, ready)[:2], _of(meshed, places)),
+                                                     now, _of(seen, ready), fewer)
             lumped.take_out(found, places)  # what fewer steps said
             found.place(places, answers)
+            reach[places] = np.abs(seen[3][ready]).max(axis=(1, 2))
             steps[places[finer]] = 2 * now
         now *= 2
-    return found, exact, steps
+    return found, exact, steps, reach
 
 
 def _of(found, places):
@@ -254,15 +292,15 @@ def _of(found, places):
 def _marched(models: Sequence[Model], cases: tuple, steps: int, seen: tuple, coarser: list) -> tuple:
     """(Answers of models that marched by so many steps a cycle; (n,) which must be run otherwise, and which by twice
     the steps); arguments as of `runs_of`."""
-    (cycles, law), least = group(models[0]), np.zeros(len(models), bool)
-    window = window_of(cycles)
+    law, least, window = kind_of(models[0]), np.zeros(len(models), bool), window_of(group(models[0])[0])
     runs, exact, lost = runs_of(models, cases, steps, seen, coarser)
-    more = (law == "iwan" or march.flows(KINDS[law])) and 2 * steps <= SMOOTH[-1]
+    more, wide_of = (law in march.MASING or march.flows(law)) and 2 * steps <= SMOOTH[-1], partial(too_wide, models,
+                                                                                                  meshed=cases[2])
     found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window},
-                                    partial(too_wide, models) if more else None)
+                                    wide_of if more else None)
     chosen = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
     found.numerics.update(dict.fromkeys(range(len(models)), chosen))
-    wide = too_wide(models, found) | lost | alone
+    wide = wide_of(found) | lost | alone
     finer = wide if more else least
     return found, (exact | wide | (found.outcome == "grows")) & ~finer, finer
 
@@ -279,16 +317,18 @@ def exactly(models: Sequence[Model], say, finer: int = 0) -> Answers:
     return found
 
 
-def too_wide(models, found: Answers) -> np.ndarray:
-    """(n,) whether a bar misses the tolerance of a case: of a measure or of the larger term that it is left of."""
+def too_wide(models, found: Answers, meshed: dict | None = None) -> np.ndarray:
+    """(n,) whether a bar misses the tolerance of a case: of a measure or of the larger term that it is left of, beside
+    what a coarser mesh changes, (n,) by name, which no other engine knows better."""
     tolerance, out = columns_of(models, lambda model: (model.accuracy.tolerance,))[0], np.zeros(len(models), bool)
     for name, values in found.values.items():
         if name in RING:  # the fit of a single run knows it no better
             continue
-        if name.endswith("_steady") and KINDS[models[0].friction.law] not in MARCH_ON:
+        if name.endswith("_steady") and kind_of(models[0]) not in MARCH_ON:
             continue  # an extrapolation errs alike at finer steps, and in the exact engine
+        of_mesh = (meshed or {}).get(name.removesuffix("_steady"), 0.0)
         floors = np.fmax(found.floors[name], tolerance * larger_term(name, found.values))
-        out |= found.errors[name] > tolerance * np.abs(values) + floors
+        out |= found.errors[name] - of_mesh > tolerance * np.abs(values) + floors
     return out
 
 
@@ -322,10 +362,11 @@ def contradicted(found: Answers, ones: Answers | None, looked: list, exact, time
 def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tuple:
     """(Runs of models of a group, (n,) which must be run otherwise, (n,) which need finer steps at least); cases: as of
     `cases_of`; seen: as of `_measured`, by so many steps a cycle; coarser: values by half of them, and by a quarter."""
-    law, cycles, (cases, c), (values, book, found, extremes, rise) = KINDS[models[0].friction.law], \
-        group(models[0])[0], cases, seen
+    law, cycles, (cases, c, meshed), (values, book, found, extremes, rise) = kind_of(models[0]), group(models[0])[0], \
+        cases, seen
     window = window_of(cycles)
     errors = bars(values, changed(values, coarser), law)
+    errors |= {name: errors[name] + error for name, error in (meshed or {}).items() if name in errors}
     slips = found.shown[:, at.SLIP_HIGH - at.SHOW] - found.shown[:, at.SLIP_LOW - at.SHOW]
     stuck = slips / 2 <= np.maximum(c["held"], ROUND * np.abs(found.history[:, :, :2]).max(axis=(1, 2)))
     stuck &= (cases.spring > 0) | (law == "rigid")
@@ -335,7 +376,7 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
     if law in MARCH_ON:
         steady, open_ones = _settled(law, cases, found, steps, windows_of(extremes, window)[0], ~stuck)
         steady, exact = tuple(np.abs(c["ratio"]) * one for one in steady), exact | open_ones
-    if law == "masing":
+    if law in march.MASING:
         exact |= march.own_of(law, found.motion, "DROPPED") > DROPPED
     phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
@@ -379,7 +420,7 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
         _of_springs(cases, c, found, held & rings & marched, out)
         return *out, rings & ~held, faint
     # nothing rings in what repeats
-    may = (rings & marched & (march.own_of(law, found.motion, "EVER") > 0)) if law == "masing" else \
+    may = (rings & marched & (march.own_of(law, found.motion, "EVER") > 0)) if law in march.MASING else \
         stays(cases, found) & (stuck | rings)
     untold, told = may & ~held, may & held
     strides = steps / (PER_PERIOD * np.sqrt(np.maximum(cases.square + cases.spring, 1.0)))
@@ -458,11 +499,12 @@ def _known(history, part: int) -> tuple:
     return np.where(closes, last, value), np.where(closes, left + 1e-9 * last, error)
 
 
-def cases_of(models) -> tuple:
-    """(Cases of models, what else is told of them by name, (n,) each: SI)."""
-    own, damping, slide, share, output, mass, drive, w, moving, static, kinetic, z, v, stiffness, load, size, spring, \
-        length, *numbers = columns_of(models, _row)
-    law, scale, numbers = KINDS[models[0].friction.law], slide**2 / (mass * w**2), np.array(numbers).T
+def cases_of(models, contacts=None) -> tuple:
+    """(Cases of models, what else is told of them by name, (n,) each: SI); contacts (m, n): what `_of_contact` gives of
+    points, of others."""
+    own, damping, slide, share, output, mass, drive, w, moving, z, v, stiffness, size = columns_of(models, _of_rig)
+    static, kinetic, load, spring, length, *numbers = columns_of(models, _of_contact) if contacts is None else contacts
+    law, scale, numbers = kind_of(models[0]), slide**2 / (mass * w**2), np.array(numbers).T
     numbers = numbers * march.scales(law, scale, w) if march.flows(law) else numbers.reshape(len(w), -1)
     cases = march.Cases(damping / w, (own / w)**2, -slide * share * drive / w**2, scale * kinetic, scale * static,
                         scale * spring, length, output / slide * w**2, drive * moving, slide * z, slide * v / w,
@@ -472,16 +514,33 @@ def cases_of(models) -> tuple:
                    "load": load, "size": size}
 
 
-def _row(model: Model) -> tuple:
-    """The numbers of a model that `cases_of` takes."""
-    modes, drive, start, (static, kinetic) = model.rig.modes, model.rig.drive, model.rig.start, \
-        model.limits(model.point.load)
-    law = KINDS[model.friction.law]
-    kinetic = kinetic if law == "rigid" and model.friction.kinetic is not None else static
+def _of_rig(model: Model) -> tuple:
+    """The numbers of a model but for its contact that `cases_of` takes."""
+    modes, drive, start = model.rig.modes, model.rig.drive, model.rig.start
     return (modes.omega[0], modes.dampers[0, 0], modes.slide[0], modes.base[0], modes.output[0], modes.mass,
-            drive.acceleration, drive.omega, drive.moving, static, kinetic,
-            *((0.0, 0.0) if start is None else (start.z[0], start.v[0])), model.rig.stiffness, model.point.load,
-            largest(drive), *_contact(model))
+            drive.acceleration, drive.omega, drive.moving,
+            *((0.0, 0.0) if start is None else (start.z[0], start.v[0])), model.rig.stiffness, largest(drive))
+
+
+def _of_contact(model: Model) -> tuple:
+    """The numbers of the contact of a model that `cases_of` takes: static and kinetic friction [N], load [N], and
+    `_contact`."""
+    static, kinetic = model.limits(model.point.load)
+    kinetic = kinetic if kind_of(model) == "rigid" and model.friction.kinetic is not None else static
+    return static, kinetic, model.point.load, *_contact(model)
+
+
+def kind_of(model: Model) -> str:
+    """The law of `dynamics.lanes` of a model; that of a patch is the table of its elements."""
+    return KINDS[model.friction.law] if model.patch is None else "table"
+
+
+def _of_mesh(fine: dict, rough: dict) -> dict:
+    """Errors by name, (n,) each, of a mesh, from values on it and on a coarser one; one that this lacks is as uncertain
+    as it is large."""
+    with np.errstate(all="ignore"):
+        return {name: np.where(np.isnan(error), np.abs(fine[name]), error)
+                for name, error in pieces_error(fine, rough).items()}
 
 
 def window_of(cycles: int) -> int:
@@ -530,12 +589,12 @@ def bars(values: dict, changes: dict, law: str = "") -> dict:
                            if name in values])
         shares[:, np.isnan(shares).all(axis=0)] = 0.0
         typical = np.nanmedian(shares, axis=0)
-    out, smooth = {}, law == "masing" or march.flows(law)
+    out, smooth = {}, law in march.MASING or march.flows(law)
     for name, change in changes.items():
         size = first_harmonic(values) if name == "equivalent_stiffness" else 1.0 if TABLE[name].term is not None \
             and name not in GAPS and name != "drift_per_cycle" else np.abs(values[name])
         if name == "acceleration_distortion":  # a small part of the acceleration
-            size = np.maximum(size, 1e-3 if law == "masing" else 1e-4)
+            size = np.maximum(size, 1e-3 if law in march.MASING else 1e-4)
         if name == "drift_per_cycle":
             size = np.abs(values[MAIN[0]])
         least = OF_MIDDLE if smooth and name == "drift_per_cycle" else OF_SIZE

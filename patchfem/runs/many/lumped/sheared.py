@@ -1,11 +1,11 @@
 """Patches that slip part by part, on one mode under a sine, many together.
 
 Patches that share their pieces are pressed together (`runs.patch.static`), others as their own runs do it. Their
-elements, and those of the coarser mesh for the error, then move without histories, as `pieces` has it. A case that
-sticks, or rings in its sticks, is run by itself.
+elements, and those of the coarser mesh for the error, then move without histories, as `pieces` has it, or in lanes
+(`tabled`). A case that sticks, or rings in its sticks, is run by itself.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -35,7 +35,7 @@ TOGETHER = 128  # cases of one compiled call: their elements and histories of cy
 LEAST = 2  # cases of a thread: one takes as long as hundreds of a point
 
 
-class _Pressed(NamedTuple):
+class Pressed(NamedTuple):
     """A case whose patch is pressed: what its motion and its words want of it; patch: for lengths and places alone."""
 
     fine: YieldingElements
@@ -69,15 +69,20 @@ def group(model: Model) -> tuple:
 
 def solve(models: Sequence[Model], say=None) -> Answers:
     """Answers of models of one group; a case that needs it is run by itself."""
+    return solved(models, say, moved, TOGETHER)
+
+
+def solved(models: Sequence[Model], say, move: Callable, together: int) -> Answers:
+    """Answers of models of one group, by so many; move: as `moved`."""
     found = Answers.blank(len(models))
-    for first in range(0, len(models), TOGETHER):
-        part = models[first:first + TOGETHER]
+    for first in range(0, len(models), together):
+        part = models[first:first + together]
         with one_thread():  # more wait for each other longer than such small systems take
-            found.place(range(first, first + len(part)), _solved(part, say))
+            found.place(range(first, first + len(part)), _solved(part, say, move))
     return found
 
 
-def _solved(models, say) -> Answers:
+def _solved(models, say, move: Callable) -> Answers:
     begin, out = perf_counter(), Answers.blank(len(models))
     models = patches.solved_together(models)
     held = dict.fromkeys(range(len(models)))
@@ -87,7 +92,7 @@ def _solved(models, say) -> Answers:
     alone = set(range(len(models))) - set(moves)
     if moves:
         these = [models[case] for case in moves]
-        answers, lost = _moved(these, [held[case] for case in moves], say)
+        answers, lost = move(these, [held[case] for case in moves], say)
         answers.seconds[:] = (perf_counter() - begin) / len(models)
         alone |= {moves[k] for k in np.flatnonzero(lost)}
         take_out(answers, np.flatnonzero(lost).tolist())
@@ -98,7 +103,7 @@ def _solved(models, say) -> Answers:
     return out
 
 
-def _pressed(model: Model) -> _Pressed | None:
+def _pressed(model: Model) -> Pressed | None:
     """A case with its patch pressed; None of one that is run by itself."""
     try:
         with placed(model.source):
@@ -107,14 +112,14 @@ def _pressed(model: Model) -> _Pressed | None:
                 return None
             warnings = [*model.source.remarks, *of_patch.strained(model.patch, patch), *patch.notes]
             numerics = choose(model)
-            return _Pressed(YieldingElements(model, numerics, patch), YieldingElements(model, numerics, coarse[0]),
+            return Pressed(YieldingElements(model, numerics, patch), YieldingElements(model, numerics, coarse[0]),
                             of_patch.measured(model, patch, coarse), warnings,
                             of_patch.left_out(model, patch, coarse), patch)
     except Exception:  # what is wrong is told by its own run
         return None
 
 
-def _moved(models, held: list, say) -> tuple:
+def moved(models, held: list, say) -> tuple:
     """(Answers of pressed cases, (n,) whether a case must be run by itself)."""
     cycles = int(models[0].rig.cycles)
     window = min(10, cycles // 10)
@@ -129,14 +134,15 @@ def _moved(models, held: list, say) -> tuple:
     found, alone, _ = batch_answers(models, runs, {"engine": PIECES.name, "window_cycles": window})
     alone = alone | runs.stuck | coarse.lost
     for case in np.flatnonzero(~alone).tolist():
-        _tell(found, case, models[case], held[case], runs.extremes[case])
+        tell(found, case, models[case], held[case], np.abs(runs.extremes[case]).max())
     return found, alone
 
 
-def _tell(found: Answers, case: int, model: Model, one: _Pressed, extremes) -> None:
-    """Put the measures of the pressed patch in, and the outcome, warnings and notes as a run of its own has them."""
+def tell(found: Answers, case: int, model: Model, one: Pressed, reach: float) -> None:
+    """Put the measures of the pressed patch in, and the outcome, warnings and notes as a run of its own has them; reach
+    [m]: furthest its output was."""
     modes = model.rig.modes
-    slide = extremes * (float(modes.interfaces[0, 0]) / float(modes.output[0]))
+    slide = np.array([reach * abs(float(modes.interfaces[0, 0]) / float(modes.output[0]))])
     found.outcome[case] = str(outcome_on_piece(Outcome(found.outcome[case]), model.patch, one.patch, slide))
     known = known_of(found, case)
     found.fill(case, one.measures)

@@ -1,0 +1,92 @@
+"""The force of a first loading of parallel Jenkins elements, over their stiffness and the slide LENGTH of all of them:
+straight between their yields,
+
+    g(w) = F + S w,  F = sum k y and S = sum k of those that have, and have not, yielded.
+
+A case has its table in its state (`run.tables_of`): of each yield its place, F, S and B = sum k y^2. In a step it is
+walked through once, from where the last one ended; what is found lies side by side, as a compiler takes several lanes
+at once only where it knows the distance of any two numbers. Twin: many elements, from event to event
+(`dynamics.events`).
+"""
+
+from ...compiled.inner import njit
+from ...friction.flags_kernels import FAST, LEAN
+from .names_kernels import CURVE, LANES, WHERE
+
+YIELDS = 512  # of a case, the first of which is none and the last beyond all slides
+YIELD, FORCE, SLOPE, MOMENT, COLUMNS = range(5)
+# number of the yield; F, S and B at WHERE, F and B where the step begins
+AT, FOUND_F, FOUND_S, FOUND_B, HERE_F, HERE_B = range(WHERE + 1, WHERE + 7)
+TABLE = WHERE + 7
+ROOM = TABLE - CURVE + COLUMNS * YIELDS  # numbers that it has in the state of a case
+PART = 0.25  # of LENGTH, over which a step may go at most
+FORETELLS = True
+ASKED, FOUND, HERE = range(3)  # where the numbers of a curve are: in its table, found ahead of a step, at its begin
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def last(w, room, i):
+    """Place in the room of the last yield up to w: that of the last time, or by halves."""
+    k, step, first = int(room[AT * LANES + i]), YIELDS // 2, (TABLE + YIELD) * LANES + i
+    if w < room[first + COLUMNS * LANES * k] or w >= room[first + COLUMNS * LANES * (k + 1)]:
+        k = 0
+        while step > 0:
+            k = k + step if w >= room[first + COLUMNS * LANES * (k + step)] else k
+            step >>= 1
+        room[AT * LANES + i] = k
+    return (TABLE + COLUMNS * k) * LANES + i
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def find(room, i):
+    """Find the curve of a lane at WHERE."""
+    at, w = int(room[AT * LANES + i]), room[WHERE * LANES + i]
+    while w >= room[(TABLE + COLUMNS * (at + 1) + YIELD) * LANES + i]:
+        at += 1
+    while w < room[(TABLE + COLUMNS * at + YIELD) * LANES + i]:
+        at -= 1
+    room[AT * LANES + i], place = at, (TABLE + COLUMNS * at) * LANES + i
+    room[FOUND_F * LANES + i], room[FOUND_S * LANES + i] = room[place + FORCE * LANES], room[place + SLOPE * LANES]
+    room[FOUND_B * LANES + i] = room[place + MOMENT * LANES]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def go_on(room, i, event):
+    """Begin the next step where this one ended, unless it holds an event."""
+    f, b = room[HERE_F * LANES + i], room[HERE_B * LANES + i]
+    room[HERE_F * LANES + i] = f if event else room[FOUND_F * LANES + i]
+    room[HERE_B * LANES + i] = b if event else room[FOUND_B * LANES + i]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def begin_at(w, room, i):
+    """Begin the next step at w."""
+    at = last(w, room, i)
+    room[HERE_F * LANES + i], room[HERE_B * LANES + i] = room[at + FORCE * LANES], room[at + MOMENT * LANES]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def force(w, room, i, when):
+    """(g, its slope) at w > 0."""
+    if when == FOUND:
+        return room[FOUND_F * LANES + i] + room[FOUND_S * LANES + i] * w, room[FOUND_S * LANES + i]
+    at = last(w, room, i)
+    return room[at + FORCE * LANES] + room[at + SLOPE * LANES] * w, room[at + SLOPE * LANES]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def slipped(w, g, room, i, when):
+    """Mean slip of the sliders, each by what it carries at most, times that of all."""
+    if when == FOUND:
+        return room[FOUND_F * LANES + i] * w - room[FOUND_B * LANES + i]
+    if when == HERE:
+        return room[HERE_F * LANES + i] * w - room[HERE_B * LANES + i]
+    at = last(w, room, i)
+    return room[at + FORCE * LANES] * w - room[at + MOMENT * LANES]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def work(w, g, room, i):
+    """Integral of the force up to w, where it is g."""
+    at = last(w, room, i)
+    return (w * (g + room[at + FORCE * LANES]) - room[at + MOMENT * LANES]) / 2

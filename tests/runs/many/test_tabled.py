@@ -1,0 +1,47 @@
+"""Patches of elements in lanes, beside the exact batch and where they have to leave a case to it.
+
+`python tests/support/tabled_bars.py` is the whole campaign, beside single runs.
+"""
+
+import numpy as np
+import pytest
+from lane_bars import held, rows
+from tabled_bars import FAMILIES, drawn
+
+from patchfem.runs.many import many, meshes
+from patchfem.runs.many.lumped import sheared, tabled
+
+
+def missed(family: str, seed: int, count: int) -> tuple:
+    """(Answers of random cases in lanes, measures beyond the sum of both bars, all that were compared)."""
+    models = meshes.meshed(drawn(family, seed, count))
+    assert all(many.batch_of(one, 64).name == "lumped.tabled" for one in models)
+    assert all(many.batch_of(one, 63).name == "lumped.sheared" for one in models)
+    found, ones = tabled.solve(models), sheared.solve(models)
+    assert list(found.outcome) == list(ones.outcome) and not found.messages
+    pairs = [row for some in rows(found, ones) for row in some]
+    return found, [row for row in pairs if not held(row)], len(pairs)
+
+
+@pytest.mark.parametrize("family", ["tilt x friction"])
+def test_always_97_of_100_measures_lie_within_both_bars(family):
+    found, misses, count = missed(family, 7, 6)
+    assert sum(one["engine"] == "lanes" for one in found.numerics.values()) >= 4
+    assert len(misses) <= 0.03 * count
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", FAMILIES)
+def test_always_97_of_100_measures_lie_within_both_bars_many(family):
+    _, misses, count = missed(family, 8, 100)
+    assert len(misses) <= 0.03 * count
+
+
+def test_always_a_set_beyond_the_table_is_exact(monkeypatch):
+    """Sets of more elements than a table has room for, as of a finer mesh, march from yield to yield."""
+    models = meshes.meshed(drawn("frequency x load", 9, 3))
+    monkeypatch.setattr(tabled, "load", lambda _: type("Few", (), {"YIELDS": 8}))
+    found, ones = tabled.solve(models), sheared.solve(models)
+    assert all(one["engine"] == "piecewise" for one in found.numerics.values())
+    for name, column in ones.values.items():
+        np.testing.assert_array_equal(found.values[name], column)
