@@ -49,9 +49,9 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
                                                     "surface, such as rig.toml")] = None,
             set_: Sets = (), out: Out = None, json_: Json = False, quiet: Quiet = False):
     """Compare the surface in BEFORE with that in AFTER: registration, worn depth, ratios, a verdict, a page; of areal
-    scans the worn volume, maps and the levelled difference as X3P and text; two more files are the pair of the other
-    direction, of traces. A table of many pairs has mean, scatter and interval over them; two results folders, the
-    second of a run with [wear], what wore off.
+    scans the worn volume, maps and the levelled difference as X3P and text. Give two more traces to compare the
+    perpendicular direction too. A table of many pairs has mean, scatter and interval over them; two results folders,
+    the second of a run with [wear], what wore off.
 
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """

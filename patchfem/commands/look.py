@@ -65,7 +65,7 @@ def report(*folders: Path, out: out_in("page.html, by default report.html here")
            measured: Annotated[Path | None, Parameter(help="file of a laboratory, or the table that `import` made of "
                                                            "it: laid over the pictures of runs")] = None):
     """Lay the results folders of several runs, or of several sweeps over the same keys, side by side on one page for a
-    browser; of one sweep its own page is made again.
+    browser; for a single sweep, rebuild its page.
 
     Example: patchfem report out/rig out/six --measured loop.csv -o both.html
     """

@@ -20,8 +20,8 @@ from .sweep import Over
 
 
 def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
-    """Name every mistake in SCENE and in the files that it names; compute nothing. A table [sweep] whose cases are all
-    refused is one.
+    """Name every mistake in SCENE and in the files that it names; compute nothing. A [sweep] in which every case is
+    invalid counts as a mistake.
 
     Example: patchfem check rig.toml
     """

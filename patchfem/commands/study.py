@@ -148,8 +148,8 @@ def fit(scene: Path, /, *, to: Annotated[str, Parameter(
         rows: Annotated[Rows, Parameter(name="*")] = Rows(),
         out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
     """Find values of keys of SCENE from what was measured: a bench from a friction loop, a rig from rows of frequency,
-    input, acceleration and displacement or from frequency and damping over the amplitude, the coefficient of [wear]
-    from a worn depth.
+    input, acceleration and displacement or from frequency and damping over the amplitude, the wear coefficient from a
+    measured wear depth.
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """

@@ -14,7 +14,7 @@ PAGE = "report.html"
 def report_of(folders: list, out: Path | None = None, measured: Path | None = None) -> Path:
     """Write the page of these results folders and return its path.
 
-    Several runs, or several sweeps over the same keys, are laid side by side; of one sweep its own page is made again.
+    Several runs, or several sweeps over the same keys, are laid side by side; for a single sweep, its page is rebuilt.
     out: the page; unless given, report.html in the folder of one sweep, else in this folder. PatchfemError for a folder
     that is neither a run nor a sweep, and for runs beside sweeps; Missing where the page cannot be written.
     measured: a file of a laboratory, whose histories and loops are laid over those of the runs.

@@ -178,7 +178,8 @@ ROWS = (
         lambda s: None if s.load is None else s.own.loops[0].force if s.own.loops else
         float(np.abs(s.window.force).max()), group="friction"),
     Row("energy_balance", "1", 1e-8,
-        "work in that is neither stored nor dissipated over the run, over the power that passed and the peak stored",
+        "error of the energy balance over the run: work less what is stored and dissipated, relative to the energy "
+        "that went to and fro and the largest stored",
         lambda s: energy_balance(s.book), group="energy", term=("1", lambda _: 1.0)),
     Row("absolute_acceleration_fundamental", "m s-2", FLOOR,
         "first harmonic of the acceleration at the output, base motion included",
@@ -197,21 +198,21 @@ ROWS = (
         "friction limits: the points of a patch by the pressure, the sliders of law 'iwan' by their slip forces",
         lambda s: s.slip.get("slip_amplitude"), group="friction"),
     Row("stick_fraction", "1", 1e-3,
-        "share of the time of the last cycles in which the interface as a whole sticks: less than half of its slide is "
-        "irreversible, in the mean of slip_amplitude; part of a patch, or some sliders of law 'iwan', may slip "
+        "share of the last cycles in which the interface as a whole sticks: over half of its slide, weighted as in "
+        "slip_amplitude, is elastic; part of a patch, or some sliders of law 'iwan', may slip "
         "meanwhile",
         lambda s: s.slip.get("stick_fraction"), 0.35, group="friction", term=("1", lambda _: 1.0),
         halves=(2.5, 0.5)),
     Row("slip_start_phase", "rad", 1e-3,
         "phase of the base displacement at which slip of the interface as a whole, in the mean of slip_amplitude, "
-        "starts after a stick, modulo pi",
+        "starts after a stick, modulo pi; printed in degrees",
         lambda s: s.slip.get("slip_start_phase"), 1.0, group="friction", term=("pi", lambda _: np.pi),
         halves=(2.5, 1.0)),
     Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together", lambda s: s.load,
         group="friction"),
     Row("loop_area", "J", 1e-10,
-        "work of friction of this interface alone per cycle; without a value where no sine drives the motion and the "
-        "interface stores or gives back more than it dissipates, so that the loop does not close",
+        "work of friction of this interface alone per cycle; null if the drive is not a sine and the loop does not "
+        "close: the interface then stores or gives back more than it dissipates",
         lambda s: s.cycle.get("loop_area"), group="energy"),
     Row("equivalent_stiffness", "N m-1", 1.0,
         "part of the friction's first harmonic in phase with the slide over the first harmonic of the slide, negative "

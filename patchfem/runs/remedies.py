@@ -102,7 +102,8 @@ def _finer_mesh(seen, wide: dict, coarse) -> str:
         finer = f"points closer than {say(seen.patch.averaging, 3)}" if seen.patch.averaging and \
             seen.patch.sharper else f"a mesh finer than {nodes} interface nodes"
         return f"{finer} would take too long; read {'them by their errors' if len(wide) > 1 else 'it by its error'}"
-    return f"the mesh ({nodes} interface nodes) was not chosen for it; accuracy.tolerance = {tighter:.3g} refines it"
+    return f"the mesh ({nodes} interface nodes) was not refined for this quantity; set accuracy.tolerance = " \
+           f"{tighter:.3g} for a finer one"
 
 
 def _locks(seen, wide: dict) -> bool:
@@ -225,14 +226,14 @@ def _finer_under(seen, coarse) -> str:
     """What refines the mesh that leaves a motion open."""
     asked, nodes = seen.model.patch, seen.patch.x.size
     if asked.mesh is not None:
-        return "the mesh leaves it open; split the elements of contact.mesh"
+        return "the mesh causes this; split the elements of contact.mesh"
     if not asked.chosen:
-        return f"the mesh leaves it open; leave out {SIZE}"
+        return f"the mesh causes this; leave out {SIZE}"
     tighter = _climbing(seen, coarse)
     if tighter is None:
-        return f"the mesh ({nodes} interface nodes) leaves it open, and a finer one would take too long; read it by " \
+        return f"the mesh ({nodes} interface nodes) causes this, and a finer one would take too long; read it by " \
                "its error"
-    return f"the mesh ({nodes} interface nodes) leaves it open; accuracy.tolerance = {tighter:.3g} refines it"
+    return f"the mesh ({nodes} interface nodes) causes this; set accuracy.tolerance = {tighter:.3g} for a finer one"
 
 
 def _stepless(model) -> str:

@@ -117,7 +117,7 @@ def _slid(slip: dict | None, done: str) -> str:
         return done
     if slip["value"] <= max(_open(slip), NO_SLIP):
         return f"{done} The interface holds: no slip in the last cycle."
-    return f"{done} The interface slips: {pair('slip_amplitude', slip)} half peak-to-peak in the mean over it."
+    return f"{done} Slip amplitude {pair('slip_amplitude', slip)}, half peak-to-peak, averaged over the interface."
 
 
 def _open(one: dict) -> float:
@@ -156,7 +156,7 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
             said("friction_ratio_peak", "friction ratio peaks at {}")
         if whole and not released:
             said("loop_area", "{} dissipated per cycle")
-        said("contact_fraction", "contact on {} of the length")
+        said("contact_fraction", "{} of the length in contact")
         if summary["kind"] == "patch":
             said("pressure_peak", "peak pressure {}")
     text = "; ".join(parts)
@@ -183,7 +183,7 @@ def least_known(result: Result) -> str:
     if not name:
         return f"{of_steps}."
     but = f"; {of_steps}, which the scene sets" if steps else ""
-    least = f"; least well {known(name)}" if "±" in told[name] else ""
+    least = f"; worst: {known(name)}" if "±" in told[name] else ""
     sharp = "" if all("±" in one for one in told.values()) else f"; {SHARP}"
     return f"Every measure with an error meets the tolerance {tolerance:g}{least}{but}{sharp}."
 

@@ -41,7 +41,7 @@ def plane_band(asked, patch: Patch) -> list:
     try:
         mine, theirs = values(patch), values(pressed(other, pair_beside(other, patch.pair)))
     except PatchfemError as error:
-        return [f"{_assumed(asked)}; the truth lies between plane strain and plane stress, and in plane "
+        return [f"{_assumed(asked)}; the true state lies between plane strain and plane stress; in plane "
                 f"{other.plane} the patch has no answer ({error})"]
     return band_words(asked, mine, theirs)
 
@@ -66,7 +66,7 @@ def band_words(asked, mine: dict, theirs: dict) -> list:
     shares = [(name, theirs[name] / mine[name] - 1) for name in (first, *BANDED) if name != "approach" and mine[name]]
     parts += [f"{name} by {100 * share:+.2g} %" for name, share in shares if abs(share) > 1e-3]
     other = "stress" if asked.plane == "strain" else "strain"
-    return [f"{_assumed(asked)}; the truth lies between plane strain and plane stress; plane {other} would change "
+    return [f"{_assumed(asked)}; the true state lies between plane strain and plane stress; plane {other} would change "
             f"{', '.join(parts)}"] \
         if parts else []
 

@@ -26,11 +26,11 @@ class Tip(NamedTuple):
     @property
     def sentence(self) -> str:
         """What the check found, for the notes."""
-        head = (f"a tip of radius {say(self.radius)}: the sharper sixth of the valleys has a radius of "
-                f"{say(self.valleys)} or less, {100 * self.share:.0f} % of the valleys are narrower than the tip")
+        sharp = f"the sharpest sixth of the valleys has a radius of {say(self.valleys)} or less"
         if self.reaches:
-            return head + "; it reaches the bottoms"
-        return head + "; it does not reach their bottoms: Rv, Rz, Rvk and the slopes are those of the tip's path"
+            return f"the tip of radius {say(self.radius)} reaches the bottom of nearly every valley ({sharp})"
+        return f"the tip of radius {say(self.radius)} does not reach the bottom of {100 * self.share:.0f} % of the " \
+               f"valleys ({sharp}): Rv, Rz, Rvk and the slopes are those of the tip's path"
 
 
 def tip_check(heights: Heights, radius: float) -> Tip | None:

@@ -22,8 +22,8 @@ HEAD = """\
 # What a scene may say
 
 Generated from the program's own records by `python tests/support/reference`; a test holds the two together.
-A quantity is a text of one number and one unit, `"12.7 mm"`; the units of each kind stand below. A table named in a
-scene acts, one left out does not exist. A key that only some values of a selector need names them under "required".
+A quantity is a text of one number and one unit, `"12.7 mm"`; the units of each kind stand below. An effect is
+on if its table is present. A key that only some values of a selector need names them under "required".
 
 [The guide](GUIDE.md) explains; [what a run answers](MEASURES.md), [materials by name](MATERIALS.md) and
 [what it cannot do](LIMITS.md) have pages of their own.

@@ -17,10 +17,10 @@ class Measures:
 # What a run answers
 
 {MADE}
-Values in summary.json are in SI and have all digits. The error is an estimated half-width; it is to stay below
-tolerance × |value| + floor, else a warning says so. What is printed ends at the second digit of its error; a value
-without one is known to its last digit, and what is 0 within its floor is printed as 0. Measures of a motion are those
-of the last cycles, the last ten or the last tenth of a shorter run. A number behind a name counts the interfaces
+Values in summary.json are in SI and have all digits. The error is an estimated half-width; it should stay
+below tolerance × |value| + floor, else a warning says so. What is printed ends at the second digit of its error; a
+value without one is known to its last digit, and what is 0 within its floor is printed as 0. Measures of a motion are
+those of the last cycles, the last ten or the last tenth of a shorter run. A number behind a name counts the interfaces
 (strips, where strips slide apart): `slip_amplitude_2` is that of the second. Of a displacement the floor is 1e-5 of
 what the drive itself moves, a/omega^2, where that is less.
 """

@@ -1,0 +1,84 @@
+"""Links and commands of the site: every link between its pages leads somewhere, every command that it shows runs.
+
+`python check.py out/site` in this folder's repository prints what is wrong and counts what was tried.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from urllib.parse import unquote
+
+HERE = Path(__file__).parent
+PAGES = (HERE / "start.md", *sorted((HERE / "tasks").glob("*.md")))
+
+
+class _Page(HTMLParser):
+    """What a page links to, and the names that can be linked in it."""
+
+    def __init__(self):
+        super().__init__()
+        self.links, self.names = [], set()
+
+    def handle_starttag(self, tag, attrs):
+        of = dict(attrs)
+        self.links += [of[key] for key in ("href", "src") if of.get(key)]
+        self.names |= {of[key] for key in ("id", "name") if of.get(key)}
+
+
+@cache
+def read(path: Path) -> _Page:
+    """A page of HTML, read once."""
+    page = _Page()
+    page.feed(path.read_text("utf-8"))
+    return page
+
+
+def links(folder: Path) -> tuple:
+    """(how many links inside a built site were tried, those that lead nowhere as "page: link")."""
+    tried, dead = 0, []
+    for path in sorted(folder.rglob("*.html")):
+        for link in read(path).links:
+            target, _, name = unquote(link).partition("#")
+            if re.match(r"[a-z]+:|//", target) or not (target or name):
+                continue
+            tried += 1
+            to = (path.parent / target.partition("?")[0]).resolve() if target else path
+            known = to.exists() and (not name or to.suffix != ".html" or name in read(to).names)
+            dead += [] if known else [f"{path.relative_to(folder)}: {link}"]
+    return tried, dead
+
+
+def commands(page: Path) -> list:
+    """The commands that a page shows as bash, in order."""
+    blocks = re.findall(r"^```bash\n(.*?)^```", page.read_text("utf-8"), re.S | re.M)
+    return [line for block in blocks for line in block.splitlines() if line.strip()]
+
+
+def faults(page: Path) -> list:
+    """What the commands of a page answer where one fails; they run one after the other in an empty folder."""
+    place = os.environ | {"PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])}
+    with TemporaryDirectory() as room:
+        for line in commands(page):
+            done = subprocess.run(line, shell=True, cwd=room, env=place, capture_output=True, text=True)
+            if done.returncode:
+                return [f"{page.name}: {line}: {done.stderr.strip()[-300:]}"]
+    return []
+
+
+def main(site: str) -> int:
+    """Print what is wrong; 1 where anything is."""
+    tried, wrong = links(Path(site))
+    print(f"{tried} links tried, {len(wrong)} dead")
+    failed = [text for page in PAGES for text in faults(page)]
+    print(f"{sum(len(commands(page)) for page in PAGES)} commands tried, {len(failed)} fail")
+    print(*wrong, *failed, sep="\n")
+    return int(bool(wrong or failed))
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,57 @@
+"""The site: Sphinx reads the repository's own pages where they lie, and those that `made` writes from the program.
+
+The source folder is the repository, so that a link works in the repository as on the site.
+"""
+
+import os
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+sys.path[:0] = [str(ROOT), str(HERE), str(ROOT / "tests/support")]
+os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])  # of the notebooks too
+
+import made  # noqa: E402
+
+import patchfem  # noqa: E402
+
+project, author, copyright = "patchfem", "The patchfem founders", "The patchfem founders, MIT licence"
+version = release = patchfem.__version__
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_copybutton", "equations"]
+root_doc = "studies/site/index"
+include_patterns = ["README.md", "patchfem/*.md", "patchfem/scene/*.md", "studies/README.md", "studies/*/README.md",
+                    "studies/report/*.md", "studies/notebooks/*.ipynb", "studies/site/**.md", "tests/README.md"]
+exclude_patterns = [".venv", ".git", "out", "dist", "studies/site/README.md", "**/.*"]
+myst_enable_extensions = ["dollarmath", "deflist"]
+myst_heading_anchors = 4
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(ROOT / "out/site.cache")
+nb_execution_timeout = 600
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+default_role = "code"
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+html_theme = "pydata_sphinx_theme"
+html_math_renderer = "mathml"
+html_title = "patchfem"
+html_show_sourcelink = False
+html_copy_source = False
+html_static_path = []
+html_theme_options = {"show_prev_next": False, "secondary_sidebar_items": ["page-toc"], "navigation_depth": 3,
+                      "footer_start": ["copyright"], "footer_end": [], "logo": {"text": "patchfem"}}
+suppress_warnings = ["myst.header"]  # a page of the repository may begin below its first heading
+
+
+def setup(app) -> None:
+    """Write the pages that are made from the program, before any page is read; at the end a first one for a browser."""
+    app.connect("builder-inited", lambda app: made.write(HERE / "made"))
+    app.connect("build-finished", _front)
+
+
+def _front(app, fault) -> None:
+    if fault is None and app.builder.name == "html":
+        (Path(app.outdir) / "index.html").write_text(
+            '<!doctype html><meta http-equiv="refresh" content="0; url=studies/site/index.html">'
+            '<a href="studies/site/index.html">patchfem</a>', "utf-8")

@@ -1,0 +1,303 @@
+"""Pages of the site that are made from what the program itself knows: effects, glossary, commands, Python, code.
+
+In: the records of the package (effects, keys, measures, sources, docstrings) and the scenes of `examples`, which are
+run. Out: Markdown and pictures in one folder, written anew at every build.
+"""
+
+import ast
+import contextlib
+import inspect
+import re
+import subprocess
+import sys
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+
+import examples
+import matplotlib
+import terms
+from matplotlib import pyplot
+from reference import keys as keys_page
+from reference import tried
+
+import patchfem as pf
+from patchfem.commands.sources import SOURCES
+from patchfem.effects import EFFECTS, LAWS
+from patchfem.response.rows import ROWS as MOTION
+from patchfem.runs.results.patch_rows import ROWS as STATIC
+from patchfem.scales import told
+from patchfem.scene.keys.types import keys, meaning
+
+ROOT = Path(__file__).parents[2]
+SHOWN = [name for name in EFFECTS if not name.startswith("structure.interface.")]
+GROUPS = {"The patch": "contact", "One point": "normal", "Friction": "friction", "Prescribed slide": "slide",
+          "Rig": "structure", "Drive": "drive", "Wear": "wear", "Method": "accuracy", "Readings beside": "measured",
+          "Many runs": "sweep"}
+TABLES = {header.strip("[]"): model for header, model in keys_page.tables()}
+FENCE = "```"
+KINDS = {"patch": "pressure", "bench": "loop", "rig": "history", "linear": "history"}
+WITHOUT = 6  # rows of a table of changes
+
+
+def write(folder: Path) -> None:
+    """All pages, into a folder of the site; nothing where none of what they are made from has changed since."""
+    matplotlib.use("Agg")
+    (folder / "effects").mkdir(parents=True, exist_ok=True)
+    files = sorted([*(ROOT / "patchfem").rglob("*.py"), guide_file(), *Path(__file__).parent.glob("*.py")])
+    state, kept = sha256(b"".join(file.read_bytes() for file in files)).hexdigest(), folder / "made_from"
+    if kept.exists() and kept.read_text("utf-8") == state:
+        return
+    for name, text in examples.FILES.items():
+        (folder / "effects" / name).write_text(text, "utf-8")
+    pages = {"glossary": glossary(), "commands": commands(), "python": python(), "code": code(),
+             "effects/index": effects_index()}
+    pages |= {f"effects/{slug(name)}": effect(name, folder / "effects") for name in SHOWN}
+    for name, text in pages.items():
+        (folder / f"{name}.md").write_text(text, "utf-8")
+    kept.write_text(state, "utf-8")
+
+
+def slug(effect: str) -> str:
+    """The name of the page of an effect."""
+    return re.sub(r"[.=]", "-", effect)
+
+
+def fenced(kind: str, text: str) -> str:
+    """A block of Markdown."""
+    return f"{FENCE}{kind}\n{text.strip()}\n{FENCE}"
+
+
+# --- effects
+
+
+def effects_index() -> str:
+    """The list of all effects, group by group."""
+    parts = ["# Effects", "An effect is on if its table or its value stands in the scene. Each page has the equation, "
+             "a scene that was run when this site was built, its picture, the keys and what the effect cannot do yet."]
+    for title, table in GROUPS.items():
+        of = [name for name in SHOWN if re.split(r"[.=]", name)[0] == table]
+        parts += [f"## {title}", keys_page.grid(("effect", "what it does"), [
+            (f"[`{name}`]({slug(name)}.md)", about(name)) for name in of])]
+    listed = "\n".join(slug(name) for name in SHOWN)
+    return "\n\n".join([*parts, fenced("{toctree}", f":hidden:\n\n{listed}")]) + "\n"
+
+
+def table_of(effect: str) -> tuple:
+    """(table, key, value) that turn an effect on: ("friction", "law", "coulomb"), ("contact.tilt", "", "")."""
+    selector, _, value = effect.partition("=")
+    table, _, key = selector.rpartition(".") if value else (selector, "", "")
+    return table, key, value
+
+
+def about(effect: str) -> str:
+    """What an effect is, in the words of the guide or of the records of the keys."""
+    table, key, value = table_of(effect)
+    if effect == "sweep":
+        return "Keys and their values: the scene is run for each combination."
+    if not value:
+        return " ".join((TABLES[table].__doc__ or "").split())
+    for row in re.findall(r"^\| (.+?) \| (.+) \|$", guide(), re.M):
+        if row[0] in (f"`{value}`", f'`{key} = "{value}"`'):
+            return linked(row[1][:1].upper() + row[1][1:].rstrip(".") + ".")
+    return f"One value of `{key}`: {meaning(TABLES[table], key)}."
+
+
+def guide_file() -> Path:
+    """The guide, whose tables have a sentence for each law, drive and method."""
+    return ROOT / "patchfem/scene/GUIDE.md"
+
+
+@cache
+def guide() -> str:
+    """The text of the guide."""
+    return guide_file().read_text("utf-8")
+
+
+def linked(text: str) -> str:
+    """A sentence of the guide without its links, which lead elsewhere from here."""
+    return re.sub(r"\[([^\]]+)\]\([^)]+\)", r"\1", text)
+
+
+def effect(name: str, folder: Path) -> str:
+    """The page of an effect; its picture is drawn into the folder."""
+    table, key, value = table_of(name)
+    heading = f"`{key} = \"{value}\"` in `[{table}]`" if value else f"`[{table}]`"
+    parts = [f"# {heading}", about(name), "## Equation", fenced("text", EFFECTS[name].equations),
+             "Numbers in brackets are those of the [corrected equations](../../theory.md).", "## Scene",
+             fenced("toml", examples.scene(name)), *read_files(name), "## Answer", *answer(name, folder),
+             "## Keys", *key_rows(name), "## Limits", *limits(name), *source(name)]
+    return "\n\n".join(parts) + "\n"
+
+
+def read_files(name: str) -> list:
+    """The first lines of the files that a scene reads."""
+    return [f"The first lines of `{file}`:\n\n" + fenced("text", "\n".join(text.splitlines()[:4]))
+            for file, text in examples.FILES.items() if f'"{file}"' in examples.scene(name)]
+
+
+def answer(name: str, folder: Path) -> list:
+    """What the scene answers, with and without the effect, and its picture."""
+    scene = folder / f"{slug(name)}.toml"
+    scene.write_text(examples.scene(name), "utf-8")
+    picture = folder / f"{slug(name)}.svg"
+    if name == "sweep":
+        found = pf.sweep(scene)
+        save(pf.plot.sweep(found, "contact_fraction"), picture)
+        return [str(found.attrs["answer"]), f"![Share in contact over the tilt]({picture.name})"]
+    result = pf.run(scene, say=lambda text: None)
+    kind = "levels" if "levels" in name else KINDS[result.plan.kind]
+    save(getattr(result.plot, kind)(), picture)
+    words = [result.outcome.sentence, changes(name, result, folder), f"![{kind}: {about(name)}]({picture.name})"]
+    words += [f"*Warning of this run:* {text}" for text in result.warnings]
+    return [one for one in words if one]
+
+
+def save(axes, path: Path) -> None:
+    """A picture as SVG whose bytes follow from what it shows."""
+    figure = axes.figure
+    figure.set_size_inches(7, 3.6)
+    with matplotlib.rc_context({"svg.hashsalt": "patchfem"}):
+        figure.savefig(path, metadata={"Date": None}, bbox_inches="tight")
+    pyplot.close(figure)
+
+
+def changes(name: str, result, folder: Path) -> str:
+    """The measures that the effect changes by more than their errors; the first ones where it has no run without it."""
+    start, more = examples.EXAMPLES[name]
+    plain = None
+    if more and not table_of(name)[2] and name != "contact.approach":
+        bare = folder / "without.toml"
+        bare.write_text(start, "utf-8")
+        with contextlib.suppress(pf.PatchfemError):
+            plain = pf.run(bare, say=lambda text: None)
+    rows = []
+    for measure, one in result.measures.items():
+        other = plain.measures.get(measure) if plain is not None else None
+        if one.value is None or (plain is not None and not differs(one, other)):
+            continue
+        rows.append((f"`{measure}`", told(one.value, one.error, one.floor, one.unit),
+                     *([told(other.value, other.error, other.floor, one.unit)] if plain is not None else [])))
+    heads = ("measure", "with it", "without it") if plain is not None else ("measure", "value")
+    return keys_page.grid(heads, rows[:WITHOUT]) if rows else ""
+
+
+def differs(one, other) -> bool:
+    """Whether two answers of a measure differ by more than both errors and round-off."""
+    if other is None or other.value is None:
+        return False
+    return abs(one.value - other.value) > (one.error or 0) + (other.error or 0) + 1e-9 * abs(one.value) + one.floor
+
+
+def key_rows(name: str) -> list:
+    """The keys of the effect: of a table all of them, of a value those that it needs and may have."""
+    table, key, value = table_of(name)
+    if name == "sweep":
+        return ["Its keys are dotted keys of the scene in quotes; a value is a list, or a range with its number of "
+                "values."]
+    model = TABLES[table]
+    used = keys_page.NEEDS.get(f"{table}.{key}", {}).get(value, ("", ""))
+    named = [key, *" ".join(used).split()] if value else list(keys(model))
+    rows = [keys_page._row(model, one, table) for one in named
+            if one in keys(model) and not keys_page._is_table(model, keys(model)[one])]
+    head = ("key", "kind", "default", "required", "meaning")
+    return [keys_page.grid(head, rows)] if rows else ["It has no keys."]
+
+
+def limits(name: str) -> list:
+    """What the effect does not go with: of a law what was tried, of others every effect beside it, tried now."""
+    value = table_of(name)[2]
+    said = {}
+    if value in LAWS:
+        law = tried.laws()[value]
+        for one in (*tried.RIGS, *tried.MORE, *tried.BENCHES):
+            for sentence in tried.refused(law, one):
+                said.setdefault(sentence, []).append(one.words)
+    elif name != "sweep":
+        for other in SHOWN:
+            for sentence in beside(name, other):
+                said.setdefault(sentence, []).append(f"`{other}`")
+    rows = [(", ".join(dict.fromkeys(words)), sentence) for sentence, words in said.items()]
+    more = "[What it cannot do](../../../../patchfem/scene/LIMITS.md) has the bounds of all numbers and what the " \
+           "models leave out."
+    return [*([keys_page.grid(("not beside", "what the program says"), rows)] if rows else
+              ["Every other effect that its scene can hold goes with it."]), more]
+
+
+def beside(name: str, other: str) -> list:
+    """Sentences with which the scene of an effect refuses another one for not being built yet."""
+    start, more = examples.EXAMPLES[name]
+    blocks, own = examples.blocks(start) | examples.blocks(more), examples.blocks(more)
+    added = examples.blocks(examples.EXAMPLES[other][1])
+    if not added or set(added) & (set(own) | {"[accuracy]", "[drive]", "[slide]", "[measured]", "[sweep]"}):
+        return []
+    both = "".join((blocks | added).values())
+    try:
+        pf.load(both)
+    except pf.SceneError as fault:
+        return [re.sub(r"^[^:]*(?::\d+)?: ", "", line) for line in fault.mistakes if "not yet built" in line]
+    return []
+
+
+def source(name: str) -> list:
+    """The papers that an effect stands on."""
+    found = [entry for effects, (_, _, entry) in SOURCES if name in effects]
+    return ["## Source", *(f"{one['author'].replace(' and ', ', ')}: {one['title']}. {one['journal']} {one['volume']}, "
+                           f"{one['pages']} ({one['year']}).".translate(str.maketrans("", "", "{}\\\"")).replace(
+                               "--", "-") for one in found)] if found else []
+
+
+# --- glossary, commands, Python, code
+
+
+def glossary() -> str:
+    """Every term and every measure in one alphabet."""
+    words = dict(terms.TERMS)
+    for row in (*STATIC, *MOTION):
+        text = f"{row.text[:1].upper()}{row.text[1:]} [{row.unit}]. A measure: `{row.name}` in `summary.json`."
+        words.setdefault(row.name.replace("_", " "), text)
+    body = "\n\n".join(f"{term}\n  {text}" for term, text in sorted(words.items(), key=lambda one: one[0].lower()))
+    return f"# Glossary\n\nTerms of the field as this program uses them, and every measure that it answers.\n\n" \
+           f"{fenced('{glossary}', body)}\n"
+
+
+def commands() -> str:
+    """The help of every verb, as the command line prints it."""
+    from patchfem.__main__ import VERBS
+
+    parts = ["# Commands", "What `patchfem VERB --help` prints."]
+    for verb in VERBS:
+        said = subprocess.run([sys.executable, "-m", "patchfem", verb, "--help"], capture_output=True, text=True,
+                              cwd=ROOT, check=True, env=dict(examples.ENVIRON, COLUMNS="110")).stdout
+        parts += [f"## patchfem {verb}", fenced("text", said)]
+    return "\n\n".join(parts) + "\n"
+
+
+def python() -> str:
+    """The public names of the package with their docstrings."""
+    parts = ["# Python", "`import patchfem as pf`; each name below is `pf.NAME`. A key with dots is passed as "
+             '`**{"contact.load": "26 lbf"}`.']
+    for name in pf.__all__:
+        one = pf.api.plot if name == "plot" else getattr(pf.api, name)
+        if inspect.isclass(one):
+            parts.append(fenced("{eval-rst}", f".. autoclass:: patchfem.api.{name}\n   :members:"))
+        elif callable(one):
+            parts.append(fenced("{eval-rst}", f".. autofunction:: patchfem.api.{name}"))
+    parts.append(fenced("{eval-rst}", ".. autoclass:: patchfem.api.SweepPlots\n   :members:\n\n.. autoclass:: "
+                                      "patchfem.api.Plots\n   :members:"))
+    return "\n\n".join(parts) + "\n"
+
+
+def code() -> str:
+    """The reading order of the package and what each folder says of itself."""
+    order = re.findall(r"^\d+\. `(\w+)`\s+(.*)$", pf.__doc__, re.M)
+    parts = ["# How the code is laid out", "The package is a ladder of folders: a module imports its own folder and "
+             "the folders before it. A test counts every import.",
+             "[How to add a law, a gap shape, a drive, a measure](../../../patchfem/ADDING.md) tells which files each "
+             "of them takes. [tests/README.md](../../../tests/README.md) says which test proves what."]
+    for name, words in order:
+        file = ROOT / "patchfem" / name / "__init__.py"
+        file = file if file.exists() else file.parent.with_suffix(".py")
+        text = ast.get_docstring(ast.parse(file.read_text("utf-8")))
+        parts += [f"## {name}", words[:1].upper() + words[1:] + ".", fenced("text", text)]
+    return "\n\n".join(parts) + "\n"

@@ -1,0 +1,93 @@
+"""The site: every effect has a scene that names it, every measure a line, every link of a page a target; built slow."""
+
+import os
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+import patchfem as pf
+from patchfem.effects import EFFECTS
+
+ROOT = Path(__file__).parents[2]
+SITE = ROOT / "studies" / "site"
+sys.path.insert(0, str(SITE))
+check, examples, made, terms = (__import__(name) for name in ("check", "examples", "made", "terms"))
+WRITTEN = sorted([*SITE.glob("*.md"), *SITE.glob("tasks/*.md")])
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """The folder of the files that the scenes of the effects read."""
+    folder = tmp_path_factory.mktemp("files")
+    for name, text in examples.FILES.items():
+        (folder / name).write_text(text, "utf-8")
+    return folder
+
+
+def test_always_every_effect_has_a_scene_that_names_it(files):
+    assert sorted(examples.EXAMPLES) == sorted(made.SHOWN)
+    for name in set(made.SHOWN) - {"sweep"}:
+        (files / "scene.toml").write_text(examples.scene(name), "utf-8")
+        assert name in pf.plan(files / "scene.toml").effects, name
+
+
+def test_always_an_effect_is_told_from_its_records(files):
+    page = made.effect("contact.tilt", files)
+    assert (files / "contact-tilt.svg").read_text("utf-8").startswith("<?xml")
+    assert EFFECTS["contact.tilt"].equations in page and '[contact.tilt]\nangle = "0.1 mrad"' in page
+    with_it, without = re.search(r"`contact_fraction` \| ([\d.]+) ± [\d.]+ \| ([\d.]+)", page).groups()
+    assert float(with_it) < 0.25 and float(without) == 1
+    assert "not yet built" in " ".join(made.limits("friction.law=iwan"))
+    assert made.source("friction.law=iwan")[1].startswith("Segalman, D. J.: A four-parameter Iwan model")
+
+
+def test_always_every_value_has_a_sentence():
+    said = [made.about(name) for name in made.SHOWN]
+    assert all(len(text) > 20 and text.endswith(".") for text in said)
+
+
+def test_always_the_glossary_has_every_measure_and_term_once():
+    heads = re.findall(r"^(\S[^\n]*)\n  \S", made.glossary(), re.M)
+    assert len(heads) == len(set(heads)) > 90
+    assert {row.name.replace("_", " ") for row in (*made.STATIC, *made.MOTION)} | set(terms.TERMS) == set(heads)
+
+
+def test_always_every_folder_of_the_package_is_told():
+    order = re.findall(r"^\d+\. `(\w+)`", pf.__doc__, re.M)
+    assert re.findall(r"^## (\w+)$", made.code(), re.M) == order and len(order) > 20
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=lambda page: page.stem)
+def test_always_every_link_of_a_written_page_leads_somewhere(page):
+    for link in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text("utf-8")):
+        if not link.startswith(("http", "made/")):
+            assert (page.parent / link).exists(), link
+
+
+def test_always_the_commands_of_a_page_run():
+    assert len(check.commands(SITE / "tasks" / "paraview.md")) == 8
+    assert check.faults(SITE / "tasks" / "paraview.md") == []
+
+
+def test_always_a_dead_link_and_a_failing_command_are_found(tmp_path):
+    (tmp_path / "a.html").write_text('<h1 id="top"></h1><a href="#top"><a href="b.html#no"><a href="c.html">')
+    (tmp_path / "b.html").write_text("<p>")
+    assert check.links(tmp_path) == (3, ["a.html: b.html#no", "a.html: c.html"])
+    page = tmp_path / "page.md"
+    page.write_text("```bash\ntrue\nfalse\n```\n")
+    assert check.faults(page) == ["page.md: false: "]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("myst_nb") is None, reason="the site is built where patchfem[docs] is installed")
+def test_always_the_site_is_built_without_a_warning_and_without_a_dead_link(tmp_path):
+    words = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-c", str(SITE), str(ROOT), str(tmp_path)]
+    done = subprocess.run(words, capture_output=True, text=True, env=os.environ)
+    assert done.returncode == 0, done.stderr[-2000:]
+    tried, dead = check.links(tmp_path)
+    assert dead == [] and tried > 1000
+    assert [text for page in check.PAGES for text in check.faults(page)] == []
