@@ -41,7 +41,7 @@ def read(path: Path) -> _Page:
 def links(folder: Path) -> tuple:
     """(how many links inside a built site were tried, those that lead nowhere as "page: link")."""
     tried, dead = 0, []
-    for path in sorted(folder.rglob("*.html")):
+    for path in sorted(set(folder.rglob("*.html")) - set(folder.rglob("_static/**/*.html"))):  # the theme's templates
         for link in read(path).links:
             target, _, name = unquote(link).partition("#")
             if re.match(r"[a-z]+:|//", target) or not (target or name):
