@@ -11,7 +11,8 @@ def _inline(self, node) -> None:
 
 def _display(self, node) -> None:
     number = f'<span class="eqno">({node["number"]})</span>' if node.get("number") else ""
-    self.body.append(f'<div class="math">{number}{convert(node.astext(), display="block")}</div>')
+    drawn = convert(node.astext(), display="block")
+    self.body.append(f'<div style="overflow: auto; margin: 1em 0; padding: 0.3em 0">{number}{drawn}</div>')
     raise nodes.SkipNode
 
 
