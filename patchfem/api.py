@@ -18,26 +18,17 @@ from typing import TYPE_CHECKING, Any
 
 from .campaigns import backbone as backbones
 from .campaigns import cost as cost_curves
-from .campaigns import fit as loop_fits
-from .campaigns import fit_decay as decay_fits
-from .campaigns import fit_path, wear_coefficient
-from .campaigns.rows import asked as row_asked
-from .campaigns.rows import fit as row_fits
 from .campaigns.sweeps import ask, executors
 from .campaigns.sweeps import asked as case_models
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
 from .export import backbone as backbone_files
+from .export import chosen, fits, histories, shown
 from .export import cost as cost_files
-from .export import fit_folder, fit_rows, histories, results, shown, wear_fit
-from .export import fitted_decay as decay_written
 from .export import folder as results_folder
-from .export import lab as lab_files
 from .export import reports as page_of_several
 from .export import summary as summaries
-from .export.drawing import paraview, swept
-from .export.drawing import view as viewer
-from .export.fields import vtu
-from .export.pages import lead, player, released, words
+from .export.drawing import swept
+from .export.pages import lead, released, words
 from .export.surfaces import compare as compared_data
 from .export.surfaces import pairs as pairs_data
 from .export.surfaces import roughness, worn
@@ -53,7 +44,7 @@ from .runs.plan import Plan
 from .runs.plan import plan as plan_model
 from .runs.results import result as run_result
 from .runs.run import run as run_plan
-from .scene import ranges, starting
+from .scene import axes, starting
 from .scene.changed import Base
 from .scene.scene import Scene, SceneError, loads, text_of, with_files
 from .scene.scene import load as load_file
@@ -166,23 +157,23 @@ def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Pat
     return {knob: cost_files.answer_of(each, model.accuracy.tolerance) for knob, each in runs.items()}
 
 
-def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "", amplitudes: Iterable[float] | None = None,
-             method: str = "all", **sets: Any) -> Dataset:
+def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "",
+             amplitudes: float | str | Iterable | None = None, method: str = "all", **sets: Any) -> Dataset:
     """Frequency and damping ratio of a mode over its amplitude at the output, with errors, as an xarray.Dataset.
 
-    scene and sets as `load` takes them. mode: its name, of masses its number; the first unless given. amplitudes: (k,)
-    [m], around where the contact slips unless given. method: "balance", "decay", "quasi-static" or "all"; each has
-    variables of its own name over amplitudes of its own. The attributes have `free_frequency` and `stuck_frequency`
-    [Hz], `exponent_micro` and `exponent_gross` of the contact's loss, `flutter_amplitude` [m], where they are known;
-    `missing`: why a method gave no curve. PatchfemError for a scene without a rig or friction, or no such mode.
+    scene and sets as `load` takes them. mode: its name, of masses its number; the first unless given. amplitudes: one
+    or more [m], or a text such as "1 um..1 mm:25"; around where the contact slips unless given. method: "balance",
+    "decay", "quasi-static" or "all"; each has variables of its own name over amplitudes of its own. The attributes have
+    `free_frequency` and `stuck_frequency` [Hz], `exponent_micro` and `exponent_gross` of the contact's loss,
+    `flutter_amplitude` [m], where they are known; `missing`: why a method gave no curve. PatchfemError for a scene
+    without a rig or friction, no such mode and amplitudes that are no lengths above 0.
     """
     model = joint.freed(build(scene, **sets))
     ways = backbones.WAYS if method == "all" else (method,)
     if unknown := set(ways) - set(backbones.WAYS):
         raise PatchfemError(f"backbone: method {unknown.pop()!r}: one of {', '.join(backbones.WAYS)} or all")
-    wanted = None if amplitudes is None else sorted(float(one) for one in amplitudes)
-    if wanted is not None and not (wanted and wanted[0] > 0 and wanted[-1] < float("inf")):
-        raise PatchfemError("backbone: amplitudes are lengths above 0")
+    wanted = None if amplitudes is None else axes.lengths(amplitudes if isinstance(amplitudes, str) else ",".join(
+        texts(axes.LENGTH, amplitudes)), "amplitudes")
     found = backbones.backbone(model, mode, wanted, ways)
     return backbone_files.contents(found, model.source.title).to_xarray()
 
@@ -243,36 +234,41 @@ def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[
 
 def fit(scene: str | Path | Scene, /, *, to: str | Path, free: Mapping[str, Any], hold: Iterable[str] = (),
         offset: Iterable[str] = (), warm_up: bool = False, leave_out: str = "", starts: int = 8, seed: int = 0,
-        out: str | Path | None = None, say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
+        unstable: str = "bound", placebo: Iterable[str] = (), resume: bool = False, out: str | Path | None = None,
+        say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
     """Values of keys of a scene from what was measured, with intervals: the dict that fit.json holds, in SI.
 
     scene and sets as `load` takes them. to: a loop of a bench, rows of a rig or its frequency and damping over the
-    amplitude, a worn depth of a scene with [wear].
-    free: key -> (low, high), texts as in a scene or numbers in SI. hold: rows that are only predicted, such as
-    "frequency=135 Hz,150 Hz"; offset, warm_up: of a loop; leave_out: a column of which each value is left out in turn;
-    starts, seed: of the search over rows. out: the folder that `patchfem fit -o` writes. say: called with one line
-    where something takes long. SceneError, PatchfemError as `patchfem fit` refuses.
+    amplitude, a worn depth of a scene with [wear]. free: key -> (low, high), texts as in a scene or numbers in SI, or a
+    text such as "0.1..0.6". hold: rows that are only predicted, such as "frequency=135 Hz,150 Hz"; offset, warm_up: of
+    a loop; leave_out: a column of which each value is left out in turn; unstable: "bound", "out" or "read", what rows
+    flagged U count as; placebo: values such as "structure.mode.yaw.frequency=110 Hz,138 Hz", with each of which a whole
+    fit is made; starts, seed: of the search over rows. out: the folder that `patchfem fit -o` writes, with `resume`
+    gone on with. say: called with one line where something takes long. SceneError, PatchfemError as `patchfem fit`
+    refuses.
     """
     found, tell = load(scene, **sets), _on_stderr if say is None else say
-    asked = [f"{key}={'..'.join(texts(key, list(ends)))}" for key, ends in free.items()]
+    if not isinstance(free, Mapping):
+        raise PatchfemError(f"fit: free is a dict of key: (low, high), not {free!r:.60}")
+    asked = [f"{key}={_ends_of(key, ends)}" for key, ends in free.items()]
+    options = fits.Options(_words(hold), _words(offset), warm_up, leave_out, starts, seed, unstable, _words(placebo),
+                           resume)
+    if out is not None:
+        return fits.fit_into(found, str(to), asked, options, Path(out), fits.Heard(tell))
     with TemporaryDirectory() as room:
-        target = Path(room) / "fit" if out is None else Path(out)
-        if found.wear is not None:
-            one = wear_coefficient.wear_coefficient(build_model(found), str(to), asked, None)
-            text = loads(found.text, found.path, [*found.sets, one.bounds.assigned(one.value)]).resolved()
-            return wear_fit.fit_into(one, found.title, text, target)
-        if found.kind not in ("rig", "linear"):
-            options = fit_path.LoopOptions(tuple(offset), warm_up)
-            return fit_folder.fit_into(loop_fits.fit_loop(found, Path(to), asked, tuple(hold), tell, options), target)
-        if decay_fits.is_curve(to):
-            return decay_written.fit_into(decay_fits.fit_decay(found, Path(to), asked, tell), target)
-        wanted, wrong = ranges.ranges(asked)
-        if wrong:
-            raise SceneError(wrong)
-        options = row_fits.RowsOptions(tuple(hold), leave_out, (), row_fits.Search(starts, seed))
-        fitted = row_fits.fit_rows(row_asked.Question(found, wanted, Path(to)), options, tell)
-        with results.Folder(target) as folder:
-            return fit_rows.fit_into(fitted, folder.path, folder.target)
+        return fits.fit_into(found, str(to), asked, options, Path(room) / "fit", fits.Heard(tell))
+
+
+def _ends_of(key: str, ends: Any) -> str:
+    """"low..high" of such a text or of two values; PatchfemError for anything else."""
+    pair = [ends] if isinstance(ends, str) else texts(key, ends)
+    if not isinstance(ends, str) and len(pair) != 2:
+        raise PatchfemError(f"fit: free: {key}: (low, high) or a text such as '0.1..0.6' is wanted, not {ends!r:.60}")
+    return "..".join(pair)
+
+
+def _words(given: str | Iterable[str]) -> tuple:
+    return (given,) if isinstance(given, str) else tuple(given)
 
 
 def profile(*files: str | Path, cutoff: float | None = None, window: Iterable[float] | None = None,
@@ -288,39 +284,34 @@ def profile(*files: str | Path, cutoff: float | None = None, window: Iterable[fl
     return {"profiles": [roughness.data_of(one) for one in reports], "means": roughness.means_data(reports)}
 
 
-def report(*folders: str | Path, out: str | Path | None = None, measured: str | Path | None = None) -> Path:
-    """Lay results folders side by side on one page, of one sweep its own; the path of the page. measured: a file of a
-    laboratory, laid over the pictures."""
-    return Path(page_of_several.report_of([Path(one) for one in folders], None if out is None else Path(out),
+def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None = None, *,
+           measured: str | Path | None = None) -> Path:
+    """Lay the results folders of a list side by side on one page, of one sweep its own; the path of the page.
+
+    out: the page, report.html unless given. measured: a file of a laboratory, laid over the pictures. PatchfemError for
+    folders that do not stand together, and for none.
+    """
+    listed = [folders] if isinstance(folders, str | Path) else folders
+    return Path(page_of_several.report_of([Path(one) for one in listed], None if out is None else Path(out),
                                           None if measured is None else Path(measured)))
 
 
-def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None) -> Path:
+def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, histories: bool = False) -> Path:
     """Write a results folder in another format, by the ending of `out`; its path.
 
-    Fields: .pvd, .vtu, .vtkhdf; histories and loops: .uff, .mat, .csv; .py: a script that plays the last cycle in
-    ParaView. frame: number of the frame of a .vtu, the last one unless given.
+    Fields: .pvd, .vtu, .vtkhdf, .csv (the interface); histories and loops: .uff, .mat, and .csv where `histories` asks
+    for them or the folder has no fields; .py: a script that plays the last cycle in ParaView. frame: number of the
+    frame of a .vtu or .csv, the last one unless given. PatchfemError as `patchfem export` refuses.
     """
-    folder, out = Path(folder), Path(out)
-    if out.suffix.lower() in lab_files.ENDINGS:
-        from .export.lab import write  # its folder holds more than words
-
-        write.export(folder, out)
-    elif out.suffix == ".py":
-        paraview.write_script(folder, out)
-    else:
-        vtu.export(folder, out, frame)
-    return out
+    chosen.export(Path(folder), Path(out), frame, histories)
+    return Path(out)
 
 
 def view(folder: str | Path, out: str | Path | None = None, /, *, frame: int | None = None,
          magnify: float | None = None) -> None:
     """Show the pieces of a results folder in a window, or draw them into `out`: a picture, or the last cycle as .gif,
     .mp4 or .html; arguments as those of `patchfem view`."""
-    if out is not None and Path(out).suffix == ".html":
-        player.write_page(Path(folder), Path(out))
-        return
-    viewer.view(Path(folder), None if out is None else Path(out), frame, magnify)
+    chosen.view(Path(folder), None if out is None else Path(out), frame, magnify)
 
 
 def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> Path:

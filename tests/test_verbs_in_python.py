@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from command_line import cli
 from scene_texts import shaken
 
 import patchfem as pf
@@ -14,6 +15,7 @@ BLOCK = {"title": "a block", "normal": {"load": "100 N"}, "friction": {"law": "c
                                                      "slide": 1.0}]},
          "drive": {"kind": "base", "frequency": 100.0, "acceleration": "9 g", "cycles": 50}}
 TEXT = 'title = "a block"\n' + shaken('law = "coulomb"', "9 g", 50)
+PLASTIC_BLOCK = shaken('law = "elastic-plastic"\nbond_length = "1 um"', "9 g", 50)
 PIECES = """[contact]
 length = "10 mm"
 width = "10 mm"
@@ -71,8 +73,103 @@ def test_a_verb_and_a_folder_of_one_name_stand_beside_each_other(tmp_path):
         pf.mesh(TEXT, tmp_path / "none.vtu")
     pf.run(BLOCK).save(tmp_path / "block")
     assert pf.export(tmp_path / "block", tmp_path / "histories.csv").read_text("utf-8").startswith("time")
-    page = pf.report(tmp_path / "block", tmp_path / "block", out=tmp_path / "both.html")
-    assert "side by side" in page.read_text("utf-8") or page.is_file()
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    """Results folders of a rig, `block`, and of pressed pieces, which have fields, `pieces`."""
+    folder = tmp_path_factory.mktemp("saved")
+    pf.run(BLOCK).save(folder / "block")
+    pf.run(PIECES).save(folder / "pieces")
+    return folder
+
+
+def test_a_report_lays_the_folders_of_a_list_side_by_side(saved, tmp_path):
+    one = saved / "block"
+    page = pf.report([one, saved / "pieces"], tmp_path / "both.html")
+    assert page == tmp_path / "both.html"
+    assert all(f">{name}<" in page.read_text("utf-8") for name in ("block", "pieces"))
+    alone = pf.report(one, tmp_path / "one.html").read_text("utf-8")
+    assert alone == pf.report([str(one)], out=tmp_path / "other.html").read_text("utf-8") and ">pieces<" not in alone
+    with pytest.raises(pf.PatchfemError, match="at least one results folder"):
+        pf.report([])
+
+
+@pytest.mark.parametrize("folder, name, given, words", [
+    ("pieces", "a.csv", {}, []), ("pieces", "a.csv", {"frame": 0}, ["--frame", 0]), ("block", "a.csv", {}, []),
+    ("block", "a.csv", {"histories": True}, ["--histories"]), ("block", "a.csv", {"frame": 0}, ["--frame", 0]),
+    ("block", "a.uff", {"frame": 1}, ["--frame", 1]), ("pieces", "a.py", {"frame": 1}, ["--frame", 1]),
+    ("pieces", "a.vtu", {"histories": True}, ["--histories"]), ("block", "a.xyz", {}, [])])
+def test_exact_an_export_is_that_of_the_command_line(saved, tmp_path, folder, name, given, words):
+    answer = cli("export", saved / folder, "-o", tmp_path / f"shell_{name}", *words)
+    if answer.code:
+        with pytest.raises(pf.PatchfemError) as refused:
+            pf.export(saved / folder, tmp_path / name, **given)
+        assert str(refused.value) in answer.err.replace("shell_", "")
+        return
+    assert pf.export(saved / folder, tmp_path / name, **given).read_bytes() == \
+        (tmp_path / f"shell_{name}").read_bytes()
+
+
+def test_refuses_settings_that_a_page_does_not_have(saved, tmp_path):
+    with pytest.raises(pf.PatchfemError, match="a slider for each"):
+        pf.view(saved / "pieces", tmp_path / "a.html", magnify=2.0)
+
+
+@pytest.mark.parametrize("amplitudes", [1e-6, "1 um", np.array([1e-6]), ["1 um"]])
+def test_exact_amplitudes_are_one_or_many_numbers_or_a_text(amplitudes):
+    found = pf.backbone(PLASTIC_BLOCK, amplitudes=amplitudes, method="quasi-static")
+    assert found["quasi_static_amplitude"].values == pytest.approx([1e-6], rel=1e-12)
+
+
+@pytest.mark.parametrize("amplitudes, said", [
+    ([1e-6, np.nan, 1e-3], "amplitudes: 'nan m'"), ("1 um..x", "amplitudes: "), ([0.0, 1e-6], "above 0"),
+    ([], "amplitudes"), (object(), "no value of a scene"), ("1 um..9 um", "number of values")])
+def test_refuses_amplitudes_that_are_no_lengths(amplitudes, said):
+    with pytest.raises(pf.PatchfemError, match=said):
+        pf.backbone(PLASTIC_BLOCK, amplitudes=amplitudes, method="quasi-static")
+
+
+@pytest.mark.parametrize("free, said", [
+    ({"friction.static": 0.3}, r"\(low, high\) .* not 0\.3"), ({"friction.static": (0.1, 0.2, 0.5)}, r"\(low, high\)"),
+    ({"friction.static": None}, "no value of a scene"), (["friction.static=0.1..0.5"], "is a dict"),
+    ({}, "at least one"), ({"friction.static": "0.5..0.1"}, "must lie below")])
+def test_refuses_free_keys_without_two_ends(tmp_path, free, said):
+    with pytest.raises(pf.PatchfemError, match=said):
+        pf.fit(BLOCK, to=rows_in(tmp_path), free=free)
+
+
+@pytest.mark.parametrize("scene, given, said", [
+    (BLOCK, {"offset": ["force"], "warm_up": True}, "offset belongs to a loop of a bench; warm_up belongs"),
+    (pf.new("bench"), {"starts": 3}, "starts belongs to rows of a rig"),
+    (pf.new("bench"), {"leave_out": "frequency"}, "leave_out belongs to rows of a rig"),
+    (pf.new("wear"), {"hold": "frequency=1 Hz"}, "hold belongs to a loop"), (BLOCK, {"starts": 0}, "one at least"),
+    (BLOCK, {"seed": -1}, "from 0 on"), (BLOCK, {"unstable": "maybe"}, "bound, out, read"),
+    (BLOCK, {"hold": "frequency=135 Hz"}, "--hold frequency=135 Hz: no row")])
+def test_refuses_options_that_a_fit_does_not_have_before_anything_is_read(tmp_path, scene, given, said):
+    with pytest.raises(pf.PatchfemError, match=said):
+        pf.fit(scene, to=rows_in(tmp_path), free={"friction.static": "0.1..0.5"}, **given)
+
+
+def rows_in(folder):
+    path = folder / "rows.csv"
+    path.write_text("frequency [Hz],input [g],acceleration [g],displacement [mil],flag\n100,5,20,1,\n100,6,22,2,\n",
+                    "utf-8")
+    return path
+
+
+@pytest.mark.parametrize("scene, words", [
+    (pf.new("bench"), ("fit", "--to", "none.csv", "--free", "friction.static=0.1..0.5")),
+    (TEXT, ("fit", "--to", "none.csv", "--free", "friction.static=0.1..0.5")),
+    (pf.new("wear"), ("fit", "--to", "none.json", "--free", "wear.coefficient=1e-16 m^2/N..1e-12 m^2/N")),
+    (TEXT, ("backbone", "--mode", "none"))], ids=["loop", "rows", "wear", "backbone"])
+def test_a_folder_of_other_files_is_refused_before_the_work(tmp_path, monkeypatch, scene, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "notes.txt").write_text("mine", "utf-8")
+    (tmp_path / "scene.toml").write_text(scene, "utf-8")
+    answer = cli(words[0], "scene.toml", *words[1:], "-o", "other")
+    assert answer.code == 2 and "notes.txt" in answer.err and (tmp_path / "other" / "notes.txt").is_file()
 
 
 def test_exact_profile_gives_the_roughness_of_a_sine(tmp_path):

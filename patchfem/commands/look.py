@@ -5,13 +5,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..export import lab, reports
-from ..export.drawing import paraview
-from ..export.drawing import view as viewer
-from ..export.fields import vtu
-from ..export.lab import write
-from ..export.pages import player
-from .shared import Refused, flag, out_in
+from ..export import chosen, reports
+from .shared import flag, out_in
 
 Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0, the pressed state; the last one unless "
                                              "given")]
@@ -27,23 +22,7 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
 
     Example: patchfem export out/rig -o histories.uff
     """
-    fields = (folder / lab.FIELDS).is_file() or not folder.is_dir()
-    if out.suffix.lower() in lab.ENDINGS and (out.suffix != ".csv" or histories or not fields):
-        if frame is not None:
-            raise Refused("--frame: belongs to fields (.vtu, .csv); histories have all their times in one file")
-
-        print(write.export(folder, out))
-        return
-    if histories:
-        raise Refused(f"--histories: they are written as {', '.join(lab.ENDINGS)}, not as {out.suffix or out}")
-    if out.suffix == ".py":
-        if frame is not None:
-            raise Refused("--frame: a script plays the whole last cycle")
-
-        print(paraview.write_script(folder, out))
-        return
-
-    print(vtu.export(folder, out, frame))
+    print(chosen.export(folder, out, frame, histories))
 
 
 def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif, .mp4, .html: the last cycle") = None,
@@ -53,12 +32,8 @@ def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif
 
     Example: patchfem view out/rig -o cycle.gif
     """
-    if out is not None and out.suffix == ".html":
-        if frame is not None or magnify is not None:
-            raise Refused("--frame, --magnify: a page shows the last cycle and has a slider for each")
-        print(player.write_page(folder, out))
-        return
-    viewer.view(folder, out, frame, magnify)
+    if told := chosen.view(folder, out, frame, magnify):
+        print(told)
 
 
 def report(*folders: Path, out: out_in("page.html, by default report.html here") = None,
@@ -69,6 +44,4 @@ def report(*folders: Path, out: out_in("page.html, by default report.html here")
 
     Example: patchfem report out/rig out/six --measured loop.csv -o both.html
     """
-    if not folders:
-        raise Refused("report: name at least one results folder")
     print(reports.report_of(list(folders), out, measured))

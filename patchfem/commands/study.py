@@ -7,25 +7,14 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from .. import scales
 from ..campaigns import backbone as backbones
 from ..campaigns import cost as cost_curves
-from ..campaigns import fit as loop_fits
-from ..campaigns import fit_decay as fit_decays
-from ..campaigns import fit_path, wear_coefficient
-from ..campaigns.rows import asked as asking
-from ..campaigns.rows import fit as row_fits
 from ..effects import unbuilt
 from ..export import backbone as backbone_files
 from ..export import cost as cost_files
-from ..export import fit as fit_lines
-from ..export import fit_folder, results, wear_fit
-from ..export import fit_rows as written
-from ..export import fitted_decay as decay_written
-from ..model import model
+from ..export import fits, results
 from ..runs import joint
-from ..scene import axes, ranges
-from ..scene import scene as scenes
+from ..scene import axes
 from .shared import (
     Json,
     NoPage,
@@ -88,10 +77,12 @@ def backbone(scene: Path, /, *, mode: word("a mode by its name, such as axial; o
     """
     found = joint.freed(model_of(scene, set_))
     ways = backbones.WAYS if method == ALL else (method,)
-    one = backbones.backbone(found, mode, _lengths(amplitudes), ways,
-                             None if quiet or json_ else lambda way: say(f"{way} ..."))
+    lengths = axes.lengths(amplitudes, "--amplitudes") if amplitudes else None
     target = placed(out, f"{found.source.path.stem}-backbone")
-    answer = backbone_files.write_into(one, found.source.title, found.source.resolved, target, not no_page)
+    with results.Folder(target) as folder:
+        one = backbones.backbone(found, mode, lengths, ways,
+                                 None if quiet or json_ else lambda way: say(f"{way} ..."))
+        answer = backbone_files.write_into(one, found.source.title, found.source.resolved, folder, not no_page)
     if json_:
         print(json.dumps(answer, ensure_ascii=False))
     else:
@@ -103,20 +94,6 @@ def backbone(scene: Path, /, *, mode: word("a mode by its name, such as axial; o
         raise NotReached
 
 
-def _lengths(text: str):
-    """Rising amplitudes [m] of "a..b:n" or a list of them; None where nothing is given."""
-    if not text:
-        return None
-    found, wrong = axes.read([f"{LENGTH}={text}"])
-    if wrong:
-        raise scenes.SceneError([one.replace("--over ", "").replace(LENGTH, "--amplitudes") for one in wrong])
-    values = sorted(float(one) for one in found[0].values)
-    if values[0] <= 0:
-        raise Refused("--amplitudes: they are above 0")
-    return values
-
-
-LENGTH = "drive.displacement"  # a key whose values are read as amplitudes are
 EXACT = 1e-12  # of a value, below which an error is round-off
 
 
@@ -153,80 +130,20 @@ def fit(scene: Path, /, *, to: Annotated[str, Parameter(
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
-    found = scene_of(scene, set_)
-    if found.kind in ("rig", "linear") and found.wear is None:
-        if offset or warm_up:
-            raise Refused("--offset and --warm-up belong to a loop of a bench, and this scene is a rig")
-        if fit_decays.is_curve(to):
-            if hold or rows != Rows():
-                raise Refused("--hold, --leave-out, --starts, --seed, --unstable, --placebo and --resume belong to "
-                              f"rows of frequency and input, and {to} is a curve over the amplitude")
-            fitted = fit_decays.fit_decay(found, Path(to), free, None if quiet or json_ else say)
-            target = placed(out, f"{found.path.stem}-fit")
-            _print_fit(decay_written.fit_into(fitted, target), decay_written.lines_of, target, json_)
-            return
-        _fit_rows(found, to, (free, hold, rows), out, json_, quiet)
-        return
-    if rows != Rows():
-        raise Refused("--leave-out, --starts, --seed, --unstable, --placebo and --resume belong to rows of a rig, and "
-                      "this scene is none")
-    if found.wear is not None:
-        _fit_wear(found, to, free, out, json_, quiet)
-        return
-    options = fit_path.LoopOptions(offset, warm_up)
-    fitted = loop_fits.fit_loop(found, Path(to), free, hold, None if quiet else say, options)
-    target = placed(out, f"{found.path.stem}-fit")
-    _print_fit(fit_folder.fit_into(fitted, target), fit_lines.lines_of, target, json_)
-
-
-def _fit_rows(found, to: str, asked: tuple, out: Path | None, json_: bool, quiet: bool) -> None:
-    """Fit a rig to rows; asked: (free, hold, Rows) as they stand on the command line."""
-    free, hold, rows = asked
-    wanted, wrong = ranges.ranges(free)
-    if wrong:
-        raise scenes.SceneError(wrong)
-    if rows.starts < 1:
-        raise Refused(f"--starts {rows.starts}: one at least is wanted")
-    target, path = placed(out, f"{found.path.stem}-fit"), Path(to)
-    with results.Folder(target, rows.resume) as folder, progress_bar(quiet or json_) as progress:
-        if folder.dropped and not quiet:
-            say(folder.dropped)
-        question = (found.resolved(), free, hold, rows.leave_out, rows.placebo, rows.seed, rows.unstable,
-                    path.read_bytes() if path.is_file() else "")
-        starts = written.Starts(folder.path / results.STARTS, question, rows.resume)
-        how = row_fits.Search(rows.starts, rows.seed, rows.unstable, starts)
-        options = row_fits.RowsOptions(hold, rows.leave_out, rows.placebo, how)
-        fitted = row_fits.fit_rows(asking.Question(found, wanted, path), options, None if quiet else say, progress)
-        answer = written.fit_into(fitted, folder.path, folder.target)
-    _print_fit(answer, written.lines_of, target, json_)
-
-
-def _print_fit(answer: dict, lines_of, target: Path, json_: bool) -> None:
-    """The answer of a fit on stdout, as JSON or in lines; NotReached for one that did not converge."""
+    found, target = scene_of(scene, set_), placed(out, f"{scene.stem}-fit")
+    options = fits.Options(hold, offset, warm_up, **vars(rows))
+    with progress_bar(quiet or json_ or fits.kind_of(found, to) in ("loop", "curve")) as progress:
+        heard = fits.Heard(None if quiet else say, progress, lambda name: f"--{name.replace('_', '-')}")
+        answer = fits.fit_into(found, to, free, options, target, heard)
     if json_:
         print(json.dumps(answer, ensure_ascii=False))
     else:
-        print("\n".join(lines_of(answer)))
+        print("\n".join(fits.lines_of(answer)))
         for text in answer["warnings"]:
             say(f"warning: {text}")
         print(f"results: {target}")
     if answer["outcome"] == "not_converged":
         raise NotReached
-
-
-def _fit_wear(found, to: str, free, out: Path | None, json_: bool, quiet: bool) -> None:
-    with progress_bar(quiet or json_) as progress:
-        fitted = wear_coefficient.wear_coefficient(model.build(found), to, free, progress)
-    target = placed(out, f"{found.path.stem}-fit")
-    text = scenes.loads(found.text, found.path, [*found.sets, fitted.bounds.assigned(fitted.value)]).resolved()
-    answer = wear_fit.fit_into(fitted, found.title, text, target)
-    if json_:
-        print(json.dumps(answer, ensure_ascii=False))
-        return
-    one = answer["values"]["wear.coefficient"]
-    value, low, high = (scales.plain(number, 4) for number in (one["value"], *one["interval"]))
-    print(f"wear.coefficient {value} {one['unit']}, {low} to {high} by the interval of {fitted.measured.name}")
-    print(f"results: {target}")
 
 
 def _print_cost(knob: str, runs: list, names: list, text: str) -> None:

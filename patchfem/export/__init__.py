@@ -25,7 +25,9 @@ In: a `Result`. Out: files. A module imports its own entry of this list and the 
 21. `fitted_decay` a rig fitted to frequency and damping over the amplitude
 22. `fit_rows`  a rig fitted to rows
 23. `wear_fit`  a fitted wear coefficient on disk
-24. `backbone`  frequency and damping over the amplitude on disk
+24. `fits`      a fit of any kind, from its options to its folder
+25. `backbone`  frequency and damping over the amplitude on disk
+26. `chosen`    a results folder in the format, or the picture, that the ending of a file asks for
 
 Read `folder` first.
 """

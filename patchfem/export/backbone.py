@@ -1,7 +1,6 @@
 """A backbone on disk: backbone.csv, backbone.nc, a picture and a page; its answer as plain numbers and as lines."""
 
 from html import escape
-from pathlib import Path
 
 import numpy as np
 
@@ -54,20 +53,19 @@ def contents(found: Backbone, title: str = "") -> Contents:
         name: value for name, value in numbers.items() if value is not None})
 
 
-def write_into(found: Backbone, title: str, resolved: str, target: Path, with_page: bool = True) -> dict:
-    """Write the folder `target`, and return the answer; title: of the scene, resolved: its text in SI."""
+def write_into(found: Backbone, title: str, resolved: str, folder: Folder, with_page: bool = True) -> dict:
+    """Write into an open results folder, and return the answer; title: of the scene, resolved: its text in SI."""
     answer = answer_of(found)
-    with Folder(target) as folder:
-        write_rows(folder.path / "backbone.csv", [HEAD, *(
-            [way, *(repr(float(value)) for value in row)] for way, one in found.curves.items()
-            for row in zip(*(getattr(one, name) for name in COLUMNS)))])
-        write(contents(found, title), folder.path / "backbone.nc")
-        write_json(answer, folder.path / "backbone.json")
-        write_text(folder.path / "scene.resolved.toml", resolved)
-        if found.curves:
-            write_text(folder.path / "backbone.svg", pictures.draw(drawn(found)))
-        if with_page:
-            write_text(folder.path / "report.html", page(found, title))
+    write_rows(folder.path / "backbone.csv", [HEAD, *(
+        [way, *(repr(float(value)) for value in row)] for way, one in found.curves.items()
+        for row in zip(*(getattr(one, name) for name in COLUMNS)))])
+    write(contents(found, title), folder.path / "backbone.nc")
+    write_json(answer, folder.path / "backbone.json")
+    write_text(folder.path / "scene.resolved.toml", resolved)
+    if found.curves:
+        write_text(folder.path / "backbone.svg", pictures.draw(drawn(found)))
+    if with_page:
+        write_text(folder.path / "report.html", page(found, title))
     return answer
 
 

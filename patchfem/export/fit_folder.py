@@ -67,17 +67,16 @@ def value_of(one: Range, found: Fit, k: int) -> dict:
             "sensitivity": float(found.sensitivity[k])}
 
 
-def fit_into(fitted: Fitted, target: Path) -> dict:
-    """Write the results folder of a fit and return the object of fit.json.
+def fit_into(fitted: Fitted, folder: Folder) -> dict:
+    """Write a fit into an open results folder and return the object of fit.json.
 
-    Files: fit.json, fit.csv, fit.svg, scene.fitted.toml. PatchfemError and Missing as in `results.Folder`.
+    Files: fit.json, fit.csv, fit.svg, scene.fitted.toml.
     """
     answer, loop = answer_of(fitted), fitted.loop
-    with Folder(target) as folder:
-        write_json(answer, folder.path / "fit.json")
-        write_text(folder.path / "scene.fitted.toml", fitted_scene(fitted, folder.target))
-        write_rows(folder.path / "fit.csv", loop.time, loop.displacement, loop.reading, fitted.model, fitted.held,
-                   loop.quantity)
-        picture = draw(loop.displacement, loop.reading, fitted.model, fitted.held, loop.quantity)
-        write_text(folder.path / "fit.svg", picture)
+    write_json(answer, folder.path / "fit.json")
+    write_text(folder.path / "scene.fitted.toml", fitted_scene(fitted, folder.target))
+    write_rows(folder.path / "fit.csv", loop.time, loop.displacement, loop.reading, fitted.model, fitted.held,
+               loop.quantity)
+    picture = draw(loop.displacement, loop.reading, fitted.model, fitted.held, loop.quantity)
+    write_text(folder.path / "fit.svg", picture)
     return answer

@@ -1,7 +1,5 @@
 """A fitted decay on disk: its object, rows, and the fitted scene, which runs."""
 
-from pathlib import Path
-
 import numpy as np
 
 from .. import __version__
@@ -30,17 +28,16 @@ def answer_of(fitted: FittedDecay) -> dict:
             "seconds": round(fitted.seconds, 6)}
 
 
-def fit_into(fitted: FittedDecay, target: Path) -> dict:
-    """Write the results folder of a fit, fit.json, fit.csv and scene.fitted.toml, and return the object of fit.json."""
+def fit_into(fitted: FittedDecay, folder: Folder) -> dict:
+    """Write fit.json, fit.csv and scene.fitted.toml into an open results folder, and return the object of fit.json."""
     answer = answer_of(fitted)
     whole = loads(fitted.scene.text, fitted.scene.path, [*fitted.scene.sets, *fitted.sets])
-    with Folder(target) as folder:
-        write_json(answer, folder.path / "fit.json")
-        write_text(folder.path / "scene.fitted.toml", fit_folder.scene_text(whole, fitted.free, fitted.found,
-                                                                            fitted.path, folder.target))
-        rows = zip(fitted.amplitude, fitted.measured[0], 2 * fitted.error[0], fitted.measured[1], 2 * fitted.error[1],
-                   *fitted.model)
-        write_rows(folder.path / "fit.csv", [HEAD, *([repr(float(one)) for one in row] for row in rows)])
+    write_json(answer, folder.path / "fit.json")
+    text = fit_folder.scene_text(whole, fitted.free, fitted.found, fitted.path, folder.target)
+    write_text(folder.path / "scene.fitted.toml", text)
+    rows = zip(fitted.amplitude, fitted.measured[0], 2 * fitted.error[0], fitted.measured[1], 2 * fitted.error[1],
+               *fitted.model)
+    write_rows(folder.path / "fit.csv", [HEAD, *([repr(float(one)) for one in row] for row in rows)])
     return answer
 
 

@@ -19,6 +19,8 @@ def report_of(folders: list, out: Path | None = None, measured: Path | None = No
     that is neither a run nor a sweep, and for runs beside sweeps; Missing where the page cannot be written.
     measured: a file of a laboratory, whose histories and loops are laid over those of the runs.
     """
+    if not folders:
+        raise PatchfemError("report: name at least one results folder")
     many = [(folder / "sweep.csv").is_file() for folder in folders]
     if len(set(many)) > 1:
         raise PatchfemError(f"runs and sweeps cannot be laid side by side: {folders[many.index(True)]} is a sweep, "

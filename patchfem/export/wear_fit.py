@@ -9,10 +9,10 @@ from .results import Folder
 from .summary import write_json
 
 
-def fit_into(fitted: Coefficient, title: str, text: str, target: Path) -> dict:
-    """Write fit.json and scene.fitted.toml into the folder `target` and return the object of fit.json, in SI.
+def fit_into(fitted: Coefficient, title: str, text: str, folder: Folder) -> dict:
+    """Write fit.json and scene.fitted.toml into an open results folder and return the object of fit.json, in SI.
 
-    title and text: of the fitted scene. PatchfemError and Missing as in `results.Folder`.
+    title and text: of the fitted scene.
     """
     one, bounds = fitted.measured, fitted.bounds
     value = {"value": fitted.value, "unit": "m2 N-1", "low": fitted.low, "high": fitted.high,
@@ -22,8 +22,7 @@ def fit_into(fitted: Coefficient, title: str, text: str, target: Path) -> dict:
               "data": {"value": one.value, "low": one.low, "high": one.high},
               "values": {KEY: value},
               "warnings": []}
-    with Folder(target) as folder:
-        write_json(answer, folder.path / "fit.json")
-        told = f"# {KEY} fitted to {one.name}" + ("" if one.where == "--to" else f" of {Path(one.where).name}")
-        write_text(folder.path / "scene.fitted.toml", f"{told}\n\n{text}")
+    write_json(answer, folder.path / "fit.json")
+    told = f"# {KEY} fitted to {one.name}" + ("" if one.where == "--to" else f" of {Path(one.where).name}")
+    write_text(folder.path / "scene.fitted.toml", f"{told}\n\n{text}")
     return answer

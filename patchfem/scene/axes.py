@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, get_origin
 
+from ..core import PatchfemError
 from .keys import quantities
 from .keys.types import keys, kind_of, model_of, parts
 from .reader import _set_value, held, is_value, known, owner_of
 
 LIMITS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
+LENGTH = "drive.displacement"  # a key that holds one
 MOST = 10_000_000  # values of one range
 _RANGE = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
 _UNIT = re.compile(r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*(.*)")
@@ -69,6 +71,17 @@ def read(texts: Iterable[str], sampled: bool = False) -> tuple[list[Axis | Span]
         _add(found, wrong, key, values, sampled)
     named = [one.key for one in found]
     return found, wrong + [f"{key}: stands twice" for key in dict.fromkeys(named) if named.count(key) > 1]
+
+
+def lengths(text: str, name: str) -> list[float]:
+    """Rising values [m] of "a..b:n" or a list, all above 0; PatchfemError names what is asked for."""
+    try:
+        values = sorted(_axis(LENGTH, text, False).values)
+    except ValueError as error:
+        raise PatchfemError("; ".join(f"{name}: {line}" for line in str(error).split("\n"))) from None
+    if values[0] <= 0:
+        raise PatchfemError(f"{name}: {values[0]:g} m; lengths above 0 are wanted, such as 1 um..1 mm:9")
+    return values
 
 
 def _add(found: list, wrong: list, key: str, values: str, sampled: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import Any
 
@@ -33,7 +34,7 @@ def texts(key: str, values: Any) -> list[str]:
     A number alone is a list of one. A text with signs that say something there, such as a comma, stands in quotes.
     """
     listed = values.tolist() if hasattr(values, "tolist") else values
-    return [_piece(key, one) for one in ([listed] if isinstance(listed, Real) else listed)]
+    return [_piece(key, one) for one in (listed if isinstance(listed, Iterable) else [listed])]
 
 
 def _piece(key: str, value: Any) -> str:

@@ -44,7 +44,8 @@ def _of_rows(table: dict, most: int) -> Drawn:
 
 
 def _of_grid(table: dict, first: str | None, most: int) -> Drawn:
-    """Some values of each key, the ends among them and those at which the measure of interest has its ends."""
+    """Some values of each key, the ends among them and those at which the measure of interest has its ends; of keys cut
+    to one value the one at which it is largest."""
     number, ends = len(table["outcome"]), _ends(table["measures"][first]["values"]) if first else []
     along = [np.unique(np.asarray(one["values"], float), return_inverse=True) for one in table["keys"]]
     counts = [values.size for values, _ in along]
@@ -58,7 +59,8 @@ def _of_grid(table: dict, first: str | None, most: int) -> Drawn:
     there = np.all([np.isin(place, some) for some, (_, place) in zip(chosen, along)], axis=0)
     of = ", ".join(f"{some.size} of {values.size} values of {one['name']}" for one, some, (values, _) in
                    zip(table["keys"], chosen, along) if some.size < values.size)
-    told = f"; those with the largest and the smallest {label(first)} are among them" if ends else ""
+    told = "" if not ends else f"; the one with the largest {label(first)} is among them" if not there[ends[0]] else \
+        f"; those with the largest and the smallest {label(first)} are among them"
     return Drawn(np.flatnonzero(there), f"Drawn are {int(there.sum())} of {number} cases: {of}{told}.")
 
 

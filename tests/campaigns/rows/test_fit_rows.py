@@ -347,7 +347,7 @@ def test_placebos_are_whole_fits_of_their_own(tmp_path):
 
 
 @pytest.mark.parametrize("words, said", [
-    (["--offset", "force"], "belong to a loop"), (["--starts", "0"], "one at least"),
+    (["--offset", "force"], "belongs to a loop"), (["--starts", "0"], "one at least"),
     (["--placebo", "friction.static"], "table.key=value,value"), (["--leave-out", "displacement"], "no column"),
     (["--placebo", "structure.mode.axial.damping=0.01,0.2"], "the key is free"),
     (["--placebo", "drive.frequency=140 Hz"], "the rows give the drive"),

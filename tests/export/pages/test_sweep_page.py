@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from page_data import data_of, own_part
 
-from patchfem.export.pages import library
+from patchfem.export.pages import drawn, library
 from patchfem.export.pages.document import DIGITS, document, encoded
 from patchfem.export.pages.lead import span
 from patchfem.export.pages.sweep import brief, page
@@ -123,7 +123,23 @@ def test_always_a_grid_is_thinned_to_a_grid_with_the_extremes_of_its_first_measu
     assert len(text.encode()) < 3e6 and shown.shape[1] > 400
     assert shown.shape[1] == np.prod([len(set(one)) for one in shown.tolist()])  # every combination
     cases = np.ravel_multi_index(shown.astype(int), counts)
-    assert np.argmax(values) in cases and (len(counts) > 9 or np.argmin(values) in cases)
+    said = "those with the largest and the smallest relative displacement amplitude are among them" in text
+    assert np.argmax(values) in cases and said is (np.argmin(values) in cases) and (said or len(counts) > 9)
+
+
+@pytest.mark.parametrize("most, said", [(900, "the one with the largest loop area is among them."),
+                                        (5000, "those with the largest and the smallest loop area are among them.")])
+def test_exact_a_page_names_the_extremes_that_its_grid_has(most, said):
+    """Thirteen keys of two values; the one that is cut first is another at the smallest of the first case."""
+    places = [one.ravel() for one in np.meshgrid(*[np.arange(2)] * 13, indexing="ij")]
+    values = np.random.default_rng(5).uniform(size=8192)
+    smallest, largest = (8190, 1) if most < 1000 else (2, 1)
+    values[[smallest, largest]] = -1, 2
+    keys = [{"name": f"k{k}", "values": one} for k, one in enumerate(places)]
+    table = {"outcome": ["done"] * 8192, "measures": {"loop_area": {"values": values}}, "keys": keys}
+    found = drawn._of_grid(table, "loop_area", most)
+    assert found.said.endswith(said) and largest in found.cases and found.cases.size <= most
+    assert (smallest in found.cases) is ("smallest" in found.said)
 
 
 def test_exact_a_key_written_in_several_units_is_shown_in_that_of_its_numbers(table):

@@ -1,0 +1,42 @@
+"""A results folder in another format, or shown, as the ending of a file says."""
+
+from pathlib import Path
+
+from ..core import PatchfemError
+from . import lab
+from .drawing import paraview
+from .drawing import view as viewer
+from .fields import vtu
+from .lab import write
+from .pages import player
+
+
+def export(folder: Path, out: Path, frame: int | None = None, histories: bool = False) -> str:
+    """Write the fields of a results folder, or its histories and loops, as the ending of `out` says; one line on what
+    was written.
+
+    A .csv has the interface, or the histories where these are asked for or the folder has no fields. PatchfemError for
+    an ending, a frame or histories that do not stand together.
+    """
+    fields = (folder / lab.FIELDS).is_file() or not folder.is_dir()
+    if out.suffix.lower() in lab.ENDINGS and (out.suffix != ".csv" or histories or not fields):
+        if frame is not None:
+            raise PatchfemError("--frame: belongs to fields (.vtu, .csv); histories have all their times in one file")
+        return write.export(folder, out)
+    if histories:
+        raise PatchfemError(f"--histories: they are written as {', '.join(lab.ENDINGS)}, not as {out.suffix or out}")
+    if out.suffix == ".py":
+        if frame is not None:
+            raise PatchfemError("--frame: a script plays the whole last cycle")
+        return paraview.write_script(folder, out)
+    return vtu.export(folder, out, frame)
+
+
+def view(folder: Path, out: Path | None, frame: int | None = None, magnify: float | None = None) -> str:
+    """Show the pieces of a results folder in a window, or draw them into `out`; one line on a page, "" for others."""
+    if out is None or out.suffix != ".html":
+        viewer.view(folder, out, frame, magnify)
+        return ""
+    if frame is not None or magnify is not None:
+        raise PatchfemError("--frame, --magnify: a page shows the last cycle and has a slider for each")
+    return player.write_page(folder, out)
