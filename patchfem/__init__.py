@@ -105,7 +105,7 @@ class _Package(ModuleType):
     """This package, whose folders of these names can be called."""
 
     def __setattr__(self, name: str, value) -> None:
-        if name in _FOLDERS:
+        if name in _FOLDERS and isinstance(value, ModuleType):
             value.__class__ = _Folder
         super().__setattr__(name, value)
 

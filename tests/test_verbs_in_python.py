@@ -172,6 +172,15 @@ def test_a_folder_of_other_files_is_refused_before_the_work(tmp_path, monkeypatc
     assert answer.code == 2 and "notes.txt" in answer.err and (tmp_path / "other" / "notes.txt").is_file()
 
 
+def test_a_folder_that_is_a_verb_can_be_replaced(monkeypatch):
+    import patchfem.mesh.files  # noqa: F401
+    monkeypatch.setattr(pf, "mesh", lambda: "mine")
+    assert pf.mesh() == "mine"
+    monkeypatch.undo()
+    with pytest.raises(pf.PatchfemError, match="only a scene with"):
+        pf.mesh(TEXT, "none.vtu")
+
+
 def test_exact_profile_gives_the_roughness_of_a_sine(tmp_path):
     x = np.linspace(0, 4e-3, 4001)
     path = tmp_path / "trace.csv"

@@ -55,9 +55,9 @@ def of_relay(modes: ModalBasis, row, slides: float, holds: float) -> list:
     """Limit cycles under rigid friction on one interface that slides from turn to turn; [] where there is none.
 
     row (n,): its slide per coordinate; no mode is rigid; slides, holds [N]: friction while it slides and the most that
-    it holds. From a
-    turn on the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half period T/2, and that in which the
-    slide comes to rest there is a cycle, if it goes one way all the time and what would hold it is more than `holds`.
+    it holds. From a turn on the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half period T/2, and
+    that in which the slide comes to rest there is a cycle, if it goes one way all the time and what would hold it is
+    more than `holds`.
     """
     return sorted(one for mode in unstable_modes(modes) for one in _turning(modes, row, (slides, holds), mode))
 
@@ -76,7 +76,7 @@ def _turning(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
 
 def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int) -> list:
     """(Cycle, damping ratio that it balances) at amplitudes (k,) [m] of the output under rigid friction; None where the
-    slide would hold on the way.
+    slide would hold on the way, and of a mode that friction does not act on.
 
     A damping -g of every coordinate keeps the motion of `mode` up (extended periodic motion: Krack 2015); its ratio is
     g/(2 omega). row, forces (slides, holds) [N]: as of `of_relay`.
@@ -88,7 +88,7 @@ def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int)
 
     own = float(modes.dampers[mode, mode])
     first = 4 * forces[0] * abs(row[mode] * modes.output[mode]) / (np.pi * modes.mass * modes.omega[mode])
-    return [_balanced_at(cycle, float(a), own, first / float(a)) for a in amplitudes]
+    return [_balanced_at(cycle, float(a), own, first / float(a)) if first else None for a in amplitudes]
 
 
 def _balanced_at(cycle, amplitude: float, own: float, more: float) -> tuple | None:

@@ -118,6 +118,8 @@ def test_exact_the_backbone_of_rigid_friction_has_its_closed_form():
     assert [one.omega for one, _ in found] == pytest.approx(omega, rel=1e-8)
     assert [ratio for _, ratio in found] == pytest.approx((net + zeta) * 750.0 / omega, rel=1e-7)
     assert limit_cycles.relay_backbone(modes, modes.slide, (force, 4 * force), [2.4 * h], 0) == [None]  # it holds
+    with np.errstate(all="raise"):  # a mode that friction does not act on
+        assert limit_cycles.relay_backbone(modes, 0 * modes.slide, (force, force), [h, 2 * h], 0) == [None, None]
 
 
 def test_the_backbone_of_two_modes_is_the_cycle_of_its_damping():

@@ -118,7 +118,7 @@ def test_cases_with_such_a_mode_run_by_themselves():
         '"free"', '"base"\nfrequency = "110 Hz"\nacceleration = "3 g"')
     scenes = [pf.load(driven.replace("-0.02", damping)) for damping in ("-0.02", "0.02")]
     gains, loses = (pf.build(one) for one in scenes)
-    assert lumped.refuses(gains) and not lumped.refuses(loses)
+    assert "gain energy" in lumped.refuses(gains) and not lumped.refuses(loses)
     both, single = many.answers([gains, loses]), pf.run(scenes[0])
     assert both.outcome[0] == single.outcome
     for name in ("relative_displacement_amplitude", "flutter_amplitude"):

@@ -10,7 +10,7 @@ class Body(NamedTuple):
 
     c (m, m) [m/N]; x (m,) [m]; upper (m, m): factor of the nodes from a on, which is overwritten; side (2, m): U^-T of
     1 and of x; table (m + 1, 3, m + 1): of the stretches [a, stop) the sums of the first squared, of both and of the
-    second squared, which are dN/d closing, -dN/d theta and -dM/d theta; room (4, m): scratch.
+    second squared, which are dN/d closing, -dN/d theta and -dM/d theta; room (2, m): scratch.
     """
 
     c: np.ndarray
