@@ -116,6 +116,8 @@ EFFECTS = {
     "slide.kind=file": Effect("patchfem.inputs.paths", "q straight between the rows of a table", (), ("motion",)),
     "structure": Effect("patchfem.structure.modes", "z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4)", (),
                         ("modes",)),
+    "structure.reduced": Effect("patchfem.structure.reduced", "x = V y, V of constraint and fixed-interface modes, or "
+                                "of free and residual attachment modes", (), ("modes",)),
     "structure.bonded": Effect("patchfem.structure.bonded", "K += k s s^T, D += c s s^T / m", ("modes",)),
     "structure.start": Effect("patchfem.structure.starts", "z(0) = Phi^-1 x(0) (3.2)", ("modes",)),
     "drive.kind=base": Effect("patchfem.dynamics.propagator", "G_i = -base_i a(t)", ("modes",), ("motion",)),

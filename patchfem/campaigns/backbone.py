@@ -30,7 +30,7 @@ from ..model.model import Model
 from ..model.slide import SlidePath
 from ..model.source import placed
 from ..response import ring_down
-from ..response.errors import with_errors
+from ..response.errors import OF_MODES, with_errors
 from ..runs.bench import bench
 from ..runs.bench.engine import steps_of
 from ..runs.bench.errors import errors_of
@@ -155,15 +155,26 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
                                 "--amplitudes", "structure.travel")
         if joint.linear:
             return _level(joint, wanted, methods)
-        curves, missing = {}, {}
+        curves, missing, richer = {}, {}, model.rig.richer
+        other = None if richer is None else _joint(replace(model, rig=richer), mode)
         for way in methods:
             if progress is not None:
                 progress(way)
             try:
                 curves[way] = FIND[way](joint, wanted)
+                if other is not None:
+                    curves[way] = _beside(curves[way], FIND[way](other, wanted))
             except (NotConverged, PatchfemError) as reason:
                 missing[way] = str(reason).removeprefix("backbone: ")
     return _put_together(joint, wanted, curves, missing)
+
+
+def _beside(curve: Curve, other: Curve) -> Curve:
+    """The curve of a reduced structure with the error of the modes left out, from the curve of more of them."""
+    frequency, damping = (OF_MODES * np.abs(np.interp(curve.amplitude, other.amplitude, theirs) - own) for own, theirs
+                          in ((curve.frequency, other.frequency), (curve.damping, other.damping)))
+    return curve._replace(frequency_error=curve.frequency_error + frequency,
+                          damping_error=curve.damping_error + damping)
 
 
 def _joint(model: Model, name: str) -> Joint:

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from ..core import PatchfemError
 
@@ -31,11 +32,13 @@ _BROKEN = (zlib.error, struct.error, ValueError, KeyError, IndexError, OverflowE
 
 
 class Array(NamedTuple):
-    """One variable: "number", "sparse" or "text"; its shape; a call that gives its values, full and as floats."""
+    """One variable: "number", "sparse" or "text"; its shape; a call that gives its values, full and as floats; of a
+    sparse one another that gives a scipy.sparse array."""
 
     kind: str
     shape: tuple
     values: Callable
+    sparse: Callable | None = None
 
 
 class _Known(NamedTuple):
@@ -89,7 +92,7 @@ def _head(path, body, packed: bool, order: str) -> _Known | None:
     count = 1
     for one in shape:
         count *= one
-    if not shape or min(shape) < 0 or count > LARGEST:
+    if not shape or min(shape) < 0 or (max(shape) if kind == _SPARSE else count) > LARGEST:
         raise PatchfemError(f"{path}: a variable of shape {shape}, more than {LARGEST:.1e} numbers; save a part of it")
     if kind in _NUMERIC and total > 8 * count + at + 16:
         raise ValueError(f"{total} bytes for {count} numbers")
@@ -138,7 +141,7 @@ def _fields(data, at: int, order: str):
 
 
 def _array(path, body, packed: bool, order: str, known: _Known) -> Array:
-    def values():
+    def stored():
         try:
             data = _unpacked(path, body, known.total) if packed else body
             if known.kind in _NUMERIC:
@@ -149,7 +152,9 @@ def _array(path, body, packed: bool, order: str, known: _Known) -> Array:
             raise PatchfemError(f"{path}: variable {name} is damaged ({_short(error)}); save it anew") from None
 
     kind = "number" if known.kind in _NUMERIC else "sparse" if known.kind == _SPARSE else "text"
-    return Array(kind, known.shape, values)
+    if kind == "sparse":
+        return Array(kind, known.shape, lambda: in_full(path, stored()), stored)
+    return Array(kind, known.shape, stored)
 
 
 def _unpacked(path, body, total: int) -> bytes:
@@ -168,27 +173,33 @@ def _numbers(data, at: int, shape: tuple, order: str) -> np.ndarray:
     return np.frombuffer(stored, order + _STORED[kind]).reshape(shape, order="F").astype(float)
 
 
-def _sparse(data, known: _Known, order: str) -> np.ndarray:
-    """A sparse matrix in full: row numbers, starts of the columns, values."""
+def _sparse(data, known: _Known, order: str):
+    """A sparse matrix: row numbers, starts of the columns, values."""
     parts, at = [], known.at
     for _ in range(3):
         kind, stored, at = _element(data, at, order)
         parts.append(np.frombuffer(stored, order + _STORED[kind]))
-    return sparse_in_full(*parts, known.shape)
+    return sparse_of(*parts, known.shape)
 
 
-def sparse_in_full(rows, starts, values, shape: tuple) -> np.ndarray:
-    """The matrix (n, m) of a sparse one: row numbers (k,), starts of the columns (m + 1,), values (k,); ValueError
-    where they do not fit together."""
+def sparse_of(rows, starts, values, shape: tuple):
+    """The scipy.sparse array (n, m) of row numbers (k,), starts of the columns (m + 1,), values (k,); ValueError where
+    they do not fit together."""
     count, wide = shape[1], np.diff(starts)
     if starts.size != count + 1 or starts[0] != 0 or (wide < 0).any() or starts[-1] > min(rows.size, values.size):
         raise ValueError("its columns do not fit")
     rows, values = rows[:starts[-1]], values[:starts[-1]]
     if rows.size and not 0 <= rows.min() <= rows.max() < shape[0]:
         raise ValueError("its rows do not fit")
-    out = np.zeros(shape)
-    np.add.at(out, (rows, np.repeat(np.arange(count), wide)), values.astype(float))
-    return out
+    return sparse.csc_array((values.astype(float), rows.astype(np.int64), np.asarray(starts, np.int64)), shape=shape)
+
+
+def in_full(path, matrix) -> np.ndarray:
+    """A sparse matrix as a full array; PatchfemError for one of too many numbers."""
+    if matrix.shape[0] * matrix.shape[1] > LARGEST:
+        raise PatchfemError(f"{path}: a sparse variable of shape {matrix.shape}, more than {LARGEST:.1e} numbers in "
+                            "full; save a part of it")
+    return matrix.toarray()
 
 
 def _texts(data, known: _Known, order: str) -> np.ndarray:

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from ..core import PatchfemError
-from .matlab5 import DEEP, LARGEST, MOST, RATIO, SMALL, Array, sparse_in_full
+from .matlab5 import DEEP, LARGEST, MOST, RATIO, SMALL, Array, in_full, sparse_of
 
 _BROKEN = (OSError, KeyError, ValueError, RuntimeError, TypeError, IndexError, AttributeError, MemoryError,
            OverflowError)
@@ -114,21 +114,22 @@ def _text(rows) -> np.ndarray:
 
 
 def _sparse(path, group) -> Array | None:
-    """A sparse matrix in full: rows of the numbers, starts of the columns, numbers."""
+    """A sparse matrix: rows of the numbers, starts of the columns, numbers."""
     for one in group.values():
         _limited(path, one)
     starts = group["jc"][()].astype(np.int64)
     shape = int(np.ravel(group.attrs["MATLAB_sparse"])[0]), starts.size - 1
-    if shape[0] < 0 or shape[0] * shape[1] > LARGEST:
+    if shape[0] < 0 or max(shape) > LARGEST:
         raise PatchfemError(f"{path}: a sparse variable of shape {shape}, more than {LARGEST:.1e} numbers; save a part")
     if "data" in group and group["data"].dtype.kind not in "iufb":
         return None
 
-    def full():
+    def stored():
         rows, values = (group[name][()] if name in group else np.zeros(0) for name in ("ir", "data"))
-        return sparse_in_full(rows.astype(np.int64), starts, values, shape)
+        return sparse_of(rows.astype(np.int64), starts, values, shape)
 
-    return _array(path, "sparse", shape, full)
+    array = _array(path, "sparse", shape, stored)
+    return array._replace(values=lambda: in_full(path, array.values()), sparse=array.values)
 
 
 def _limited(path, one) -> None:

@@ -12,7 +12,7 @@ from ..inputs import measured
 from ..mesh import files
 from ..scene.rules import limits
 from ..scene.scene import files_of, is_there
-from . import drive, patch, profile, slide, structure_files, worn
+from . import drive, patch, profile, slide, structure_files, structure_reduced, worn
 
 WHOLE = 2 * 2**20  # bytes of a mesh that is read whole
 STARTS = {".msh": (b"$MeshFormat",), ".vtu": (b"<?xml", b"<VTKFile"), ".inp": (b"*",), ".unv": (b"-1", b"    -1")}
@@ -36,7 +36,19 @@ def faults(tables, folder: Path, whole: bool = True, notes: list | None = None) 
                 notes += [text.replace(str(path), path.name) for text in said or ()]
         except PatchfemError as error:
             found.append((error.key or key, str(error).removeprefix(f"{key}: ")))
-    return found
+    return found if found or not whole else [*found, *_reduced(tables, folder)]
+
+
+def _reduced(tables, folder: Path) -> list:
+    """Faults of the matrices of [structure.reduced] beside each other and of its coordinates; nothing is reduced."""
+    table = tables.structure and tables.structure.reduced
+    if not table or not all(is_there(folder / file) for key, file in files_of(tables) if "reduced" in key):
+        return []
+    try:
+        structure_reduced.checked(folder, table, tables.drive.kind == "base")
+    except PatchfemError as error:
+        return [(error.key, str(error))]
+    return []
 
 
 def _mesh(path: Path, tables, whole: bool) -> None:
@@ -87,6 +99,10 @@ def _structure(path: Path, tables, whole: bool) -> None:
     structure_files.built(path, tables.structure, tables.drive, rubs)
 
 
+def _matrix(key: str):
+    return lambda path, tables, whole: structure_reduced.read(path, key)
+
+
 def _measured(path: Path, tables, whole: bool) -> None:
     measured.read_table(path)
 
@@ -98,4 +114,5 @@ def _worn(path: Path, tables, whole: bool) -> tuple:
 
 
 READERS = {"contact.mesh": _mesh, "contact.profile.file": _profile, "slide.file": _slide, "drive.file": _drive,
-           "structure.file": _structure, "measured.file": _measured, "wear.start": _worn}
+           "structure.file": _structure, **{f"structure.reduced.{key}": _matrix(key) for key in
+           structure_reduced.FILES}, "measured.file": _measured, "wear.start": _worn}

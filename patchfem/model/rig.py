@@ -1,7 +1,7 @@
 """The rig that a scene asks for: modes, drive, start, interfaces and springs, built once. Nothing is solved."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -10,7 +10,18 @@ from ..core import ModalBasis, Start
 from ..structure.drive_sizes import decay_rate, omega_of, peak_speed
 from .drive import cycles_of, cycles_per_level, drive_of, levelled
 from .law import interface_laws_of, interface_names
-from .structure import acts, first_of, frequencies, modes_of, notes_of, of_a_patch, own_modes, start_of, yaws
+from .structure import (
+    acts,
+    first_of,
+    frequencies,
+    modes_of,
+    notes_of,
+    of_a_patch,
+    own_modes,
+    richer_modes,
+    start_of,
+    yaws,
+)
 
 BEYOND = 1e3  # m, past which nobody follows a motion that a mode of damping below 0 or a softening spring drives
 NOTHING = 1e-9  # of the largest slide of a mode: one below it is round-off
@@ -31,7 +42,8 @@ class Rig:
     scene lists modes; notes: on a structure file; parts (p, n): slide of the first interface in each of the scene's own
     modes, that first one before the others, per coordinate; contact_mass [kg]: modal mass of that mode over
     slide_1^2, 0 where it leaves the interface at rest; stuck(stiffness [N/m]) -> the Rig without the joint, of modes
-    that were measured with one that a patch holds, which is not pressed yet; None of any other.
+    that were measured with one that a patch holds, which is not pressed yet; None of any other. richer: the rig
+    of a reduced structure with more of its modes, None where none is left out; kept: notes on what is left of it.
     """
 
     modes: ModalBasis
@@ -61,6 +73,8 @@ class Rig:
     contact_mass: float
     onset: tuple = ("distortion", None)
     stuck: Callable | None = None
+    richer: "Rig | None" = None
+    kept: tuple = ()
 
     @property
     def speed(self) -> float:
@@ -101,7 +115,14 @@ def rig_asked(scene, joint: float | None = None) -> Rig:
 
     joint: stiffness [N/m] of a pressed patch, taken off modes that were measured with it.
     """
-    structure, asked, alone = scene.structure, scene.drive, own_modes(scene, joint)
+    more, kept = richer_modes(scene)
+    return replace(_rig(scene, own_modes(scene, joint), joint), richer=None if more is None else _rig(scene, more),
+                   kept=tuple(kept))
+
+
+def _rig(scene, alone: ModalBasis, joint: float | None = None) -> Rig:
+    """The rig of a scene with the coordinates `alone`, as `own_modes` gives them."""
+    structure, asked = scene.structure, scene.drive
     modes = modes_of(scene, alone)
     drive, bonded = drive_of(scene, modes), structure.bonded
     own, mass = first_of(scene, alone)

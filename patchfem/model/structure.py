@@ -14,7 +14,7 @@ from ..friction import record
 from ..scene.keys.same import once
 from ..structure import masses, starts
 from ..structure.modes import basis
-from . import structure_files
+from . import structure_files, structure_reduced
 from .law import interface_laws_of
 
 
@@ -117,7 +117,14 @@ def _as_given(scene) -> ModalBasis:
                             [(d.between, d.coefficient) for d in structure.damper],
                             [i.between for i in structure.interface], structure.output_mass or 1,
                             pushed_mass(structure, drive) if forced else None)
+    if structure.reduced is not None:
+        return structure_reduced.found(scene)[0]
     return _read(scene)[0]
+
+
+def richer_modes(scene) -> tuple:
+    """(coordinates of a reduced [structure] with more modes than it keeps, None where no mode is left out; notes)."""
+    return (None, ()) if scene.structure.reduced is None else structure_reduced.found(scene)[1:]
 
 
 @once
@@ -156,7 +163,8 @@ def start_state(scene, found: ModalBasis) -> Start:
     structure, drive = scene.structure, scene.drive
     if structure.start is not None:
         try:
-            return starts.given(found, structure.start.displacement, structure.start.velocity)
+            return starts.given(found, *(_of_boundary(structure, found, values) for values in
+                                         (structure.start.displacement, structure.start.velocity)))
         except PatchfemError as error:
             text = str(error).removeprefix("structure.start: ")
             raise PatchfemError(f"{scene.where('structure.start')}: {text}") from None
@@ -172,6 +180,13 @@ def start_state(scene, found: ModalBasis) -> Start:
     if drive.kind == "base" and drive.waveform == "step" and drive.displacement is not None:
         return step_start(found, drive.displacement)
     return starts.at_rest(found)
+
+
+def _of_boundary(structure, found: ModalBasis, values):
+    """Values of a start, of a reduced structure those of its boundary with its modes at rest."""
+    if structure.reduced is None or values is None:
+        return values
+    return np.append(np.asarray(values, float), np.zeros(len(found.names) - len(values)))
 
 
 def step_start(found: ModalBasis, displacement: float) -> Start:

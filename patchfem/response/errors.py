@@ -37,6 +37,7 @@ LOOSER = {"slip_amplitude": 1.4, "stick_fraction": 1.7, "slip_start_phase": 1.4,
 SHARE, LEAST = 0.5, 0.2  # of the typical relative change, that of an irregular and of a regular measure at least
 OF_CHANGE, OF_TYPICAL = 0.5, 0.3  # of runs that a tolerance tells apart
 OF_FINER, OF_TYPICAL_FINER = 2.8, 0.4  # of runs that twice the harmonics tell apart: 99.5 % of 555 bars of 48 rigs
+OF_MODES, OF_TYPICAL_MODES = 3.0, 0.5  # of runs with more than twice the modes of a reduced structure
 # of runs whose cells are a quarter as many, and of measures that change less with them: of the first order, or peaks
 OF_CELLS, OF_TYPICAL_CELLS = 0.2, 0.02
 OF_CELL = {"stick_fraction": 0.4, "slip_start_phase": 0.4, "friction_force_peak": 0.5, "drift_per_cycle": 0.3}
@@ -187,6 +188,20 @@ def finer_error(values: dict, finer: dict) -> dict:
     typical = typical_change(values, gaps)
     return {name: OF_FINER * gap + (OF_TYPICAL_FINER * typical * abs(values[name]) if gap > ROUND * abs(values[name])
                                     else 0.0) for name, gap in gaps.items()}
+
+
+def modes_error(values: dict, more: dict) -> dict:
+    """Error by name of a motion of a reduced structure, from one with more than twice as many of its modes.
+
+    The change is most of the error on the mean, but friction that sticks and slips answers what is left out unevenly.
+    One change can be small by chance, so a share of what the main measures typically change by counts besides, but for
+    what a limit holds. Of 30 random chains under five laws, none of them used before, 98.8 % of 511 bars held the
+    value of the whole chain, at a median of three times the error.
+    """
+    gaps = change(values, more)
+    typical = typical_change(values, gaps)
+    return {name: max(OF_MODES * gap, OF_TYPICAL_MODES * typical * abs(values[name]))
+            if gap > ROUND * abs(values[name]) else gap for name, gap in gaps.items()}
 
 
 def cells_error(fine: dict, *coarse: dict) -> dict:

@@ -151,6 +151,8 @@ def _finer_motion(seen, wide: dict, coarse) -> str:
         return _to_a_sample(seen.extra["cycles"], int(steps))
     if cause == "mesh":
         return _finer_under(seen, coarse)
+    if cause == "reduced":
+        return f"set structure.reduced.modes = {_more_modes(seen, wide[name])}"
     if cause == "modes" and seen.extra["shear_modes"] < seen.patch.x.size:
         return f"set accuracy.shear_modes = {min(4 * seen.extra['shear_modes'], seen.patch.x.size)}"
     if cause == "bonds":
@@ -158,6 +160,12 @@ def _finer_motion(seen, wide: dict, coarse) -> str:
     balanced = seen.extra.get("harmonics")  # None where a steady motion is exact between yields
     return READ if balanced is None or name.startswith(OF_SAMPLES) else \
         notes.more_harmonics(balanced, _sharp(seen))
+
+
+def _more_modes(seen, times: float) -> int:
+    """Modes of a reduced structure that bring an error down by `times`, which falls with the square of their number."""
+    kept = seen.model.rig.modes.omega.size
+    return ceil(kept * min(max(2.0, times**0.5), 16.0))
 
 
 def _cause(seen, name: str) -> str:

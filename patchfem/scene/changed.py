@@ -79,6 +79,7 @@ class Base:
         """How scenes with other numbers at these keys are made from one that `changed` gave for the same keys; None
         where a key is not plain, or where a rule of such a scene looks at what the key holds."""
         told = "friction.static" in keys and "kinetic" in self.raw.get("friction", {})
+        told |= like.structure is not None and like.structure.reduced is not None
         if told or not (_lumped(like) or _pressed(like)):
             return None
         places = [_place_of(like, key) for key in keys]

@@ -152,10 +152,17 @@ def files_of(found: tables.Tables | Scene) -> list[tuple[str, str]]:
     profile = found.contact and found.contact.profile
     named = [("contact.mesh", found.contact and found.contact.mesh), ("contact.profile.file", profile and profile.file),
              ("slide.file", found.slide and found.slide.file), ("drive.file", found.drive and found.drive.file),
-             ("structure.file", found.structure and found.structure.file),
+             ("structure.file", found.structure and found.structure.file), *_reduced_files(found.structure),
              ("measured.file", found.measured and found.measured.file),
              ("wear.start", found.wear and found.wear.start)]
     return [(key, file) for key, file in named if file]
+
+
+def _reduced_files(structure: tables.Structure | None) -> list[tuple[str, Any]]:
+    """(key, file) of the matrices of [structure.reduced]; a damping ratio is no file."""
+    reduced = structure and structure.reduced
+    return [(f"structure.reduced.{name}", file) for name in ("stiffness", "mass", "damping")
+            if reduced and isinstance(file := getattr(reduced, name), str)]
 
 
 def is_there(path: Path) -> bool:
@@ -314,7 +321,7 @@ def _slide(slide: tables.Slide) -> tables.Slide:
 def _structure(structure: tables.Structure) -> tables.Structure:
     update: dict[str, Any] = {"mode": tuple(_mode(mode, not index) for index, mode in enumerate(structure.mode))}
     update["interface"] = tuple(map(_law, structure.interface))
-    if structure.masses and structure.output_mass is None:
+    if (structure.masses or structure.reduced) and structure.output_mass is None:
         update["output_mass"] = 1
     return structure.model_copy(update=update)
 

@@ -17,7 +17,7 @@ import numpy as np
 from ...effects import has
 from ...model.model import Model
 from ...response.coarser import Coarser, coarser_space
-from ...response.errors import cells_error, change, pieces_error, step_error, tolerance_error
+from ...response.errors import cells_error, change, modes_error, pieces_error, step_error, tolerance_error
 from ...scene.rules import methods
 from ...scene.rules.draft import acts, pinned
 from ...slip import shear_modes
@@ -81,6 +81,15 @@ class Engine(NamedTuple):
     resumes: bool = False
     keeps: bool = False
     steady: bool = False
+
+    def in_modes(self, model: Model, numerics, patch) -> list:
+        """The run with more modes of a reduced structure, [] where it leaves none out; in a march at a quarter of the
+        steps."""
+        if model.rig.richer is None:
+            return []
+        few = _fewer(numerics, 4) if self.in_time is _march_in_time else numerics
+        beside = None if few is numerics else Variant(few, patch)
+        return [Coarser((Variant(replace(few, richer=True), patch),), modes_error, beside, "reduced")]
 
     @property
     def run(self) -> Callable:

@@ -48,7 +48,7 @@ def notes_of(run) -> list:
     if raw.levels and rig.onset[0] == "slip" and raw.held > 0:
         out.append(f"onset_level: a slip amplitude counts from {length(raw.held)} on, a thousandth of the slide over "
                    "which the interface gives way; below it a part of the interface may slip already")
-    return [*out, *creeping_note(f), *run.rings.notes, *ended]
+    return [*rig.kept, *out, *creeping_note(f), *run.rings.notes, *ended]
 
 
 def _across(run) -> list:

@@ -162,9 +162,10 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         return found, numerics, with_errors(found.values, size=size) | curve_measures(found.extra)
 
     def solve(variant):
-        return go(model, replace(variant.numerics, whole=False), variant.patch)
+        meant = replace(model, rig=model.rig.richer) if variant.numerics.richer else model
+        return go(meant, replace(variant.numerics, whole=False), variant.patch)
 
-    meshed = engine.in_space(model, numerics, patch, coarse, found)
+    meshed = [*engine.in_space(model, numerics, patch, coarse, found), *engine.in_modes(model, numerics, patch)]
     space, spent = estimate(solve, found.values, meshed, made)
     bars = []  # errors of the displacement, of one doubling of the steps after the other
     while True:

@@ -178,6 +178,32 @@ class Interface(Friction):
     load: key(Force, "normal force on the interface")
 
 
+MOST_ROWS = 2_000_000
+Coordinate = whole(1, MOST_ROWS) | Text
+
+
+class Reduced(Table):
+    """Matrices of a finite-element program, reduced to boundary coordinates and a few modes."""
+
+    stiffness: key(Text, "file of the stiffness matrix: Matrix Market or Abaqus text (.mtx), MATLAB (.mat), NumPy or "
+                   "SciPy (.npz), Nastran (.op4, .pch)")
+    mass: key(Text, "file of the mass matrix; may be the file of the stiffness")
+    damping: key(number(ge=0, lt=1) | Text | None, "damping ratio of every mode, or a file of the damping matrix; none "
+                 "unless given") = None
+    boundary: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)], "coordinates that are kept, which "
+                  "interfaces, drive.mass and structure.output_mass count from 1: rows of the matrices, or "
+                  "node:direction such as 1201:x where the files name nodes")
+    modes: key(whole(0, 1000), "modes that are kept beside the boundary") = 12
+    method: key(Literal["craig-bampton", "free-interface"], "'craig-bampton' modes with the boundary held, "
+                "'free-interface' modes of the whole with residual attachment modes") = "craig-bampton"
+    moved: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)] | None, "coordinates that a base drive moves "
+               "along x, by row, range a..b:n of rows, node or direction; all of direction x, or all where the files "
+               "name none, unless given") = None
+    slide: key(Between | None, "two boundary coordinates between which [contact] or [normal] slides, 0 for the base",
+               "beside friction") = None
+    unit: key(Length, "unit of length of the files, whose forces are in N; \"1 mm\" for N, mm and tonne") = 1.0
+
+
 class Start(Table):
     """Displacements and velocities at t = 0, one per mode or mass."""
 
@@ -204,6 +230,7 @@ class Structure(Table):
     damper: tuple[Damper, ...] = ()
     interface: tuple[Interface, ...] = ()
     file: key(Text | None, "file of matrices, modes or measured responses (.npz, .mat, .uff), in place of modes") = None
+    reduced: Reduced | None = None
     slide_at: key(Text | None, "place in the file that moves the patch along x, such as 12:+x") = None
     output_at: key(Text | None, "place in the file that carries the accelerometer") = None
     base_at: key(Text | None, "place in the file that is driven as the base") = None

@@ -10,6 +10,7 @@ from ..keys.types import choices
 from .draft import Draft
 
 MATRICES, MEASURED = (".npz", ".mat"), (".uff", ".unv")
+REDUCED = (".mtx", ".mat", ".npz", ".op4", ".pch", ".bdf", ".dat")  # matrices of finite-element programs
 HEAVY = 0.5  # damping ratio from which a mode hardly swings: seldom meant
 PLACES = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
 
@@ -19,7 +20,7 @@ def check_structure(draft: Draft) -> None:
     structure = draft.tables.structure
     if structure is None:
         return
-    forms = [key for key in ("mode", "masses", "file") if draft.given(f"structure.{key}")]
+    forms = [key for key in ("mode", "masses", "file", "reduced") if draft.given(f"structure.{key}")]
     if len(forms) > 1:
         draft.say(f"structure.{forms[1]}", f"{' and '.join(forms)} exclude each other: keep one description of the rig")
     if not forms:
@@ -28,21 +29,23 @@ def check_structure(draft: Draft) -> None:
     if not draft.given("structure.moving_mass") and forms in ([], ["mode"]):
         draft.lacks("structure.moving_mass", "")
     for key in ("spring", "damper", "output_mass"):
-        if "masses" not in forms and draft.given(f"structure.{key}"):
+        if not {"masses", *(["reduced"] if key == "output_mass" else [])} & set(forms) and \
+                draft.given(f"structure.{key}"):
             if draft.given("contact") and key != "output_mass":
                 draft.say(f"structure.{key}", f"joins masses, which do not rub on [contact]; {modes_instead(draft)}")
             else:
                 draft.lacks("structure.masses", f"structure.{key} needs them")
-    if not {"masses", "file"} & set(forms) and draft.given("structure.interface"):
-        draft.lacks("structure.masses", "structure.interface needs them, or structure.file")
+    if not {"masses", "file", "reduced"} & set(forms) and draft.given("structure.interface"):
+        draft.lacks("structure.masses", "structure.interface needs them, or structure.file or [structure.reduced]")
     for key in PLACES:
         if "file" not in forms and draft.given(f"structure.{key}"):
             draft.say(f"structure.{key}", "names a place in a file of modes or responses; give structure.file")
-    if forms == ["masses"] and draft.given("structure.moving_mass"):
-        draft.remark("structure.moving_mass has no meaning beside structure.masses and is not used")
+    if forms in (["masses"], ["reduced"]) and draft.given("structure.moving_mass"):
+        draft.remark(f"structure.moving_mass has no meaning beside structure.{forms[0]} and is not used")
     _modes(draft)
     _masses(draft, structure)
     _file(draft, structure)
+    _reduced(draft, structure.reduced)
     _bonded(draft, structure)
     if structure.measured == "stuck":
         _bolted(draft, structure)
@@ -130,8 +133,8 @@ def _instruments(draft: Draft, modes: tuple) -> None:
 
 def _masses(draft: Draft, structure: Any) -> None:
     """Every spring, damper, interface and named mass must stand between masses that exist."""
-    count = len(structure.masses) if structure.masses is not None else None
-    if count == 0:
+    count = _numbered(structure)
+    if structure.masses is not None and not structure.masses:
         draft.say("structure.masses", "at least one mass is wanted, such as masses = [\"1 kg\"]")
         return
     for name in ("spring", "damper", "interface"):
@@ -140,20 +143,30 @@ def _masses(draft: Draft, structure: Any) -> None:
     _known(draft, "structure.output_mass", structure.output_mass, count)
 
 
+def _numbered(structure: Any) -> int | None:
+    """Number of masses, or of boundary coordinates of a reduced structure; None of any other rig."""
+    if structure.reduced is not None:
+        return len(structure.reduced.boundary) if structure.reduced.boundary else None
+    return len(structure.masses) if structure.masses is not None else None
+
+
 def _between(draft: Draft, key: str, pair: Any, count: int | None) -> None:
     if pair is None:
         return
+    what = "mass" if draft.tables.structure.reduced is None else "boundary coordinate"
     if pair[0] == pair[1]:
-        what = "the base" if pair[0] == 0 else f"mass {pair[0]}"
-        draft.say(key, f"joins {what} to itself; two different masses are wanted, or a mass and 0, the base")
+        draft.say(key, f"joins {'the base' if pair[0] == 0 else f'{what} {pair[0]}'} to itself; two different ones are "
+                       f"wanted, or a {what} and 0, the base")
     for one in dict.fromkeys(pair):
         _known(draft, key, one, count)
 
 
 def _known(draft: Draft, key: str, mass: int | None, count: int | None) -> None:
     if count is not None and mass is not None and mass > count:
-        draft.say(key, f"there is no mass {mass}: masses has {count}, counted from 1" +
-                  ("; 0 is the base" if key.endswith("between") else ""))
+        what, where = ("mass", "masses") if draft.tables.structure.reduced is None else \
+            ("boundary coordinate", "structure.reduced.boundary")
+        draft.say(key, f"there is no {what} {mass}: {where} has {count}, counted from 1" +
+                  ("; 0 is the base" if key.endswith(("between", "slide")) else ""))
 
 
 def drives_mass(draft: Draft) -> None:
@@ -164,8 +177,8 @@ def drives_mass(draft: Draft) -> None:
     if draft.given("structure.mode"):
         draft.say("drive.mass", "names one of structure.masses; [[structure.mode]] is driven at its output: leave it "
                                 "out")  # fmt: skip
-    elif structure.masses:
-        _known(draft, "drive.mass", drive.mass, len(structure.masses))
+    else:
+        _known(draft, "drive.mass", drive.mass, _numbered(structure))
 
 
 def _file(draft: Draft, structure: Any) -> None:
@@ -188,6 +201,30 @@ def _file(draft: Draft, structure: Any) -> None:
         draft.say("structure.interface", "a universal file has nodes, not masses; use slide_at with [friction]")
 
 
+def _reduced(draft: Draft, reduced: Any) -> None:
+    """Files that can be read, boundary coordinates that are named once, places that slide where something rubs."""
+    if reduced is None:
+        return
+    for key in ("stiffness", "mass", "damping"):
+        file = getattr(reduced, key)
+        ending = "." + file.rpartition(".")[2].lower() if isinstance(file, str) else REDUCED[0]
+        if ending not in REDUCED:
+            draft.say(f"structure.reduced.{key}", f"the name ends in '{ending}'; {choices(ending, REDUCED)}")
+    twice = [one for k, one in enumerate(reduced.boundary or ()) if one in reduced.boundary[:k]]
+    if twice:
+        draft.say("structure.reduced.boundary", f"names {twice[0]} twice; each coordinate once")
+    drive = draft.tables.drive
+    if reduced.moved is not None and drive is not None and drive.kind in ("force", "free"):
+        draft.remark("structure.reduced.moved is that of a base drive and is not used")
+    _between(draft, "structure.reduced.slide", reduced.slide, len(reduced.boundary) if reduced.boundary else None)
+    if draft.given("structure.interface"):
+        if reduced.slide is not None:
+            draft.say("structure.reduced.slide", "stands beside [friction]; an interface names its places by between")
+    elif draft.given("friction") and reduced.slide is None:
+        draft.lacks("structure.reduced.slide", "which two boundary coordinates rub, such as slide = [1, 0] for the "
+                                               "first on the base; or write [[structure.interface]] with its own law")
+
+
 def _bonded(draft: Draft, structure: Any) -> None:
     """The spring beside the contact needs to know which contact."""
     if structure.bonded is None or structure.masses is None or len(structure.interface or ()) == 1:
@@ -203,6 +240,7 @@ def _bolted(draft: Draft, structure: Any) -> None:
     if tables.friction is None and not structure.interface:
         draft.say(key, "'stuck' takes the stiffness of the joint off the modes, and this scene has no [friction]")
     for reason, holds in (("structure.masses: masses and springs are not measured", structure.masses is not None),
+                          ("structure.reduced: matrices are not measured", structure.reduced is not None),
                           ("a spring of structure.bonded.wavelength", structure.bonded is not None
                            and structure.bonded.wavelength is not None),
                           ("grooves", under is not None and under.grooves is not None),
@@ -220,8 +258,9 @@ def _start(draft: Draft, structure: Any) -> None:
         return
     if not draft.given("structure.start.displacement") and not draft.given("structure.start.velocity"):
         draft.lacks("structure.start.displacement", "or structure.start.velocity, one value per mode or mass")
-    count = len(structure.masses or structure.mode or ())
-    form = ("mass" if count == 1 else "masses") if structure.masses else "mode" if count == 1 else "modes"
+    count = _numbered(structure) or len(structure.mode or ())
+    form = "boundary coordinates" if structure.reduced is not None else \
+        ("mass" if count == 1 else "masses") if structure.masses else "mode" if count == 1 else "modes"
     for key in ("displacement", "velocity"):
         values = getattr(start, key)
         if values is not None and count and len(values) != count:

@@ -36,6 +36,8 @@ def not_one_sine(rig) -> str:
     """Why a rig is not one mode under one sine, seen by one accelerometer; "" where it is."""
     if rig.modes.gauge is not None:
         return "its gauge and its accelerometer do not move alike"
+    if rig.richer is not None:
+        return "its structure is reduced"
     if rig.modes.omega.size != 1 or not isinstance(rig.drive, BaseSine) or rig.levels:
         return "it is not one mode under one sine"
     if np.isfinite(rig.travel):

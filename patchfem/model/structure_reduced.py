@@ -1,0 +1,140 @@
+"""[structure.reduced] of a scene as modal bases: of the modes that it keeps, and of more of them for the error."""
+
+import re
+from functools import lru_cache
+
+import numpy as np
+
+from ..core import ModalBasis, PatchfemError
+from ..inputs import matrices
+from ..structure import reduced
+from ..structure.places import AXES
+
+FILES = ("stiffness", "mass", "damping")
+_PLACE, _RANGE = re.compile(r"(\d+)(?::(r?[xyz]))?"), re.compile(r"(\d+)\.\.(\d+)(?::(\d+))?")
+
+
+def found(scene) -> tuple:
+    """(ModalBasis, the same with more modes or None where none is left out, notes) of the structure of a scene.
+
+    PatchfemError with the line of the key at fault.
+    """
+    table, structure, drive = scene.structure.reduced, scene.structure, scene.drive
+    try:
+        files = {key: scene.beside(name) for key in FILES if isinstance(name := getattr(table, key), str)}
+        made, notes = _reduction(tuple((key, path, *_stamp(path, key)) for key, path in files.items()), table.boundary,
+                                 table.modes, table.method, table.moved, table.unit, drive.kind == "base")
+        pairs = [one.between for one in structure.interface] or [table.slide] * (table.slide is not None)
+        pushed = None if drive.kind == "base" else drive.mass or structure.output_mass or 1
+        ratio = 0.0 if table.damping is None or isinstance(table.damping, str) else table.damping
+        names = [str(one) for one in table.boundary]
+        basis, more = (reduced.basis(made, count, pairs, structure.output_mass or 1, pushed, ratio, names)
+                       for count in (table.modes, made.omega.size))
+    except PatchfemError as error:
+        raise type(error)(f"{scene.where(error.key or 'structure.reduced')}: {error}") from None
+    return basis, None if made.whole and table.modes >= made.omega.size else more, [*notes, _kept(made, basis, table)]
+
+
+def _kept(made, basis: ModalBasis, table) -> str:
+    """What is left of a structure, by which wrong units show."""
+    count = min(table.modes, made.omega.size)
+    kind = "fixed-interface" if table.method == reduced.CRAIG_BAMPTON else "free-interface"
+    upto = f" up to {made.omega[count - 1] / (2 * np.pi):.4g} Hz" if count else ""
+    moving = np.flatnonzero(basis.omega > 0)
+    first = f"; its first frequency is {basis.omega[moving[0]] / (2 * np.pi):.5g} Hz" if moving.size else ""
+    return f"structure.reduced keeps {len(made.boundary)} boundary coordinate{'s' * (len(made.boundary) > 1)} and " \
+        f"{count} {kind} modes{upto}{first}"
+
+
+def _stamp(path, key: str) -> tuple:
+    try:
+        stamp = path.stat()
+    except OSError as error:
+        raise PatchfemError(f"{path} cannot be read ({error.strerror})", f"structure.reduced.{key}") from None
+    return stamp.st_mtime_ns, stamp.st_size
+
+
+@lru_cache(maxsize=4)
+def _file(key: str, path, changed: int, size: int) -> matrices.Matrix:
+    try:
+        return matrices.read(path, key)
+    except PatchfemError as error:
+        raise PatchfemError(str(error), f"structure.reduced.{key}") from None
+
+
+@lru_cache(maxsize=4)
+def _reduction(files: tuple, boundary: tuple, modes: int, method: str, moved: tuple | None, unit: float,
+               driven: bool) -> tuple:
+    """(Reduction, notes) of files (key, path, time, size)."""
+    every = [_file(*one) for one in files]
+    rows, moving, notes = _placed(every, boundary, moved, driven)
+    found = dict(zip((key for key, *_ in files), (one.values / unit for one in matrices.aligned(*every))))
+    return reduced.reduction(found["stiffness"], found["mass"], found.get("damping"), rows, modes, method,
+                             moving), notes
+
+
+def checked(folder, table, driven: bool) -> None:
+    """PatchfemError with its key for files in a folder, boundary or moved coordinates that cannot be used; nothing is
+    reduced."""
+    every = [_file(key, folder / name, *_stamp(folder / name, key)) for key in FILES
+             if isinstance(name := getattr(table, key), str)]
+    _placed(every, table.boundary, table.moved, driven)
+
+
+def read(path, key: str) -> None:
+    """PatchfemError where a matrix cannot be read."""
+    _file(key, path, *_stamp(path, key))
+
+
+def _placed(every: list, boundary: tuple, moved: tuple | None, driven: bool) -> tuple:
+    """(rows of the boundary, motion (n,) with the base or None, notes) in matrices that fit together."""
+    try:
+        one = matrices.aligned(*every)[0]
+    except PatchfemError as error:
+        raise PatchfemError(str(error), "structure.reduced.mass") from None
+    n = one.values.shape[0]
+    rows = np.concatenate([_rows(each, one, n, "boundary") for each in boundary])
+    if np.unique(rows).size < rows.size:
+        raise PatchfemError("names a coordinate twice", "structure.reduced.boundary")
+    if not driven:
+        return rows, None, []
+    moving, notes = np.zeros(n), []
+    if moved is None and one.places is None:
+        moving[:] = 1.0
+        notes = [f"all {n} coordinates of structure.reduced move with the base, as the files name no directions; name "
+                 "those along x in structure.reduced.moved"] if n > rows.size else []
+    for each in ("x",) if moved is None and one.places is not None else moved or ():
+        moving[_rows(each, one, n, "moved")] = 1.0
+    return rows, moving, notes
+
+
+def _rows(text, one: matrices.Matrix, n: int, key: str) -> np.ndarray:
+    """Rows from 0 that a number from 1, a range of them, a node:direction or, of `moved`, a direction names."""
+    where = f"structure.reduced.{key}"
+    if not isinstance(text, str):
+        if text > n:
+            raise PatchfemError(f"there is no coordinate {text}: the matrices have {n}, counted from 1", where)
+        return np.array([text - 1])
+    if key == "moved" and (found := _RANGE.fullmatch(text)):
+        first, last, count = int(found[1]), int(found[2]), int(found[3] or 0)
+        count = count or last - first + 1
+        step = (last - first) / max(count - 1, 1)
+        if not 1 <= first <= last <= n or step != int(step) or (step == 0 and count > 1):
+            raise PatchfemError(f"'{text}' is no range of whole rows from 1 to {n}; 'a..b:n' are n rows from a to b",
+                                where)
+        return np.arange(first - 1, last, max(int(step), 1))
+    if one.places is None:
+        raise PatchfemError(f"'{text}' names a node, but the files name none; give rows of the matrices from 1", where)
+    if key == "moved" and text in AXES:
+        return np.flatnonzero(one.places[:, 1] == AXES.index(text) + 1)
+    found = _PLACE.fullmatch(text)
+    if found is None:
+        raise PatchfemError(f"'{text}' is no place; node:direction is wanted, such as \"1201:x\"", where)
+    place = int(found[1]), AXES.index(found[2]) + 1 if found[2] else 0
+    rows = np.flatnonzero((one.places == place).all(axis=1))
+    if not rows.size:
+        own = one.places[one.places[:, 0] == place[0], 1]
+        has = ", ".join(AXES[k - 1] if k else "no direction" for k in own)
+        raise PatchfemError(f"the files have no {text}; " + (f"node {place[0]} has {has}" if own.size else
+                            f"their nodes are {one.places[0, 0]} to {one.places[-1, 0]}"), where)
+    return rows

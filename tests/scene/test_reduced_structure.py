@@ -1,0 +1,183 @@
+"""[structure.reduced] of a scene: runs against those of the whole matrices within their bars, what is refused where."""
+
+import numpy as np
+import pytest
+from command_line import cli
+from scene_texts import line_of
+from scipy import sparse
+from scipy.io import mmwrite
+
+import patchfem as pf
+
+COUNT = 40
+SCENE = """\
+[structure]
+output_mass = 2
+[structure.reduced]
+stiffness = "k.mtx"
+mass = "both.npz"
+damping = "both.npz"
+boundary = [40, 25]
+modes = 4
+[[structure.interface]]
+between = [1, 0]
+law = "elastic-plastic"
+static = 0.4
+load = "50 N"
+bond_length = "1 um"
+[drive]
+kind = "base"
+frequency = "100 Hz"
+acceleration = "5 g"
+cycles = 10
+"""
+WHOLE = SCENE[:SCENE.index("[structure.reduced]")].replace("output_mass = 2", 'file = "whole.npz"') + \
+    SCENE[SCENE.index("[[structure.interface]]"):].replace("[1, 0]", "[40, 0]")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Matrices of a chain of 40 masses, held at one end."""
+    k, m = 1e7, 0.02
+    K = k * (2 * np.eye(COUNT) - np.eye(COUNT, k=1) - np.eye(COUNT, k=-1))
+    K[-1, -1] = k
+    M, C = m * np.eye(COUNT), 1e-6 * K
+    mmwrite(tmp_path / "k.mtx", sparse.coo_array(K), symmetry="symmetric")
+    mmwrite(tmp_path / "mm.mtx", sparse.coo_array(K / 1e3), symmetry="symmetric")
+    np.savez(tmp_path / "both.npz", M=M, C=C)
+    np.savez(tmp_path / "milli.npz", M=M / 1e3, C=C / 1e3)
+    np.savez(tmp_path / "whole.npz", M=M, K=K, C=C, output=np.eye(COUNT)[24])
+    np.savez(tmp_path / "small.npz", M=M[:9, :9])
+    skew = M.copy()
+    skew[0, 3] = 1.0
+    np.savez(tmp_path / "skew.npz", M=skew)
+    np.savez(tmp_path / "minus.npz", M=-M)
+    (tmp_path / "named.mtx").write_text("\n".join(f"{i + 1},{1 + i % 2},{j + 1},{1 + j % 2},{K[i, j]:.17g}"
+                                                  for i, j in zip(*np.nonzero(K))))
+    return tmp_path
+
+
+def run_of(folder, text, **sets):
+    (folder / "scene.toml").write_text(text)
+    return pf.run(folder / "scene.toml", **sets)
+
+
+@pytest.mark.share(0)
+@pytest.mark.parametrize("method", ["craig-bampton", "free-interface"])
+def test_always_bars_hold_the_run_of_the_whole_matrices(folder, method):
+    """Under base and force, for every measure with an error."""
+    for old, new, pushed in (("", "", ""), ('kind = "base"', 'kind = "force"', 'acceleration = "5 g"')):
+        pairs = [(SCENE, f'method = "{method}"\nmodes = 4'), (WHOLE, "")]
+        found = []
+        for text, put in pairs:
+            mass = "mass = 1" if text is SCENE else "mass = 40"
+            text = text.replace("modes = 4", put).replace(old or "\0", new)
+            found.append(run_of(folder, text.replace(pushed or "\0", f'force = "60 N"\n{mass}')))
+        small, whole = found
+        errors = {name: (abs(one.value - whole.measures[name].value), one.error) for name, one in small.measures.items()
+                  if one.error is not None and whole.measures.get(name) is not None and not name.startswith("ring_")}
+        assert len(errors) > 10 and all(gap <= bar + 1e-9 * gap for gap, bar in errors.values()), errors
+        assert errors["relative_displacement_amplitude"][0] > 0
+    assert any("keeps 2 boundary coordinates and 4 " in note for note in small.extra["notes"])
+
+
+def test_exact_all_modes_kept_are_the_whole_matrices(folder):
+    small, whole = run_of(folder, SCENE, **{"structure.reduced.modes": 100}), run_of(folder, WHOLE)
+    for name, one in whole.measures.items():
+        if one.value is not None:
+            np.testing.assert_allclose(small.measures[name].value, one.value, rtol=1e-6, atol=one.floor, err_msg=name)
+    assert "reduced" not in small.extra["left_open"]["parts"]
+
+
+def test_exact_other_units_and_names_of_nodes_are_the_same_structure(folder):
+    """N, mm and tonne; rows by node and direction in the order of nodes."""
+    plain, milli, named = (run_of(folder, text) for text in (
+        SCENE, SCENE.replace("k.mtx", "mm.mtx").replace("both", "milli").replace("modes = 4", 'modes = 4\nunit = "1 mm"'),
+        SCENE.replace("modes = 4", 'modes = 4\nmoved = ["1..20", "21..39:10", "22..40:10"]')))
+    for other in (milli, named):
+        one, two = (run.measures["relative_displacement_amplitude"] for run in (plain, other))
+        np.testing.assert_allclose(two.value, one.value, rtol=1e-9)
+
+
+def test_exact_named_nodes_move_along_x_alone(folder):
+    """Odd nodes move along x: the base moves their mass, and interfaces name them."""
+    text = SCENE.replace("k.mtx", "named.mtx").replace("both.npz", "mass.mtx", 1).replace(
+        "[40, 25]", '["40:y", "25:x"]').replace('damping = "both.npz"', "damping = 0.01")
+    (folder / "mass.mtx").write_text("\n".join(f"{i + 1},{1 + i % 2},{i + 1},{1 + i % 2},0.02" for i in range(COUNT)))
+    model = pf.build(pf.load(_written(folder, text.replace("modes = 4", "modes = 38"))))
+    np.testing.assert_allclose((model.rig.modes.base**2).sum(), 20 * 0.02, rtol=1e-9)
+    (folder / "scene.toml").write_text(text.replace("25:x", "25:z"))
+    answer = cli("check", folder / "scene.toml")
+    assert answer.code == 2 and "the files have no 25:z; node 25 has x" in answer.err
+
+
+def _written(folder, text):
+    (folder / "scene.toml").write_text(text)
+    return folder / "scene.toml"
+
+
+REFUSED = {
+    ("boundary", "[40, 25]", "[40, 41]"): "there is no coordinate 41: the matrices have 40, counted from 1",
+    ("boundary", "[40, 25]", "[40, 40]"): "names 40 twice; each coordinate once",
+    ("boundary", "[40, 25]", '["40:x", 2]'): "'40:x' names a node, but the files name none",
+    ("stiffness", "k.mtx", "k.txt"): "the name ends in '.txt'",
+    ("stiffness", "k.mtx", "whole.mtx"): "there is no file",
+    ("mass", "both.npz", "small.npz"): "the matrices differ in size: 40 x 40 and 9 x 9",
+    ("mass", "both.npz", "skew.npz"): "the mass is not symmetric: entries differ from the transpose by 1",
+    ("mass", "both.npz", "minus.npz"): "the mass is not positive: coordinate 1 has -0.02 by itself",
+    ("mass", "both.npz", "named.mtx"): "names nodes and directions and another does not",
+    ("damping", '"both.npz"\nboundary', "1.5\nboundary"): "must be < 1, not 1.5",
+    ("modes", "modes = 4", "modes = -1"): "must be >= 0, not -1",
+    ("moved", "modes = 4", 'modes = 4\nmoved = ["1..60"]'): "'1..60' is no range of whole rows from 1 to 40",
+    ("unit", "modes = 4", 'modes = 4\nunit = "1 kg"'): "'kg' is a unit of mass, but this is a length",
+    ("slide", "modes = 4", "modes = 4\nslide = [1, 0]"): "stands beside [friction]",
+}
+
+
+@pytest.mark.parametrize("key, old, new", REFUSED)
+def test_refuses_with_the_line_of_the_key(folder, key, old, new):
+    text = SCENE.replace(old, new, 1)
+    answer = cli("run", _written(folder, text), "-o", folder / "out")
+    assert answer.code == 2, answer.err
+    line = f"scene.toml:{line_of(text, f'{key} = ')}: structure.reduced.{key}: "
+    assert line in answer.err and REFUSED[key, old, new] in answer.err, answer.err
+
+
+@pytest.mark.parametrize("old, new, says", [
+    ("[1, 0]", "[3, 0]", "there is no boundary coordinate 3: structure.reduced.boundary has 2"),
+    ("output_mass = 2", "output_mass = 3", "there is no boundary coordinate 3"),
+    ('kind = "base"', 'kind = "force"\nmass = 3\nforce = "1 N"', "there is no boundary coordinate 3"),
+    ("output_mass = 2", 'masses = ["1 kg"]', "masses and reduced exclude each other"),
+    ("[[structure.interface]]\nbetween = [1, 0]\n", "[normal]\nload = \"1 N\"\n[friction]\n",
+     "structure.reduced.slide: missing"),
+])
+def test_refuses_places_that_are_not_there(folder, old, new, says):
+    text = SCENE.replace(old, new)
+    text = text.replace('load = "50 N"\n', "") if "normal" in new else text
+    answer = cli("check", _written(folder, text))
+    assert answer.code == 2 and says in answer.err, answer.err
+
+
+def test_exact_a_point_and_a_start_stand_on_the_boundary(folder):
+    """[normal] with slide = [1, 0] is the interface between them; a release moves drive.mass alone."""
+    head, tail = SCENE.split("[[structure.interface]]\n")
+    law, drive = tail.split("[drive]\n")
+    law = law.replace("between = [1, 0]\n", "").replace('load = "50 N"\n', "")
+    one = run_of(folder, SCENE)
+    two = run_of(folder, head.replace("modes = 4", "modes = 4\nslide = [1, 0]") + "[normal]\nload = \"50 N\"\n"
+                 "[friction]\n" + law + "[drive]\n" + drive)
+    np.testing.assert_allclose(two.measures["loop_area"].value, one.measures["loop_area"].value, rtol=1e-9)
+    text = SCENE.split("[drive]")[0] + '[drive]\nkind = "free"\nmass = 2\ndisplacement = "20 um"\ncycles = 5\n'
+    model = pf.build(pf.load(_written(folder, text)))
+    moved = model.rig.modes.shapes @ model.rig.start.z
+    np.testing.assert_allclose(moved, [0, 20e-6, 0, 0, 0, 0], atol=1e-15)
+
+
+@pytest.mark.slow
+def test_exact_a_sweep_over_the_modes_has_a_reduction_for_each(folder):
+    table = pf.sweep(_written(folder, SCENE), {"structure.reduced.modes": [2, 30]})
+    found = table["relative_displacement_amplitude"].values
+    wanted = [run_of(folder, SCENE, **{"structure.reduced.modes": k}).measures["relative_displacement_amplitude"].value
+              for k in (2, 30)]
+    np.testing.assert_allclose(found, wanted, rtol=1e-9)
+    assert found[0] != found[1]
