@@ -28,6 +28,7 @@ from .export import folder as results_folder
 from .export import reports as page_of_several
 from .export import summary as summaries
 from .export.drawing import swept
+from .export.lab import structures
 from .export.pages import lead, released, words
 from .export.surfaces import compare as compared_data
 from .export.surfaces import pairs as pairs_data
@@ -297,14 +298,21 @@ def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None
 
 
 def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, histories: bool = False) -> Path:
-    """Write a results folder in another format, by the ending of `out`; its path.
+    """Write a results folder, or the structure of a scene (.toml), in another format, by the ending of `out`; its path.
 
     Fields: .pvd, .vtu, .vtkhdf, .csv (the interface); histories and loops: .uff, .mat, and .csv where `histories` asks
-    for them or the folder has no fields; .py: a script that plays the last cycle in ParaView. frame: number of the
-    frame of a .vtu or .csv, the last one unless given. PatchfemError as `patchfem export` refuses.
+    for them or the folder has no fields; .py: a script that plays the last cycle in ParaView. Of a scene: matrices and
+    friction elements, .mat for NLvib, .npz for TMDSimPy and pyHarm. frame: number of the frame of a .vtu or .csv, the
+    last one unless given. PatchfemError as `patchfem export` refuses.
     """
-    chosen.export(Path(folder), Path(out), frame, histories)
-    return Path(out)
+    folder, out = Path(folder), Path(out)
+    if folder.suffix != ".toml":
+        chosen.export(folder, out, frame, histories)
+    elif frame is not None or histories:
+        raise PatchfemError("frame, histories: belong to a results folder; of a scene its structure is written")
+    else:
+        structures.export(build(folder), out)
+    return out
 
 
 def view(folder: str | Path, out: str | Path | None = None, /, *, frame: int | None = None,

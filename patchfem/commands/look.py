@@ -6,7 +6,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ..export import chosen, reports
-from .shared import flag, out_in
+from ..export.lab import structures
+from .shared import Refused, Sets, flag, model_of, out_in
 
 Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0, the pressed state; the last one unless "
                                              "given")]
@@ -14,15 +15,23 @@ Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0, th
 
 def export(folder: Path, /, *, out: Annotated[Path, Parameter(
         name=["-o", "--out"], help="fields.pvd (a series, for any ParaView), .vtu, .csv or .vtkhdf; cycle.py (plays "
-                                   "the last cycle in ParaView); histories.uff, .mat or .csv")],
-           frame: Frame = None,
+                                   "the last cycle in ParaView); histories.uff, .mat or .csv; of a scene its matrices "
+                                   "and friction elements as .mat (NLvib) or .npz (TMDSimPy, pyHarm)")],
+           frame: Frame = None, sets: Sets = (),
            histories: flag("the histories and loops as .csv, not the interface") = False):
     """Write the fields of a results folder in another format, or its histories and loops; of a fit the measured loop
-    beside the fitted one.
+    beside the fitted one; of a scene its structure for other programs.
 
     Example: patchfem export out/rig -o histories.uff
     """
-    print(chosen.export(folder, out, frame, histories))
+    if folder.suffix != ".toml":
+        if sets:
+            raise Refused("--set: belongs to a scene; a results folder has run")
+        print(chosen.export(folder, out, frame, histories))
+        return
+    if frame is not None or histories:
+        raise Refused("--frame, --histories: belong to a results folder; of a scene its structure is written")
+    print(structures.export(model_of(folder, sets), out))
 
 
 def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif, .mp4, .html: the last cycle") = None,

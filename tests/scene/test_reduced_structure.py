@@ -92,7 +92,8 @@ def test_exact_all_modes_kept_are_the_whole_matrices(folder):
 def test_exact_other_units_and_names_of_nodes_are_the_same_structure(folder):
     """N, mm and tonne; rows by node and direction in the order of nodes."""
     plain, milli, named = (run_of(folder, text) for text in (
-        SCENE, SCENE.replace("k.mtx", "mm.mtx").replace("both", "milli").replace("modes = 4", 'modes = 4\nunit = "1 mm"'),
+        SCENE, SCENE.replace("k.mtx", "mm.mtx").replace("both", "milli").replace(
+            "modes = 4", 'modes = 4\nunit = "1 mm"'),
         SCENE.replace("modes = 4", 'modes = 4\nmoved = ["1..20", "21..39:10", "22..40:10"]')))
     for other in (milli, named):
         one, two = (run.measures["relative_displacement_amplitude"] for run in (plain, other))

@@ -1,0 +1,116 @@
+"""A rig as matrices and friction elements, for NLvib (.mat) and for TMDSimPy, pyHarm or one's own script (.npz).
+
+M q'' + D q' + K q + sum_e w_e f_e(w_e' q) = Fex1 cos(omega t), q being the coordinates of the rig's modes. NLvib takes
+M, D, K, Fex1 and the structures of `nonlinear_elements`: elasticDryFriction with stiffness and friction_limit_force, or
+tanhDryFriction with friction_limit_force and eps, its speed [m/s]. TMDSimPy takes M, K, C, and Q, T, kt, Fs of each
+JenkinsForce: one row of `direction`, its transpose, `stiffness` and `limit`. M, K, C, slide, output and force or base
+are those that structure.file reads.
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import BaseSine, Outcome, PatchfemError
+from ...disk.whole import whole
+from ...effects import has
+from ...model.model import Model
+from ...model.source import placed
+from ...runs.patch import result as patch_result
+from ...runs.rig import engines, numerics, pieces
+
+ENDINGS = (".mat", ".npz")
+NLVIB = {"elements": "elasticDryFriction", "tanh": "tanhDryFriction"}
+
+
+class Elements(NamedTuple):
+    """Friction elements: form "elements" or "tanh", direction (e, n), limit (e,) [N], stiffness (e,) [N/m] of elements
+    that stretch, speed (e,) [m/s] under tanh."""
+
+    form: str
+    direction: np.ndarray
+    limit: np.ndarray
+    stiffness: np.ndarray
+    speed: np.ndarray
+
+
+def export(model: Model, out: Path) -> str:
+    """Write the rig of a Model as .mat or .npz; one line on what was written.
+
+    PatchfemError for another ending, a scene without [structure] and a law that is neither elements that stretch and
+    slip nor tanh; Missing where `out` cannot be written.
+    """
+    out = Path(out)
+    if out.suffix.lower() not in ENDINGS:
+        raise PatchfemError(f"{out}: a structure is exported as {' or '.join(ENDINGS)}")
+    with placed(model.source):
+        if model.rig is None:
+            raise PatchfemError("a scene is exported as its structure, which it lacks; export a results folder",
+                                "structure")
+        arrays, found = matrices_of(model), elements_of(model)
+    with whole(out) as partial, open(partial, "wb") as file:
+        if out.suffix.lower() == ".npz":
+            np.savez(file, **arrays, **found._asdict())
+        else:
+            _matlab(file, arrays, found)
+    return f"{out}: {len(arrays['M'])} coordinates, {found.limit.size} friction elements"
+
+
+def matrices_of(model: Model) -> dict:
+    """M, C, K (n, n) [kg, N s/m, N/m], output (n,), Fex1 (n,) [N] of the drive, force or base (n,), slide (i, n),
+    Omega [rad/s] of a sine; without a sine Fex1 is that of 1 N or 1 m/s^2."""
+    rig, modes = model.rig, model.rig.modes
+    n = modes.omega.size
+    sine = isinstance(rig.drive, BaseSine)
+    size = rig.drive.acceleration if sine else 1.0
+    push = -modes.base * modes.mass * size
+    found = {"base": np.array(modes.base)} if rig.kind == "base" else {"force": -np.array(modes.base)}
+    found |= {"slide": np.array(modes.interfaces)} if rig.interfaces else {}
+    found |= {"Omega": rig.drive.omega} if sine else {}
+    return {"M": modes.mass * np.eye(n), "C": modes.mass * modes.dampers, "K": modes.mass * np.diag(modes.omega**2),
+            "output": np.array(modes.output), "Fex1": push, **found}
+
+
+def elements_of(model: Model) -> Elements:
+    """The friction elements of a rig; none of one that does not rub. PatchfemError for a law without such elements."""
+    rig, n = model.rig, model.rig.modes.omega.size
+    none = np.zeros(0)
+    if not rig.interfaces:
+        return Elements("elements", np.zeros((0, n)), none, none, none)
+    rows, laws = rig.modes.interfaces, [one.numbers for one in rig.interfaces]
+    if all(law.law == "tanh" for law in laws):
+        limit = np.array([law.static * (model.nominal_load if one.load is None else one.load)
+                          for law, one in zip(laws, rig.interfaces)])
+        return Elements("tanh", rows, limit, none, np.array([law.reference_speed for law in laws]))
+    if why := engines.PIECES.lacks(model, steady=True):
+        odd = next((law.law for law in laws if not has(law.law, "pieces")), None)
+        raise PatchfemError((f"law '{odd}' is" if odd else "the contact is") + " no set of elements that stretch and "
+                            f"slip{'' if odd else f' ({why})'}; use law 'elastic-plastic', 'iwan' or 'tanh', or law "
+                            "'coulomb' with [contact.shear]", rig.interfaces[0].key + ".law" if odd else "contact")
+    patch = None
+    if model.patch is not None:
+        patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
+        if patch.pressure.outcome is Outcome.NO_CONTACT:
+            raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
+    chosen = numerics.by_pieces(model, numerics.choose(model))
+    groups = pieces.YieldingElements(model, chosen, patch).groups
+    stiffness = np.concatenate([one.stiffness for one in groups])
+    limit = np.concatenate([one.stiffness * one.yield_slide for one in groups])
+    direction = np.repeat(rows, [one.stiffness.size for one in groups], axis=0)
+    return Elements("elements", direction, limit, stiffness, none)
+
+
+def _matlab(file, arrays: dict, found: Elements) -> None:
+    """Variables of NLvib, column vectors, and a cell array of its structures."""
+    from scipy.io import savemat
+
+    cells = np.empty((1, found.limit.size), dtype=object)
+    for k, limit in enumerate(found.limit):
+        own = {"stiffness": found.stiffness[k], "ishysteretic": 1.0} if found.form == "elements" else \
+            {"eps": found.speed[k], "ishysteretic": 0.0}
+        cells[0, k] = {"type": NLVIB[found.form], "force_direction": found.direction[k][:, None],
+                       "friction_limit_force": limit, "islocal": 1.0, **own}
+    column = {name: np.asarray(one)[:, None] if np.ndim(one) == 1 else one for name, one in arrays.items()}
+    savemat(file, {**column, "D": arrays["C"], "T_out": arrays["output"][None, :], "nonlinear_elements": cells},
+            long_field_names=True)

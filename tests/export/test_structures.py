@@ -1,0 +1,101 @@
+"""The structure of a scene written for other programs: read back it is the rig, its elements give its friction."""
+
+import numpy as np
+import pytest
+from command_line import cli
+from scene_texts import DRIVE, PAIR, PLASTIC, POINT, STRUCTURE, friction_of
+from scipy.io import loadmat
+
+import patchfem as pf
+from patchfem.model.model import build
+
+RUB = POINT + PLASTIC + STRUCTURE
+
+
+def written(folder, text: str, ending: str):
+    """(Model, path of the export) of a scene."""
+    (folder / "rig.toml").write_text(text)
+    answer = cli("export", folder / "rig.toml", "-o", folder / f"rig{ending}")
+    assert answer.code == 0 and "friction element" in answer.out, answer.err
+    return build(pf.load(folder / "rig.toml")), folder / f"rig{ending}"
+
+
+@pytest.mark.parametrize("ending", [".mat", ".npz"])
+@pytest.mark.parametrize("text", [RUB, RUB.replace('kind = "base"', 'kind = "force"').replace(
+    'acceleration = "5 g"', 'force = "40 N"')], ids=["base", "force"])
+def test_exact_an_exported_structure_is_read_back_as_the_same_rig(tmp_path, text, ending):
+    """By structure.file, to 1e-12: frequency, damping, share of the drive, slide and output; and it runs alike."""
+    model, path = written(tmp_path, text, ending)
+    head, tail = text.split("[structure]")
+    again = head + f'[structure]\nfile = "{path.name}"\n[drive]' + tail.split("[drive]")[1]
+    (tmp_path / "again.toml").write_text(again)
+    one, two = model.rig.modes, build(pf.load(tmp_path / "again.toml")).rig.modes
+    scale = np.sqrt(one.mass)  # modes of a file have 1 kg
+    for name, factor in (("omega", 1.0), ("zeta", 1.0), ("slide", 1 / scale), ("output", 1 / scale)):
+        np.testing.assert_allclose(getattr(two, name), factor * getattr(one, name), rtol=1e-12, err_msg=name)
+    share = scale if '"base"' in text else 1 / scale
+    np.testing.assert_allclose(two.base, share * one.base, rtol=1e-12)
+    before, after = (pf.run(tmp_path / f"{name}.toml") for name in ("rig", "again"))
+    for name in ("relative_displacement_amplitude", "loop_area"):
+        np.testing.assert_allclose(after.measures[name].value, before.measures[name].value, rtol=1e-9)
+
+
+def loop_of(stiffness, limit, slide):
+    """Force (k,) of parallel elements that stretch and slip along a slide (k,), from a rest without force."""
+    stretch, out, last = np.zeros(len(limit)), [], 0.0
+    for x in slide:
+        stretch = np.clip(stretch + stiffness * (x - last), -limit, limit)
+        out.append(stretch.sum())
+        last = x
+    return np.array(out)
+
+
+@pytest.mark.parametrize("law", ["elastic-plastic", "iwan"])
+def test_exact_exported_elements_give_the_friction_of_a_bench(tmp_path, law):
+    """A triangle over the elements, element by element, against the bench of the same law and load."""
+    _, path = written(tmp_path, POINT + friction_of(law) + STRUCTURE, ".npz")
+    with np.load(path) as file:
+        found = {name: file[name] for name in file.files}
+    text = POINT + friction_of(law) + '[slide]\nkind = "triangle"\namplitude = "8 um"\nspeed = "1 mm/s"\ncycles = 2\n'
+    loop = pf.run(text)
+    response = loop.response
+    force = loop_of(found["stiffness"], found["limit"], response.slide - response.slide[0])
+    np.testing.assert_allclose(force, response.force, atol=2e-3 * found["limit"].sum())
+    np.testing.assert_allclose(found["limit"].sum(), 0.3 * 26 * 4.4482216152605, rtol=1e-6)
+    assert found["direction"].shape == (found["limit"].size, 1) and found["form"] == "elements"
+
+
+def test_exact_matlab_has_the_structures_of_nlvib(tmp_path):
+    """A cell array of structures with type, direction and numbers, a D and an Fex1 of the drive; several interfaces."""
+    model, path = written(tmp_path, PAIR + DRIVE, ".mat")
+    found = loadmat(path)
+    modes, drive = model.rig.modes, model.rig.drive
+    np.testing.assert_allclose(found["Fex1"].ravel(), -modes.mass * modes.base * drive.acceleration, rtol=1e-12)
+    np.testing.assert_allclose(np.diag(found["K"]) / np.diag(found["M"]), modes.omega**2, rtol=1e-12)
+    assert found["D"].shape == found["M"].shape and found["T_out"].shape == (1, 2)
+    cells = found["nonlinear_elements"].ravel()
+    assert len(cells) == 2 and {str(cell["type"][0, 0][0]) for cell in cells} == {"elasticDryFriction"}
+    for cell, law, row in zip(cells, model.rig.interfaces, modes.interfaces):
+        assert float(cell["ishysteretic"][0, 0].item()) == 1 and cell["force_direction"][0, 0].shape == (2, 1)
+        np.testing.assert_allclose(cell["force_direction"][0, 0].ravel(), row, rtol=1e-12)
+        np.testing.assert_allclose(cell["friction_limit_force"][0, 0].item(), law.numbers.static * law.load, rtol=1e-12)
+        np.testing.assert_allclose(cell["stiffness"][0, 0].item(), law.numbers.static * law.load
+                                   / law.numbers.bond_length, rtol=1e-12)
+
+
+def test_exact_tanh_has_its_speed(tmp_path):
+    _, path = written(tmp_path, POINT + friction_of("tanh") + STRUCTURE, ".mat")
+    cell = loadmat(path)["nonlinear_elements"].ravel()[0]
+    assert str(cell["type"][0, 0][0]) == "tanhDryFriction" and cell["eps"][0, 0].item() == 1e-3
+
+
+@pytest.mark.parametrize("text, ending, says", [
+    (POINT + friction_of("coulomb") + STRUCTURE, ".mat", "law 'coulomb'"),
+    (POINT + friction_of("bouc-wen") + STRUCTURE, ".npz", "law 'bouc-wen' is no set of elements"),
+    (RUB, ".csv", "a structure is exported as .mat or .npz"),
+    (POINT + PLASTIC + '[slide]\nkind = "triangle"\namplitude = "8 um"\nspeed = "1 mm/s"\n', ".mat", "which it lacks"),
+])
+def test_refuses_what_has_no_such_form(tmp_path, text, ending, says):
+    (tmp_path / "rig.toml").write_text(text)
+    answer = cli("export", tmp_path / "rig.toml", "-o", tmp_path / f"rig{ending}")
+    assert answer.code == 2 and says in answer.err and not (tmp_path / f"rig{ending}").exists(), answer.err
