@@ -115,4 +115,4 @@ def _worn(path: Path, tables, whole: bool) -> tuple:
 
 READERS = {"contact.mesh": _mesh, "contact.profile.file": _profile, "slide.file": _slide, "drive.file": _drive,
            "structure.file": _structure, **{f"structure.reduced.{key}": _matrix(key) for key in
-           structure_reduced.FILES}, "measured.file": _measured, "wear.start": _worn}
+           ("stiffness", "mass", "damping")}, "measured.file": _measured, "wear.start": _worn}
