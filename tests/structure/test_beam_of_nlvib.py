@@ -91,6 +91,6 @@ def test_exact_beam_whose_friction_speed_goes_with_the_frequency(tmp_path, omega
 @pytest.mark.skipif(not (FOLDER and FILE.is_file()), reason="PATCHFEM_DATA has no nlvib-beam.mat")
 @pytest.mark.parametrize("omega", [193.0, 300.0])
 def test_always_the_bar_holds_where_friction_nearly_jumps(tmp_path, omega):
-    """6e-7 m/s at all frequencies: the series are long; 7 harmonics of 128 samples give the peak 3 % lower."""
+    """6e-7 m/s at all frequencies: the series are long."""
     found, truth = run_at(tmp_path, omega, 6e-7), balanced(omega, 6e-7, 61, 4096)
     assert abs(found.value - truth) <= found.error + 1e-6 * truth and found.error < 0.02 * truth

@@ -92,8 +92,10 @@ def no_lanes(model: Model) -> str:
     rig, law = model.rig, model.bonds
     if rig.waveform != "sine" or rig.kind != "base" or rig.levels or rig.start is not None or rig.bends or rig.names:
         return "it is no rig at rest under one sine of the base"
-    if rig.modes.gauge is not None or np.isfinite(rig.travel) or rig.cycles != int(rig.cycles) or rig.cycles < 20:
-        return "it has a gauge, a stop or too few or broken cycles"
+    if rig.modes.gauge is not None or rig.richer is not None or np.isfinite(rig.travel):
+        return "it has a gauge, a reduced structure or a stop"
+    if rig.cycles != int(rig.cycles) or rig.cycles < 20:
+        return "it has too few or broken cycles"
     if law.grows or law.order != 1 or law.initial != 1 or law.breakaway or law.ratio != 1 or not law.static > 0:
         return "its bonds change in number or length"
     if model.measured is not None or model.heat is not None or model.accuracy.shear_modes is not None:
