@@ -19,8 +19,8 @@ MOST = 4096  # tables with other values that are remembered
 # keys of a rig under a sine or of a pressed patch -> end of the values > 0 of which no rule or remark tells one from
 # another
 PLAIN = {"normal.load": inf, "contact.load": inf, "contact.tilt.angle": inf, "contact.crown.radius": inf,
-         "friction.static": inf,
-         "friction.bond_length": inf, "drive.acceleration": inf,
+         "friction.static": inf, "friction.bond_length": inf, "friction.reference_speed": inf,
+         "friction.stiffness": inf, "friction.stribeck_speed": inf, "drive.acceleration": inf,
          "drive.frequency": inf, "structure.moving_mass": inf, "structure.mode.frequency": inf,
          "structure.mode.damping": HEAVY}
 

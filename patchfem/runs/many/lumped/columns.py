@@ -130,8 +130,8 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     wide_of &= True if again is None else ~again(found)
     alike = isinstance(models, Alike)
     remarks = _remarks(models[0], numerics["engine"]) if alike else ()
-    for case in range(n) if remarks or not alike or has(models[0].friction.law, "bonds") \
-            else np.flatnonzero(wide_of).tolist():
+    told = wide_of | _by_law(models, found) if alike else wide_of
+    for case in range(n) if remarks or not alike else np.flatnonzero(told).tolist():
         model = models[case]
         said = remarks if alike else _remarks(model, numerics["engine"])
         if warnings := [*said, *warned(model, outcome[case], found, case, wide_of[case])]:
@@ -191,6 +191,18 @@ def warned(model, outcome, found: Answers, case: int, wide: bool) -> list:
     known = known_of(found, case)
     drift = {name: one for name, one in known.items() if name == "drift_per_cycle"}
     return [*law_warnings(model, outcome, drift, 0.0), *beyond_tolerance(Finding(model, known))]
+
+
+def _by_law(models: Alike, found: Answers) -> np.ndarray:
+    """(n,) whether the law of a case may have to be warned of, as `law_warnings` does: bonds that grow, are unbounded
+    or creep."""
+    first = models.first
+    if not has(first.friction.law, "bonds"):
+        return np.zeros(len(models), bool)
+    if first.bonds.grows or first.bonds.order < 0 or first.bonds.reading != "stretch":
+        return np.ones(len(models), bool)
+    drift, error = found.values["drift_per_cycle"], found.errors["drift_per_cycle"]
+    return (np.abs(drift) > np.nan_to_num(error)) & (found.outcome != str(Outcome.TRANSIENT))
 
 
 def known_of(found: Answers, case: int) -> dict:

@@ -208,9 +208,10 @@ def _solved(models: Sequence[Model], say) -> Answers:
         return exactly(some(models, places), say, FINER_CELLS if law == "iwan" and check else 0)
 
     found, others, _ = answered(models, (*cases_of(models), None), steps_of(models), exact)
-    for case in np.flatnonzero(~others).tolist() if law == "tanh" else ():
-        if notes := creeping_note(models[case].friction):
-            found.notes[case] = notes
+    if law == "tanh":
+        speeds, first = columns_of(models, lambda model: (model.friction.reference_speed,))[0], models[0].friction
+        notes = {one: creeping_note(first.model_copy(update={"reference_speed": one})) for one in {*speeds.tolist()}}
+        found.notes |= {case: [*notes[speeds[case]]] for case in np.flatnonzero(~others).tolist()}
     return found
 
 
