@@ -1,6 +1,8 @@
 """Do the three ways to a backbone keep their bars on joints that nobody chose?
 
-Not yet scored.
+Nearly always. Of 30 joints of seed 41: 495 of 498 numbers by balance lie inside the sum of both bars (Bouc-Wen misses
+by 7.8 and 1.3 bars, tanh by 2.3), all 1164 by decay and all 1242 by statics. Twelve more of one decay lie below what
+400 cycles of the loop beside it come down to; they are left out.
 
 The recipe: 30 rigs of one mode, 50 to 300 Hz, .1 to 10 kg, damping 5e-4 to 1e-2; the joint holds with .03 to 2 times
 the mode's stiffness and slips as a whole at 1 to 30 um. Laws by turns: elastic-plastic, Iwan, Bouc-Wen, tanh.
@@ -12,7 +14,7 @@ step, run at STEPS and half as many a cycle, whose change is its error:
 - decay: the same release, read from turn to turn as `patchfem.response.ring_down` says it is.
 - quasi-static: tip and area of a loop of the law alone.
 
-Run: python studies/steady/three_ways.py [COUNT] [SEED]      (long: three minutes; 30 joints of seed 41)
+Run: python studies/steady/three_ways.py [COUNT] [SEED]      (long: some four minutes; 30 joints of seed 41)
 """
 
 import sys
@@ -193,9 +195,12 @@ def of_decay(curve, laws, rig, last: float) -> np.ndarray:
                                    2 * np.pi / omega))
         stop = np.flatnonzero(at[1:] >= at[:-1])
         end = int(stop[0]) if stop.size else at.size
-        told.append([np.interp(np.log(curve["amplitude"]), np.log(at[:end][::-1]), part[:end][::-1]) for part in rest])
-    return missed([curve[name] for name in ("frequency", "frequency_error", "damping", "damping_error")], told[1],
-                  np.abs(np.subtract(*told)))
+        deep = np.where(curve["amplitude"] < at[end - 1], np.nan, 1.0)
+        told.append([deep * np.interp(np.log(curve["amplitude"]), np.log(at[:end][::-1]), part[:end][::-1])
+                     for part in rest])
+    off = missed([curve[name] for name in ("frequency", "frequency_error", "damping", "damping_error")], told[1],
+                 np.abs(np.subtract(*told)))
+    return off[:, np.isfinite(off).all(axis=0)]
 
 
 def tips(law, slides, steps: int) -> tuple:

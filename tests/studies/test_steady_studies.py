@@ -141,3 +141,8 @@ def test_exact_one_harmonic_is_the_loop_of_the_bench(backbone, tmp_path):
     assert abs(sharp.many[0][1] / sharp.bench[0][1] - 1) < 0.02 < abs(sharp.many[0][2] / sharp.bench[0][2] - 1)
     text = study("steady/steady_pictures.py").backbone(rows, tmp_path / "x.svg").read_text()
     assert "damping ratio" in text and "bonds" in text
+
+
+@pytest.mark.slow
+def test_three_ways_to_a_backbone_keep_their_bars():
+    assert all(inside == total > 0 for inside, total in study("steady/three_ways.py").main(2, 41).values())
