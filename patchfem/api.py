@@ -28,7 +28,6 @@ from .export import folder as results_folder
 from .export import reports as page_of_several
 from .export import summary as summaries
 from .export.drawing import swept
-from .export.lab import structures
 from .export.pages import lead, released, words
 from .export.surfaces import compare as compared_data
 from .export.surfaces import pairs as pairs_data
@@ -311,6 +310,8 @@ def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, 
     elif frame is not None or histories:
         raise PatchfemError("frame, histories: belong to a results folder; of a scene its structure is written")
     else:
+        from .export.lab import structures  # its folder holds more than words
+
         structures.export(build(folder), out)
     return out
 

@@ -50,6 +50,16 @@ cycles = 40
 tolerance = 1e-2
 """
 SOFT = RIG.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"')
+CHAIN = """\
+[structure]
+output_mass = 1
+[[structure.interface]]
+between = [1, 0]
+law = "elastic-plastic"
+static = 0.4
+load = "50 N"
+bond_length = "1 um"
+""" + RIG[RIG.index("[drive]"):]
 
 
 def law(name: str, keys: str = "") -> tuple:
@@ -126,6 +136,8 @@ EXAMPLES = {
     "slide.kind=file": (BONDS, '[slide]\nkind = "file"\nfile = "path.csv"\n'),
     "structure": (RIG, ""),
     "structure.bonded": (RIG, '[structure.bonded]\nstiffness = "1e5 N/m"\n'),
+    "structure.reduced": (CHAIN, '[structure.reduced]\nstiffness = "k.mtx"\nmass = "m.mtx"\ndamping = 0.003\n'
+                                 'boundary = [6]\nmodes = 2\n'),
     "structure.start": (RIG, '[structure.start]\ndisplacement = ["0.1 mm"]\n'),
     "drive.kind=base": drive('kind = "base"\n' + SINE + "cycles = 40\n"),
     "drive.kind=force": drive('kind = "force"\nfrequency = "143 Hz"\nforce = "45 N"\ncycles = 40\n'),
@@ -156,11 +168,20 @@ def _table(head: str, *columns) -> str:
     return "\n".join([head, *(",".join(f"{value:.6g}" for value in row) for row in zip(*columns))]) + "\n"
 
 
+def _matrix(entries) -> str:
+    """A symmetric matrix of (row, column, value), counted from 1, as Matrix Market."""
+    size = max(row for row, _, _ in entries)
+    return "\n".join(["%%MatrixMarket matrix coordinate real symmetric", f"{size} {size} {len(entries)}",
+                      *(f"{row} {column} {value:g}" for row, column, value in entries)]) + "\n"
+
+
 _X, _T = np.linspace(0, 12.7, 301), np.linspace(0, 0.05, 201)
 FILES = {
     "trace.csv": _table("x [mm],z [um]", _X, 0.05 * np.sin(2 * np.pi * _X / 3) + 0.02 * np.sin(2 * np.pi * _X / 0.7)),
     "path.csv": _table("time [s],displacement [um]", [0, 1, 2, 4], [0, 4, -2, 3]),
     "shock.csv": _table("time [s],acceleration [g]", _T, 8 * np.sin(np.pi * _T / 0.01) * (_T < 0.01)),
+    "k.mtx": _matrix([(k, k, 1e6 if k == 6 else 2e6) for k in range(1, 7)] + [(k + 1, k, -1e6) for k in range(1, 6)]),
+    "m.mtx": _matrix([(k, k, 0.1) for k in range(1, 7)]),
     "readings.csv": "frequency [Hz],input [g],acceleration [g],displacement [mil],flag\n143,5,5.4,0.6,\n",
 }
 

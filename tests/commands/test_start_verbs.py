@@ -76,7 +76,7 @@ def test_always_the_doctor_names_every_package_of_the_project_and_what_writes_fi
     found = {one.name: one for one in examine.examined()}
     named = {re.match(r"[\w-]+", line)[0] for line in project["dependencies"]}
     assert set(examine.NEEDED) == named and named <= set(found)
-    assert {extra for extra, _ in examine.EXTRAS.values()} == set(project["optional-dependencies"]) - {"test"}
+    assert {extra for extra, _ in examine.EXTRAS.values()} == set(project["optional-dependencies"]) - {"test", "docs"}
     assert not found["films (.mp4)"].fine and "pip install imageio-ffmpeg" in found["films (.mp4)"].cure
     monkeypatch.setattr(examine, "_version", lambda name: "0.6" if name == "imageio-ffmpeg" else "")
     assert examine._film()[1:] == (True, "imageio-ffmpeg 0.6", "")
