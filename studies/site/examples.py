@@ -137,7 +137,7 @@ EXAMPLES = {
     "structure": (RIG, ""),
     "structure.bonded": (RIG, '[structure.bonded]\nstiffness = "1e5 N/m"\n'),
     "structure.reduced": (CHAIN, '[structure.reduced]\nstiffness = "k.mtx"\nmass = "m.mtx"\ndamping = 0.003\n'
-                                 'boundary = [6]\nmodes = 2\n'),
+                                 'boundary = [6]\nmodes = 3\n'),
     "structure.start": (RIG, '[structure.start]\ndisplacement = ["0.1 mm"]\n'),
     "drive.kind=base": drive('kind = "base"\n' + SINE + "cycles = 40\n"),
     "drive.kind=force": drive('kind = "force"\nfrequency = "143 Hz"\nforce = "45 N"\ncycles = 40\n'),
