@@ -67,16 +67,46 @@ from .commands import compare, lab, look, profile, run, scene, start, study, swe
 from .commands.shared import Ended, Refused, say
 from .commands.streams import plain, ready
 
-# verb -> the module of its function, which is loaded where the verb is asked for
-VERBS = {"new": start, "demo": start, "check": scene, "plan": scene, "run": run, "sweep": sweep, "profile": profile,
-         "compare": compare, "cost": study, "backbone": study, "fit": study, "mesh": scene, "import": lab,
-         "export": look, "view": look, "report": look, "schema": start, "doctor": start, "cite": start}
+# group -> verb -> (the module of its function, loaded where the verb is asked for; what it does; words of an example)
+SCREEN = {
+    "Start": {"demo": (start, "run the rig that comes with it", ""),
+              "new": (start, "write a scene to start from", "joint -o joint.toml"),
+              "check": (scene, "name every mistake", "joint.toml"),
+              "plan": (scene, "say what would run, and its cost", "joint.toml"),
+              "run": (run, "run it: results and a page", "joint.toml")},
+    "Study": {"sweep": (sweep, "run many values of some keys", "tilts.toml"),
+              "backbone": (study, "frequency and damping of a mode", "rig.toml --mode axial"),
+              "fit": (study, "find values from a measurement",
+                      "joint.toml --to loop.csv --free friction.static=0.1..0.8"),
+              "cost": (study, "error against CPU seconds", "rig.toml")},
+    "Surfaces": {"profile": (profile, "roughness of a trace or a scan", "before.csv"),
+                 "compare": (compare, "what wore off between the two", "before.csv after.csv")},
+    "Files": {"report": (look, "several runs on one page", "out/a out/b -o both.html"),
+              "view": (look, "a picture or a film of the pieces", "out/joint -o joint.png"),
+              "export": (look, "fields for ParaView; histories", "out/joint -o play.py"),
+              "import": (lab, "records of a laboratory", "shaker.uff -o record.csv"),
+              "mesh": (scene, "the mesh of the pieces", "joint.toml -o pieces.vtu")},
+    "About": {"doctor": (start, "what this installation has", ""),
+              "schema": (start, "completion of scenes in an editor", "-o scene.json"),
+              "cite": (start, "BibTeX of what a scene stands on", "joint.toml")}}
+VERBS = {verb: row[0] for verbs in SCREEN.values() for verb, row in verbs.items()}
 
 OUT_OF_MEMORY = "out of memory; `patchfem plan` names what takes most of it and the key that drives it"
 
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
-          help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem demo; "
-               "for a scene of your own: patchfem new.")
+          help="friction, vibration and wear of two rubbing surfaces.")
+
+
+def first_screen() -> str:
+    """The verbs in their groups: an example of each and what it does, 80 columns wide."""
+    lines = [f"patchfem {__version__}: {app.help}"]
+    for group, verbs in SCREEN.items():
+        lines += ["", group]
+        for verb, (_, what, example) in verbs.items():
+            shown = f"  patchfem {verb} {example}"
+            lines += [f"{shown:<45}  {what}"] if len(shown) <= 45 else [shown, f"{'':47}{what}"]
+    return "\n".join([*lines, "", "`patchfem VERB --help` explains a verb. `patchfem --install-completion` completes "
+                      "words."])
 
 
 def known(words: list) -> None:
@@ -147,6 +177,9 @@ def _guarded(words: list, before=lambda: None) -> int:
         return 2
     try:
         before()
+        if words in ([], ["--help"], ["-h"]):
+            print(first_screen(), flush=True)
+            return 0
         known(words)
         try:
             app(words, exit_on_error=False, print_error=False)

@@ -8,12 +8,13 @@ from cyclopts import Parameter
 
 from .. import rates
 from ..campaigns.sweeps import ask, estimate
+from ..core import G_N
 from ..effects import shown_absent
 from ..mesh import files as mesh_files
 from ..model import files as model_files
 from ..runs import plan as plans
 from ..runs.patch import result
-from ..scales import tidied
+from ..scales import short, tidied
 from ..scene import scene as scenes
 from .shared import Json, Refused, Sets, flag, model_of, note, say, scene_of
 from .sweep import Over
@@ -54,9 +55,10 @@ def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
 
 
 def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Json = False,
-         probe: flag("time this machine, and solve the static patch for its stiffness") = False):
-    """Say what SCENE would run and not, its size, cost, stiffness chain and groups; with --over, or a table [sweep],
-    of the whole sweep.
+         probe: flag("time this machine, and solve the static patch for its stiffness") = False,
+         verbose: flag("also the effects that the scene does not name", "-v", "--verbose") = False):
+    """Say what SCENE would run, its size, cost, stiffness chain and groups; with --over, or a table [sweep], of the
+    whole sweep.
 
     Example: patchfem plan rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9"
     """
@@ -65,7 +67,7 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
     if over is not None or read.sweep:
         if probe:
             raise Refused("--probe solves the patch of one scene; name its values by --set and leave out what is swept")
-        _plan_sweep(scene, set_, over or Over(), json_)
+        _plan_sweep(scene, set_, over or Over(), json_, verbose)
         return
     found = plans.plan(read)
     answer, asked = found.as_json(), found.model.patch
@@ -78,38 +80,56 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
     if json_:
         print(json.dumps(answer))
         return
-    _print_plan(answer, probe)
+    _print_plan(answer, probe, verbose)
 
 
-def _plan_sweep(scene: Path, sets, what: Over, json_: bool) -> None:
+def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> None:
     """The plan of a sweep."""
     answer = estimate.estimate(*_swept(scene, sets, what))
     if json_:
         print(json.dumps(answer))
         return
-    _print_plan(answer, False)
+    _print_plan(answer, False, verbose)
     print(f"sweep    {answer['cases']} cases of " + ", ".join(f"{n} {key}" for key, n in answer["values"].items())
           + f"; about {answer['seconds_per_case']:.2g} s each on one core, {answer['disk_bytes'] / 1e6:.2g} MB on disk")
 
 
-def _print_plan(answer: dict, probe: bool) -> None:
+def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
+    """What runs and costs, sentences, stiffnesses and groups; at last what the scene does not name."""
     print(f"kind     {answer['kind']}, engine {answer['engine']}")
-    for effect in answer["effects"]:
-        print(f"  runs   {effect['effect']:<28} {effect['equations']}")
-    print(f"  not    {', '.join(shown_absent(answer['not_in_scene'], answer['engine']))}")
-    print("sizes    " + ", ".join(f"{k} {v}" for k, v in answer["unknowns"].items()) + f", steps {answer['steps']}")
     print(f"cost     about {answer['seconds']:.1f} s{plans.compile_words(answer['compile_seconds'])} and "
           f"{answer['bytes'] / 1e6:.0f} MB")
-    print("chain    " + " -> ".join(f"{k} {v:.4g} N/m" if not isinstance(v, str) else f"{k} {v}"
-                                   for k, v in answer["stiffness_chain"].items()))
+    sizes = [f"{count} {_words(name)}" for name, count in answer["unknowns"].items()]
+    print("sizes    " + ", ".join([*sizes, f"{answer['steps']} steps in all"]))
+    for effect in answer["effects"]:
+        print(f"  runs   {effect['effect']:<28} {effect['equations']}")
+    for sentence in answer["verdict"]:
+        print(f"says     {sentence}")
+    links = [f"{_words(name)} {link if isinstance(link, str) else short(link, 'N m-1', 4)}"
+             for name, link in answer["stiffness_chain"].items()]
+    print("chain    " + " -> ".join(links))
     if not probe and not isinstance(answer["stiffness_chain"].get("pieces_shear", "rigid"), str):
-        print("         pieces_shear is an upper estimate from the layers; --probe solves it")
+        print("         the shear of the pieces is an upper estimate from the layers; --probe solves it")
     for one in answer.get("modes", ()):
         held = "" if one["stuck_frequency"] is None else f", {one['stuck_frequency']:.5g} Hz while the contact holds"
         print(f"mode     {one['name']} {one['free_frequency']:.5g} Hz free{held}")
-    print("groups   " + ", ".join(f"{k} {v:.4g}" for k, v in answer["groups"].items()))
-    for sentence in answer["verdict"]:
-        print(f"verdict  {sentence}")
+    for name, value in answer["groups"].items():
+        print(f"group    {_group(value, name)}")
+    if verbose:
+        print(f"not on   {', '.join(shown_absent(answer['not_in_scene'], answer['engine']))}")
+
+
+def _words(name: str) -> str:
+    """The name of a size or of a link as words: those that are foreseen say so."""
+    return f"{name.removesuffix('_about')} (about)".replace("_", " ") if name.endswith("_about") else \
+        name.replace("_", " ")
+
+
+def _group(value: float, name: str) -> str:
+    """A group of the plan with its value as people read it."""
+    text, unit = plans.GROUPS.get(name, (_words(name), "1"))
+    shown = f"{value / G_N:.4g} g" if unit == "m s-2" else short(value, unit, 4)
+    return f"{shown:<10} {text}"
 
 
 def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"], help="mesh.msh or mesh.vtu")],

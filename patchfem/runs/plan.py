@@ -21,6 +21,16 @@ from .rig import plan as of_rig
 from .wear import plan as of_wear
 
 LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
+GROUPS = {  # group -> (what it is, SI unit of its value)
+    "D": ("D: friction limit over the largest push of the drive", "1"),
+    "knee": ("acceleration beyond which friction alone does not bound a resonance", "m s-2"),
+    "drive_amplitude_over_bond_length": ("amplitude of the drive over the bond length", "1"),
+    "amplitude_over_bond_length": ("amplitude of the slide over the bond length", "1"),
+    "slip_length": ("elastic slide of the pieces before the patch slips", "m"),
+    "tilt_over_first_opening": ("tilt over the one at which an edge lifts off", "1"),
+    "share_of_the_spread": ("factor of eq. 2.15 for the spread across the width", "1"),
+}
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Plan:
