@@ -115,8 +115,8 @@ def run(scene: str | Path | Scene | Model | Plan, /, *, say: Callable[[str], Non
     """Run a scene and estimate the errors of its measures; `scene` and sets as `load` takes them.
 
     say: called with one line where something takes long (compiling); on stderr unless given. progress: called with the
-    share of the main pass that is done. SceneError for mistakes in the scene, PatchfemError where it cannot run,
-    NotConverged and Missing among them.
+    share that is done: of all passes of a rig, of the main one of a bench. SceneError for mistakes in the scene,
+    PatchfemError where it cannot run, NotConverged and Missing among them.
     """
     if isinstance(scene, Plan):
         _without(sets, "Plan")

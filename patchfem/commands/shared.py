@@ -132,7 +132,7 @@ class progress_bar:
 
 
 class Lines:
-    """Progress as lines: the share of the main pass that is done and what is left of it, at most one in SECONDS.
+    """Progress as lines: the share that is done and the time that is left, at most one in SECONDS.
 
     The pace is that since the first call: what is compiled before it says nothing of the work.
     """
@@ -149,5 +149,5 @@ class Lines:
             return
         self.next = now + self.SECONDS
         begin, before = self.first
-        left = f", about {(now - begin) * (1 - share) / (share - before):.0f} s left of it" if share > before else ""
-        say(f"{share:.0%} of the main pass done{left}")
+        left = f", about {(now - begin) * (1 - share) / (share - before):.0f} s left" if share > before else ""
+        say(f"{share:.0%} done{left}")

@@ -43,11 +43,11 @@ def run(what, say=None, progress=None, per_point: bool = False, estimate: bool =
         kept: KeptState | None = None) -> Result:
     """Run a Plan, or plan and run a Scene or a Model.
 
-    say: called with one line when compiled code has to be made; progress: called with the share of the main pass that
-    is done. per_point forces the path of every interface point where one lumped point would do; estimate=False skips
-    the coarser runs and leaves the errors None; fresh condenses the pieces anew; kept: where the state of a run with
-    [wear] or of a long march is kept on the way. NotConverged and Missing as named by the stages; the first carries the
-    pressed patch where the motion alone is missed.
+    say: called with one line when compiled code has to be made; progress: called with the share that is done, of all
+    passes of a rig, of the main one of a bench. per_point forces the path of every interface point where one lumped
+    point would do; estimate=False skips the coarser runs and leaves the errors None; fresh condenses the pieces anew;
+    kept: where the state of a run with [wear] or of a long march is kept on the way. NotConverged and Missing as named
+    by the stages; the first carries the pressed patch where the motion alone is missed.
     """
     what = what if isinstance(what, Plan) else plan(what, per_point)
     with placed(what.model.source):

@@ -55,6 +55,8 @@ def write(folder: Path) -> None:
     pages |= {f"effects/{slug(name)}": effect(name, folder / "effects") for name in SHOWN}
     for name, text in pages.items():
         (folder / f"{name}.md").write_text(text, "utf-8")
+    for path in (*folder.rglob("*.toml"), *folder.rglob("*.csv")):
+        path.unlink()  # the scenes stand on their pages; a scene of the repository is one that people wrote
     kept.write_text(state, "utf-8")
 
 

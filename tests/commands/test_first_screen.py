@@ -2,12 +2,14 @@
 
 import json
 import re
+import shlex
 from types import SimpleNamespace
 
 import pytest
 from command_line import cli
 from scene_texts import JOINT_SHAKEN
 
+from patchfem.__main__ import SCREEN, app, known
 from patchfem.commands import shared
 from patchfem.core import Measure, Outcome
 from patchfem.export.pages.words import (
@@ -23,6 +25,7 @@ from patchfem.export.pages.words import (
 )
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
+from patchfem.runs.rig.rig import Passes
 from patchfem.scene.keys.quantities import KINDS
 from patchfem.scene.starting import text_of
 
@@ -92,8 +95,36 @@ def test_exact_progress_as_lines(capsys):
     lines = shared.Lines(lambda: next(times))
     for share in (0.1, 0.25, 0.3, 1.0):
         lines(share)
-    assert capsys.readouterr().err == "25% of the main pass done, about 15 s left of it\n" \
-                                      "100% of the main pass done, about 0 s left of it\n"
+    assert capsys.readouterr().err == "25% done, about 15 s left\n" \
+                                      "100% done, about 0 s left\n"
+
+
+def test_exact_progress_counts_all_passes_by_their_steps():
+    """A run at 400 steps a cycle, its half and its quarter, then one at 800 that nobody foresaw: no share falls."""
+    told = []
+    passes = Passes(told.append, 700)
+    for steps in (400, 200, 100, 800):
+        assert passes.told(steps, lambda progress: [progress(0.5), progress(1.0)] and "gone") == "gone"
+    assert told == pytest.approx([200 / 700, 400 / 700, 500 / 700, 600 / 700, 650 / 700, 1, 1, 1])
+
+
+def test_always_the_first_screen_has_an_example_of_every_verb_that_is_read():
+    screen = cli().out
+    assert screen == cli("--help").out and max(map(len, screen.splitlines())) <= 80
+    assert [line for line in screen.splitlines() if line in SCREEN] == ["Start", "Study", "Surfaces", "Files", "About"]
+    for verb, (_, what, example) in ((verb, row) for verbs in SCREEN.values() for verb, row in verbs.items()):
+        known([verb])
+        assert f"  patchfem {verb} {example}".rstrip() in screen and what in screen
+        read = app.parse_args([verb, *shlex.split(example)], exit_on_error=False, print_error=False)[0]
+        assert read.__name__.rstrip("_") == verb
+
+
+def test_always_a_plan_says_what_does_not_run_where_it_is_asked(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text(text_of("rig"), "utf-8")
+    short, long = cli("plan", path).out, cli("plan", path, "-v").out
+    assert "not on" not in short and long.startswith(short) and "friction.law=iwan" in long[len(short):]
+    assert "N/mm -> " in short and "friction limit over the largest push" in short and "e+0" not in short
 
 
 def test_exact_a_run_that_compiles_tells_no_pace_at_its_first_share(capsys):
@@ -101,7 +132,7 @@ def test_exact_a_run_that_compiles_tells_no_pace_at_its_first_share(capsys):
     lines = shared.Lines(lambda: next(times))
     for share in (0.003, 0.5):
         lines(share)
-    assert capsys.readouterr().err == "0% of the main pass done\n50% of the main pass done, about 11 s left of it\n"
+    assert capsys.readouterr().err == "0% done\n50% done, about 11 s left\n"
 
 
 @pytest.mark.parametrize("cycles, text", [

@@ -151,13 +151,18 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
     Steps a cycle that the scene does not pin are doubled until the error of the displacement is met.
     """
     engine, frames, made = ENGINES[numerics.engine], 0 if patch is None or model.patch.gathers else FRAMES, {}
-    go, size = engine.run, model.rig.displacement
-    found = go(model, numerics, patch, frames, say, progress)
+    passes = Passes(progress, _foreseen(engine, model, numerics, patch, coarse, estimated))
+    size = model.rig.displacement
+
+    def go(meant, numerics, patch, frames=0, say=None):
+        return passes.told(numerics.steps, lambda progress: engine.run(meant, numerics, patch, frames, say, progress))
+
+    found = go(model, numerics, patch, frames, say)
     seconds |= {"march": found.seconds} | (found.prepare or {})
     wide = _whole_period(model, numerics, found)
     if wide > numerics.window:
         numerics = replace(numerics, window=wide)
-        found = go(model, numerics, patch, frames, say, progress)
+        found = go(model, numerics, patch, frames, say)
     if not estimated or found.outcome is Outcome.NOT_CONVERGED:
         return found, numerics, with_errors(found.values, size=size) | curve_measures(found.extra)
 
@@ -194,8 +199,37 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         made[Variant(numerics, patch)] = found
         spent += found.seconds
         numerics = numerics.finer()
-        found = go(model, numerics, patch, frames, say, progress)
+        found = go(model, numerics, patch, frames, say)
         seconds["march"] = found.seconds
+
+
+class Passes:
+    """Progress over all passes of a run, each of which weighs as many as its steps: the share done never falls.
+
+    progress: called with the share, or None; foreseen: steps a cycle of all passes together.
+    """
+
+    def __init__(self, progress, foreseen: float):
+        self.progress, self.foreseen, self.done, self.shown = progress, foreseen, 0.0, 0.0
+
+    def told(self, steps: float, go):
+        """What go(progress of a pass of so many steps a cycle, or None) returns."""
+        found = go(None if self.progress is None else lambda share: self._tell(self.done + share * steps, steps))
+        self.done += steps
+        return found
+
+    def _tell(self, done: float, steps: float) -> None:
+        self.shown = max(self.shown, done / max(self.foreseen, self.done + steps))
+        self.progress(self.shown)
+
+
+def _foreseen(engine, model, numerics, patch, coarse, estimated: bool) -> float:
+    """Steps a cycle of a run and of the coarser ones behind its errors; that on a coarser mesh takes the fewest."""
+    if not estimated:
+        return numerics.steps
+    ways = [*engine.in_time(model, numerics, patch), *engine.in_modes(model, numerics, patch)]
+    each = {numerics: numerics.steps} | {run.numerics: run.numerics.steps for way in ways for run in way.runs}
+    return sum(each.values()) + (min(each.values()) if coarse is not None and model.soft else 0)
 
 
 def _halved(engine, model, numerics, patch) -> tuple:
