@@ -6,9 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .. import rates
+from .. import core, rates
 from ..campaigns.sweeps import ask, estimate
-from ..core import G_N
 from ..effects import shown_absent
 from ..mesh import files as mesh_files
 from ..model import files as model_files
@@ -128,7 +127,7 @@ def _words(name: str) -> str:
 def _group(value: float, name: str) -> str:
     """A group of the plan with its value as people read it."""
     text, unit = plans.GROUPS.get(name, (_words(name), "1"))
-    shown = f"{value / G_N:.4g} g" if unit == "m s-2" else short(value, unit, 4)
+    shown = f"{value / core.G_N:.4g} g" if unit == "m s-2" else short(value, unit, 4)
     return f"{shown:<10} {text}"
 
 
