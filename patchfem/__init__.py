@@ -61,6 +61,7 @@ if TYPE_CHECKING:
         demo,
         export,
         fit,
+        import_,
         load,
         mesh,
         new,
@@ -76,8 +77,8 @@ if TYPE_CHECKING:
 
 __version__ = "0.4.0"
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "backbone", "build", "compare", "cost", "demo", "export", "fit", "load", "mesh", "new", "plan",
-           "plot", "profile", "report", "run", "run_many", "sweep", "view"]
+           "SceneError", "backbone", "build", "compare", "cost", "demo", "export", "fit", "import_", "load", "mesh",
+           "new", "plan", "plot", "profile", "report", "run", "run_many", "sweep", "view"]
 _FOLDERS = ("export", "mesh")  # that are verbs too
 _later = modules_of(__name__, __path__)
 

@@ -14,6 +14,7 @@ from dataclasses import fields
 from difflib import get_close_matches
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from .campaigns import backbone as backbones
@@ -27,7 +28,7 @@ from .export import cost as cost_files
 from .export import folder as results_folder
 from .export import reports as page_of_several
 from .export import summary as summaries
-from .export.drawing import swept
+from .export.drawing import pictures, swept
 from .export.pages import lead, released, words
 from .export.surfaces import compare as compared_data
 from .export.surfaces import pairs as pairs_data
@@ -46,9 +47,10 @@ from .runs.results import result as run_result
 from .runs.run import run as run_plan
 from .scene import axes, starting
 from .scene.changed import Base
+from .scene.keys.quantities import parse
 from .scene.scene import Scene, SceneError, loads, text_of, with_files
 from .scene.scene import load as load_file
-from .scene.sets import assignments, texts
+from .scene.sets import assignments, oversized, sized, texts
 from .scene.sets import text_of as tables_text
 from .surface.compare import pairs as pairs_tables
 from .surface.compare import verdict
@@ -62,8 +64,8 @@ if TYPE_CHECKING:
     from .runs.many.answers import Answers
 
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "backbone", "build", "compare", "cost", "demo", "export", "fit", "load", "mesh", "new", "plan",
-           "plot", "profile", "report", "run", "run_many", "sweep", "view"]
+           "SceneError", "backbone", "build", "compare", "cost", "demo", "export", "fit", "import_", "load", "mesh",
+           "new", "plan", "plot", "profile", "report", "run", "run_many", "sweep", "view"]
 TEXT = "<text>"  # the name of a scene that came without a file
 
 
@@ -72,16 +74,17 @@ def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene
 
     A str that holds a newline or a bracket is the text of a scene, any other and a Path name a file. sets: keys with
     their values, as ``**{"contact.load": "26 lbf"}``; a text stands as in the scene, a number is in SI, lists are
-    taken too. A Scene is read again with the sets added to its own.
+    taken too. A Scene is read again with the sets added to its own. A length that is a number alone and more than the
+    patch is long, or than 1 m, is refused, as somebody meant millimetres; a radius and a text are taken as they are.
     """
     added = assignments(sets)
-    if isinstance(scene, Mapping):  # texts as in a scene, numbers in SI
-        return with_files(loads(tables_text(dict(scene)), TEXT, added))
+    if isinstance(scene, Mapping):
+        return sized(with_files(loads(tables_text(dict(scene)), TEXT, added)), {**scene, **sets})
     if isinstance(scene, Scene):
-        return scene if not added else base_of(scene).changed(added)
+        return scene if not added else sized(base_of(scene).changed(added), sets)
     if isinstance(scene, str) and ("\n" in scene or "[" in scene):
-        return with_files(loads(scene, TEXT, added))
-    return load_file(scene, added)
+        return sized(with_files(loads(scene, TEXT, added)), sets)
+    return sized(load_file(_path(scene, "a scene"), added), sets)
 
 
 def base_of(scene: Scene) -> Base:
@@ -134,7 +137,7 @@ def demo(**sets: Any) -> Result:
 def new(kind: str, /) -> str:
     """The text of a scene of this kind to start from, which `load` and `run` take: patch, joint, bench, rig, linear,
     misalignment or wear; PatchfemError for any other word, with those that there are."""
-    return starting.text_of(kind)
+    return starting.text_of(_word(kind, "new"))
 
 
 def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Path | None = None,
@@ -148,7 +151,7 @@ def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Pat
     stderr unless given. {} where the answer is exact; PatchfemError for a knob that the scene does not have.
     """
     model, runs = build(scene, **sets), {}
-    for knob in [over] if over else cost_curves.knobs_of(model):
+    for knob in [over] if _word(over, "cost: over") else cost_curves.knobs_of(model):
         runs[knob] = cost_curves.curve(model, knob, _on_stderr if say is None else say)
         if out is not None:
             cost_files.write(Path(out), runs)
@@ -169,12 +172,12 @@ def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "",
     without a rig or friction, no such mode and amplitudes that are no lengths above 0.
     """
     model = joint.freed(build(scene, **sets))
-    ways = backbones.WAYS if method == "all" else (method,)
+    ways = backbones.WAYS if _word(method, "backbone: method") == "all" else (method,)
     if unknown := set(ways) - set(backbones.WAYS):
         raise PatchfemError(f"backbone: method {unknown.pop()!r}: one of {', '.join(backbones.WAYS)} or all")
     wanted = None if amplitudes is None else axes.lengths(amplitudes if isinstance(amplitudes, str) else ",".join(
         texts(axes.LENGTH, amplitudes)), "amplitudes")
-    found = backbones.backbone(model, mode, wanted, ways)
+    found = backbones.backbone(model, _word(mode, "backbone: mode"), wanted, ways)
     return backbone_files.contents(found, model.source.title).to_xarray()
 
 
@@ -191,6 +194,10 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
     jobs: processes; executor: "dask" or "dask:ADDRESS". A case that is refused or fails has outcome "failed" and its
     message; SceneError where no case is valid.
     """
+    if over is not None and not isinstance(over, Mapping):
+        raise PatchfemError(f"sweep: over is a dict of key: values, not {over!r:.60}")
+    if wrong := oversized(over or {}):
+        raise SceneError(wrong)
     asked = case_models.Asked(*_text_of(scene))
     lines = [one if isinstance(one, str) else ",".join(texts(key, one)) for key, one in (over or {}).items()]
     request = ask.Request([f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed)
@@ -205,15 +212,34 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
 
 
 class SweepPlots:
-    """Pictures of sweeps, as matplotlib Axes: ``pf.plot.sweep(dataset, "loop_area")``."""
+    """Pictures of sweeps and backbones, as matplotlib Axes: ``pf.plot.sweep(dataset, "loop_area")``."""
 
     @staticmethod
     def sweep(dataset: Dataset, measure: str, ax: Axes | None = None) -> Axes:
         """A measure of the Dataset of a sweep over its key with most values, with the numerical errors.
 
         Hollow points miss the tolerance; values over two decades have a logarithmic axis. ax: Axes to draw on.
+        PatchfemError for what is no Dataset of a sweep, and for a measure that it has not.
         """
+        if not hasattr(dataset, "coords") or not any(str(name).endswith("_error") for name in dataset):
+            raise PatchfemError("plot.sweep: the Dataset of pf.sweep is wanted, with measures and their errors")
         figure = swept.draw.figure(dataset, measure, onto=ax)
+        return figure.axes[0] if ax is None else ax
+
+    @staticmethod
+    def backbone(dataset: Dataset, ax: Axes | None = None) -> Axes:
+        """Frequency of a mode over its amplitude by each way, with the errors; beside it, unless on `ax`, its damping
+        ratio.
+
+        dataset: of `pf.backbone`; PatchfemError for any other, and for one without a curve.
+        """
+        ways = [way for way in backbones.WAYS if f"{way.replace('-', '_')}_amplitude" in getattr(dataset, "coords", ())]
+        if not ways:
+            raise PatchfemError("plot.backbone: the Dataset of pf.backbone with at least one curve is wanted"
+                                + "".join(f"; {why}" for why in [getattr(dataset, "attrs", {}).get("missing")] if why))
+        curves = {way: SimpleNamespace(**{name: dataset[f"{way.replace('-', '_')}_{name}"].values
+                                          for name in backbone_files.COLUMNS}) for way in ways}
+        figure = pictures.draw.figure(backbone_files.drawn(SimpleNamespace(curves=curves)), onto=ax)
         return figure.axes[0] if ax is None else ax
 
 
@@ -227,7 +253,7 @@ def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[
     that serves all of them, as in a sweep. A model that cannot run has outcome "failed" and its message; SceneError
     for a mistake in a scene. One scene or model alone is a list of one.
     """
-    if isinstance(models, str | Path | Scene | Model):
+    if isinstance(models, str | Path | Scene | Model | Mapping) or not isinstance(models, Iterable):
         models = [models]
     return many.answers(meshes.meshed([build(one) for one in models]), say=_on_stderr if say is None else say)
 
@@ -251,12 +277,12 @@ def fit(scene: str | Path | Scene, /, *, to: str | Path, free: Mapping[str, Any]
     if not isinstance(free, Mapping):
         raise PatchfemError(f"fit: free is a dict of key: (low, high), not {free!r:.60}")
     asked = [f"{key}={_ends_of(key, ends)}" for key, ends in free.items()]
-    options = fits.Options(_words(hold), _words(offset), warm_up, leave_out, starts, seed, unstable, _words(placebo),
-                           resume)
+    options = fits.Options(_words(hold, "fit: hold"), _words(offset, "fit: offset"), warm_up, leave_out, starts, seed,
+                           unstable, _words(placebo, "fit: placebo"), resume)
     if out is not None:
-        return fits.fit_into(found, str(to), asked, options, Path(out), fits.Heard(tell))
+        return fits.fit_into(found, str(_path(to, "fit: to")), asked, options, Path(out), fits.Heard(tell))
     with TemporaryDirectory() as room:
-        return fits.fit_into(found, str(to), asked, options, Path(room) / "fit", fits.Heard(tell))
+        return fits.fit_into(found, str(_path(to, "fit: to")), asked, options, Path(room) / "fit", fits.Heard(tell))
 
 
 def _ends_of(key: str, ends: Any) -> str:
@@ -267,20 +293,29 @@ def _ends_of(key: str, ends: Any) -> str:
     return "..".join(pair)
 
 
-def _words(given: str | Iterable[str]) -> tuple:
-    return (given,) if isinstance(given, str) else tuple(given)
+def _words(given: str | Iterable[str], what: str) -> tuple:
+    listed = given if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+    return tuple(_word(one, what) for one in listed)
 
 
-def profile(*files: str | Path, cutoff: float | None = None, window: Iterable[float] | None = None,
-            tip: float | None = None, units: tuple[str, str] | None = None) -> dict[str, Any]:
+def profile(*files: str | Path, cutoff: float | str | None = None, window: Iterable | None = None,
+            tip: float | str | None = None, units: tuple[str, str] | None = None) -> dict[str, Any]:
     """Roughness of measured traces or areal scans: the dict that `patchfem profile --json` prints, in SI.
 
-    cutoff [m]: wavelength that splits roughness from waviness; window [m]: first and last place, of a scan first those
-    of x; tip [m]: radius of the stylus; units: of x and of z for files that name none. `profiles` has a dict per file,
-    `means` those over all. PatchfemError for a file that cannot be read.
+    cutoff: wavelength that splits roughness from waviness; window: first and last place, of a scan first those of x;
+    tip: radius of the stylus; each in m, or a text such as "0.25 mm". units: of x and of z for files that name none.
+    `profiles` has a dict per file, `means` those over all. PatchfemError for a file that cannot be read and what is no
+    length, of cutoff and tip above zero.
     """
-    asked = {"cutoff": cutoff, "window": None if window is None else tuple(window), "tip": tip}
-    reports = [roughness_report.report_of(surfaces.read_surface(Path(one), units), **asked) for one in files]
+    asked = {"cutoff": _metres(cutoff, "profile: cutoff"), "tip": _metres(tip, "profile: tip"), "window": None}
+    if window is not None:
+        listed = window.split(",") if isinstance(window, str) else window if isinstance(window, Iterable) else [window]
+        asked["window"] = tuple(_metres(one, "profile: window") for one in listed)
+    for name in ("cutoff", "tip"):
+        if asked[name] is not None and not 0 < asked[name] < float("inf"):
+            raise PatchfemError(f"profile: {name}: a length above zero is wanted, not {asked[name]:g} m")
+    reports = [roughness_report.report_of(surfaces.read_surface(_path(one, "profile"), units), **asked)
+               for one in files]
     return {"profiles": [roughness.data_of(one) for one in reports], "means": roughness.means_data(reports)}
 
 
@@ -291,9 +326,8 @@ def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None
     out: the page, report.html unless given. measured: a file of a laboratory, laid over the pictures. PatchfemError for
     folders that do not stand together, and for none.
     """
-    listed = [folders] if isinstance(folders, str | Path) else folders
-    return Path(page_of_several.report_of([Path(one) for one in listed], None if out is None else Path(out),
-                                          None if measured is None else Path(measured)))
+    return Path(page_of_several.report_of(_paths(folders, "report"), None if out is None else _path(
+        out, "report: out"), None if measured is None else _path(measured, "report: measured")))
 
 
 def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, histories: bool = False) -> Path:
@@ -304,7 +338,7 @@ def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, 
     friction elements, .mat for NLvib, .npz for TMDSimPy and pyHarm. frame: number of the frame of a .vtu or .csv, the
     last one unless given. PatchfemError as `patchfem export` refuses.
     """
-    folder, out = Path(folder), Path(out)
+    folder, out = _path(folder, "export"), _path(out, "export: out")
     if folder.suffix != ".toml":
         chosen.export(folder, out, frame, histories)
     elif frame is not None or histories:
@@ -320,7 +354,26 @@ def view(folder: str | Path, out: str | Path | None = None, /, *, frame: int | N
          magnify: float | None = None) -> None:
     """Show the pieces of a results folder in a window, or draw them into `out`: a picture, or the last cycle as .gif,
     .mp4 or .html; arguments as those of `patchfem view`."""
-    chosen.view(Path(folder), None if out is None else Path(out), frame, magnify)
+    chosen.view(_path(folder, "view"), None if out is None else _path(out, "view: out"), frame, magnify)
+
+
+def import_(file: str | Path, out: str | Path, /, *, map: str | Iterable[str] = (), zero: bool = False,
+            decay: bool = False, **how: str) -> dict[str, Any]:
+    """Write the records of a laboratory's file (.uff, .mat, .csv) as the table that scenes and fits read (.csv), as
+    modes of a scene (.toml) or as a frequency response (.uff): the dict that `patchfem import --json` prints, in SI.
+
+    map: which channel is what, as "force=Load cell [lbf]"; zero: time and displacement count from their first row;
+    decay: the record is a free decay; how: the words of segment, window, band and begin, as segment="2 s".
+    PatchfemError as `patchfem import` refuses.
+    """
+    from .export.lab import imported
+
+    file, out, given = _path(file, "import_"), _path(out, "import_: out"), imported.Estimate._fields
+    if unknown := set(how) - set(given):
+        raise PatchfemError(f"import_: {unknown.pop()}: no setting; there are map, zero, {', '.join(sorted(given))}")
+    words = {name: _word(one, f"import_: {name}") for name, one in how.items()}
+    return {"file": str(out), **imported.imported(file, out, _words(map, "import_: map"), zero,
+                                                  imported.Estimate(decay=decay, **words))}
 
 
 def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> Path:
@@ -328,9 +381,10 @@ def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> 
     model = build(scene, **sets)
     if model.patch is None:
         raise PatchfemError("only a scene with [contact] has a mesh", "contact")
+    out = _path(out, "mesh")
     low, high = patch_result.bodies(model)
-    mesh_files.write_mesh(low, Path(out), high)
-    return Path(out)
+    mesh_files.write_mesh(low, out, high)
+    return out
 
 
 def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | None = None, shift: float | None = None,
@@ -348,7 +402,9 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
     of a run with [wear]: what wore off between them, over the whole patch, with the measures of both under `runs`.
     PatchfemError for files that do not fit together.
     """
-    how = {"units": units, "shift": shift, "keep_spikes": keep_spikes}
+    how = {"units": units, "shift": _metres(shift, "compare: shift"), "keep_spikes": keep_spikes}
+    files = [_path(one, "compare") for one in files]
+    _word(direction, "compare: direction")
     if pairs is None and len(files) > 1 and any(Path(one).is_dir() for one in files):
         if len(files) > 2 or direction or units is not None or shift is not None or keep_spikes:
             raise PatchfemError("compare: two results folders stand alone, without other files and settings of traces")
@@ -358,7 +414,8 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
         return compared_data.data_of(*verdict.judged(files, direction, **how))
     if files:
         raise PatchfemError("compare: files or a table of pairs are wanted, not both")
-    return pairs_data.data_of(pairs_data.answers(pairs_tables.read_pairs(pairs), direction, **how))
+    return pairs_data.data_of(pairs_data.answers(pairs_tables.read_pairs(_path(pairs, "compare: pairs")), direction,
+                                                 **how))
 
 
 def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
@@ -369,7 +426,36 @@ def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
         return scene.path, scene.text, scene.sets
     if isinstance(scene, str) and ("\n" in scene or "[" in scene):
         return Path(TEXT), scene, ()
-    return Path(scene), text_of(scene), ()
+    return _path(scene, "a scene"), text_of(scene), ()
+
+
+def _path(given: Any, what: str) -> Path:
+    """The path of a file or folder; PatchfemError for anything else."""
+    if not isinstance(given, str | Path):
+        raise PatchfemError(f"{what}: a path is wanted, not {given!r:.60}")
+    return Path(given)
+
+
+def _paths(given: Any, what: str) -> list:
+    """The paths of a list, or of one alone."""
+    listed = given if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+    return [_path(one, what) for one in listed]
+
+
+def _metres(given: Any, what: str) -> float | None:
+    """A length [m], from a number or from a text with its unit; None stays. PatchfemError for anything else."""
+    try:
+        return parse(given, "length") if isinstance(given, str) else given if given is None else float(given)
+    except (TypeError, ValueError) as error:
+        raise PatchfemError(f"{what}: " + (str(error) if isinstance(given, str) else
+                            f"a length in m or a text such as '0.25 mm' is wanted, not {given!r:.60}")) from None
+
+
+def _word(given: Any, what: str) -> str:
+    """A text; PatchfemError for anything else."""
+    if not isinstance(given, str):
+        raise PatchfemError(f"{what}: a text is wanted, not {given!r:.60}")
+    return given
 
 
 def _on_stderr(text: str) -> None:
@@ -446,14 +532,26 @@ class Plots:
         return self._drawn(ax, ("levels", "curve"), self._still() or 'the drive has no levels; take drive.waveform = '
                            '"levels", or a sweep with accuracy.method = "harmonic"')
 
+    def stress(self, ax: Axes | None = None) -> Axes:
+        """Von Mises stress in both pieces, pressed; beside it, unless on `ax`, the part around the contact."""
+        if self._result.patch is None:
+            raise PatchfemError("plot.stress: nothing to draw: the scene has no [contact]")
+        from .export.fields import bodies
+
+        with TemporaryDirectory() as room:
+            made = bodies.write_fields(self._result, Path(room) / "fields.vtkhdf")
+        return self._drawn(ax, ("bodies",), "the pieces do not touch, or their mesh is no grid", {"bodies": made})
+
     def _still(self) -> str:
         if self._result.response is not None:
             return ""
         return "a static patch does not move; add [friction] with [slide], or with [structure] and [drive]" \
             if self._result.plan.kind == "patch" else "no motion was computed"
 
-    def _drawn(self, ax: Axes | None, names: tuple, lack: str) -> Axes:
-        found = shown.axes(self._result, names, ax)
+    def _drawn(self, ax: Axes | None, names: tuple, lack: str, more: dict | None = None) -> Axes:
+        if ax is not None and not hasattr(ax, "errorbar"):
+            raise PatchfemError(f"plot.{names[0]}: matplotlib Axes are wanted as ax, not {ax!r:.60}")
+        found = shown.axes(self._result, names, ax, more)
         if found is not None:
             return found
         raise PatchfemError(f"plot.{names[0]}: nothing to draw: {lack}")
@@ -479,7 +577,7 @@ class Result(run_result.Result):
 
     @property
     def plot(self) -> Plots:
-        """The pictures of the run: pressure(), loop(), history(), levels()."""
+        """The pictures of the run: pressure(), stress(), loop(), history(), levels()."""
         return Plots(self)
 
     def table(self) -> Any:
@@ -502,5 +600,6 @@ class Result(run_result.Result):
 
         PatchfemError for a folder that holds other files.
         """
-        results_folder.save(self, Path(folder))
-        return Path(folder)
+        folder = _path(folder, "save")
+        results_folder.save(self, folder)
+        return folder

@@ -181,6 +181,76 @@ def test_a_folder_that_is_a_verb_can_be_replaced(monkeypatch):
         pf.mesh(TEXT, "none.vtu")
 
 
+@pytest.mark.parametrize("given", [{"cutoff": 0.25e-3}, {"cutoff": "0.25 mm"}, {"cutoff": np.float64(2.5e-4)}])
+def test_exact_a_length_is_a_number_or_a_text(tmp_path, given):
+    path = tmp_path / "trace.csv"
+    path.write_text("x [um],z [um]\n" + "".join(f"{k},{k % 7}\n" for k in range(2000)), "utf-8")
+    one, other = pf.profile(path, **given), pf.profile(path, cutoff=0.25e-3, window="0 um,1999 um")
+    assert one["profiles"][0]["measures"]["Ra"] == other["profiles"][0]["measures"]["Ra"]
+    for wrong in (0.0, float("nan"), "0.25", object()):
+        with pytest.raises(pf.PatchfemError, match="profile: cutoff"):
+            pf.profile(path, cutoff=wrong)
+
+
+@pytest.mark.parametrize("given, said", [
+    ({"slide.amplitude": 2.0}, r"slide\.amplitude: 2 without a unit is 2 m, more than the patch is long \(0\.04 m\)"),
+    ({"contact": {"crown": {"radius": 3.0}}, "contact.length": 12.7}, r"contact\.length: 12\.7 .* any joint has")])
+def test_refuses_a_bare_length_that_nobody_means(given, said):
+    scene, other = pf.load(pf.new("joint")), {key: f"{value!r} m" for key, value in given.items() if key != "contact"}
+    for load in (lambda sets: scene.with_(**sets), lambda sets: pf.load(pf.new("joint"), **sets)):
+        with pytest.raises(pf.SceneError, match=said):
+            load({key: value for key, value in given.items() if key != "contact"})
+        assert load(other).kind == "bench"  # with its unit it is meant
+    assert scene.with_(**{"contact.crown.radius": 3.0}).contact.crown.radius == 3.0
+
+
+def test_exact_a_scene_with_other_values_is_that_of_load():
+    scene, sets = pf.load(BLOCK), {"normal.load": 90.0, "structure.mode.axial.damping": 0.01}
+    assert scene.with_(**sets).resolved() == pf.load(BLOCK, **sets).resolved() != scene.resolved()
+    again = scene.with_(**sets).with_(title="b")
+    assert (again.title, again.normal.load, scene.normal.load) == ("b", 90.0, 100.0)
+    with pytest.raises(pf.SceneError, match=r"drive\.file: there is no file"):
+        scene.with_(**{"drive.waveform": "file", "drive.file": "none.csv"})
+
+
+def test_exact_an_import_is_that_of_the_command_line(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("time [ms],force [lbf]\n0,1\n1,2\n2,-1\n", "utf-8")
+    found = pf.import_(path, tmp_path / "python.csv", zero=True)
+    cli("import", path, "-o", tmp_path / "shell.csv", "--zero")
+    assert (tmp_path / "python.csv").read_bytes() == (tmp_path / "shell.csv").read_bytes() and found["rows"] == 3
+    for given, said in (({"segmet": "2 s"}, "segmet: no setting"), ({"map": 3}, "map: a text"),
+                        ({"segment": 2.0}, "segment: a text"), ({"begin": "1 s"}, "belong to modes")):
+        with pytest.raises(pf.PatchfemError, match=said):
+            pf.import_(path, tmp_path / "other.csv", **given)
+
+
+@pytest.mark.parametrize("odd", [None, 3, True, object(), [], b"x", np.zeros(2), float("nan"), [None]],
+                         ids=["none", "number", "truth", "object", "list", "bytes", "array", "nan", "list of none"])
+def test_refuses_what_is_no_scene_file_word_or_dataset(odd):
+    verbs = [pf.load, pf.plan, pf.sweep, pf.backbone, pf.cost, pf.new, pf.profile, pf.report, pf.view, pf.plot.backbone,
+             lambda one: pf.sweep(BLOCK, one), lambda one: pf.mesh(PIECES, one), lambda one: pf.export(one, "a.csv"),
+             lambda one: pf.fit(BLOCK, to=one, free={"friction.static": (0.1, 0.2)}), lambda one: pf.compare(one, one),
+             lambda one: pf.import_(one, "a.csv"), lambda one: pf.backbone(BLOCK, mode=[one]),
+             lambda one: pf.plot.sweep(one, "loop_area"), lambda one: pf.import_("a.csv", one),
+             lambda one: pf.compare("a.csv", "b.csv", shift=[one]), lambda one: pf.cost(BLOCK, over=[one])]
+    verbs = verbs[:10] + verbs[11:] if odd is None else verbs  # a sweep without axes takes those of its table
+    for verb in verbs:
+        with pytest.raises(pf.PatchfemError, match=r"wanted|at least one|no kind|is a dict|no value|settings|not a"):
+            verb(odd)
+
+
+def test_exact_a_backbone_and_stresses_are_drawn_with_their_values():
+    found = pf.backbone(PLASTIC_BLOCK, amplitudes="0.1 um..10 um:5", method="quasi-static")
+    axes = pf.plot.backbone(found)
+    assert axes.lines[0].get_ydata() == pytest.approx(found["quasi_static_frequency"].values)
+    assert len(axes.figure.axes) == 2 and pf.plot.backbone(found, axes) is axes
+    shown = pf.run(PIECES).plot.stress()
+    assert shown.collections[0].get_array().max() > 0 and "m" in shown.get_xlabel()
+    with pytest.raises(pf.PatchfemError, match="no \\[contact\\]"):
+        pf.run(BLOCK).plot.stress()
+
+
 def test_exact_profile_gives_the_roughness_of_a_sine(tmp_path):
     x = np.linspace(0, 4e-3, 4001)
     path = tmp_path / "trace.csv"

@@ -95,12 +95,13 @@ def page_of(result: Result, bodies: dict, film: dict | None = None) -> str:
     return page(report_data(result) | ({"bodies": bodies} if bodies else {}) | ({"film": film} if film else {}))
 
 
-def axes(result: Result, names: tuple, onto=None):
+def axes(result: Result, names: tuple, onto=None, more: dict | None = None):
     """The first of the named pictures in which a run has something to show, as matplotlib Axes; None without.
 
-    onto: Axes to draw the first panel on; without them the Axes are the first of a new figure with all panels.
+    onto: Axes to draw the first panel on; without them the Axes are the first of a new figure with all panels. more:
+    beside the data of the report.
     """
-    data = report_data(result)
+    data = report_data(result) | {name: one for name, one in (more or {}).items() if one}
     shown = next((one for one in (picture(name, data) for name in names) if one is not None), None)
     if shown is None:
         return None

@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
 
+from ..faults import PatchfemError
 from . import meant
 from .keys import quantities
 from .keys.contact import Material
@@ -23,6 +24,14 @@ _LONG_WORD = re.compile(r"[^\s/\\:]{200,}")  # no key, unit or name of a file is
 _LIMITS = {"greater_than": ("gt", ">"), "greater_than_equal": ("ge", ">="), "less_than": ("lt", "<"),
            "less_than_equal": ("le", "<=")}  # fmt: skip
 _LAST = 10**9  # sorts the mistakes of --set behind those of the file
+
+
+class SceneError(PatchfemError):
+    """A scene that cannot be run; `mistakes` holds one whole line for each, ``FILE:LINE: table.key: message``."""
+
+    def __init__(self, mistakes: Iterable[str]) -> None:
+        self.mistakes = list(mistakes)
+        super().__init__("\n".join(self.mistakes))
 
 
 class Draft:

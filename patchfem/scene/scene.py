@@ -17,13 +17,12 @@ from typing import Any
 
 from ..disk.opened import reading
 from ..effects import MOST_COORDINATES, takes
-from ..faults import PatchfemError
 from . import axes
 from .keys import tables
 from .keys.same import once
 from .keys.types import keys as keys_of
 from .lines import DEEPEST, TooDeep, key_lines, place_of
-from .reader import Draft, apply_set
+from .reader import Draft, SceneError, apply_set
 from .rules.accuracy import knobs_unused
 from .rules.check import check
 from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
@@ -32,18 +31,11 @@ from .rules.friction import kinetic_unused, rest_speed_unused, temperature_unuse
 from .rules.limits import combinations, not_yet_built
 from .rules.methods import method_unused
 from .rules.structure import unseen
+from .sets import assignments, sized
 from .text import effects, toml
 
 LARGEST = 32 * 2**20  # bytes of a scene
 _VALUE = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")  # a key with a value that opens no quotes and no bracket
-
-
-class SceneError(PatchfemError):
-    """A scene that cannot be run; `mistakes` holds one whole line for each, ``FILE:LINE: table.key: message``."""
-
-    def __init__(self, mistakes: Iterable[str]) -> None:
-        self.mistakes = list(mistakes)
-        super().__init__("\n".join(self.mistakes))
 
 
 @dataclass(frozen=True)
@@ -72,6 +64,11 @@ class Scene:
     def __repr__(self) -> str:
         sets = f"\n  with {shorten(', '.join(self.sets), 160)}" if self.sets else ""
         return f"Scene of {self.path.name}: {self.kind}; {shorten(', '.join(self.named()), 160)}{sets}"
+
+    def with_(self, **sets: Any) -> Scene:
+        """A copy with other values, as ``scene.with_(**{"contact.load": "26 lbf"})``: texts as in a scene, numbers in
+        SI. SceneError as `load`, and for a length without a unit that no joint has."""
+        return sized(with_files(loads(self.text, self.path, (*self.sets, *assignments(sets)))), sets)
 
     def tables(self) -> tables.Tables:
         """All tables as one model, absent ones None."""

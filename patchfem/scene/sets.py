@@ -9,8 +9,9 @@ from typing import Any
 
 from .keys.quantities import format_si
 from .keys.types import kind_of
-from .reader import owner_of
-from .scene import SceneError
+from .reader import SceneError, owner_of
+
+LONGEST = 1.0  # m, beyond which only a radius of a joint lies
 
 
 def assignments(sets: dict[str, Any]) -> tuple[str, ...]:
@@ -26,6 +27,37 @@ def text_of(tables: dict[str, Any]) -> str:
     """The text of a scene of these tables, a dict of dicts: texts as in a scene, numbers in SI; SceneError for values
     that no scene can hold."""
     return "".join(f"{name} = {_written(str(name), one)}\n" for name, one in tables.items())
+
+
+def sized(scene: Any, given: dict[str, Any]) -> Any:
+    """The scene itself; SceneError for lengths among `given`, by key or in tables, that came as bare numbers and that
+    nobody means in metres: longer than the patch, as no slide, bond or motion beside it is, or than LONGEST."""
+    if wrong := oversized(given, scene.contact and scene.contact.length):
+        raise SceneError(wrong)
+    return scene
+
+
+def oversized(given: dict[str, Any], patch: float | None = None, at: str = "") -> list[str]:
+    """The mistakes that `sized` raises, one line each; patch [m]: its length; at: the key of the table `given`."""
+    wrong = []
+    for name, value in given.items():
+        key = f"{at}{name}"
+        value = value.tolist() if hasattr(value, "tolist") else value
+        if isinstance(value, dict | list | tuple):
+            wrong += oversized(value if isinstance(value, dict) else dict(enumerate(value)), patch, f"{key}.")
+        elif isinstance(value, Real) and not isinstance(value, bool) and _kind(key) == "length":
+            limit = patch if patch is not None and not key.startswith("contact.") else LONGEST
+            if abs(value) > limit and not key.endswith("radius"):
+                wrong.append(f"--set: {key}: {value:g} without a unit is {value:g} m, more than "
+                             f"{'the patch is long' if limit is patch else 'any joint has'} ({limit:g} m); give it "
+                             f"its unit, such as '{value:g} mm' or '{value:g} m'")
+    return wrong
+
+
+def _kind(key: str) -> str | None:
+    """Kind of the quantity that a key holds, None for a plain one and for a key that no table has."""
+    model, name = owner_of(key)
+    return kind_of(model, name) if model is not None else None
 
 
 def texts(key: str, values: Any) -> list[str]:
@@ -57,8 +89,7 @@ def _written(key: str, value: Any) -> str:
     if not isinstance(value, Real):
         raise SceneError([f"--set: {key}: {value!r:.60} is no value of a scene; a text as in a scene, a number in SI, "
                           "a boolean or a list of them is wanted"])
-    model, name = owner_of(key)
-    kind = kind_of(model, name) if model is not None else None
+    kind = _kind(key)
     if kind is not None:
         return json.dumps(format_si(value, kind))
     return repr(int(value) if isinstance(value, Integral) else float(value))

@@ -70,10 +70,7 @@ def styled(draw):
 
 @styled
 def draw(made: list, onto=None, height: float = TALL):
-    """Draw charts as `charts` describes them, side by side, `height` inches tall; onto Axes the first alone.
-
-    Cells are drawn by pages alone.
-    """
+    """Draw charts as `charts` describes them, side by side, `height` inches tall; onto Axes the first alone."""
     figure, axes = drawing(len(made), height, onto)
     for axis, one in zip(axes, made):
         for mark in one["marks"]:
@@ -128,4 +125,14 @@ def _arrow(axis, mark: dict) -> None:
     axis.annotate("", xy=tip, xytext=tail, arrowprops={"arrowstyle": "-|>", "color": _colour(mark), "lw": 1.2})
 
 
-MARKS = {"line": _line, "dots": _dots, "band": _band, "span": _span, "rule": _rule, "arrow": _arrow}
+def _cells(axis, mark: dict) -> None:
+    """Cells over the lines x and y, coloured by their value; the first of an axis brings the scale of colours."""
+    first = not axis.collections
+    drawn = axis.pcolormesh(mark["x"], mark["y"], mark["value"].T, vmin=0.0, vmax=mark["top"], rasterized=True)
+    if first:
+        axis.figure.colorbar(drawn, ax=axis, label=mark["unit"])
+        axis.grid(visible=False)
+
+
+MARKS = {"cells": _cells, "line": _line, "dots": _dots, "band": _band, "span": _span, "rule": _rule,
+         "arrow": _arrow}

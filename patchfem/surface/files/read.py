@@ -27,7 +27,7 @@ def read_surface(path, units: tuple | None = None) -> Profile | Areal:
     overrule a header of text, with a note; a format that tells its units keeps them, with a note. Heights keep the sign
     of the file. PatchfemError names file and line of a fault, Missing what is not there.
     """
-    if units is not None and (isinstance(units, str) or len(tuple(units)) != 2):
+    if units is not None and (isinstance(units, str) or not hasattr(units, "__len__") or len(units) != 2):
         raise PatchfemError(f'{path}: units are two, of x and of z, such as ("mm", "um"), not {units!r}')
     raw = fetch(path)
     begins = raw.data[:80].replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \r\n\t") if raw.kind == "text" else b""

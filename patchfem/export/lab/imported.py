@@ -1,0 +1,146 @@
+"""A laboratory's files as the table that scenes and fits read, as modes of a scene, or as a frequency response."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+from ... import scales
+from ...core import PatchfemError
+from ...disk import whole
+from ...identify import measured_modes as measured
+from ...inputs import laboratory, records
+from ...inputs import universal as universal_files
+from ...scene.keys import quantities
+from ...structure import universal as universal_modes
+from . import modes as mode_lines
+from . import write
+
+
+class Estimate(NamedTuple):
+    """How modes or a response are estimated, in words, "" for the default: segment, as "2 s"; window, hann or none;
+    band, as "20 Hz..400 Hz"; decay: the record is a free decay; begin: where it begins, as "0.2 s"."""
+
+    segment: str = ""
+    window: str = ""
+    band: str = ""
+    decay: bool = False
+    begin: str = ""
+
+
+def imported(file: Path, out: Path, asked: Iterable[str], zero: bool, how: Estimate) -> dict:
+    """Write records (.csv), modes (.toml) or a response (.uff) of a file, and return what is told of them.
+
+    asked: channels as `patchfem import --map` has them; zero: time and displacement count from their first row. The
+    dict has `notes`, `told`, a sentence, and what was found. PatchfemError for what does not stand together.
+    """
+    ending = out.suffix.lower()
+    if ending not in (".csv", ".toml", ".uff", ".unv"):
+        raise PatchfemError(f"{out}: records are written as .csv, modes as .toml, a frequency response as .uff")
+    if ending == ".csv" and how != Estimate(decay=how.decay, begin=how.begin if how.decay else ""):
+        raise PatchfemError("--segment, --window, --band and, without --decay, --begin belong to modes (-o modes.toml) "
+                            "and responses (-o response.uff)")
+    if zero and how.decay:
+        raise PatchfemError("--zero belongs to a table of records, not to what --decay reads off it")
+    if zero and ending != ".csv":
+        raise PatchfemError("--zero belongs to a table of records (-o table.csv)")
+    if ending == ".csv":
+        return _decay(file, out, asked, how.begin) if how.decay else _table(file, out, asked, zero)
+    return (_modes if ending == ".toml" else _response)(file, out, asked, how)
+
+
+def _table(file: Path, out: Path, asked, zero: bool) -> dict:
+    found = laboratory.read_records(file, records.wanted(asked))
+    values = records.from_zero(found.values) if zero else found.values
+    units = {name: records.SI[name] for name in values}
+    write.write_table(out, values, units)
+    rows = len(next(iter(values.values())))
+    moved = [f"{name} starts at {values[name][0]:g} {records.SI[name]}" for name in ("time", "displacement", "lateral")
+             if "displacement" in values and name in values and values[name][0] != 0]
+    notes = [*found.notes, *([f"{', '.join(moved)}: slide.file wants a table that starts at 0; --zero counts from the "
+                              "first row"] if moved else [])]
+    return {"rows": rows, "units": units, "notes": notes, "told": f"{rows} rows of {', '.join(values)}"}
+
+
+def _decay(file: Path, out: Path, asked, begin: str) -> dict:
+    values, notes = _records(file, asked)
+    found = measured.decay_curve(values, _quantity(begin, "time", f"--begin {begin}"))
+    write.write_table(out, {f"decay_{name}": one for name, one in found._asdict().items()},
+                      {f"decay_{name}": unit for name, unit in write.DECAY.items()})
+    ends = [f"{scales.told(found.frequency[k], found.frequency_error[k], unit='Hz')} with a damping ratio of "
+            f"{scales.told(found.damping[k], found.damping_error[k])} at {scales.short(found.amplitude[k], 'm', 3)}"
+            for k in (0, -1)]
+    return {"points": found.time.size, **{f"decay_{name}": one.tolist() for name, one in found._asdict().items()},
+            "notes": notes, "told": f"{found.time.size} amplitudes, from {ends[0]} to {ends[1]}"}
+
+
+def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
+    shapes, notes = _shapes(file, asked, how)
+    if shapes is not None:
+        found = measured.of_shapes(*shapes)
+    else:
+        values, notes = _records(file, asked)
+        found = measured.of_decay(values, _quantity(how.begin, "time", f"--begin {how.begin}")) if how.decay else \
+            measured.of_drive(values, _segment(how.segment), _window(how.window), _band(how.band))
+    whole.write_text(out, mode_lines.fragment(found, file.name))
+    listed = [{"frequency": f, "damping": zeta, "about": about} for f, zeta, about in
+              zip(found.frequency.tolist(), found.damping.tolist(), found.about)]
+    told = "; ".join(f"{one['frequency']:.5g} Hz with a damping of {one['damping']:.4g}" for one in listed)
+    return {"modes": listed, "moving_mass": found.mass, "notes": [*notes, *found.notes], "told": told}
+
+
+def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
+    if how.decay or how.begin or how.band:
+        raise PatchfemError("--decay, --begin and --band belong to modes (-o modes.toml)")
+    values, notes = _records(file, asked)
+    found, step, drive, response = measured.estimated(values, _segment(how.segment), _window(how.window))
+    write.write_response(out, found, drive, response)
+    return {"lines": found.frequency.size, "segments": found.segments, "window": found.window, "notes": notes,
+            "told": f"{response} over {drive}, {found.frequency.size} lines from {found.segments} segments of "
+                    f"{found.segment * step:.4g} s, window {found.window}"}
+
+
+def _records(file: Path, asked) -> tuple:
+    found = laboratory.read_records(file, records.wanted(asked))
+    return found.values, found.notes
+
+
+def _shapes(file: Path, asked, how: Estimate) -> tuple:
+    """((shapes, places), notes) of a universal file with modes or frequency responses; (None, ()) of any other."""
+    names = {text.partition("=")[0].strip() for text in asked}
+    if file.suffix.lower() not in laboratory.UNIVERSAL or how != Estimate() or names & set(records.UNITS):
+        return None, ()
+    if not any(one["type"] == 55 or int(one.get("func_type", 0)) == 4 for one in universal_files.sets_of(file)):
+        return None, ()
+    try:
+        shapes = universal_modes.read(file)
+    except PatchfemError as error:
+        raise type(error)(str(error).removeprefix("structure.file: ")) from None
+    return (shapes, {one.quantity: one.source for one in records.wanted(asked, measured.PLACES)}), ()
+
+
+def _quantity(text: str, kind: str, option: str) -> float | None:
+    """The words of an option in SI, None where there are none."""
+    try:
+        return quantities.parse(text, kind) if text else None
+    except ValueError as error:
+        raise PatchfemError(f"{option}: {error}") from None
+
+
+def _segment(text: str) -> float | None:
+    return _quantity(text, "time", f"--segment {text}")
+
+
+def _window(text: str) -> str | None:
+    if text not in ("", "hann", "none"):
+        raise PatchfemError(f"--window {text}: hann or none")
+    return text or None
+
+
+def _band(text: str) -> tuple:
+    if not text:
+        return (0.0, float("inf"))
+    low, dots, high = text.partition("..")
+    ends = [_quantity(one, "frequency", f"--band {one}") for one in (low.strip(), high.strip()) if dots]
+    if not ends or None in ends or not 0 <= ends[0] < ends[1]:
+        raise PatchfemError(f'--band {text}: two rising frequencies are wanted, such as "20 Hz..400 Hz"')
+    return tuple(ends)
