@@ -150,11 +150,11 @@
     unsettled(fig, cases, x);
     const cycle = colours(), dots = [], sizes = [...groups.keys()].sort((a, b) => a - b);
     const many = beside && !beside.words && sizes.length > cycle.length;  // a scale of colours in place of their names
-    const level = (v) => beside.log && sizes[0] > 0 ? Math.log(v) : v, span = level(sizes.at(-1)) - level(sizes[0]);
+    const level = (v) => beside.log && sizes[0] > 0 ? Math.log(v) : v;
     const scale = Bokeh.Palettes.cividis(256);
     sizes.forEach((v, k) => {
       const group = groups.get(v);
-      const colour = many ? scale[Math.round(255 * (level(v) - level(sizes[0])) / span)] : cycle[k % cycle.length];
+      const colour = many ? scale[Math.round(255 * (level(v) - level(sizes[0])) / (level(sizes.at(-1)) - level(sizes[0])))] : cycle[k % cycle.length];
       dots.push(curve(fig, group, x, m, colour, beside && !many ? `${beside.label} ${beside.texts[group[0]]}` : ""));
     });
     if (many) {
