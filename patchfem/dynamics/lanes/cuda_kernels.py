@@ -41,16 +41,16 @@ def kernels(law: str) -> SimpleNamespace:
             one_march(cases, order[i:i + 1], motion, table, until, history, ended, room[i], marked[i])
 
     @cuda.jit
-    def read(cases, order, motion, table, cycles, history, ended, shown, room, marked):
+    def read(cases, order, motion, table, cycles, history, ended, shown, felt, room, marked):
         i = cuda.grid(1)
         if i < order.size:
-            one_read(cases, order[i:i + 1], motion, table, cycles, history, ended, shown, room[i], marked[i])
+            one_read(cases, order[i:i + 1], motion, table, cycles, history, ended, shown, felt, room[i], marked[i])
 
     def marched(cases, order, motion, table, until, history, ended, room, _):
         _run(march, (cases, order), (motion, table), until, (history, ended), _rooms(order, room))
 
-    def seen(cases, order, motion, table, cycles, history, ended, shown, room, _):
-        _run(read, (cases, order), (motion, table), cycles, (history, ended, shown), _rooms(order, room))
+    def seen(cases, order, motion, table, cycles, history, ended, shown, felt, room, _):
+        _run(read, (cases, order), (motion, table), cycles, (history, ended, shown, felt), _rooms(order, room))
 
     return SimpleNamespace(march=marched, read=seen)
 

@@ -115,11 +115,11 @@ def glide(room, i, s0, c0, s1, c1):
 
 @njit(error_model="numpy", forceinline=True, **LEAN)
 def happens(room, marked):
-    """Number of lanes in which a step holds an event; writes which into `marked` (LANES + 1,)."""
+    """Number of lanes with a case in which a step holds an event; writes which into `marked` (LANES + 1,)."""
     count = 0
     for i in range(LANES):
         marked[count] = i
-        count += 1 if room[EVENT * LANES + i] > 0.0 else 0
+        count += 1 if room[EVENT * LANES + i] > 0.0 and room[CASE * LANES + i] >= 0.0 else 0
     return count
 
 
@@ -274,6 +274,10 @@ def fetch(case, i, cases, motion, room):
     """Put a case in the lane i."""
     for n in range(NUMBERS):
         room[(NUMBER + n) * LANES + i] = cases[case, n]
+    size = cases.shape[1] - NUMBERS
+    table = len(room) - size * (LANES - i)
+    for n in range(size):
+        room[table + n] = cases[case, NUMBERS + n]
     for n in range(motion.shape[1]):
         room[(n if n < STATE else n - STATE + OWN) * LANES + i] = motion[case, n]
     room[CASE * LANES + i], room[CYCLE * LANES + i] = case, 0.0
@@ -315,10 +319,10 @@ def repeats(i, room):
 def march(cases, order, motion, table, until, history, ended, room, marked):
     """March cases up to the end of the cycle `until`, or of one that repeats. A lane that is done takes the next case.
 
-    cases (n, NUMBERS); order (m,): numbers of those that march; motion (n, STATE and more): at their begin, and end;
-    table (3, s + 1): sine and cosine at the steps of a cycle, and the step; history (n, c, 4): least and largest slide
-    of a cycle [m], and its phasor [m]; ended (n,): cycles done; room (numbers of a lane times LANES,), marked
-    (LANES + 1,): of the lanes. Cost: 2 to 5 ns a step of a case.
+    cases (n, NUMBERS and those of its table); order (m,): numbers of those that march; motion (n, STATE and more): at
+    their begin, and end; table (3, s + 1): sine and cosine at the steps of a cycle, and the step; history (n, c, 4):
+    least and largest slide of a cycle [m], and its phasor [m]; ended (n,): cycles done; room (numbers of a lane times
+    LANES,), marked (LANES + 1,): of the lanes. Cost: 2 to 5 ns a step of a case.
     """
     share, given = 2 / (table.shape[1] - 1), min(LANES, len(order))
     for i in range(LANES):
@@ -347,17 +351,17 @@ def march(cases, order, motion, table, until, history, ended, room, marked):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def pulled(i, room):
-    """Friction of a lane at the end of a cycle [m]."""
-    return law.felt(room[X * LANES + i], room[V * LANES + i], room[WAY * LANES + i], room[PLACE * LANES + i], 0.0, room,
-                    i)
+def pulled(i, room, s):
+    """Friction of a lane [m] where the sine is s."""
+    x, v, way, place = room[X * LANES + i], room[V * LANES + i], room[WAY * LANES + i], room[PLACE * LANES + i]
+    return law.felt(x, v, way, place, s, room, i)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def open_cycle(i, room):
     """Begin a cycle of what a lane shows."""
     room[BEGUN * LANES + i] = room[X * LANES + i]
-    room[MEAN * LANES + i], room[PULL * LANES + i] = 0.0, 0.5 * pulled(i, room)
+    room[MEAN * LANES + i], room[PULL * LANES + i] = 0.0, 0.5 * pulled(i, room, 0.0)
     rests = law.RESTS and room[WAY * LANES + i] == 0.0
     room[PULL_HIGH * LANES + i] = room[PULL_LOW * LANES + i] = 0.0 if rests else nan
 
@@ -372,17 +376,28 @@ def close_cycle(i, room, first, cycles, h):
         room[SEEN * LANES + i] += 1.0
         room[SECANT * LANES + i] += secant
     mean = h * (room[MEAN * LANES + i] + 0.5 * (begun - room[X * LANES + i]))
-    pull = h * (room[PULL * LANES + i] - 0.5 * pulled(i, room))
+    pull = h * (room[PULL * LANES + i] - 0.5 * pulled(i, room, 0.0))
     if first:
         room[FIRST * LANES + i], room[F_FIRST * LANES + i] = mean, pull
     room[LAST * LANES + i], room[F_LAST * LANES + i] = mean, pull
 
 
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def note(room, felt, k, s):
+    """Write the acceleration of the output after k steps, where the sine is s, if it is asked for."""
+    for i in range(LANES if felt.shape[1] > 0 else 0):
+        if room[CASE * LANES + i] >= 0.0:
+            x, v, pull = room[X * LANES + i], room[V * LANES + i], pulled(i, room, s)
+            rate = room[P * LANES + i] * s - room[D * LANES + i] * v - room[W * LANES + i] * x - pull
+            felt[int(room[CASE * LANES + i]), k] = room[OUT * LANES + i] * rate + room[BASE * LANES + i] * s
+
+
 @njit(error_model="numpy", cache=True, nogil=True, fastmath=FAST, **LEAN)
-def read(cases, order, motion, table, cycles, history, ended, shown, room, marked):
+def read(cases, order, motion, table, cycles, history, ended, shown, felt, room, marked):
     """March cases over their last `cycles` and read what they show; arguments as of `march`.
 
-    ended: the cycle at which a case goes on; shown (n, SHOWN): numbers by their places.
+    ended: the cycle at which a case goes on; shown (n, SHOWN): numbers by their places; felt (n, steps + 1): absolute
+    acceleration of the output [m s-2] at all steps and at their begin, (n, 0) where it is not asked for.
     """
     steps = table.shape[1] - 1
     h = table[2, 0]
@@ -393,6 +408,9 @@ def read(cases, order, motion, table, cycles, history, ended, shown, room, marke
                 room[n * LANES + i] = 0.0
             room[SLIP_HIGH * LANES + i] = law.slid(room[X * LANES + i], room[PLACE * LANES + i], room, i)
             room[SLIP_LOW * LANES + i] = room[SLIP_HIGH * LANES + i]
+            if begin + i >= len(order):
+                room[CASE * LANES + i] = -1.0
+        note(room, felt, 0, table[0, 0])
         for k in range(cycles):
             for i in range(LANES):
                 open_cycle(i, room)
@@ -403,10 +421,12 @@ def read(cases, order, motion, table, cycles, history, ended, shown, room, marke
                     watch(room, i, s0, c0, s1, c1, h)
                 for i in range(happens(room, marked)):
                     look(room, marked[i], s0, c0, s1, c1, h)
+                note(room, felt, k * steps + j + 1, s1)
             for i in range(LANES):
-                close_cycle(i, room, k == 0, cycles, h)
                 case = int(room[CASE * LANES + i])
-                turn_over(i, room, history, case, ended[case] + k, 2 / steps)
+                if case >= 0:
+                    close_cycle(i, room, k == 0, cycles, h)
+                    turn_over(i, room, history, case, ended[case] + k, 2 / steps)
         for i in range(min(LANES, len(order) - begin)):
             for n in range(SHOWN):
                 shown[order[begin + i], n] = room[(SHOW + n) * LANES + i]

@@ -15,7 +15,7 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from . import power_curve_kernels as curve
 from .names_kernels import CURVE, GK, HALF, LANES, LENGTH, OWN, PLACE, WAY, WHERE, D, H, K, P, V, W, X
-from .rigid_kernels import begin, sticking
+from .rigid_kernels import sticking
 
 __all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "foretell", "held", "path", "rise",
            "slid", "sticking"]
@@ -26,10 +26,11 @@ TURNS_HELD = True  # an event may leave a stick as it is
 # which something happens next; stiffness now, and in the step: at its begin, before and after its event, at its end;
 # path of slip in the step; friction at the last turn that was; whether it ever slipped, whether the first loading is
 # remembered, whether all sliders slip; largest gap of a loop that was dropped for want of room, over its size; number
-# of points behind; share of the step up to its event in which it sticks
+# of points behind; share of the step up to its event in which it sticks; side over m times the length; whole of the
+# sliders over their friction
 (SIDE, M, FROM, HELD, SLIP_FROM, ENERGY_FROM, NEXT, STIFF, STIFF_0, STIFF_1, STIFF_2, STIFF_3, GONE, AT_TURN, EVER,
- VIRGIN, ALL, DROPPED, BEHIND, STUCK_IN) = range(OWN, OWN + 20)
-STACK, EACH = OWN + 20, 4  # those points: slide, friction, irreversible slide and energy of each
+ VIRGIN, ALL, DROPPED, BEHIND, STUCK_IN, PER, WHOLE) = range(OWN, OWN + 22)
+STACK, EACH = OWN + 22, 4  # those points: slide, friction, irreversible slide and energy of each
 DEPTH = (CURVE - STACK) // EACH
 OWN_STATE = CURVE - OWN + curve.ROOM
 LEAST = 1e-30  # of w
@@ -39,9 +40,17 @@ FAR = 1e300
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def begin(room, i):
+    """Set what follows from the numbers and the state of a lane that takes a case, or has begun a branch."""
+    length = room[LENGTH * LANES + i]
+    room[PER * LANES + i] = room[SIDE * LANES + i] / (room[M * LANES + i] * length)
+    room[WHOLE * LANES + i] = room[K * LANES + i] * length / room[GK * LANES + i]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def place_of(x, room, i):
     """Slide since the last turn at x, over that of all sliders there."""
-    return room[SIDE * LANES + i] * (x - room[FROM * LANES + i]) / (room[M * LANES + i] * room[LENGTH * LANES + i])
+    return room[PER * LANES + i] * (x - room[FROM * LANES + i])
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -69,7 +78,7 @@ def slid(x, place, room, i, when=curve.ASKED):
     u = place_of(x, room, i)
     w = min(u, 1.0)
     slips = curve.slipped(w, side * (place - room[HELD * LANES + i]) / (m * whole), room, i, when)
-    return room[SLIP_FROM * LANES + i] + side * m * length * (whole / room[GK * LANES + i] * slips + (u - w))
+    return room[SLIP_FROM * LANES + i] + side * m * length * (room[WHOLE * LANES + i] * slips + (u - w))
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
@@ -279,6 +288,7 @@ def closing(room, i):
 @njit(error_model="numpy", **LEAN)
 def look_ahead(x, room, i):
     """Note where something happens next, and whether half of the friction slips."""
+    begin(room, i)
     side, size = room[SIDE * LANES + i], room[M * LANES + i] * room[LENGTH * LANES + i]
     far, end = side * (x - room[FROM * LANES + i]), closing(room, i)
     slips = far >= size * room[HALF * LANES + i] * (1 - 1e-9)

@@ -42,7 +42,7 @@ class Cases(NamedTuple):
 class Marched(NamedTuple):
     """Cases after their march: motion (n, STATE) at the start, where the cycles begin that were read, and at the end;
     history (n, c, 4) of all cycles; shown (n, SHOWN); ended, cycles (n,): cycles before those that were read, and how
-    many these are; numbers (n, NUMBERS); step: angle."""
+    many these are; numbers (n, NUMBERS and a table); step: angle."""
 
     start: np.ndarray
     begun: np.ndarray
@@ -122,9 +122,10 @@ def after(damp, square, h: float, begin: tuple, forces: tuple) -> tuple:
 
 
 def numbers_of(law: str, cases: Cases, steps: int) -> np.ndarray:
-    """(n, NUMBERS) of cases that march by so many steps a cycle."""
-    found, h = np.zeros((len(cases.damp), at.NUMBERS)), 2 * np.pi / steps
-    found[:, at.D - at.NUMBER:] = np.array(cases[:9]).T
+    """(n, NUMBERS) of cases that march by so many steps a cycle, and behind them the table of a table."""
+    table = cases.law[:, 3:] if law == "table" else np.empty((len(cases.damp), 0))
+    found, h = np.concatenate([np.zeros((len(table), at.NUMBERS)), table], axis=1), 2 * np.pi / steps
+    found[:, at.D - at.NUMBER:at.NUMBERS] = np.array(cases[:9]).T
     if own_state(law):
         found[:, at.H - at.NUMBER], found[:, at.MIDDLE - at.NUMBER] = h, 0.5 / np.cos(h / 2)
         first = at.FIRST_OF_LAW - at.NUMBER
@@ -165,8 +166,6 @@ def begun_at(law: str, cases: Cases) -> np.ndarray:
                              (own.STIFF, cases.spring), (own.NEXT, cases.x + first * half)):
             motion[:, place - at.OWN + at.STATE] = value
         motion[:, at.PLACE] = 0.0
-        table = cases.law[:, 3:]
-        motion[:, motion.shape[1] - table.shape[1]:] = table
     motion[:, at.HIGH] = motion[:, at.LOW] = cases.x
     return motion
 
@@ -180,31 +179,28 @@ def march_on(law: str, cases: Cases, motion, cycles: int, steps: int) -> tuple:
     """(history (n, c, 4), motion at the end) of cases that march over `cycles` more from a motion (n, STATE and
     more), or until they repeat; the last cycle then stands for those that follow."""
     n, history = len(cases.damp), np.zeros((len(cases.damp), cycles, 4))
-    ended, motion = np.zeros(n, np.int64), motion.copy()
-    room, marked = np.zeros((at.OWN + motion.shape[1] - at.STATE) * at.LANES), np.zeros(at.LANES + 1, np.int64)
-    kernels(law).march(numbers_of(law, cases, steps), np.arange(n), motion, table_of(steps), cycles, history, ended,
-                       room, marked)
+    ended, motion, numbers = np.zeros(n, np.int64), motion.copy(), numbers_of(law, cases, steps)
+    kernels(law).march(numbers, np.arange(n), motion, table_of(steps), cycles, history, ended,
+                       *room_of(numbers, motion))
     for case in np.flatnonzero(ended < cycles):
         history[case, ended[case]:] = history[case, ended[case] - 1]
     return history, motion
 
 
-def accelerations(law: str, cases: Cases, motion, cycles: int, steps: int, stride: int = 1) -> np.ndarray:
-    """(n, cycles steps / stride + 1) absolute acceleration of the output [m s-2] at every step, or one of `stride`
-    steps, from a motion (n, STATE and more) on, by a march of so many steps after the other."""
-    n, loop, numbers, table, motion = len(cases.damp), kernels(law), numbers_of(law, cases, steps), table_of(steps), \
-        motion.copy()
-    room, marked = np.zeros((at.OWN + motion.shape[1] - at.STATE) * at.LANES), np.zeros(at.LANES + 1, np.int64)
-    out, order, done = np.empty((n, cycles * steps // stride + 1)), np.arange(n), np.zeros(n, np.int64)
-    for k in range(cycles * steps // stride + 1):
-        at_step = k * stride % steps
-        sine = table[0, at_step]
-        x, v = motion[:, at.X], motion[:, at.V]
-        rate = cases.push * sine - cases.damp * v - cases.square * x - motion[:, at.PLACE]
-        out[:, k] = cases.out * rate + cases.base * sine
-        part = table[:, at_step:at_step + stride + 1].copy()
-        loop.march(numbers, order, motion, part, 1, np.zeros((n, 1, 4)), done, room, marked)
+def accelerations(law: str, cases: Cases, motion, cycles: int, steps: int) -> np.ndarray:
+    """(n, cycles steps + 1) absolute acceleration of the output [m s-2] at every step from a motion (n, STATE and more)
+    on."""
+    n, numbers, motion = len(cases.damp), numbers_of(law, cases, steps), motion.copy()
+    out, ended = np.empty((n, cycles * steps + 1)), np.zeros(n, np.int64)
+    kernels(law).read(numbers, np.arange(n), motion, table_of(steps), cycles, np.zeros((n, cycles, 4)), ended,
+                      np.zeros((n, at.SHOWN)), out, *room_of(numbers, motion))
     return out
+
+
+def room_of(numbers, motion) -> tuple:
+    """Room for the lanes of cases with such numbers and motions, and for the marks of their events."""
+    each = at.OWN + motion.shape[1] - at.STATE + numbers.shape[1] - at.NUMBERS
+    return np.zeros(each * at.LANES), np.zeros(at.LANES + 1, np.int64)
 
 
 def march(law: str, cases: Cases, cycles: int, window: int, steps: int, device: str = "cpu") -> Marched:
@@ -216,11 +212,11 @@ def march(law: str, cases: Cases, cycles: int, window: int, steps: int, device: 
     numbers, table, order = numbers_of(law, cases, steps), table_of(steps), np.arange(n)
     motion, history = begun_at(law, cases), np.zeros((n, cycles, 4))
     start, ended, shown = motion.copy(), np.zeros(n, np.int64), np.zeros((n, at.SHOWN))
-    room, marked = np.zeros((at.OWN + motion.shape[1] - at.STATE) * at.LANES), np.zeros(at.LANES + 1, np.int64)
-    loop.march(numbers, order, motion, table, cycles - window, history, ended, room, marked)
+    room = room_of(numbers, motion)
+    loop.march(numbers, order, motion, table, cycles - window, history, ended, *room)
     begun, read = motion.copy(), np.where(ended < cycles - window, min(ONCE, window), window)
     for count in np.unique(read).tolist():
-        loop.read(numbers, order[read == count], motion, table, count, history, ended, shown, room, marked)
+        loop.read(numbers, order[read == count], motion, table, count, history, ended, shown, np.empty((n, 0)), *room)
     done = ended + read
     for case in np.flatnonzero(done < cycles):  # a motion that repeats goes on as it is
         history[case, done[case]:] = history[case, done[case] - 1]

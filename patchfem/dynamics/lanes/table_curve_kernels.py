@@ -3,10 +3,10 @@ straight between their yields,
 
     g(w) = F + S w,  F = sum k y and S = sum k of those that have, and have not, yielded.
 
-A case has its table in its state (`run.tables_of`): of each yield its place, F, S and B = sum k y^2. In a step it is
-walked through once, from where the last one ended; what is found lies side by side, as a compiler takes several lanes
-at once only where it knows the distance of any two numbers. Twin: many elements, from event to event
-(`dynamics.events`).
+A case has its table behind its numbers (`run.tables_of`): of each yield its place, F, S and B = sum k y^2, one beside
+the other in the room of a lane. In a step it is walked through once, from where the last one ended; what is found lies
+side by side with that of other lanes, as a compiler takes several at once only where it knows the distance of any two
+numbers. Twin: many elements, from event to event (`dynamics.events`).
 """
 
 from ...compiled.inner import njit
@@ -17,8 +17,8 @@ YIELDS = 512  # of a case, the first of which is none and the last beyond all sl
 YIELD, FORCE, SLOPE, MOMENT, COLUMNS = range(5)
 # number of the yield; F, S and B at WHERE, F and B where the step begins
 AT, FOUND_F, FOUND_S, FOUND_B, HERE_F, HERE_B = range(WHERE + 1, WHERE + 7)
-TABLE = WHERE + 7
-ROOM = TABLE - CURVE + COLUMNS * YIELDS  # numbers that it has in the state of a case
+TABLE, SIZE = (WHERE + 7) * LANES, COLUMNS * YIELDS  # where the tables begin, and the numbers of one
+ROOM = WHERE + 7 - CURVE  # numbers that it has in the state of a case
 PART = 0.25  # of LENGTH, over which a step may go at most
 FORETELLS = True
 ASKED, FOUND, HERE = range(3)  # where the numbers of a curve are: in its table, found ahead of a step, at its begin
@@ -27,27 +27,27 @@ ASKED, FOUND, HERE = range(3)  # where the numbers of a curve are: in its table,
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def last(w, room, i):
     """Place in the room of the last yield up to w: that of the last time, or by halves."""
-    k, step, first = int(room[AT * LANES + i]), YIELDS // 2, (TABLE + YIELD) * LANES + i
-    if w < room[first + COLUMNS * LANES * k] or w >= room[first + COLUMNS * LANES * (k + 1)]:
+    k, step, first = int(room[AT * LANES + i]), YIELDS // 2, TABLE + SIZE * i
+    if w < room[first + COLUMNS * k] or w >= room[first + COLUMNS * (k + 1)]:
         k = 0
         while step > 0:
-            k = k + step if w >= room[first + COLUMNS * LANES * (k + step)] else k
+            k = k + step if w >= room[first + COLUMNS * (k + step)] else k
             step >>= 1
         room[AT * LANES + i] = k
-    return (TABLE + COLUMNS * k) * LANES + i
+    return first + COLUMNS * k
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def find(room, i):
     """Find the curve of a lane at WHERE."""
-    at, w = int(room[AT * LANES + i]), room[WHERE * LANES + i]
-    while w >= room[(TABLE + COLUMNS * (at + 1) + YIELD) * LANES + i]:
+    at, w, first = int(room[AT * LANES + i]), room[WHERE * LANES + i], TABLE + SIZE * i
+    while w >= room[first + COLUMNS * (at + 1)]:
         at += 1
-    while w < room[(TABLE + COLUMNS * at + YIELD) * LANES + i]:
+    while w < room[first + COLUMNS * at]:
         at -= 1
-    room[AT * LANES + i], place = at, (TABLE + COLUMNS * at) * LANES + i
-    room[FOUND_F * LANES + i], room[FOUND_S * LANES + i] = room[place + FORCE * LANES], room[place + SLOPE * LANES]
-    room[FOUND_B * LANES + i] = room[place + MOMENT * LANES]
+    room[AT * LANES + i], place = at, first + COLUMNS * at
+    room[FOUND_F * LANES + i], room[FOUND_S * LANES + i] = room[place + FORCE], room[place + SLOPE]
+    room[FOUND_B * LANES + i] = room[place + MOMENT]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -62,7 +62,7 @@ def go_on(room, i, event):
 def begin_at(w, room, i):
     """Begin the next step at w."""
     at = last(w, room, i)
-    room[HERE_F * LANES + i], room[HERE_B * LANES + i] = room[at + FORCE * LANES], room[at + MOMENT * LANES]
+    room[HERE_F * LANES + i], room[HERE_B * LANES + i] = room[at + FORCE], room[at + MOMENT]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -71,7 +71,7 @@ def force(w, room, i, when):
     if when == FOUND:
         return room[FOUND_F * LANES + i] + room[FOUND_S * LANES + i] * w, room[FOUND_S * LANES + i]
     at = last(w, room, i)
-    return room[at + FORCE * LANES] + room[at + SLOPE * LANES] * w, room[at + SLOPE * LANES]
+    return room[at + FORCE] + room[at + SLOPE] * w, room[at + SLOPE]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -82,11 +82,11 @@ def slipped(w, g, room, i, when):
     if when == HERE:
         return room[HERE_F * LANES + i] * w - room[HERE_B * LANES + i]
     at = last(w, room, i)
-    return room[at + FORCE * LANES] * w - room[at + MOMENT * LANES]
+    return room[at + FORCE] * w - room[at + MOMENT]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def work(w, g, room, i):
     """Integral of the force up to w, where it is g."""
     at = last(w, room, i)
-    return (w * (g + room[at + FORCE * LANES]) - room[at + MOMENT * LANES]) / 2
+    return (w * (g + room[at + FORCE]) - room[at + MOMENT]) / 2

@@ -20,7 +20,7 @@ from . import grids, ladder
 from .condensed import condensed
 from .measures import measures, missed
 from .press import pressed
-from .static import patches_on
+from .static import missed_on, patches_on
 
 CASES = 48  # cases that a mesh is chosen by; of more, those that lie farthest apart
 ROUNDS = 4  # of the search for the contacts
@@ -172,7 +172,9 @@ def _climbed(cases: list, bodies, tolerance: float, once: bool) -> tuple:
         bodies = [finer(body) for body in bodies]
         if len(pairs) < grids.LEAST_LEVELS:
             continue
-        missed_by = next((by for one in cases if (by := _missed(one, pairs, tolerance)) > 1), 0.0)
+        known = missed_on(cases, pairs, tolerance)
+        missed_by = next((by for one, seen in zip(cases, known) if (
+            by := _missed(one, pairs, tolerance) if seen is None else seen) > 1), 0.0)
         dear = bodies[0].x.size > MOST_NODES or grids.seconds_of(bodies) > grids.SPENT[cases[0].still]
         if missed_by <= 1 or once or dear:
             return [(pair.grid, None if pair.upper is pair.piece else pair.upper_grid) for pair in pairs], missed_by

@@ -180,15 +180,30 @@ def solved_patches(patches, tolerance: float) -> list:
             if found.good[k] else None for k, one in enumerate(patches)]
 
 
-def pressed_together(asked: Asked, tolerance: float) -> Together:
+def missed_on(patches, pairs: list, tolerance: float) -> list:
+    """For each of `PatchModel`s of one geometry on pieces, fine to coarse, its largest error over the tolerance; None
+    for those that do not press as this module can."""
+    out, groups = [None] * len(patches), {}
+    grids = all(isinstance(body, TensorGrid) for pair in pairs for body in (pair.grid, pair.upper_grid))
+    for k, asked in enumerate(patches if grids and len(pairs) > 2 else ()):
+        if asked.gap.profile is None and not _not_of_one_stretch(asked):
+            groups.setdefault((asked.mesh_tolerance, *_kind(asked)), []).append(k)
+    for cases in groups.values():
+        found = pressed_together(asked_of([patches[k] for k in cases]), tolerance, pairs)
+        for place in np.flatnonzero(found.good).tolist():
+            out[cases[place]] = one_by_one.missed(found.measures(place), tolerance)
+    return out
+
+
+def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None) -> Together:
     """Patches on the meshes that they share, with their errors; tolerance: relative error beyond which values are
-    extrapolated."""
-    pairs, first, level, levels = shared_pairs(asked.first), asked.first, None, []
+    extrapolated; pieces: those, fine to coarse, on which they are pressed without the other plane state."""
+    pairs, first, level, levels = pieces or shared_pairs(asked.first), asked.first, None, []
     with one_thread():
         for pair in reversed(pairs):
             level = pressed_on(asked, pair, level)
             levels.insert(0, level)
-        theirs = _in_other_plane(asked, levels[1])
+        theirs = () if pieces else _in_other_plane(asked, levels[1])
     fine, pair = levels[0], pairs[0]
     good = np.logical_and.reduce([level.good for level in (*levels, *theirs)])
     good &= (fine.count > one_by_one.POINT) & (not any(one.closing.any() for one in pairs))

@@ -426,13 +426,10 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
     untold, told = may & ~held, may & held
     strides = steps / (PER_PERIOD * np.sqrt(np.maximum(cases.square + cases.spring, 1.0)))
     strides = 2 ** np.log2(np.maximum(strides, 1.0)).astype(int)  # each case by its own, whatever stands beside it
-    signals = {}
-    for stride in np.unique(strides[told]).tolist():
-        where = np.flatnonzero(told & (strides == stride))
-        signals |= zip(where.tolist(), march.accelerations(law, _of(cases, where), found.begun[where], window, steps,
-                                                           stride))
-    for case, signal in sorted(signals.items()):
-        omega = float(c["omega"][case])
+    where = np.flatnonzero(told)
+    every = march.accelerations(law, _of(cases, where), found.begun[where], window, steps) if where.size else ()
+    for case, signal in zip(where.tolist(), every):
+        omega, signal = float(c["omega"][case]), signal[::strides[case]]
         time = np.linspace(0, 2 * np.pi * window / omega, len(signal))
         values, apart = ringing(time, signal, [(0.0, time[-1])], omega)
         faint[case] = not values and march.flows(law) and steps < RINGING  # for so few steps, perhaps
