@@ -135,8 +135,8 @@ def demo(**sets: Any) -> Result:
 
 
 def new(kind: str, /) -> str:
-    """The text of a scene of this kind to start from, which `load` and `run` take: patch, joint, bench, rig, linear,
-    misalignment or wear; PatchfemError for any other word, with those that there are."""
+    """The text of a scene of this kind to start from, which `load` and `run` take: patch, joint, bench, rig, beam,
+    damper, shroud, linear, misalignment or wear; PatchfemError for any other word, with those that there are."""
     return starting.text_of(_word(kind, "new"))
 
 

@@ -29,7 +29,7 @@ def new(kind: str = "", /, *, out: out_in("mine.toml in place of the screen") = 
         raise Refused(f"{out}: is there already; name another file by -o, or remove it")
 
     whole.write_text(out, text)
-    print(f"{out}: {starting.KINDS[kind]}\nnext: patchfem {'sweep' if '[sweep]' in text else 'run'} {out}")
+    print(f"{out}: {starting.KINDS[kind]}\nnext: patchfem {starting.NEXT.get(kind, 'run')} {out}")
 
 
 def demo(*, out: Out = None, no_page: NoPage = False):

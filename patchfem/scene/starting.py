@@ -15,10 +15,14 @@ KINDS = {
     "joint": "a bolted lap joint shaken to and fro: its friction loop, stiffness and damping",
     "bench": "a law of friction on one contact point, along a prescribed slide",
     "rig": "a rubbing block on flexures, shaken at one frequency",
+    "beam": "a beam with a bolted lap joint: frequency and damping over its amplitude",
+    "damper": "a sweep: the under-platform damper that takes most out of a blade's resonance",
+    "shroud": "a sweep: resonances of blades that rub at their shrouds, by nodal diameter",
     "linear": "a mass on flexures without friction",
     "misalignment": "a sweep: how much tilt the rig of the report allows",
     "wear": "how a tilted patch wears in over many cycles",
 }
+NEXT = {"beam": "backbone", "damper": "sweep", "shroud": "sweep", "misalignment": "sweep"}  # else run
 
 
 def text_of(kind: str) -> str:

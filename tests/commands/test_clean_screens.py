@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from command_line import cli
 
-from patchfem.scene.starting import KINDS, text_of
+from patchfem.scene.starting import KINDS, NEXT, text_of
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "studies").glob("*/*.toml"))
@@ -42,12 +42,12 @@ def ran(path: Path, out: Path, *words) -> list:
     return found
 
 
-@pytest.mark.parametrize("kind", [pytest.param(one, marks=pytest.mark.slow) if one == "misalignment" else one
+@pytest.mark.parametrize("kind", [pytest.param(one, marks=pytest.mark.slow) if one in NEXT else one
                                   for one in KINDS])
 def test_always_a_template_says_no_warning(kind, tmp_path):
     path = tmp_path / f"{kind}.toml"
     path.write_text(text_of(kind), "utf-8")
-    assert ran(path, tmp_path / "out", "sweep" if kind == "misalignment" else "run") == []
+    assert ran(path, tmp_path / "out", NEXT.get(kind, "run")) == []
 
 
 @pytest.mark.parametrize("scene", [one if one in CHEAP else pytest.param(one, marks=pytest.mark.slow)

@@ -17,7 +17,7 @@ from patchfem.commands import examine
 from patchfem.commands.sources import SOURCES, bibtex
 from patchfem.effects import EFFECTS
 from patchfem.scene.scene import loads
-from patchfem.scene.starting import KINDS, shipped, text_of
+from patchfem.scene.starting import KINDS, NEXT, shipped, text_of
 
 known([])  # all verbs
 
@@ -27,7 +27,9 @@ def test_exact_new_writes_what_it_prints(tmp_path):
     assert cli("new", "joint").out == text_of("joint") == pf.new("joint")
     answer = cli("new", "joint", "-o", path)
     assert answer.code == 0 and path.read_text("utf-8") == text_of("joint") and f"patchfem run {path}" in answer.out
-    assert "patchfem sweep" in cli("new", "misalignment", "-o", tmp_path / "tilts.toml").out
+    for kind, verb in NEXT.items():
+        assert f"patchfem {verb} " in cli("new", kind, "-o", tmp_path / f"{kind}.toml").out
+        assert f"patchfem {verb} FILE" in " ".join(text_of(kind).replace("\n#", " ").split())
     path.write_text("mine", "utf-8")
     answer = cli("new", "rig", "-o", path)
     assert answer.code == 2 and "is there already" in answer.err and path.read_text("utf-8") == "mine"

@@ -1,11 +1,12 @@
 """Scenes to start from: each is of the kind that it says, runs as it stands and misses no tolerance."""
 
+import numpy as np
 import pytest
 
 import patchfem as pf
 from patchfem.core import Outcome, PatchfemError
 from patchfem.scene.scene import load, loads
-from patchfem.scene.starting import KINDS, shipped, text_of
+from patchfem.scene.starting import KINDS, NEXT, shipped, text_of
 
 ENDS = {"patch": Outcome.DONE, "joint": Outcome.DONE, "bench": Outcome.DONE, "rig": Outcome.STEADY,
         "linear": Outcome.STEADY, "wear": Outcome.DONE}
@@ -30,7 +31,41 @@ def test_always_a_sweep_and_the_scene_of_the_rig_are_read():
     scene = loads(text_of("misalignment"))
     assert [axis.key for axis in scene.sweep] == ["contact.tilt.angle"] and scene.kind == "rig"
     assert load(shipped()).measured is not None
-    assert set(KINDS) == {*ENDS, "misalignment"}
+    assert set(KINDS) == {*ENDS, *NEXT}
+
+
+def test_exact_the_numbers_that_the_damper_tells():
+    """Free and held frequency of two masses, the load of two flats of a wedge, the amplitude at the held resonance."""
+    text, k, m = text_of("damper"), (1e6, 5e6), (0.15, 0.25)
+    free = np.sqrt(np.linalg.eigvals([[k[0] / m[0], -k[0] / m[0]], [-k[0] / m[1], sum(k) / m[1]]]).min()) / (2 * np.pi)
+    held = np.sqrt(k[0] / m[0]) / (2 * np.pi)
+    flats = 2 * 3e-3 * 0.3 * (10000 * np.pi / 30)**2 / (2 * np.sin(np.pi / 3))
+    assert f"has {free:.0f} Hz with free platforms and {held:.0f} Hz with held" in text
+    assert round(flats, -1) == 1140 and round(flats / 4) == 285
+    one = text[:text.index("\n[sweep]")]
+    for pressed, place, force in (("1 N", free, None), ("100 kN", held, 2.0)):
+        found = pf.run(loads(one.strip() + text[text.index("\n[accuracy]"):]),
+                       **{"structure.interface[1].load": pressed}).measures
+        assert abs(found["peak_frequency"].value - place) < found["peak_frequency"].error + 0.2
+        if force:
+            peak = force / (2.0 * 2 * np.pi * held)  # F/(c omega)
+            assert found["relative_displacement_amplitude"].value == pytest.approx(peak, rel=0.01)
+
+
+def test_exact_the_numbers_that_the_shrouds_tell():
+    """Slides 0.3 sin(pi n/24); shrouds that hold are springs of friction limit over bond length."""
+    text = text_of("shroud")
+    for n, slide in ((2, "0.0776"), (4, "0.15"), (8, "0.2598")):
+        assert f"{0.3 * np.sin(np.pi * n / 24):.4f}".rstrip("0") == slide.ljust(6, "0").rstrip("0") and slide in text
+    stiff = 0.3 * (2 * np.pi * 250)**2 + 0.2598**2 * 0.3 * 300 / 20e-6
+    assert f"up to {np.sqrt(stiff / 0.3) / (2 * np.pi):.0f} Hz with held ones" in text
+
+
+def test_always_the_beam_goes_from_the_bolted_to_the_free_frequency():
+    found = pf.backbone(loads(text_of("beam")), amplitudes=[1e-6, 3e-3], method="quasi-static")
+    f, zeta = (found[f"quasi_static_{name}"].values.ravel() for name in ("frequency", "damping"))
+    assert f[0] == pytest.approx(150, rel=3e-3) and zeta[0] == pytest.approx(1e-3, rel=0.01)
+    assert 100 < f[1] < 0.8 * f[0] and zeta[1] > 5 * zeta[0]
 
 
 def test_refuses_a_kind_that_is_not_there():

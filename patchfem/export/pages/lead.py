@@ -24,7 +24,7 @@ class Lead(NamedTuple):
     span: from where to where the main measure runs; turns: what changes as the key grows. "" where there is nothing to
     say. ranks, spread, peaks: as `ranked.ranks_of`, `ranked.quantiles` and `peaks.found` give them; rank, scatter,
     peak: what matters most, where nine in ten drawn cases lie, where a swept frequency has its peak, in sentences;
-    left: how many cases have no answer yet, and that none has settled."""
+    left: how many cases have no answer yet, and that none has settled; least: where the motion is least."""
 
     missed: dict
     misses: str
@@ -39,18 +39,19 @@ class Lead(NamedTuple):
     peaks: Sequence = ()
     peak: str = ""
     left: str = ""
+    least: str = ""
 
     def sentences(self) -> list:
         """What people read, the worst first."""
         rank = self.rank if self.scatter or not (self.limit or self.peak) else ""  # of a grid they say more
-        return [one for one in (self.left, self.misses, self.limit, self.peak, rank, self.scatter, self.span,
-                                self.turns) if one]
+        return [one for one in (self.left, self.misses, self.limit, self.peak, self.least, rank, self.scatter,
+                                self.span, self.turns) if one]
 
     def answer(self) -> str:
         """One sentence, two of drawn cases: how far the key may go, where the peak is, what matters most and how far
         the answers scatter, or where the main measure runs; before it how many cases miss the tolerance."""
         drawn = " ".join(one for one in (self.rank, self.scatter) if one)
-        text = self.limit or self.peak or drawn or self.span or self.turns
+        text = self.limit or self.peak or self.least or drawn or self.span or self.turns
         if self.left:
             return f"{self.left} {self._replace(left='').answer()}".strip()
         return f"{self.misses.rstrip('.')}; {text[0].lower() if text[1:2].islower() else text[0]}{text[1:]}" \
@@ -77,7 +78,7 @@ def lead_of(table: dict) -> Lead:
     return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
                 allowed.sentence(limits), span(columns(table), trusted, settled),
                 changes(keys, columns(table), outcome, table["grid"]), *ranked.told(table, trusted, settled.any()),
-                tops, peaks.sentence(tops), _left(outcome))
+                tops, peaks.sentence(tops), _left(outcome), least(keys, columns(table), trusted, shown))
 
 
 def _left(outcome: np.ndarray) -> str:
@@ -116,6 +117,32 @@ def span(measures: dict, trusted: dict, settled: np.ndarray) -> str:
             " in the cases that meet the tolerance"
         return f"{label(name).capitalize()}{whose} {ran}{band}."
     return ""
+
+
+def least(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
+    """Where between other cases the motion is least, as over the load of a friction damper, and its peak frequency
+    there; "" where its least is at an end of the one swept key, or below the ends by less than 5 %.
+
+    keys: as of `changes`; measures and trusted: as of `span`; shown: {name: `shown_of` the key}, of keys of numbers.
+    """
+    swept, name = [one for one in keys if len(set(one["texts"])) > 1], FIRST[0]
+    if len(swept) != 1 or swept[0]["name"] not in shown or swept[0]["name"] in peaks.KEYS or name not in measures:
+        return ""
+    key, (value, _, unit) = swept[0], measures[name]
+    place = np.asarray(key["values"], float)
+    order = [case for case in np.argsort(place, kind="stable").tolist() if np.isfinite(value[case])]
+    if len(order) < peaks.LEAST or not trusted[name][order].all():
+        return ""
+    height = np.asarray(value, float)[order]
+    low = int(np.argmin(height))
+    if min(height[0], height[-1]) < 1.05 * height[low]:
+        return ""
+    before, at, after = (shown[key["name"]](case) for case in order[low - 1:low + 2])
+    told = f"{label(name).capitalize()} is least at {key['name']} {at}: {short(height[low], unit, 4, zero_below(name))}"
+    peak = measures.get("peak_frequency")
+    if peak is not None and np.isfinite(peak[0][order[low]]):
+        told += f", at its peak frequency of {plain(peak[0][order[low]], 4)} Hz"
+    return f"{told} (next cases: {before} and {after})."
 
 
 def columns(table: dict) -> dict:

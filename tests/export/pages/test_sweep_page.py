@@ -9,7 +9,7 @@ from page_data import data_of, own_part
 
 from patchfem.export.pages import drawn, library
 from patchfem.export.pages.document import DIGITS, document, encoded
-from patchfem.export.pages.lead import span
+from patchfem.export.pages.lead import lead_of, span
 from patchfem.export.pages.sweep import brief, page
 from patchfem.export.sweeps.page import joined, wide
 
@@ -304,3 +304,24 @@ def test_exact_round_off_is_zero_in_the_span_and_known_absolutely():
     loop = np.array([4.2e-21, -1.4e-19, 3.7e-2]), np.array([1e-11, 1e-11, 7.4e-5]), "J"
     text = span({"loop_area": loop}, {"loop_area": np.ones(3, bool)}, np.ones(3, bool))
     assert text == "Loop area runs from 0 to 37 mJ, known to 0.2 % or better."
+
+
+def swept(heights, known=1e-9) -> str:
+    """What is told of the least amplitude over a load of 1 N to 1 kN."""
+    load = np.geomspace(1, 1000, len(heights))
+    key = {"name": "normal.load", "unit": "N", "values": load, "texts": [f"{one:.0f} N" for one in load], "log": True}
+    columns = {"relative_displacement_amplitude": ("m", heights),
+               "peak_frequency": ("Hz", np.linspace(300, 400, load.size))}
+    measures = {name: {"unit": unit, "means": "", "values": np.asarray(values), "errors": known * np.asarray(values),
+                       "floors": np.zeros(load.size)} for name, (unit, values) in columns.items()}
+    return lead_of({"keys": [key], "measures": measures, "outcome": ["steady"] * load.size, "tolerance": 1e-2,
+                    "grid": True}).least
+
+
+def test_exact_the_load_that_lets_a_blade_move_least():
+    assert swept(np.array([9, 5, 1, 2, 3, 4, 4]) * 1e-6) == \
+        "Relative displacement amplitude is least at normal.load 10 N: 1 um, at its peak frequency of 333.3 Hz " \
+        "(next cases: 3 N and 32 N)."
+    for ends in ([1, 2, 3, 4, 5, 6, 7], [7, 6, 5, 4, 3, 2, 1], [1.04, 1, 2, 3, 4, 5, 6], [2, 1, 2, 2]):
+        assert swept(np.array(ends) * 1e-6) == ""
+    assert swept(np.array([9, 5, 1, 2, 3, 4, 4]) * 1e-6, known=0.1) == ""
