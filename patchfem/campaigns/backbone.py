@@ -153,24 +153,31 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
         if wanted[-1] > joint.model.rig.travel:
             raise PatchfemError(f"an amplitude of {say(wanted[-1], 3)} lies beyond it; give smaller ones by "
                                 "--amplitudes", "structure.travel")
-        if joint.linear:
-            return _level(joint, wanted, methods)
         curves, missing, richer = {}, {}, model.rig.richer
         other = None if richer is None else _joint(replace(model, rig=richer), mode)
         for way in methods:
             if progress is not None:
                 progress(way)
             try:
-                curves[way] = FIND[way](joint, wanted)
-                if other is not None:
-                    curves[way] = _beside(curves[way], FIND[way](other, wanted))
+                curve = _curve(joint, wanted, way)
+                curves[way] = curve if other is None else _beside(curve, _curve(other, wanted, way))
             except (NotConverged, PatchfemError) as reason:
                 missing[way] = str(reason).removeprefix("backbone: ")
     return _put_together(joint, wanted, curves, missing)
 
 
+def _curve(joint: Joint, amplitudes, way: str) -> Curve:
+    return _level(joint, amplitudes, way) if joint.linear else FIND[way](joint, amplitudes)
+
+
 def _beside(curve: Curve, other: Curve) -> Curve:
-    """The curve of a reduced structure with the error of the modes left out, from the curve of more of them."""
+    """The curve of a reduced structure with the error of the modes left out, from the curve of more of them, where both
+    have amplitudes."""
+    a, ends = curve.amplitude, other.amplitude[[0, -1]] * [1 - CLOSE, 1 + CLOSE]
+    curve = curve.at((a >= ends[0]) & (a <= ends[1]))
+    if not curve.amplitude.size:
+        raise NotConverged("with more modes of the structure no motion of these amplitudes was found; keep more by "
+                           "structure.reduced.modes")
     frequency, damping = (OF_MODES * np.abs(np.interp(curve.amplitude, other.amplitude, theirs) - own) for own, theirs
                           in ((curve.frequency, other.frequency), (curve.damping, other.damping)))
     return curve._replace(frequency_error=curve.frequency_error + frequency,
@@ -204,7 +211,7 @@ def _joint(model: Model, name: str) -> Joint:
     return joint
 
 
-def _level(joint: Joint, amplitudes, methods) -> Backbone:
+def _level(joint: Joint, amplitudes, way: str) -> Curve:
     """Of a linear rig: by balance and by a static force omega and zeta of the damping -g of every coordinate that
     keeps a motion up, zeta = g/(2 omega); of a decay its own frequency omega (1 - zeta^2)^(1/2)."""
     modes, n = joint.modes, joint.modes.omega.size
@@ -219,16 +226,11 @@ def _level(joint: Joint, amplitudes, methods) -> Backbone:
     for _ in range(BALANCED):
         g -= 2 * root(g).real
     kept, own = abs(root(g)), root(0.0)
-    steady, decay = (kept, g / (2 * kept)), (abs(own.imag), -own.real / abs(own))
-    if not (own.imag and steady[1] < 1):
-        return _put_together(joint, amplitudes, {}, dict.fromkeys(methods, "the mode does not swing: its damping ratio "
-                                                                           "is 1 or more"))
-    curves = {}
-    for way in methods:
-        omega, zeta = decay if way == "decay" else steady
-        f, zeta = np.full(amplitudes.size, omega / (2 * np.pi)), np.full(amplitudes.size, zeta)
-        curves[way] = Curve(amplitudes, f, ROUND * f, zeta, ROUND * np.abs(zeta), np.full(f.size, np.nan))
-    return _put_together(joint, amplitudes, curves, {})
+    if not (own.imag and g < 2 * kept):
+        raise NotConverged("the mode does not swing: its damping ratio is 1 or more")
+    omega, zeta = (abs(own.imag), -own.real / abs(own)) if way == "decay" else (kept, g / (2 * kept))
+    f, zeta = np.full(amplitudes.size, omega / (2 * np.pi)), np.full(amplitudes.size, zeta)
+    return Curve(amplitudes, f, ROUND * f, zeta, ROUND * np.abs(zeta), np.full(f.size, np.nan))
 
 
 def _number(rig, name: str) -> int:

@@ -182,3 +182,16 @@ def test_exact_a_sweep_over_the_modes_has_a_reduction_for_each(folder):
               for k in (2, 30)]
     np.testing.assert_allclose(found, wanted, rtol=1e-9)
     assert found[0] != found[1]
+
+
+@pytest.mark.parametrize("rubs", [False, True])
+def test_always_bars_of_a_backbone_hold_the_whole_matrices(folder, rubs):
+    """Two boundary coordinates and one mode, of which the third frequency is off by 13 %."""
+    small, whole = (text if rubs else text.split("[[")[0] + "[drive]" + text.split("[drive]")[1] for text in
+                    (SCENE.replace("modes = 4", "modes = 1"), WHOLE))
+    for way in ("balance", "quasi-static", "decay")[:3 - rubs]:
+        one, other = (pf.backbone(_written(folder, text), mode="31"[rubs], amplitudes=[1e-6, 1e-5], method=way)
+                      for text in (small, whole))
+        for name in (f"{way.replace('-', '_')}_{what}" for what in ("frequency", "damping")):
+            gap = np.abs(one[name].values - other[name].values)
+            assert (gap > 0).all() and (gap <= one[f"{name}_error"].values).all(), name
