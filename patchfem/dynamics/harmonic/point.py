@@ -157,13 +157,14 @@ def cut(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
 
 
 def finer(found: Periodic, modes, drive) -> Periodic:
-    """The same motion with twice its harmonics and samples, those above following where they do. NotConverged where it
-    is not found."""
-    h, top, x = found.harmonics, found.coefficients.shape[1] - 1, found.unknowns
+    """The same motion with twice its harmonics, three of one (a law alike both ways has no even ones), and twice its
+    samples, those above following where they do. NotConverged where it is not found."""
+    h, x = found.harmonics, found.unknowns
+    top = max(2 * (found.coefficients.shape[1] - 1), 3)
     balance = balance_of(modes, found.group, 2 * found.base_samples)
     here = balance.system(x, drive.omega, drive.acceleration, h)
-    one = _widened(balance, Reached(x, here, 0, found.coefficients), drive, h, 2 * top // h, TOLERANCE)
-    return one if np.isfinite(one.error) else _solved(modes, drive, balance.contact, 2 * top, x, 1)
+    one = _widened(balance, Reached(x, here, 0, found.coefficients), drive, h, top // h, TOLERANCE)
+    return one if np.isfinite(one.error) else _solved(modes, drive, balance.contact, top, x, 1)
 
 
 def _solved(modes, drive, group, h, x, wider, tolerance=TOLERANCE, near=0) -> Periodic:
