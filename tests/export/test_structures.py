@@ -9,6 +9,8 @@ from scipy.io import loadmat
 import patchfem as pf
 from patchfem.model.model import build
 
+CUBIC = '[structure.stiffening]\ncubic = "1e12 N/m^3"\n'
+WAVE = 'amplitude = "3 N"\nfrequency = "70 Hz"\n'
 RUB = POINT + PLASTIC + STRUCTURE
 
 
@@ -89,9 +91,22 @@ def test_exact_tanh_has_its_speed(tmp_path):
     assert str(cell["type"][0, 0][0]) == "tanhDryFriction" and cell["eps"][0, 0].item() == 1e-3
 
 
+def test_exact_a_release_has_no_excitation(tmp_path):
+    text = RUB.split("[drive]")[0] + '[drive]\nkind = "free"\ndisplacement = "20 um"\ncycles = 5\n'
+    with np.load(written(tmp_path, text, ".npz")[1]) as found:
+        assert not found["Fex1"].any() and not {"force", "base", "Omega"} & set(found.files)
+
+
 @pytest.mark.parametrize("text, ending, says", [
     (POINT + friction_of("coulomb") + STRUCTURE, ".mat", "law 'coulomb'"),
     (POINT + friction_of("bouc-wen") + STRUCTURE, ".npz", "law 'bouc-wen' is no set of elements"),
+    (POINT + friction_of("tanh") + STRUCTURE.replace("[drive]", CUBIC + "[drive]"),
+     ".mat", "no form beside [structure.stiffening]"),
+    (STRUCTURE.replace("[drive]", CUBIC + "[drive]"), ".npz", "no form beside [structure.stiffening]; leave that out"),
+    (POINT + WAVE + friction_of("tanh") + STRUCTURE, ".npz", "no form under a load that changes; leave that out"),
+    (POINT + WAVE + PLASTIC + STRUCTURE, ".npz", "no form under a load that changes; leave that out"),
+    (POINT + "[normal.grooves]\nwavelength = \"80 um\"\namplitude = \"1 um\"\n" + friction_of("tanh") + STRUCTURE,
+     ".npz", "no form beside [normal.grooves]"),
     (RUB, ".csv", "a structure is exported as .mat or .npz"),
     (POINT + PLASTIC + '[slide]\nkind = "triangle"\namplitude = "8 um"\nspeed = "1 mm/s"\n', ".mat", "which it lacks"),
 ])

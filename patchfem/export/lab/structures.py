@@ -14,7 +14,6 @@ import numpy as np
 
 from ...core import BaseSine, Outcome, PatchfemError
 from ...disk.whole import whole
-from ...effects import has
 from ...model.model import Model
 from ...model.source import placed
 from ...runs.patch import result as patch_result
@@ -38,8 +37,8 @@ class Elements(NamedTuple):
 def export(model: Model, out: Path) -> str:
     """Write the rig of a Model as .mat or .npz; one line on what was written.
 
-    PatchfemError for another ending, a scene without [structure] and a law that is neither elements that stretch and
-    slip nor tanh; Missing where `out` cannot be written.
+    PatchfemError for another ending, a scene without [structure], a law that is neither elements that stretch and slip
+    nor tanh, a spring that bends, grooves and a load that changes; Missing where `out` cannot be written.
     """
     out = Path(out)
     if out.suffix.lower() not in ENDINGS:
@@ -48,6 +47,7 @@ def export(model: Model, out: Path) -> str:
         if model.rig is None:
             raise PatchfemError("a scene is exported as its structure, which it lacks; export a results folder",
                                 "structure")
+        _refuse(model)
         arrays, found = matrices_of(model), elements_of(model)
     with whole(out) as partial, open(partial, "wb") as file:
         if out.suffix.lower() == ".npz":
@@ -59,35 +59,49 @@ def export(model: Model, out: Path) -> str:
 
 def matrices_of(model: Model) -> dict:
     """M, C, K (n, n) [kg, N s/m, N/m], output (n,), Fex1 (n,) [N] of the drive, force or base (n,), slide (i, n),
-    Omega [rad/s] of a sine; without a sine Fex1 is that of 1 N or 1 m/s^2."""
+    Omega [rad/s] of a sine; without a sine Fex1 is that of 1 N or 1 m/s^2, and 0 of a release."""
     rig, modes = model.rig, model.rig.modes
     n = modes.omega.size
     sine = isinstance(rig.drive, BaseSine)
-    size = rig.drive.acceleration if sine else 1.0
+    size = rig.drive.acceleration if sine else float(rig.kind != "free")
     push = -modes.base * modes.mass * size
-    found = {"base": np.array(modes.base)} if rig.kind == "base" else {"force": -np.array(modes.base)}
+    found = {"base": np.array(modes.base)} if rig.kind == "base" else \
+        {"force": -np.array(modes.base)} if rig.kind == "force" else {}
     found |= {"slide": np.array(modes.interfaces)} if rig.interfaces else {}
     found |= {"Omega": rig.drive.omega} if sine else {}
     return {"M": modes.mass * np.eye(n), "C": modes.mass * modes.dampers, "K": modes.mass * np.diag(modes.omega**2),
             "output": np.array(modes.output), "Fex1": push, **found}
 
 
+def _speeds(rig) -> bool:
+    """Whether the friction is of the speed alone."""
+    return all(one.numbers.law == "tanh" for one in rig.interfaces)
+
+
+def _refuse(model: Model) -> None:
+    """PatchfemError for what neither matrices nor friction elements have."""
+    rig = model.rig
+    why = (engines.ENGINES["newmark"] if _speeds(rig) else engines.PIECES).lacks(model, steady=True)
+    if why.startswith("for law"):
+        raise PatchfemError(f"{why.removeprefix('for ')} is no set of elements that stretch and slip; use law "
+                            "'elastic-plastic', 'iwan' or 'tanh', or law 'coulomb' with [contact.shear]",
+                            f"{rig.interfaces[0].key}.law")
+    if why:
+        raise PatchfemError(f"matrices and friction elements have no form {why}; leave that out of the scene",
+                            "structure")
+
+
 def elements_of(model: Model) -> Elements:
-    """The friction elements of a rig; none of one that does not rub. PatchfemError for a law without such elements."""
+    """The friction elements of a rig; none of one that does not rub."""
     rig, n = model.rig, model.rig.modes.omega.size
     none = np.zeros(0)
     if not rig.interfaces:
         return Elements("elements", np.zeros((0, n)), none, none, none)
     rows, laws = rig.modes.interfaces, [one.numbers for one in rig.interfaces]
-    if all(law.law == "tanh" for law in laws):
+    if _speeds(rig):
         limit = np.array([law.static * (model.nominal_load if one.load is None else one.load)
                           for law, one in zip(laws, rig.interfaces)])
         return Elements("tanh", rows, limit, none, np.array([law.reference_speed for law in laws]))
-    if why := engines.PIECES.lacks(model, steady=True):
-        odd = next((law.law for law in laws if not has(law.law, "pieces")), None)
-        raise PatchfemError((f"law '{odd}' is" if odd else "the contact is") + " no set of elements that stretch and "
-                            f"slip{'' if odd else f' ({why})'}; use law 'elastic-plastic', 'iwan' or 'tanh', or law "
-                            "'coulomb' with [contact.shear]", rig.interfaces[0].key + ".law" if odd else "contact")
     patch = None
     if model.patch is not None:
         patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
