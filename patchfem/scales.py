@@ -27,6 +27,7 @@ LADDERS = {  # from the smallest unit up: (name, what one SI unit is in it)
     "m2": (("um^2", 1e12), ("mm^2", 1e6), ("m^2", 1.0)),
     "m3": (("um^3", 1e18), ("mm^3", 1e9)),
     "Hz": (("Hz", 1.0), ("kHz", 1e-3)),
+    "m s-2": (("g", 1 / 9.80665),),
     "W": (("uW", 1e6), ("mW", 1e3), ("W", 1.0), ("kW", 1e-3)),
 }
 SPOKEN = {unit: unit for unit in LADDERS if "-" not in unit} | {"N/m": "N m-1"}  # units as sentences write them

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .. import core, rates
+from .. import rates
 from ..campaigns.sweeps import ask, estimate
 from ..effects import shown_absent
 from ..mesh import files as mesh_files
@@ -127,8 +127,7 @@ def _words(name: str) -> str:
 def _group(value: float, name: str) -> str:
     """A group of the plan with its value as people read it."""
     text, unit = plans.GROUPS.get(name, (_words(name), "1"))
-    shown = f"{value / core.G_N:.4g} g" if unit == "m s-2" else short(value, unit, 4)
-    return f"{shown:<10} {text}"
+    return f"{short(value, unit, 4):<10} {text}"
 
 
 def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"], help="mesh.msh or mesh.vtu")],

@@ -105,10 +105,9 @@ def interface(x, fields: dict) -> list:
     if tau is not None and np.any(tau):
         unit, scale = axis_unit(tau, "Pa")
         frame = int(np.argmax(np.abs(tau @ np.gradient(x))))
-        name, per = axis_unit(fields["time"], "s")
         shown = np.unique(np.linspace(1, len(tau) - 1, min(FRAMES, len(tau) - 1)).round().astype(int))
         frames = [line(x * size, tau[k] * scale, "soft", most=FAINT, width=0.6, alpha=0.6) for k in shown]
-        title = f"Shear stress, largest resultant {fields['time'][frame] * per:.4g} {name} into the motion"
+        title = f"Shear stress at {len(shown)} times, the largest in colour"
         out.append(chart(title, place, axis("shear stress", unit),
                          [*frames, line(x * size, tau[frame] * scale, "warm")]))
     return out
@@ -154,7 +153,8 @@ def bodies(x, depths, mises, sigma) -> list:
             values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(means.shape)
             marks.append(mark("cells", "", x=along * size, y=side * down * size, value=values, top=top, unit=unit))
         across, up = ({"range": [low * size, high * size]} for low, high in ((left, right), (-height, height)))
-        out.append(chart("Von Mises stress", axis("x", name) | across, axis("y", name) | up, marks)
+        title = "Von Mises stress" if out else "Von Mises stress at the contact"
+        out.append(chart(title, axis("x", name) | across, axis("y", name) | up, marks)
                    | {"frame": _frame((right - left) / (2 * height))})
     return out[::-1]
 

@@ -66,10 +66,12 @@
       name: mark.x.map(() => mark.name || ""), ...more}});
   }
 
-  const BESIDE = 215;                            // pixels that axis, scale of colours and tools take beside a frame
+  const BESIDE = 215, AROUND = 85;               // pixels that axis, scale of colours and tools take beside a frame
   function framed([wide, tall], place) {         // a frame as large as its place lets it be
     const share = Math.min(1, (place.clientWidth - BESIDE) / wide);
-    return {sizing_mode: "fixed", width: place.clientWidth, frame_width: Math.round(share * wide), frame_height: Math.round(share * tall)};
+    const high = Math.round(share * tall);
+    place.style.height = `${high + AROUND}px`;
+    return {sizing_mode: "fixed", width: place.clientWidth, height: high + AROUND, frame_width: Math.round(share * wide), frame_height: high};
   }
 
   function made(chart, place) {
