@@ -175,8 +175,7 @@ def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "",
     ways = backbones.WAYS if _word(method, "backbone: method") == "all" else (method,)
     if unknown := set(ways) - set(backbones.WAYS):
         raise PatchfemError(f"backbone: method {unknown.pop()!r}: one of {', '.join(backbones.WAYS)} or all")
-    wanted = None if amplitudes is None else axes.lengths(amplitudes if isinstance(amplitudes, str) else ",".join(
-        texts(axes.LENGTH, amplitudes)), "amplitudes")
+    wanted = None if amplitudes is None else axes.lengths(_lengths(amplitudes), "amplitudes")
     found = backbones.backbone(model, _word(mode, "backbone: mode"), wanted, ways)
     return backbone_files.contents(found, model.source.title).to_xarray()
 
@@ -258,7 +257,8 @@ def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[
     return many.answers(meshes.meshed([build(one) for one in models]), say=_on_stderr if say is None else say)
 
 
-def fit(scene: str | Path | Scene, /, *, to: str | Path, free: Mapping[str, Any], hold: Iterable[str] = (),
+def fit(scene: str | Path | Scene, /, *, to: str | Path = "", free: Mapping[str, Any] | None = None,
+        from_patch: bool = False, amplitudes: str | Iterable | None = None, hold: Iterable[str] = (),
         offset: Iterable[str] = (), warm_up: bool = False, leave_out: str = "", starts: int = 8, seed: int = 0,
         unstable: str = "bound", placebo: Iterable[str] = (), resume: bool = False, out: str | Path | None = None,
         say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
@@ -266,23 +266,25 @@ def fit(scene: str | Path | Scene, /, *, to: str | Path, free: Mapping[str, Any]
 
     scene and sets as `load` takes them. to: a loop of a bench, rows of a rig or its frequency and damping over the
     amplitude, a worn depth of a scene with [wear]. free: key -> (low, high), texts as in a scene or numbers in SI, or a
-    text such as "0.1..0.6". hold: rows that are only predicted, such as "frequency=135 Hz,150 Hz"; offset, warm_up: of
-    a loop; leave_out: a column of which each value is left out in turn; unstable: "bound", "out" or "read", what rows
-    flagged U count as; placebo: values such as "structure.mode.yaw.frequency=110 Hz,138 Hz", with each of which a whole
-    fit is made; starts, seed: of the search over rows. out: the folder that `patchfem fit -o` writes, with `resume`
-    gone on with. say: called with one line where something takes long. SceneError, PatchfemError as `patchfem fit`
-    refuses.
+    text such as "0.1..0.6". from_patch: laws of one point from the loops of the scene's own patch in place of both;
+    amplitudes: of its slide, [m] or a text such as "0.1 um..10 um:25". hold: rows that are only predicted, such as
+    "frequency=135 Hz,150 Hz"; offset, warm_up: of a loop; leave_out: a column of which each value is left out in turn;
+    unstable: "bound", "out" or "read", what rows flagged U count as; placebo: values such as
+    "structure.mode.yaw.frequency=110 Hz,138 Hz", with each of which a whole fit is made; starts, seed: of the search
+    over rows. out: the folder that `patchfem fit -o` writes, with `resume` gone on with. say: called with one line
+    where something takes long. SceneError, PatchfemError as `patchfem fit` refuses.
     """
     found, tell = load(scene, **sets), _on_stderr if say is None else say
-    if not isinstance(free, Mapping):
+    if not isinstance(free, Mapping | None):
         raise PatchfemError(f"fit: free is a dict of key: (low, high), not {free!r:.60}")
-    asked = [f"{key}={_ends_of(key, ends)}" for key, ends in free.items()]
+    asked = [f"{key}={_ends_of(key, ends)}" for key, ends in (free or {}).items()]
+    slides = "" if amplitudes is None else _lengths(amplitudes)
     options = fits.Options(_words(hold, "fit: hold"), _words(offset, "fit: offset"), warm_up, leave_out, starts, seed,
-                           unstable, _words(placebo, "fit: placebo"), resume)
-    if out is not None:
-        return fits.fit_into(found, str(_path(to, "fit: to")), asked, options, Path(out), fits.Heard(tell))
+                           unstable, _words(placebo, "fit: placebo"), resume, from_patch, slides)
+    measured = "" if isinstance(to, str) and not to else str(_path(to, "fit: to"))
     with TemporaryDirectory() as room:
-        return fits.fit_into(found, str(_path(to, "fit: to")), asked, options, Path(room) / "fit", fits.Heard(tell))
+        target = Path(room) / "fit" if out is None else Path(out)
+        return fits.fit_into(found, measured, asked, options, target, fits.Heard(tell))
 
 
 def _ends_of(key: str, ends: Any) -> str:
@@ -291,6 +293,11 @@ def _ends_of(key: str, ends: Any) -> str:
     if not isinstance(ends, str) and len(pair) != 2:
         raise PatchfemError(f"fit: free: {key}: (low, high) or a text such as '0.1..0.6' is wanted, not {ends!r:.60}")
     return "..".join(pair)
+
+
+def _lengths(given: float | str | Iterable) -> str:
+    """Lengths [m], or a text of them, as the text that an option reads."""
+    return given if isinstance(given, str) else ",".join(texts(axes.LENGTH, given))
 
 
 def _words(given: str | Iterable[str], what: str) -> tuple:

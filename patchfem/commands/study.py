@@ -113,11 +113,15 @@ class Rows:
     resume: flag("go on from the starts that an interrupted fit has finished") = False
 
 
-def fit(scene: Path, /, *, to: Annotated[str, Parameter(
-            help='what was measured: loop.csv of a bench ("time [s],displacement [um],force [N]", or what export '
-                 'writes), rows.csv of a rig or its decay.csv (import --decay), compare.json or "worn_depth_max=2.5 '
-                 'um..3.5 um" of a scene with [wear]')],
-        free: texts('a key to find and its range, such as "friction.static=0.1..0.6"; may be repeated'),
+def fit(scene: Path, /, *, to: word(
+            'what was measured: loop.csv of a bench ("time [s],displacement [um],force [N]", or what export '
+            'writes), rows.csv of a rig or its decay.csv (import --decay), compare.json or "worn_depth_max=2.5 '
+            'um..3.5 um" of a scene with [wear]') = "",
+        free: texts('a key to find and its range, such as "friction.static=0.1..0.6"; may be repeated') = (),
+        from_patch: flag("in place of --to and --free: Iwan, Bouc-Wen and elastic-plastic laws of one point from the "
+                         "loops of the scene's own patch, each with what it leaves out and as a scene") = False,
+        amplitudes: word('beside --from-patch: half peak-to-peak of the slide, such as "0.1 um..10 um:25"; from where '
+                         "the patch begins to slip unless given") = "",
         hold: texts('rows that are only predicted, such as "frequency=135 Hz,150 Hz"') = (),
         offset: texts("of a loop, free besides, such as force (what the record adds to it), displacement (how far its "
                       "first row lies from the unstressed place)") = (),
@@ -126,13 +130,13 @@ def fit(scene: Path, /, *, to: Annotated[str, Parameter(
         out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
     """Find values of keys of SCENE from what was measured: a bench from a friction loop, a rig from rows of frequency,
     input, acceleration and displacement or from frequency and damping over the amplitude, the wear coefficient from a
-    measured wear depth.
+    measured wear depth; or laws of one point from its own patch.
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
     found, target = scene_of(scene, set_), placed(out, f"{scene.stem}-fit")
-    options = fits.Options(hold, offset, warm_up, **vars(rows))
-    with progress_bar(quiet or json_ or fits.kind_of(found, to) in ("loop", "curve")) as progress:
+    options = fits.Options(hold, offset, warm_up, from_patch=from_patch, amplitudes=amplitudes, **vars(rows))
+    with progress_bar(quiet or json_ or from_patch or fits.kind_of(found, to) in ("loop", "curve")) as progress:
         heard = fits.Heard(None if quiet else say, progress, lambda name: f"--{name.replace('_', '-')}")
         answer = fits.fit_into(found, to, free, options, target, heard)
     if json_:

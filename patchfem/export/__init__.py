@@ -23,11 +23,12 @@ In: a `Result`. Out: files. A module imports its own entry of this list and the 
 19. `fit`       a fitted loop on paper
 20. `fit_folder` a fit on disk
 21. `fitted_decay` a rig fitted to frequency and damping over the amplitude
-22. `fit_rows`  a rig fitted to rows
-23. `wear_fit`  a fitted wear coefficient on disk
-24. `fits`      a fit of any kind, from its options to its folder
-25. `backbone`  frequency and damping over the amplitude on disk
-26. `chosen`    a results folder in the format, or the picture, that the ending of a file asks for
+22. `fitted_patch` laws of one point fitted to a patch
+23. `fit_rows`  a rig fitted to rows
+24. `wear_fit`  a fitted wear coefficient on disk
+25. `fits`      a fit of any kind, from its options to its folder
+26. `backbone`  frequency and damping over the amplitude on disk
+27. `chosen`    a results folder in the format, or the picture, that the ending of a file asks for
 
 Read `folder` first.
 """

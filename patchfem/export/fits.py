@@ -1,5 +1,5 @@
-"""A fit as the command line and Python ask for it, of a loop, of rows, of a curve over the amplitude or of wear: its
-folder and its lines of text."""
+"""A fit as the command line and Python ask for it, of a loop, of rows, of a curve over the amplitude, of wear or of the
+scene's own patch: its folder and its lines of text."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
@@ -9,27 +9,30 @@ from .. import scales
 from ..campaigns import wear_coefficient
 from ..campaigns.fit import fit_loop
 from ..campaigns.fit_decay import fit_decay, is_curve
+from ..campaigns.fit_patch import fit_patch, slides_of
 from ..campaigns.fit_path import LoopOptions
 from ..campaigns.rows.asked import Question
 from ..campaigns.rows.fit import RowsOptions, fit_rows
 from ..campaigns.rows.search import UNSTABLE, Search
 from ..core import PatchfemError
 from ..model.model import build
+from ..scene import axes
 from ..scene.ranges import ranges
 from ..scene.scene import SceneError, loads
 from . import fit as loop_lines
-from . import fit_folder, fitted_decay, wear_fit
+from . import fit_folder, fitted_decay, fitted_patch, wear_fit
 from . import fit_rows as written
 from .results import STARTS, Folder
 
 LOOP, ROWS = ("offset", "warm_up"), ("leave_out", "starts", "seed", "unstable", "placebo", "resume")
 BELONG = {"hold": "a loop of a bench or to rows of a rig", **dict.fromkeys(LOOP, "a loop of a bench"),
-          **dict.fromkeys(ROWS, "rows of a rig")}
+          **dict.fromkeys(ROWS, "rows of a rig"), "amplitudes": "--from-patch"}
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What stands beside the free keys: `hold` of a loop and of rows, LOOP of a loop, ROWS of rows."""
+    """What stands beside the free keys: `hold` of a loop and of rows, LOOP of a loop, ROWS of rows, `amplitudes` of the
+    patch that stands in place of a measurement."""
 
     hold: tuple = ()
     offset: tuple = ()
@@ -40,6 +43,8 @@ class Options:
     unstable: str = UNSTABLE[0]
     placebo: tuple = ()
     resume: bool = False
+    from_patch: bool = False
+    amplitudes: str = ""
 
     def given(self) -> list:
         """Names of those that are not as they are by default."""
@@ -56,16 +61,22 @@ class Heard:
 
 
 def fit_into(whole, to: str, free: Sequence[str], options: Options, target: Path, heard: Heard = Heard()) -> dict:
-    """Fit the keys `free` ("table.key=low..high" texts) of a scene to what was measured, and write the folder `target`,
-    which is claimed before the work; the object of fit.json, in SI.
+    """Fit the keys `free` ("table.key=low..high" texts) of a scene to what was measured, or laws of one point to its
+    patch, and write the folder `target`, which is claimed before the work; the object of fit.json, in SI.
 
     SceneError and PatchfemError name bad input and options that this scene does not have, before anything is computed.
     """
-    kind = kind_of(whole, to)
+    kind = "patch" if options.from_patch else kind_of(whole, to)
     _refuse(kind, options, heard.named)
+    if options.from_patch == bool(to) or (options.from_patch and free):
+        raise PatchfemError(f"{heard.named('to')} MEASURED and {heard.named('free')} KEYS are wanted, or "
+                            f"{heard.named('from_patch')} alone, which fits laws of one point to the scene's own patch")
+    slides = slides_of(axes.lengths(options.amplitudes, heard.named("amplitudes")) if options.amplitudes else None)
     with Folder(target, options.resume) as folder:
         if folder.dropped and heard.say is not None:
             heard.say(folder.dropped)
+        if kind == "patch":
+            return fitted_patch.fit_into(fit_patch(whole, slides), folder)
         if kind == "rows":
             return _of_rows(whole, Path(to), free, options, folder, heard)
         if kind == "curve":
@@ -86,9 +97,9 @@ def kind_of(whole, to: str) -> str:
 
 
 def _refuse(kind: str, options: Options, named: Callable) -> None:
-    here = {"loop": ("hold", *LOOP), "rows": ("hold", *ROWS)}.get(kind, ())
+    here = {"loop": ("hold", *LOOP), "rows": ("hold", *ROWS), "patch": ("from_patch", "amplitudes")}.get(kind, ())
     is_ = {"loop": "a bench", "rows": "a rig", "wear": "one with [wear]",
-           "curve": "a rig, fitted to a curve over the amplitude"}[kind]
+           "curve": "a rig, fitted to a curve over the amplitude", "patch": "fitted to its own patch"}[kind]
     others = [name for name in options.given() if name not in here]
     if others:
         belong = "; ".join(f"{named(name)} belongs to {BELONG[name]}" for name in others)
@@ -119,6 +130,7 @@ def lines_of(answer: dict) -> list:
     """The answer of any fit as lines of text; answer: the object of fit.json."""
     one = answer["values"].get(wear_coefficient.KEY)
     if one is None or "runs" not in answer:
-        return {"rows": written, "decay": fitted_decay}.get(answer["quantity"], loop_lines).lines_of(answer)
+        own = {"rows": written, "decay": fitted_decay, "patch": fitted_patch}
+        return own.get(answer["quantity"], loop_lines).lines_of(answer)
     value, low, high = (scales.plain(number, 4) for number in (one["value"], *one["interval"]))
     return [f"{wear_coefficient.KEY} {value} {one['unit']}, {low} to {high} by the interval of {answer['quantity']}"]

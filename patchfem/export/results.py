@@ -16,6 +16,7 @@ from ..disk.whole import KEPT, unfinished, unmade
 PAGE = "report.html"
 FILES = ("summary.json", "result.nc", "fields.vtkhdf", PAGE, "scene.resolved.toml", "fields.pvd",
          "fields_frames", "fit.json", "fit.csv", "fit.svg", "scene.fitted.toml", "wear.npz",
+         "scene.iwan.toml", "scene.bouc-wen.toml", "scene.elastic-plastic.toml",
          "starts.json", "compare.json", "surface_before.csv", "surface_after.csv", "difference.x3p", "difference.csv",
          "profile.json", "profile.csv", "surfaces", "pairs.csv", "pairs.json",
          "backbone.csv", "backbone.nc", "backbone.json", "backbone.svg")

@@ -60,9 +60,9 @@ def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3, ba
 
     log: (n,) flags, None decides (see `space`); start: (n,) values tried first; starts: descents at most, 1 from
     `start` alone where it works; bars: "rows" takes rows as independent, "series" counts neighbours that correlate as
-    fewer, "" leaves the intervals NaN and looks for no bound or unknown. A residual that raises a PatchfemError or is
-    not finite is a failed evaluation, counted and passed over. ValueError for bad bounds or fewer rows than values,
-    NotConverged where every start fails.
+    fewer, "" leaves the intervals NaN and looks for no bound or unknown, "bounds" for no unknown. A residual that
+    raises a PatchfemError or is not finite is a failed evaluation, counted and passed over. ValueError for bad bounds
+    or fewer rows than values, NotConverged where every start fails.
     """
     box = space(low, high, log)
     model, n = Counted(residual, box), box.low.size
@@ -117,9 +117,7 @@ def answered(model: Counted, found: list, bars: str = "rows", starts=None) -> Fi
     agreed = sum(abs(other.cost - cost) <= 1e-6 * cost + 1e-20 * model.largest**2 * model.rows for other in found)
     if bars:
         u, cost = _onto_bounds(model, u, cost)
-        answer = intervals(model, u, cost, descend, bars == "series")
-    else:
-        answer = nothing(u.size)
+    answer = nothing(u.size) if bars in ("", "bounds") else intervals(model, u, cost, descend, bars == "series")
     rms = float(np.sqrt(cost / model.rows))
     alike = sum(one.cost <= VALLEY * cost for one in starts or found)
     return _frozen(model, u, answer, rms, agreed, Outcome.DONE if done or alike > 1 else Outcome.NOT_CONVERGED)

@@ -12,7 +12,7 @@ from ..inputs import measured
 from ..mesh import files
 from ..scene.rules import limits
 from ..scene.scene import files_of, is_there
-from . import drive, patch, profile, slide, structure_files, structure_reduced, worn
+from . import drive, patch, peaks, profile, slide, structure_files, structure_reduced, worn
 
 WHOLE = 2 * 2**20  # bytes of a mesh that is read whole
 STARTS = {".msh": (b"$MeshFormat",), ".vtu": (b"<?xml", b"<VTKFile"), ".inp": (b"*",), ".unv": (b"-1", b"    -1")}
@@ -113,6 +113,12 @@ def _worn(path: Path, tables, whole: bool) -> tuple:
     return (found.sentence,)
 
 
-READERS = {"contact.mesh": _mesh, "contact.profile.file": _profile, "slide.file": _slide, "drive.file": _drive,
-           "structure.file": _structure, **{f"structure.reduced.{key}": _matrix(key) for key in
-           ("stiffness", "mass", "damping")}, "measured.file": _measured, "wear.start": _worn}
+def _rough(path: Path, tables, whole: bool) -> None:
+    """A trace whose peaks those of a surface can be."""
+    peaks.of_trace(path)
+
+
+READERS = {"contact.mesh": _mesh, "contact.asperities.from": _rough, "contact.profile.file": _profile,
+           "slide.file": _slide, "drive.file": _drive, "structure.file": _structure,
+           **{f"structure.reduced.{key}": _matrix(key) for key in ("stiffness", "mass", "damping")},
+           "measured.file": _measured, "wear.start": _worn}

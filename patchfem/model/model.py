@@ -18,7 +18,7 @@ from . import rig as of_rig
 from . import slide as of_slide
 from . import wear as of_wear
 from .law import acting, bonds_of, pad_width
-from .source import Source
+from .source import Source, placed
 
 if TYPE_CHECKING:
     from ..friction.bonds.parameters import Bonds
@@ -112,7 +112,8 @@ def build(scene: Scene) -> Model:
                             "leave [sweep] out")
     patch = point = slide = rig = grooves = None
     if scene.contact is not None:
-        patch = patch_model.patch_asked(scene.contact, scene.kind, scene.beside)
+        with placed(scene):
+            patch = patch_model.patch_asked(scene.contact, scene.kind, scene.beside)
     if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
         point, grooves = of_load.point_asked(scene), of_load.grooves_asked(scene)
     if scene.slide is not None:

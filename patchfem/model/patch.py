@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from ..mesh.ends import SHARP, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material
+from . import peaks
 from .gap import Gap, gap_asked
 
 CHOSEN_POINTS = 160  # about what a patch takes at the default tolerance
@@ -167,7 +168,9 @@ def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
         line.offset if line is not None else None, line.moment if line is not None else None, line is not None,
         (holder.rotational_stiffness or 0.0) if holder is not None else 0.0,
         (holder.tangential_stiffness or None) if holder is not None else None,
-        contact.asperities, (strips.count, strips.roll, strips.offset) if strips is not None else None,
+        contact.asperities if contact.asperities is None or contact.asperities.law != "hertz" else
+        peaks.skin_asked(contact.asperities, beside),
+        (strips.count, strips.roll, strips.offset) if strips is not None else None,
         contact.shear is not None, contact.gives_way)
 
 

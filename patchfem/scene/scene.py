@@ -146,8 +146,9 @@ def with_files(found: Scene) -> Scene:
 
 def files_of(found: tables.Tables | Scene) -> list[tuple[str, str]]:
     """(key, file) of every file that the tables of a scene name."""
-    profile = found.contact and found.contact.profile
+    profile, rough = (found.contact and getattr(found.contact, name) for name in ("profile", "asperities"))
     named = [("contact.mesh", found.contact and found.contact.mesh), ("contact.profile.file", profile and profile.file),
+             ("contact.asperities.from", rough and rough.law == "hertz" and rough.from_),
              ("slide.file", found.slide and found.slide.file), ("drive.file", found.drive and found.drive.file),
              ("structure.file", found.structure and found.structure.file), *_reduced_files(found.structure),
              ("measured.file", found.measured and found.measured.file),

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.optimize import root
 
 from ...core import ModalBasis, NotConverged, PatchfemError, say
+from ...friction.laws.elastic_plastic import masing
 from .forces import Group
 from .laws import Jenkins, Track
 
@@ -43,14 +44,9 @@ class Static(NamedTuple):
 def loops(laws, u: float, samples: int) -> Loops:
     """Loops of the laws on one row at an amplitude u >= 0 [m] of its slide, those without a closed form on `samples` of
     a cycle."""
-    found = [_masing(law, u) if isinstance(law, Jenkins) else _sampled(law, u, samples) for law in laws]
+    found = [Loops(*map(float, masing(law.stiffness, law.limit_slide, u))) if isinstance(law, Jenkins) else
+             _sampled(law, u, samples) for law in laws]
     return Loops(sum(one.tip for one in found), sum(one.area for one in found))
-
-
-def _masing(law: Jenkins, u: float) -> Loops:
-    """Of parallel elastic-plastic elements: k min(u, w) each, and 4 k w (u - w) where one slips."""
-    slips = np.maximum(u - law.limit_slide, 0.0)
-    return Loops(float(law.stiffness @ (u - slips)), float(4 * (law.stiffness * law.limit_slide) @ slips))
 
 
 def _sampled(law, u: float, samples: int) -> Loops:

@@ -14,6 +14,7 @@ import numpy as np
 from ..protocol import Element, Step
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
+PIECES = 10  # of the integrals of a stroke
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,10 +80,30 @@ class BoucWen:
                 break
         return -np.expm1(-w), area + self._integral(lambda v: -np.expm1(-v) / self._pace(v), begin, w)
 
+    def stroke(self, w) -> tuple:
+        """(slide [eps], its slope over w, area [mu N eps]) of a stroke between the tips -y and y, w = -ln(1 - y) (...).
+
+        The area is int v (1/(1 - v^n) - 1/(1 - g v^n)) dv, g = 1 - 2 s: what loading takes more than unloading.
+        """
+        edges = np.linspace(0.0, 1.0, PIECES + 1)
+        half = np.diff(edges)[:, None] / 2
+        root = (edges[:-1, None] + half * (1 + NODES)).ravel()  # the fourth root, as in `_integral`
+        v = w[..., None] * root**4
+        rule = w[..., None] * (half * WEIGHTS).ravel() * 4 * root**3
+        rise, spent = self._rates(v)
+        return (rule * rise).sum(axis=-1), self._rates(w)[0], (rule * spent).sum(axis=-1)
+
+    def _rates(self, w) -> tuple:
+        """Slopes over w of the slide [eps] of a stroke, and of its area [mu N eps]."""
+        pace, y, give = self._pace(w), -np.expm1(-w), 1 - 2 * self.shape
+        power = y**self.exponent
+        rest = 1 - give * power
+        return 1 / pace + np.exp(-w) / rest, y / pace * power * (1 - give) / rest
+
     def _pace(self, w):
         """dw/dx of w = -ln(1 - y): (1 - y^n)/(1 - y), between 1 and n."""
         y = -np.expm1(-w)
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             pace = -np.expm1(self.exponent * np.where(w < 0.7, np.log(y), np.log1p(-np.exp(-w)))) * np.exp(w)
         return np.where(w > 30.0, self.exponent, pace)  # 1 - y = 1e-13: the pace is n but for that
 
@@ -102,6 +123,25 @@ class BoucWen:
     def stored(self, state):
         """Elastic energy per area mu sigma eps z^2/2 (m,) [J/m2] of a state."""
         return self.static * state[1] * self.length * state[0]**2 / 2
+
+
+def loop_from_keys(friction, load: float, slide) -> tuple:
+    """(force at the turns [N], area [J]) of the steady loops of the law of a [friction] table at amplitudes of the
+    slide [m], (...) or a number.
+
+    The tip y is that of a stroke 2 u/eps = int_0^y dv/(1 - (1 - 2 s) v^n) + int_0^y dv/(1 - v^n), which Newton's method
+    finds as w = -ln(1 - y). Errors below 1e-12 of force and area to an exponent of 8, 1e-9 to one of 50.
+    """
+    one, limit = from_keys(friction, load), friction.static * load
+    wanted = 2 * np.asarray(slide, float) / one.length
+    w = np.minimum(wanted / 2, 1.0)
+    for _ in range(200):
+        found, slope, area = one.stroke(w)
+        step = (found - wanted) / slope
+        if np.all(np.abs(step) <= 1e-14 * (1 + w)):
+            break
+        w = np.maximum(w - step, w / 8)
+    return limit * -np.expm1(-w), 2 * limit * one.length * area
 
 
 def from_keys(friction, load: float) -> BoucWen:

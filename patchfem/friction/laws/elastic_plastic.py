@@ -85,6 +85,18 @@ def parallel(stiffness, yield_slide) -> Element:
                    limit / total if total > 0 else 0.0, form="parallel")
 
 
+def masing(stiffness, yield_slide, slide) -> tuple:
+    """(force at the turns [N], area [J]) of the steady loops of elements (t,) side by side at amplitudes of the slide
+    [m], of any shape: k min(u, w) each, and 4 k w (u - w) where one slips."""
+    slips = np.maximum(np.asarray(slide)[..., None] - yield_slide, 0.0)
+    return slide * np.sum(stiffness) - slips @ stiffness, 4 * slips @ (stiffness * yield_slide)
+
+
+def loop_from_keys(friction, load: float, slide) -> tuple:
+    """`masing` of the law of a [friction] table under a load [N]."""
+    return masing(np.array([friction.static * load / friction.bond_length]), np.array([friction.bond_length]), slide)
+
+
 def from_keys(friction, load: float) -> ElasticPlastic:
     """The elastic-plastic law of a [friction] table, with its bond length as the length; load [N] is not used."""
     return ElasticPlastic(friction.static, friction.bond_length)

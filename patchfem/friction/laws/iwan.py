@@ -100,12 +100,12 @@ def from_keys(friction, load: float) -> Iwan:
     return Iwan(k, most)
 
 
-def loop_from_keys(friction, load: float, slide: float) -> tuple:
-    """(force at the turns [N], area [J]) of the loop of the law of a [friction] table at an amplitude of the slide [m],
-    without cells: the curve of first loading by Segalman's eq. 22, twice as large by Masing's rule."""
+def loop_from_keys(friction, load: float, slide) -> tuple:
+    """(force at the turns [N], area [J]) of the loops of the law of a [friction] table at amplitudes of the slide [m],
+    of any shape, without cells: the curve of first loading by Segalman's eq. 22, twice as large by Masing's rule."""
     chi, force = friction.chi, friction.static * load
     most = largest(force, friction.stiffness, chi, friction.beta)
-    scale, r = force / (friction.beta + (chi + 1) / (chi + 2)), min(slide / most, 1.0)
+    scale, r = force / (friction.beta + (chi + 1) / (chi + 2)), np.minimum(slide / most, 1.0)
     tip = scale * ((friction.beta + 1) * r - r**(chi + 2) / (chi + 2))
     under = scale * most * ((friction.beta + 1) * r**2 / 2 - r**(chi + 3) / ((chi + 2) * (chi + 3)))
-    return tip, 8 * (under + force * max(slide - most, 0.0)) - 4 * slide * tip
+    return tip, 8 * (under + force * np.maximum(slide - most, 0.0)) - 4 * slide * tip

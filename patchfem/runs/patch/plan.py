@@ -76,7 +76,9 @@ def verdict(found: dict, asked) -> list:
 
     Only flat pieces: what else opens the gap decides where others touch.
     """
-    return [*_of_tilt(found, asked), assembled(asked)]
+    rough = [] if asked.skin is None else \
+        skin.ranged(asked, asked.nominal_load / (asked.length * asked.width * asked.pairs))
+    return [*_of_tilt(found, asked), *rough, assembled(asked)]
 
 
 def _of_tilt(found: dict, asked) -> list:

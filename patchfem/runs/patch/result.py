@@ -13,7 +13,7 @@ from ...model.pieces import bodies_of
 from ...model.source import placed
 from ..results.patch_rows import TABLE
 from ..results.result import Result, at_rest
-from . import kept
+from . import kept, skin
 from .kept import band
 from .ladder import solve_all
 from .measures import strip_error
@@ -138,6 +138,9 @@ def left_out(model, patch, coarse) -> list:
     elif patch.averaging is not None and not asked.gap.rough:
         out.append(f"the profile is averaged over {say(patch.averaging, 3)} where it bears; what another length "
                    "changes stands in the errors")
+    if asked.skin is not None and patch.pressure.load > 0:
+        bears = patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0)
+        out += skin.ranged(asked, float(patch.pressure.load / bears))
     if patch.strips is not None:
         out.append(patch.strips.note)
     if patch.pair.coupling > COUPLED and model.kind != "patch":

@@ -1,11 +1,17 @@
 """Smooth skins of asperities between the pieces of a patch: the law, the pressed state, its linearised compliance."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 
 from ...contact import skin_laws
 from ...contact.edges import BEARING
 from ...contact.strips import press_strips
-from ...core import Compliance, Pressure, frozen_array
+from ...core import Compliance, PatchfemError, Pressure, frozen_array
+from ...model import peaks as traces
+from ...scales import short
+from ...surface.roughness import peaks
 
 
 def skin_law(asked):
@@ -27,6 +33,32 @@ def mean_stiffness(asked, pressure: float) -> float:
     if isinstance(law, skin_laws.ExponentialSkin):
         return pressure / law.u0
     return float(law.stiffness(law.separation(np.array([pressure])))[0]) if pressure > 0 else 0.0
+
+
+def ranged(asked, pressure: float) -> list:
+    """The sentence, as a list, on how far the stiffness of peaks made from a trace, or from its root mean squares, can
+    be trusted under a mean `pressure` [Pa]; none for any other skin."""
+    part = asked.skin
+    if part is None or part.law != "hertz" or part.rms_height is None or not pressure > 0:
+        return []
+    soft, stiff = peaks.persson_stiffness(pressure, part.rms_height)
+    half = ""
+    if part.from_ is not None:
+        half = ", those of every second sample " + _half(asked, pressure)
+    return [f"contact.asperities: under the mean pressure of {short(pressure, 'Pa', 3)} the peaks have "
+            f"{mean_stiffness(asked, pressure):.3g} Pa/m{half}; by the theory of waves of all lengths (Persson) it is "
+            f'{soft:.3g} to {stiff:.3g} Pa/m, which law = "exponential" with decay_length = '
+            f'"{sum(peaks.PERSSON) / 2 * part.rms_height * 1e6:.3g} um" has']
+
+
+def _half(asked, pressure: float) -> str:
+    """The stiffness of the peaks that every second sample of the trace tells, as words."""
+    try:
+        one = peaks.peaks_of(traces.of_trace(Path(asked.skin.from_))[1])
+    except PatchfemError:
+        return "are those of no such surface"
+    new = {"radius": one.radius, "density": one.density, "height_deviation": one.deviation}
+    return f"{mean_stiffness(replace(asked, skin=asked.skin.model_copy(update=new)), pressure):.3g} Pa/m"
 
 
 def borne(pressure) -> np.ndarray:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, Field
 
 from .materials import MATERIALS
 from .types import Force, Length, Place, Positive, Table, Text, choices, key, number, quantity, whole
@@ -133,9 +133,17 @@ class Asperities(Table):
                           "law that at first touch") = None
     decay_length: key(Length | None, "closing over which the pressure of the exponential law grows by a factor "
                       "e") = None
-    radius: key(Length | None, "radius of the tips of the peaks") = None
-    density: key(quantity("areal density", gt=0) | None, "number of peaks per area") = None
-    height_deviation: key(Length | None, "standard deviation of the heights of the peaks") = None
+    radius: key(Length | None, "radius of the tips of the peaks", "law `hertz`, unless from or rms_height") = None
+    density: key(quantity("areal density", gt=0) | None, "number of peaks per area", "as radius") = None
+    height_deviation: key(Length | None, "standard deviation of the heights of the peaks", "as radius") = None
+    from_: key(Text | None, "file of a trace whose peaks these are: of one rough piece on a smooth one",
+               "law `hertz`, unless radius or rms_height") = Field(None, alias="from")
+    rms_height: key(Length | None, "root mean square of the heights of a trace that the peaks are made from; of two "
+                    "rough pieces the root of the sum of both squares, as of slope and curvature",
+                    "law `hertz`, unless radius or from") = None
+    rms_slope: key(Positive | None, "root mean square of the slope of that trace", "as rms_height") = None
+    rms_curvature: key(quantity("curvature", gt=0) | None, "root mean square of the curvature of that trace",
+                       "as rms_height") = None
     tangential_ratio: key(Positive | None, "tangential over normal stiffness of the layer; rigid along x "
                           "unless given") = None
 

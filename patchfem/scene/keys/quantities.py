@@ -43,6 +43,7 @@ KINDS: dict[str, dict[str, float]] = {
     "logarithmic sweep rate": {"oct/s": 1.0, "oct/min": 1.0 / 60.0, "dec/min": math.log2(10.0) / 60.0},
     "participation": {"rad/m": 1.0, "rad/mm": 1e3},
     "areal density": {"1/m^2": 1.0, "1/cm^2": 1e4, "1/mm^2": 1e6, "1/um^2": 1e12},
+    "curvature": {"1/m": 1.0, "1/mm": 1e3, "1/um": 1e6},
 }
 
 EXAMPLES: dict[str, str] = {
@@ -52,7 +53,7 @@ EXAMPLES: dict[str, str] = {
     "rotational stiffness": "1e4 N m/rad", "foundation stiffness": "1e13 Pa/m", "damping": "10 N s/m",
     "cubic stiffness": "1e12 N/m^3", "wear coefficient": "1e-14 m^2/N", "sweep rate": "0.5 Hz/s",
     "logarithmic sweep rate": "1 oct/min",
-    "participation": "2 rad/m", "areal density": "1e10 1/m^2",
+    "participation": "2 rad/m", "areal density": "1e10 1/m^2", "curvature": "0.05 1/um",
 }
 
 NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"

@@ -1,7 +1,7 @@
 """Rules of [contact]: keys that exclude or need one another."""
 
 from ..keys.contact import outermost
-from .draft import ASPERITIES, Draft, _needs
+from .draft import ASPERITIES, PEAKS, Draft, _needs
 from .outlines import flat_of, outlines
 
 TALLEST = 10_000  # times the length: at 80 000 the stiffness of a piece is lost in its round-off
@@ -52,10 +52,25 @@ def _contact(draft: Draft) -> None:
         _free_roll(draft, contact)
     if contact.asperities:
         _needs(draft, "contact.asperities", contact.asperities, "law", ASPERITIES)
+        if contact.asperities.law == "hertz":
+            _peaks(draft)
         bare = contact.asperities.law == "exponential" and contact.asperities.normal_stiffness is None
         if contact.approach and bare:
             draft.lacks("contact.asperities.normal_stiffness", "law 'exponential' beside [contact.approach] needs it "
                         "at first touch, where an approach starts")  # fmt: skip
+
+
+def _peaks(draft: Draft) -> None:
+    """The peaks of Hertz' law are told in one of the ways of PEAKS, whole."""
+    at, told = "contact.asperities", [way for way in PEAKS if any(draft.given(f"contact.asperities.{one}")
+                                                                  for one in way)]
+    if len(told) > 1:
+        second = next(one for one in told[1] if draft.given(f"{at}.{one}"))
+        draft.say(f"{at}.{second}", f"stands beside {', '.join(told[0])}: the peaks are told in one way; keep one")
+    for one in (told or PEAKS)[0]:
+        if len(told) < 2 and not draft.given(f"{at}.{one}"):
+            others = "" if told else "; or from, or rms_height, rms_slope and rms_curvature"
+            draft.lacks(f"{at}.{one}", f"law 'hertz' needs it{others}")
 
 
 def _free_roll(draft: Draft, contact) -> None:

@@ -22,8 +22,9 @@ SLIDES: dict[str, tuple[str, str]] = {
 ASPERITIES: dict[str, tuple[str, str]] = {
     "linear": ("normal_stiffness", "tangential_ratio"),
     "exponential": ("decay_length", "normal_stiffness tangential_ratio"),
-    "hertz": ("radius density height_deviation", "tangential_ratio"),
+    "hertz": ("", "radius density height_deviation from rms_height rms_slope rms_curvature tangential_ratio"),
 }
+PEAKS = (("radius", "density", "height_deviation"), ("from",), ("rms_height", "rms_slope", "rms_curvature"))
 
 
 SELECTORS = {  # table: its model, the key that decides which others it wants, what each value needs and can use

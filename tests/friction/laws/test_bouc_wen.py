@@ -7,7 +7,8 @@ from scene_texts import COATED, DRIVE, MODE, mistakes, only
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from patchfem.friction.laws.bouc_wen import BoucWen
+from patchfem.friction.laws.bouc_wen import BoucWen, from_keys, loop_from_keys
+from patchfem.scene.keys.tables import Friction
 from patchfem.scene.scene import loads
 
 LAW = 'law = "bouc-wen"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\n'
@@ -59,6 +60,24 @@ def test_exact_a_bench_loop_is_the_equation(exponent, shape):
     assert stored == pytest.approx(LIMIT * EPS * z**2 / 2, abs=1e-9 * LIMIT * EPS)
     assert work[-1] == pytest.approx(stored[-1] + dissipated[-1] - created[-1], rel=1e-12)
     assert created[-1] == 0 if shape >= 0.5 else created[-1] > 1e-3 * dissipated[-1]
+
+
+@pytest.mark.parametrize("exponent, shape", [(0.3, 0.5), (1.0, 1.0), (1.5, 0.2), (4.0, 0.7)])
+def test_exact_steady_loops_by_stepping_the_law(exponent, shape):
+    """Force at the turns and area of the loop that strokes of the law settle to, from half a length to 40 of them."""
+    keys, one = Friction.model_construct(static=0.31, stiffness=1.3e7, exponent=exponent, shape=shape), np.ones(1)
+    slides = np.array([[0.5, 3.0], [12.0, 40.0]]) * EPS
+    tip, area = loop_from_keys(keys, LOAD, slides)
+    law = from_keys(keys, LOAD)
+    for u, force, loss in zip(slides.flat, tip.flat, area.flat):
+        state = law.start(one)
+        for _ in range(150):
+            there = law.step(state, -2 * u, one, one, 0.0)
+            back = law.step(there.state, 2 * u, one, one, 0.0)
+            state = back.state
+        ends = LOAD * (law.traction(back.state) - law.traction(there.state))[0] / 2
+        assert force == pytest.approx(ends, rel=1e-8)
+        assert loss == pytest.approx(2 * u * LOAD * (back.mean - there.mean)[0], rel=1e-8)
 
 
 def test_exact_one_and_one_is_the_stretch_reading():

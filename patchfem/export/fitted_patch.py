@@ -1,0 +1,133 @@
+"""Laws of one point fitted to a patch, on disk: their object, rows, picture, and a scene of each, which runs."""
+
+import tomllib
+
+import numpy as np
+
+from .. import __version__
+from ..campaigns.fit_patch import SEARCHED, FittedPatch
+from ..disk.whole import write_rows, write_text
+from ..model.model import build, resolved
+from ..scales import SPOKEN, axis_unit, plain, short
+from ..scene.scene import loads, moved
+from ..scene.sets import text_of
+from .drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
+from .results import Folder
+from .summary import write_json
+
+PARTS = ("stiffness", "dissipation")
+COLOURS = dict(zip(SEARCHED, (BLUE, ORANGE, GREY)))
+
+
+def answer_of(fitted: FittedPatch) -> dict:
+    """The object of fit.json, in SI."""
+    laws = {law: {"values": {f"friction.{key}": {"value": value, "unit": SEARCHED[law].units.get(key, "1")}
+                             for key, value in one.values.items()},
+                  "outcome": str(one.found.outcome), **_sizes(one.off, fitted.slides)}
+            for law, one in fitted.laws.items()}
+    return {"patchfem": __version__, "title": fitted.scene.title, "measured": fitted.scene.path.name,
+            "quantity": "patch", "outcome": laws[fitted.best]["outcome"], "law": fitted.best,
+            "values": laws[fitted.best]["values"], "laws": laws, "load": fitted.load, "slip_force": fitted.limit,
+            "stiffness": fitted.stiffness, "amplitudes": [float(fitted.slides[0]), float(fitted.slides[-1])],
+            "rows": int(fitted.slides.size),
+            "mesh": None if fitted.mesh is None else _sizes(fitted.mesh, fitted.slides),
+            "warnings": [*fitted.scene.remarks], "seconds": round(fitted.seconds, 6)}
+
+
+def _sizes(off, slides) -> dict:
+    """Largest difference by size, where, and rms of those (2, k) of stiffness and loss."""
+    return {name: {"largest": float(row[at := np.abs(row).argmax()]), "at": float(slides[at]),
+                   "rms": float(np.sqrt(np.mean(row**2)))} for name, row in zip(PARTS, off)}
+
+
+def scene_text(fitted: FittedPatch, law: str, path) -> str:
+    """The scene with one law in place of its patch, in SI with every default, its paths as from `path`."""
+    tables = tomllib.loads(fitted.scene.resolved())
+    tables.pop("contact")
+    tables["normal"] = {"load": fitted.load}
+    tables["friction"] = {"law": law, "static": fitted.scene.friction.static, **fitted.laws[law].values}
+    tables["accuracy"] = {"tolerance": fitted.scene.accuracy.tolerance}
+    whole = loads(text_of(tables), fitted.scene.path)
+    told = "\n".join(f"# {line}" for line in [f"law '{law}' in place of the patch of {fitted.scene.path.name}",
+                                              *sentences(law, answer_of(fitted))])
+    return f"{told}\n\n{resolved(moved(whole, path), build(whole))}"
+
+
+def fit_into(fitted: FittedPatch, folder: Folder) -> dict:
+    """Write fit.json, fit.csv, fit.svg, the scene of the best law as scene.fitted.toml and that of each law under its
+    name into an open results folder, and return the object of fit.json."""
+    answer = answer_of(fitted)
+    for law, name in [(fitted.best, "scene.fitted.toml"), *((law, f"scene.{law}.toml") for law in SEARCHED)]:
+        write_text(folder.path / name, scene_text(fitted, law, folder.target / name))
+    write_json(answer, folder.path / "fit.json")
+    curves = {"patch": fitted.own} | {law: one.curves for law, one in fitted.laws.items()}
+    head = ["slide [m]", *(f"{name} {part}" for name in curves for part in ("force [N]", "loss [J]"))]
+    rows = np.column_stack([fitted.slides, *(part for one in curves.values() for part in one)]).tolist()
+    write_rows(folder.path / "fit.csv", [head, *([*map(repr, row)] for row in rows)])
+    write_text(folder.path / "fit.svg", draw(fitted.slides, curves))
+    return answer
+
+
+@styled
+def draw(slides, curves: dict):
+    """Draw stiffness from turn to turn and loss per cycle over the amplitude (k,) [m] of the slide, of the patch and of
+    each law, as SVG text; curves: `Curves` by name."""
+    from matplotlib.ticker import LogLocator
+
+    figure, axes = drawing(2, 3.6)
+    along, size = axis_unit(slides, "m")
+    for axis, name, unit, of in zip(axes, ("stiffness", "loss per cycle"), ("N/m", "J"),
+                                    (lambda one: one.force / slides, lambda one: one.loss)):
+        for law, one in curves.items():
+            y = of(one)
+            style = {"color": "black", "marker": ".", "ls": "none", "ms": 4} if law == "patch" else \
+                {"color": COLOURS[law], "lw": 1.2}
+            axis.loglog(slides * size, np.where(y > 0, y, np.nan), label=law, **style)
+        axis.xaxis.set_minor_locator(LogLocator(subs=(2, 5)))
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.xaxis.set_minor_formatter("{x:g}")
+        axis.set(xlabel=f"amplitude of the slide [{along}]", ylabel=f"{name} [{unit}]")
+    axes[0].set_yscale("linear")
+    axes[0].set_ylim(bottom=0)
+    axes[0].legend()
+    return figure
+
+
+def lines_of(answer: dict) -> list:
+    """The answer as lines of text; answer: the object of fit.json."""
+    low, high = (short(one, "m", 3) for one in answer["amplitudes"])
+    out = [f"{answer['outcome']}: laws of one point for a patch under {short(answer['load'], 'N', 4)} that slips at "
+           f"{short(answer['slip_force'], 'N', 4)} and has {_value(answer['stiffness'], 'N/m')} while nothing slips; "
+           f"{answer['rows']} amplitudes of the slide, {low} to {high}",
+           f"  {'law':<16}{'stiffness off by':>22}{'loss off by':>22}   values"]
+    for law, one in answer["laws"].items():
+        parts = (f"{_percent(one[part]['largest'])} (rms {_percent(one[part]['rms'])})" for part in PARTS)
+        values = ", ".join(f"{key.partition('.')[2]} {_value(part['value'], part['unit'])}"
+                           for key, part in one["values"].items())
+        out.append(f"  {law:<16}{next(parts):>22}{next(parts):>22}   {values}")
+    out += [f"  {line}" for line in sentences(answer["law"], answer)]
+    if answer["mesh"] is not None:
+        stiff, loss = (_percent(abs(answer["mesh"][part]["largest"])) for part in PARTS)
+        out.append(f"  A coarser mesh changes the patch's own stiffness by {stiff} and its loss by {loss} at most.")
+    return out
+
+
+def sentences(law: str, answer: dict) -> list:
+    """What a law costs against the patch; answer: the object of fit.json."""
+    (low, high), (stiff, loss) = answer["amplitudes"], (answer["laws"][law][part] for part in PARTS)
+    low, high, at, there = (short(one, "m", 3) for one in (low, high, stiff["at"], loss["at"]))
+    return [f"From {low} to {high} of slide the stiffness of '{law}' is {_percent(abs(stiff['largest']))} off at most, "
+            f"at {at}, and {_percent(stiff['rms'])} rms.",
+            f"In a cycle it loses up to {_percent(abs(loss['largest']))} {'more' if loss['largest'] > 0 else 'less'} "
+            f"than the patch, at {there}, and is {_percent(loss['rms'])} off rms; a loss below a thousandth of 4 x "
+            "force x slide counts as that much.",
+            "The frequency of a mode is off by about half of the first at most, its damping by friction by both "
+            "together."]
+
+
+def _percent(share: float) -> str:
+    return f"{plain(100 * share, 2)} %"
+
+
+def _value(value: float, unit: str) -> str:
+    return short(value, SPOKEN.get(unit, unit), 5)

@@ -1,0 +1,60 @@
+"""The peaks of a measured surface as a table [contact.asperities] to paste, and how far they can be trusted."""
+
+import numpy as np
+
+from ...contact.skin_laws import HertzSkin
+from ...core import PatchfemError
+from ...scales import short
+from ...surface.roughness.peaks import PERSSON, Moments, peaks_of
+
+LIGHT = 1e-5  # of the combined modulus, the pressure at which stiffnesses are told: 1.2 MPa on steel
+
+
+def data_of(fine: Moments | None, coarse: Moments | None) -> dict | None:
+    """Root mean squares of a trace and its peaks in SI, with the stiffness over the pressure [1/m] at LIGHT; of every
+    second sample, `coarse`, that alone. A reason where no surface has such peaks, None of a flat trace."""
+    if fine is None:
+        return None
+    out = {f"rms_{name}": one for name, one in fine._asdict().items()}
+    try:
+        one = peaks_of(fine)
+    except PatchfemError as error:
+        return out | {"reason": str(error)}
+    out |= {"radius": one.radius, "density": one.density, "height_deviation": one.deviation, "stiffness": _steep(one)}
+    try:
+        return out | {"stiffness_half_sampled": None if coarse is None else _steep(peaks_of(coarse))}
+    except PatchfemError:
+        return out | {"stiffness_half_sampled": None}
+
+
+def lines_of(fine: Moments | None, coarse: Moments | None) -> list:
+    """`data_of` as lines of text, ready to paste."""
+    one = data_of(fine, coarse)
+    if one is None:
+        return []
+    if "reason" in one:
+        return [f"  no [contact.asperities] of it: {one['reason']}"]
+    soft, stiff = (1 / (share * fine.height) for share in reversed(PERSSON))
+    decay = sum(PERSSON) / 2 * fine.height
+    half = one["stiffness_half_sampled"]
+    told = "every second sample tells of no such surface" if half is None else \
+        f"every second sample of the trace gives {_per(half)}, {100 * (half / one['stiffness'] - 1):+.2g} %"
+    return ["  to paste into a scene, if the other face is smooth (peaks of Greenwood and Williamson, radius "
+            f"{short(one['radius'], 'm', 3)}, {one['density']:.3g} 1/m^2):",
+            "    [contact.asperities]", '    law = "hertz"', f'    rms_height = "{fine.height * 1e6:.5g} um"',
+            f"    rms_slope = {fine.slope:.5g}", f'    rms_curvature = "{fine.curvature:.5g} 1/m"',
+            f"  Under {LIGHT:g} of the modulus of the pair their stiffness over the pressure is "
+            f"{_per(one['stiffness'])}; {told}: waves shorter than the samples are not in it.",
+            f"  By the theory of waves of all lengths (Persson) it is {_per(soft)} to {_per(stiff)}; that is "
+            f'law = "exponential" with decay_length = "{decay * 1e6:.3g} um".']
+
+
+def _steep(one) -> float:
+    """Stiffness over pressure [1/m] of peaks under LIGHT of their modulus."""
+    law = HertzSkin(*one, 1.0)
+    return float(law.stiffness(law.separation(np.array([LIGHT])))[0] / LIGHT)
+
+
+def _per(value: float) -> str:
+    """A number per length as text."""
+    return f"{value * 1e-6:.3g} 1/um"

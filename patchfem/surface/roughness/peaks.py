@@ -1,0 +1,85 @@
+"""Peaks of a rough surface from mean squares of a trace over it, for Greenwood and Williamson's contact of peaks.
+
+A surface of Gaussian heights, alike in all directions, whose traces have the mean squares m_0, m_2, m_4 of height,
+slope and curvature has m_4/(6 pi 3^(1/2) m_2) summits per area of mean curvature (8/3) (m_4/pi)^(1/2) (Nayak, J. Lubr.
+Technol. 93, 398, 1971). Their heights have the variance m_0 (1 - 0.8968/alpha) with alpha = m_0 m_4/m_2^2 (Bush, Gibson
+and Keogh, Mech. Res. Commun. 3, 169, 1976); McCool (Wear 107, 37, 1986) makes the contact of peaks of them. No such
+surface has alpha < 3/2. The shortest waves decide on m_4: the peaks are those of a sampling step, not of a surface.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import PatchfemError
+from ..profile import Profile, despiked, even, level
+
+SUMMITS = 0.8968  # of m_0/alpha, that the heights of summits scatter less than all heights
+NARROWEST = 1.5  # alpha of waves of one length in all directions
+PERSSON = 0.4, 0.5  # u_0 over the rms height: Persson 2007, and Pastewka et al. 2013 by simulation
+FEWEST = 16  # samples of a trace
+ROUND = 1e-12  # of its heights, what levelling leaves of a straight line
+
+
+class Moments(NamedTuple):
+    """Root mean squares over a trace: height [m], slope [1], curvature [1/m]."""
+
+    height: float
+    slope: float
+    curvature: float
+
+    @property
+    def alpha(self) -> float:
+        """Nayak's bandwidth m_0 m_4/m_2^2."""
+        return (self.height * self.curvature / self.slope**2)**2
+
+    def beside(self, other: "Moments") -> "Moments":
+        """Those of the gap between two rough surfaces, whose mean squares add up."""
+        return Moments(*np.hypot(self, other).tolist())
+
+
+class Peaks(NamedTuple):
+    """Peaks of a surface: radius [m] of the mean curvature of their tips, density [1/m2], deviation [m] of their
+    heights."""
+
+    radius: float
+    density: float
+    deviation: float
+
+
+def moments_of(trace: Profile, every: int = 1) -> Moments:
+    """Moments of a trace, levelled and without spikes, from neighbouring samples or every second (third, ...) of them.
+
+    Slope and curvature are first and second differences, which see a wave of length L as sinc(step/L) and sinc^2 of its
+    own. PatchfemError for a trace of less than FEWEST such samples and for one without heights.
+    """
+    tilted = even(despiked(trace))
+    trace = level(tilted)
+    z, step = trace.z[::every], every * trace.length / (trace.z.size - 1)
+    if z.size < FEWEST:
+        raise PatchfemError(f"{trace.source}: {z.size} samples tell no curvature; {FEWEST} at least are wanted")
+    if not np.ptp(z) > ROUND * np.ptp(tilted.z):
+        raise PatchfemError(f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out")
+    return Moments(*(float(np.sqrt(np.mean(np.diff(z, order)**2)) / step**order) for order in range(3)))
+
+
+def peaks_of(moments: Moments) -> Peaks:
+    """The Peaks of a surface whose traces have some Moments; PatchfemError where no surface alike in all directions has
+    them."""
+    if not moments.alpha >= NARROWEST * (1 - 1e-9):
+        raise PatchfemError(f"rms_height x rms_curvature/rms_slope^2 is {np.sqrt(moments.alpha):.3g}, and at least "
+                            f"{np.sqrt(NARROWEST):.3g} on a surface of Gaussian heights that is alike in all "
+                            "directions; take all three from one trace across the lay, or give radius, density and "
+                            "height_deviation of the peaks")
+    m0, m2, m4 = (one**2 for one in moments)
+    return Peaks(3 / 8 * float(np.sqrt(np.pi / m4)), float(m4 / (6 * np.pi * np.sqrt(3) * m2)),
+                 float(np.sqrt(m0 * (1 - SUMMITS / moments.alpha))))
+
+
+def persson_stiffness(pressure: float, height: float) -> tuple:
+    """Least and largest stiffness [Pa/m] of a rough contact under a pressure [Pa] by a theory of waves of all lengths.
+
+    p ~ exp(-u/u_0), u_0 = 0.4 to 0.5 of the rms height [m] (PERSSON), so that the stiffness is p/u_0: it does not hang
+    on the shortest waves. It holds where little of the area touches.
+    """
+    return tuple(pressure / (share * height) for share in reversed(PERSSON))

@@ -1,0 +1,128 @@
+"""Laws of one point from the loops of a patch."""
+
+import json
+
+import numpy as np
+import pytest
+from command_line import cli
+from scene_texts import DRIVE, KILOGRAM, PIECE, POINT, friction_of
+
+import patchfem as pf
+from patchfem.campaigns.fit_patch import Curves, fit_law, fit_patch
+from patchfem.friction.laws.elastic_plastic import masing
+from patchfem.friction.laws.iwan import sliders
+from patchfem.friction.record import loop_from
+from patchfem.scales import plain, short
+from patchfem.scene.keys.tables import Friction
+
+SLIDE = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n'
+CROWN = PIECE + 'load = "26 lbf"\nelement_size = "0.2 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n[contact.crown]\n' \
+    'radius = "10 m"\n'
+JOINT = CROWN + "[contact.shear]\n" + friction_of("coulomb")
+RIG = JOINT + KILOGRAM + DRIVE
+WINKLER = PIECE + """load = "26 lbf"
+element_size = "0.05 mm"
+substrate = {young = "1e20 Pa", poisson = 0.3, density = "4000 kg/m^3"}
+[contact.load_line]
+offset = "2.1166666666666667 mm"
+[contact.asperities]
+law = "linear"
+normal_stiffness = "1e12 Pa/m"
+tangential_ratio = 0.8
+""" + friction_of("coulomb") + SLIDE
+
+
+@pytest.mark.parametrize("law, keys", [
+    ("iwan", {"stiffness": 3.3e6, "chi": -0.62, "beta": 0.4}), ("iwan", {"stiffness": 8e6, "chi": -0.2, "beta": 3.0}),
+    ("bouc-wen", {"stiffness": 4e6, "exponent": 1.7, "shape": 0.8}),
+    ("elastic-plastic", {"bond_length": 7e-6})])
+def test_exact_a_law_finds_itself_in_its_own_loops(law, keys):
+    own = Friction.model_construct(law=law, static=0.3, **keys)
+    slides = np.geomspace(2e-7, 6e-5, 20)
+    found = fit_law(law, 0.3, 100.0, slides, Curves(*loop_from(own, 100.0, slides)), 5e6)
+    assert found.values == pytest.approx(keys, rel=1e-6)
+    assert np.abs(found.off).max() < 1e-6
+
+
+def test_exact_the_cells_of_an_iwan_law_are_that_law():
+    """768 elements side by side, as a patch would hand them over."""
+    slides = np.geomspace(2e-7, 6e-5, 20)
+    own = Curves(*masing(*sliders(30.0, 5e6, -0.5, 0.5), slides))
+    found = fit_law("iwan", 0.3, 100.0, slides, own, 4e6)
+    assert found.values == pytest.approx({"stiffness": 5e6, "chi": -0.5, "beta": 0.5}, rel=1e-4)
+
+
+def test_exact_a_rough_wedge_is_an_iwan_law():
+    """Under a pressure that falls linearly to zero the points behind a linear skin slip one after the other at slides
+    that are spread evenly: chi = 0 and no last slider, K = k_t A."""
+    found = fit_patch(pf.load(WINKLER), np.geomspace(5e-8, 1e-6, 12))
+    one = found.laws["iwan"]
+    assert one.values["chi"] == 0.0 and one.values["beta"] == pytest.approx(0.0, abs=2e-2)
+    assert one.values["stiffness"] == pytest.approx(0.8e12 * 12.7e-3**2, rel=1e-3)
+    assert np.abs(one.off).max() < 2e-3 and found.best == "iwan"
+
+
+def test_a_rig_of_the_fitted_law_swings_as_that_of_the_patch(tmp_path):
+    """Frequency and damping of both agree within the differences that the fit prints, for each of the laws."""
+    answer = pf.fit(RIG, from_patch=True, out=tmp_path / "out")
+    slides = np.geomspace(*answer["amplitudes"], answer["rows"])
+    method = {"method": "quasi-static", "amplitudes": slides}
+    patch = pf.backbone(RIG, **method)
+    for law, one in answer["laws"].items():
+        point = pf.backbone(tmp_path / f"out/scene.{law}.toml", **method)
+        f, zeta = (point[f"quasi_static_{name}"].values / patch[f"quasi_static_{name}"].values - 1
+                   for name in ("frequency", "damping"))
+        stiffness, loss = (abs(one[part]["largest"]) for part in ("stiffness", "dissipation"))
+        assert np.abs(f).max() <= 1 - np.sqrt(1 - stiffness) and np.abs(zeta).max() <= (1 + loss) / (1 - stiffness) - 1
+        assert np.abs(f).max() > 0.2 * stiffness  # the mode rests on the contact
+    runs = [pf.run(scene, **{"drive.acceleration": "1 g"}).measures["relative_displacement_amplitude"].value
+            for scene in (RIG, tmp_path / "out/scene.fitted.toml")]
+    assert runs[1] == pytest.approx(runs[0], rel=abs(answer["laws"][answer["law"]]["stiffness"]["largest"]))
+
+
+def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bench.toml").write_text(JOINT + SLIDE)
+    answer = cli("fit", "bench.toml", "--from-patch", "--amplitudes", "10 nm..200 nm:9", "-o", "out")
+    assert answer.code == 0, answer.err
+    told = json.loads((tmp_path / "out/fit.json").read_text())
+    sizes = [told["laws"][told["law"]][part] for part in ("stiffness", "dissipation")]
+    for one, words in zip(sizes, ("is {} off at most, at {}, and {} rms", "loses up to {} ")):
+        largest, rms = (f"{plain(100 * abs(one[name]), 2)} %" for name in ("largest", "rms"))
+        assert words.format(largest, short(one["at"], "m", 3), rms) in answer.out
+    for word in ("9 amplitudes of the slide, 10 nm to 200 nm", "iwan", "bouc-wen", "elastic-plastic", "% off at most",
+                 "A coarser mesh"):
+        assert word in answer.out
+    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == [
+        "fit.csv", "fit.json", "fit.svg", "scene.bouc-wen.toml", "scene.elastic-plastic.toml", "scene.fitted.toml",
+        "scene.iwan.toml"]
+    assert pf.run(tmp_path / "out/scene.fitted.toml").measures["friction_force_peak"].value == pytest.approx(
+        pf.run(JOINT + SLIDE).measures["friction_force_peak"].value, rel=1e-6)
+    assert cli("fit", "bench.toml", "--from-patch", "-o", "out").code == 0  # its own folder is replaced
+
+
+@pytest.mark.parametrize("text, said, mended", [
+    (POINT + friction_of("iwan") + SLIDE, "[contact]", JOINT + SLIDE),
+    (CROWN, "[friction]", JOINT + SLIDE),
+    (JOINT.replace('"coulomb"', '"nonlocal"\nbond_length = "1 um"') + SLIDE, "use coulomb or elastic-plastic",
+     JOINT + SLIDE),
+    (JOINT.replace("[contact.shear]\n", "") + SLIDE, "add [contact.shear]", JOINT + SLIDE),
+    (RIG.replace("slide = 1.0", "slide = 1.0\nnormal = 0.1").replace('"coulomb"', '"elastic-plastic"\nbond_length = '
+                                                                   '"1 um"'), "set normal, pitch and yaw to 0",
+     RIG.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"')),
+    (JOINT + SLIDE + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 10\n', "leave [wear] out", JOINT + SLIDE),
+    (JOINT.replace('load = "26 lbf"', 'load = "0 N"') + SLIDE, "no load", JOINT + SLIDE)])
+def test_refuses_a_patch_that_is_no_set_of_elements_with_the_remedy(text, said, mended):
+    with pytest.raises(pf.PatchfemError) as wrong:
+        fit_patch(pf.load(text))
+    assert said in str(wrong.value)
+    assert fit_patch(pf.load(mended), [1e-8, 5e-8, 2e-7]).laws
+
+
+def test_refuses_words_that_do_not_stand_together():
+    for given, said in (({}, "from_patch alone"), ({"from_patch": True, "to": "a.csv"}, "from_patch alone"),
+                        ({"from_patch": True, "amplitudes": "1 um,2 um"}, "three at least"),
+                        ({"from_patch": True, "amplitudes": "1 s..2 s:4"}, "amplitudes"),
+                        ({"amplitudes": "1 um..2 um:4"}, "belongs to"), ({"from_patch": True, "hold": "a=1"}, "hold")):
+        with pytest.raises(pf.PatchfemError, match=said):
+            pf.fit(JOINT + SLIDE, **given)

@@ -1,0 +1,172 @@
+"""Peaks of a surface from the mean squares of its traces, as a scene, and as the table that `profile` prints."""
+
+import tomllib
+
+import numpy as np
+import pytest
+from command_line import cli
+from scene_texts import PIECE
+from scipy.integrate import quad
+
+import patchfem as pf
+from patchfem.core import PatchfemError
+from patchfem.surface.profile import Profile
+from patchfem.surface.roughness.peaks import Moments, moments_of, peaks_of, persson_stiffness
+
+PATCH = PIECE + 'load = "26 lbf"\nelement_size = "1 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n' \
+    '[contact.asperities]\nlaw = "hertz"\n'
+RMS = 'rms_height = "0.5 um"\nrms_slope = 0.05\nrms_curvature = "0.02 1/um"\n'
+
+
+def trace_of(z, step) -> Profile:
+    return Profile(np.arange(z.size) * step, z, "made")
+
+
+def gaussian(n: int, step: float, waves: tuple, seed: int = 0) -> np.ndarray:
+    """Heights (n, n) of a periodic Gaussian surface alike in all directions, of waves between two lengths [m] with a
+    spectral density that falls as k^-3."""
+    k = np.hypot(*np.meshgrid(*2 * [2 * np.pi * np.fft.fftfreq(n, step)]))
+    inside = (k >= 2 * np.pi / waves[1]) & (k <= 2 * np.pi / waves[0])
+    size = np.where(inside, np.maximum(k, 1.0)**-1.5, 0.0)
+    noise = np.random.default_rng(seed).normal(size=(n, n))
+    return np.fft.ifft2(size * np.fft.fft2(noise)).real
+
+
+def summits(alpha: float) -> tuple:
+    """(density, mean curvature, variance over m_0) of summits of m_0 = alpha, m_2 = m_4 = 1 by quadrature of the
+    Gaussian law of curvatures: t = -(z_xx + z_yy) of variance 8/3, the half difference and the twist of variance
+    1/3 each, so that the product of both curvatures is t^2/4 - r^2."""
+    def weight(t):
+        return (t**2 / 4 - 2 / 3 * (1 - np.exp(-3 * t**2 / 8))) * np.exp(-3 * t**2 / 16)
+
+    whole, first, second = (quad(lambda t, n=n: t**n * weight(t), 0, 40, epsabs=0, epsrel=1e-12)[0] for n in range(3))
+    mean, square = first / whole, second / whole
+    # given t a height is Gaussian, of mean 3 t/4 and variance alpha - 3/2
+    return (whole / np.sqrt(2 * np.pi * 8 / 3) / (2 * np.pi), mean / 2,
+            1 - 1.5 / alpha + 9 / 16 * (square - mean**2) / alpha)
+
+
+@pytest.mark.parametrize("alpha", [1.6, 4.0, 50.0])
+def test_exact_peaks_by_quadrature_of_the_law_of_curvatures(alpha):
+    one, (density, curvature, variance) = peaks_of(Moments(np.sqrt(alpha), 1.0, 1.0)), summits(alpha)
+    assert one.density == pytest.approx(density, rel=1e-10)
+    assert 1 / one.radius == pytest.approx(curvature, rel=1e-10)
+    assert one.deviation**2 / alpha == pytest.approx(variance, abs=1e-4 / alpha)  # of the four digits of the source
+
+
+def test_exact_units_scale():
+    """Heights in other units, lengths along in others: radius, density and deviation follow."""
+    one, other = peaks_of(Moments(2.0, 0.3, 0.2)), peaks_of(Moments(2.0 * 3, 0.3 * 3 / 7, 0.2 * 3 / 49))
+    assert other == pytest.approx((one.radius * 49 / 3, one.density / 49, one.deviation * 3), rel=1e-12)
+
+
+def test_exact_moments_of_known_sines():
+    """Whole waves of two lengths: mean squares in closed form, a difference sees a wave k as sin(k h/2)/(k h/2)."""
+    n, step = 4096, 0.5e-6
+    x = step * np.arange(n + 1)
+    waves = [(64, 0.3e-6, 0.4), (410, 0.05e-6, 1.1)]
+    z = sum(a * np.cos(2 * np.pi * k * x / (n * step) + p) for k, a, p in waves)
+    for every in (1, 2):
+        found, h = moments_of(trace_of(z, step), every), every * step
+        k = np.array([2 * np.pi * k / (n * step) for k, _, _ in waves])
+        a = np.array([a for _, a, _ in waves])
+        for order, value in enumerate(found):
+            # both ends of the trace count, and levelling takes a share of the longest wave
+            assert value == pytest.approx(np.sqrt(np.sum((a * (2 * np.sin(k * h / 2) / h)**order)**2) / 2), rel=2e-3)
+
+
+def test_a_made_surface_has_the_peaks_of_its_traces():
+    """Moments of rows of a made surface against its spectrum, and its peaks, counted on the grid, against theirs."""
+    n, step = 768, 1.0
+    z = gaussian(n, step, (12.0, 60.0))
+    z /= z.std()
+    found = Moments(*np.sqrt(np.mean([np.square(moments_of(trace_of(row, step))) for row in z[::8]], axis=0)))
+    power = np.abs(np.fft.fft2(z))**2 / n**4
+    k = 2 * np.pi * np.fft.fftfreq(n, step)
+    truth = [np.sqrt(np.sum(power * (2 * np.sin(k / 2))**(2 * order))) for order in range(3)]
+    assert found == pytest.approx(truth, rel=0.05)
+    one, around = peaks_of(Moments(*truth)), [np.roll(z, shift, axis=(0, 1)) for shift in
+                                              ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (1, -1), (-1, 1))]
+    top = (z > around).all(axis=0)
+    count = top.sum()
+    assert count / n**2 == pytest.approx(one.density, rel=4 / np.sqrt(count))
+    assert z[top].std() == pytest.approx(one.deviation, rel=4 / np.sqrt(2 * count))
+    bend = (4 * z - sum(around[:4]))[top].mean() / 2
+    assert 1 / bend == pytest.approx(one.radius, rel=0.05)  # differences over a step of a twelfth of a wave
+
+
+def test_refuses_what_no_surface_has():
+    x = np.arange(256) * 1e-6
+    with pytest.raises(PatchfemError, match=r"at least 1\.22"):
+        peaks_of(moments_of(trace_of(np.sin(2 * np.pi * x / 2e-5), 1e-6)))  # one wave: alpha = 1
+    with pytest.raises(PatchfemError, match="is flat"):
+        moments_of(trace_of(0.1 * x, 1e-6))
+    with pytest.raises(PatchfemError, match="16 at least"):
+        moments_of(trace_of(np.sin(x[:20] * 1e6), 1e-6), 2)
+
+
+def written(folder, seed=1) -> str:
+    z = 1e-7 * (one := gaussian(256, 1e-6, (8e-6, 1e-4), seed)[0]) / one.std()
+    (folder / f"trace{seed}.csv").write_text("x [um],z [um]\n" + "".join(
+        f"{k},{height * 1e6!r}\n" for k, height in enumerate(z.tolist())))
+    return str(folder / f"trace{seed}.csv")
+
+
+def test_exact_the_three_ways_to_tell_peaks_are_one(tmp_path, monkeypatch):
+    """A file, its root mean squares as `profile` prints them, and the peaks of these: one patch."""
+    monkeypatch.chdir(tmp_path)
+    one = cli("profile", written(tmp_path))
+    block = one.out[one.out.index("[contact.asperities]"):].split("  Under")[0]
+    found = tomllib.loads("\n".join(line.strip() for line in block.splitlines()))["contact"]["asperities"]
+    rms = Moments(float(found["rms_height"].split()[0]) * 1e-6, found["rms_slope"],
+                  float(found["rms_curvature"].split()[0]))
+    peaks = peaks_of(rms)
+    pasted = PATCH + "".join(f"{key} = {value!r}\n" for key, value in found.items() if key != "law")
+    ways = [PATCH + 'from = "trace1.csv"\n', pasted, PATCH + f'radius = "{peaks.radius!r} m"\ndensity = '
+            f'"{peaks.density!r} 1/m^2"\nheight_deviation = "{peaks.deviation!r} m"\n']
+    (tmp_path / "scene.toml").write_text(ways[0])
+    runs = [pf.run("scene.toml"), *(pf.run(text) for text in ways[1:])]
+    stiff = [run.measures["normal_stiffness"].value for run in runs]
+    assert stiff[1] == pytest.approx(stiff[0], rel=1e-4) and stiff[2] == pytest.approx(stiff[1], rel=1e-12)
+    said = [" ".join(note for note in run.extra["notes"] if "Persson" in note) for run in runs]
+    assert "every second sample" in said[0] and "every second" not in said[1] and said[1] and not said[2]
+    assert any("Persson" in text for text in pf.plan(pasted).verdict)
+    runs[0].save(tmp_path / "out/first")
+    (tmp_path / "again.toml").write_text((tmp_path / "out/first/scene.resolved.toml").read_text())
+    again = pf.run(tmp_path / "again.toml")
+    assert again.measures["normal_stiffness"].value == pytest.approx(stiff[0], rel=1e-12)
+
+
+def test_exact_the_other_theory_is_the_exponential_law():
+    """The law that the note names has the stiffness that the note tells, in the middle of its range."""
+    note = next(text for text in pf.plan(PATCH + RMS).verdict if "Persson" in text)
+    decay = note.split('decay_length = "')[1].split('"')[0]
+    soft, stiff = (float(word) for word in note.split("it is ")[1].split(" Pa/m")[0].split(" to "))
+    pressure = 26 * 4.4482216152605 / 12.7e-3**2
+    assert (soft, stiff) == pytest.approx(persson_stiffness(pressure, 0.5e-6), rel=5e-3)
+    other = PATCH.replace("hertz", "exponential") + f'decay_length = "{decay}"\n'
+    made, bare = (pf.run(text).measures["normal_stiffness"].value for text in (
+        other, PATCH.partition("[contact.asp")[0]))
+    area = 12.7e-3**2
+    assert soft < 1 / (1 / made - 1 / bare) / area < stiff
+
+
+@pytest.mark.parametrize("keys, said", [
+    ("", "or from, or rms_height, rms_slope and rms_curvature"),
+    ('radius = "1 um"\n', "contact.asperities.density: missing"),
+    ('rms_height = "1 um"\nrms_slope = 0.1\n', "contact.asperities.rms_curvature: missing"),
+    (RMS + 'radius = "1 um"\n', "keep one"), (RMS.replace("0.05", "0.5"), "at least 1.22"),
+    (RMS.replace("0.02 1/um", "0.02"), "1/um"), ('from = "nowhere.csv"\n', "there is no file")])
+def test_refuses_peaks_that_are_not_whole(keys, said, tmp_path):
+    (tmp_path / "scene.toml").write_text(PATCH + keys)
+    with pytest.raises(PatchfemError) as wrong:
+        pf.plan(tmp_path / "scene.toml")
+    assert said in str(wrong.value) and "asperities" in str(wrong.value)
+
+
+def test_profile_tells_two_faces_together(tmp_path):
+    files = [written(tmp_path, seed) for seed in (1, 2)]
+    told = pf.profile(*files)["profiles"]
+    both = cli("profile", *files).out.partition("two faces")[2]
+    height = np.hypot(*(one["asperities"]["rms_height"] for one in told))
+    assert f'rms_height = "{height * 1e6:.5g} um"' in both
