@@ -1,19 +1,40 @@
-"""Nested dissection of a plane mesh by the coordinates of its nodes: small cuts halve it again and again.
+"""Nested dissection of a mesh by the coordinates of its nodes: small cuts halve it again and again.
 
-All parts of a level are cut at once, so the cost is a few sorts per level: 1 s for 2.5e5 nodes.
+All parts of a level are cut at once, so the cost is a few sorts per level: 1 s for 2.5e5 nodes. Nodes of which only
+the neighbours are known are placed by their distances, counted in neighbours, from a few nodes far apart.
 """
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import maximum_bipartite_matching
+from scipy.sparse.csgraph import connected_components, dijkstra, maximum_bipartite_matching
 
 LEAF = 48  # nodes below which a part is not cut any further
+LANDMARKS = 4  # nodes far apart by which the others are placed
+
+
+def distances(graph) -> np.ndarray:
+    """Coordinates (n, LANDMARKS) of the nodes of a graph, a sparse symmetric (n, n): steps from nodes far apart.
+
+    Each of these is farthest from those before. Parts without a path between them lie one behind the other.
+    """
+    part = connected_components(graph, directed=False)[1]
+
+    def steps(node: int) -> np.ndarray:
+        found = dijkstra(graph, directed=False, indices=node, unweighted=True)
+        far = np.isinf(found)
+        return np.where(far, found[~far].max() + 1 + part, found)
+
+    out = [steps(int(np.argmax(steps(0))))]
+    while len(out) < LANDMARKS:
+        out.append(steps(int(np.argmax(np.min(out, axis=0)))))
+    return np.array(out).T
 
 
 def dissection(points, pairs) -> tuple:
     """Order of elimination of the nodes: (n,) nodes, and (f + 1,) where each part or cut begins in it.
 
-    points: (n, 2) [m]; pairs: (e, 2) neighbours. A part is cut at the median of x or y, whichever parts fewer pairs.
+    points: (n, d) [m]; pairs: (e, 2) neighbours. A part is cut at the median of one coordinate, that which parts the
+    fewest pairs.
     Its cut is the least set of nodes that touches all of those pairs; it is eliminated after both halves. Nodes of a
     cut lie in sequence along it.
     """
@@ -42,18 +63,18 @@ def dissection(points, pairs) -> tuple:
 
 
 def _sides(rising, pairs, of) -> np.ndarray:
-    """Half of its part, 0 or 1, for each node, by the better of the two medians. rising: all nodes by x and by y."""
+    """Half of its part, 0 or 1, for each node, by the best of the medians. rising: all nodes by each coordinate."""
     sizes = np.bincount(of[of >= 0])
-    sides, severed = np.zeros((2, of.size), np.int64), np.empty((2, sizes.size), np.int64)
+    sides, severed = np.zeros((len(rising), of.size), np.int64), np.empty((len(rising), sizes.size), np.int64)
     small = np.uint16 if sizes.size < 2**16 else np.int64  # short integers are sorted by their digits
-    for axis in (0, 1):
+    for axis in range(len(rising)):
         nodes = rising[axis][of[rising[axis]] >= 0]
         nodes = nodes[np.argsort(of[nodes].astype(small), kind="stable")]
         rank = np.arange(nodes.size) - np.repeat(np.cumsum(sizes) - sizes, sizes)
         sides[axis, nodes] = rank >= np.repeat(sizes // 2, sizes)
         apart = sides[axis, pairs[:, 0]] != sides[axis, pairs[:, 1]]
         severed[axis] = np.bincount(of[pairs[apart, 0]], minlength=sizes.size)
-    return np.where((severed[1] < severed[0])[of], sides[1], sides[0])
+    return sides[np.argmin(severed, axis=0)[of], np.arange(of.size)]
 
 
 def least_cover(pairs, side) -> np.ndarray:
@@ -88,5 +109,5 @@ def _in_sequence(points, key) -> tuple:
     order = np.argsort(own, kind="stable")
     firsts = np.concatenate([[0], np.cumsum(sizes)])
     extent = np.maximum.reduceat(points[order], firsts[:-1]) - np.minimum.reduceat(points[order], firsts[:-1])
-    along = np.where(extent[own, 0] >= extent[own, 1], points[:, 0], points[:, 1])
+    along = points[np.arange(len(points)), np.argmax(extent, axis=1)[own]]
     return np.lexsort((along, own)), firsts

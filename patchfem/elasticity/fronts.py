@@ -10,14 +10,17 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import eigvalsh
 from scipy.linalg.blas import dsyrk, dtrsm
 from scipy.linalg.lapack import dpotrf, dpotri, dtfsm, dtfttr, dtrttf
-from scipy.sparse import csc_matrix, tril
+from scipy.sparse import csc_matrix, csr_matrix, tril
 
 from ..core import NotConverged
+from .dissect import dissection, distances
 
 PER_NODE = 2  # unknowns of a node, next to one another
 LARGE = 40  # nodes of an update from which slices are added
+SHORT = 24  # nodes in sequence, on the mean, from which slices are blocks
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -57,28 +60,59 @@ class Fronts:
         return x
 
 
-def factorise(matrix: csc_matrix, firsts) -> Fronts:
+class Strainless(NotConverged):
+    """A motion of the unknowns takes no strain, to round-off."""
+
+
+class Factor:
+    """Factors of a symmetric positive definite sparse matrix (n, n) of which nothing but its entries is known.
+
+    Unknowns with the same neighbours are one node of the dissection. least, NotConverged and Strainless as `factorise`
+    has them.
+    """
+
+    def __init__(self, matrix, least: float = 0.0):
+        pattern = csr_matrix(matrix != 0)
+        key = pattern.astype(np.int64) @ np.random.default_rng(0).integers(2**62, size=matrix.shape[0])
+        _, first, node = np.unique(key, return_index=True, return_inverse=True)
+        graph = pattern[first][:, first]
+        order, firsts = dissection(distances(graph), np.stack(tril(graph, -1).nonzero(), axis=1))
+        place = np.argsort(order)[node]
+        self.order = np.argsort(place, kind="stable")
+        ends = np.searchsorted(place[self.order], firsts)
+        self.fronts = factorise(csc_matrix(matrix[self.order][:, self.order]), ends, 1, least)
+
+    def solve(self, load) -> np.ndarray:
+        """Solution (n,) or (n, r) of the equations for loads of the same shape."""
+        load = np.asarray(load, float)
+        out = np.empty_like(load)
+        out[self.order] = self.fronts.solve(load[self.order].reshape(len(load), -1)).reshape(load.shape)
+        return out
+
+
+def factorise(matrix: csc_matrix, firsts, per_node: int = PER_NODE, least: float = 0.0) -> Fronts:
     """Fronts of a symmetric positive definite matrix whose front f owns the nodes firsts[f]:firsts[f + 1].
 
-    Nodes have two unknowns each. NotConverged when the matrix is not positive definite.
+    per_node: unknowns of a node; least: share of its diagonal entry that every pivot exceeds, else `Strainless`.
+    NotConverged when the matrix is not positive definite.
     """
-    low = tril(matrix, format="csc")
-    reach = _reach(low, firsts)
+    low, own_size = tril(matrix, format="csc"), matrix.diagonal()
+    reach = _reach(low, firsts, per_node)
     count = len(firsts) - 1
     owner = np.repeat(np.arange(count), np.diff(firsts))
     tops, sides, later, updates = [], [], [], [[] for _ in range(count)]
     place = np.empty(firsts[-1], np.int64)
     for front, (start, stop, below) in enumerate(zip(firsts, firsts[1:], reach)):
-        own = PER_NODE * (stop - start)
+        own, size = per_node * (stop - start), own_size[per_node * start:per_node * stop]
         place[start:stop] = np.arange(stop - start)
         place[below] = np.arange(stop - start, stop - start + below.size)
-        whole = _gathered(low, start, stop, own + PER_NODE * below.size, place)
+        whole = _gathered(low, start, stop, own + per_node * below.size, place, per_node)
         for rows, update in updates[front]:
-            _add(whole, update, place[rows])
+            _add(whole, update, place[rows], per_node)
         updates[front] = None
         top, fault = dpotrf(whole[:own, :own], lower=1)
-        if fault:
-            raise NotConverged("the stiffness of the piece is not positive definite")
+        if fault or (np.diag(top)**2 <= least * size).any():
+            raise _fault(whole[:own, :own], size, least)
         side = np.empty((0, own), order="F")
         if below.size:
             side = dtrsm(1.0, top, whole[own:, :own], side=1, lower=1, trans_a=1)
@@ -86,36 +120,49 @@ def factorise(matrix: csc_matrix, firsts) -> Fronts:
             updates[owner[below[0]]].append((below, rest))
         tops.append(dtrttf(top, uplo="L")[0])
         sides.append(side)
-        later.append(_unknowns(below))
-    return Fronts(tops, sides, PER_NODE * np.asarray(firsts), later)
+        later.append(_unknowns(below, per_node))
+    return Fronts(tops, sides, per_node * np.asarray(firsts), later)
 
 
-def _add(whole, update, at) -> None:
-    """Add an update at the nodes `at`, block by block of consecutive ones: its lower half where it is large, else all
-    of it."""
+def _fault(front, size, least: float) -> NotConverged:
+    """What the own part of a front (k, k), its lower half, says of a matrix with diagonal entries (k,) there."""
+    scale = np.sqrt(np.where(size > 0, size, 1.0))
+    if eigvalsh(front / np.outer(scale, scale))[0] > -least:
+        return Strainless("a motion takes no strain")
+    return NotConverged("the stiffness of the piece is not positive definite")
+
+
+def _add(whole, update, at, per_node: int) -> None:
+    """Add an update at the nodes `at`, block by block of consecutive ones, or by columns: its lower half where it is
+    large, else all of it."""
     if at.size < LARGE:
-        at = _unknowns(at)
+        at = _unknowns(at, per_node)
         whole.T[at[:, None], at] += update.T  # along the columns of both
         return
     cuts = np.flatnonzero(np.diff(at) > 1) + 1
-    stops = PER_NODE * np.append(cuts, at.size)
-    starts = PER_NODE * np.append(0, cuts)
-    shift = PER_NODE * at[starts // PER_NODE] - starts
+    stops = per_node * np.append(cuts, at.size)
+    starts = per_node * np.append(0, cuts)
+    shift = per_node * at[starts // per_node] - starts
+    if starts.size > at.size // SHORT:  # ragged: column by column
+        at = _unknowns(at, per_node)
+        for column, place in enumerate(at):
+            whole[at[column:], place] += update[column:, column]
+        return
     for c0, c1, dc in zip(starts, stops, shift):
         for r0, r1, dr in zip(starts, stops, shift):
             if r0 >= c0:
                 whole[r0 + dr:r1 + dr, c0 + dc:c1 + dc] += update[r0:r1, c0:c1]
 
 
-def _unknowns(nodes) -> np.ndarray:
-    return (PER_NODE * nodes[:, None] + np.arange(PER_NODE)).ravel()
+def _unknowns(nodes, per_node: int) -> np.ndarray:
+    return (per_node * nodes[:, None] + np.arange(per_node)).ravel()
 
 
-def _reach(low: csc_matrix, firsts) -> list:
+def _reach(low: csc_matrix, firsts, per_node: int) -> list:
     """Later nodes that the own nodes of each front touch once all before are eliminated, rising."""
     count = len(firsts) - 1
     owner = np.repeat(np.arange(count), np.diff(firsts))
-    pointer, rows = low.indptr[::PER_NODE], low.indices // PER_NODE
+    pointer, rows = low.indptr[::per_node], low.indices // per_node
     found = [[] for _ in range(count)]
     out = []
     for front, (start, stop) in enumerate(pairwise(firsts)):
@@ -128,11 +175,11 @@ def _reach(low: csc_matrix, firsts) -> list:
     return out
 
 
-def _gathered(low: csc_matrix, start: int, stop: int, size: int, place) -> np.ndarray:
+def _gathered(low: csc_matrix, start: int, stop: int, size: int, place, per_node: int) -> np.ndarray:
     """Lower entries (size, size) of the matrix in the columns of a front's own nodes, in Fortran order."""
     whole = np.zeros((size, size), order="F")
-    pointer = low.indptr[PER_NODE * start:PER_NODE * stop + 1]
+    pointer = low.indptr[per_node * start:per_node * stop + 1]
     rows = low.indices[pointer[0]:pointer[-1]]
     columns = np.repeat(np.arange(pointer.size - 1), np.diff(pointer))
-    whole[PER_NODE * place[rows // PER_NODE] + rows % PER_NODE, columns] = low.data[pointer[0]:pointer[-1]]
+    whole[per_node * place[rows // per_node] + rows % per_node, columns] = low.data[pointer[0]:pointer[-1]]
     return whole

@@ -12,10 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, eigsh
 
-from ..core import ModalBasis, PatchfemError, frozen_array
+from ..core import ModalBasis, NotConverged, PatchfemError, frozen_array
 from ..effects import MOST_COORDINATES
+from ..elasticity.fronts import Factor, Strainless
+from ..elasticity.lapack import one_thread
 from . import masses, matrices
 
 FULL = 600  # coordinates up to which all modes are found by full matrices
@@ -78,7 +80,13 @@ def reduction(K, M, C, boundary, modes: int, method: str, moved=None) -> Reducti
     _refuse_indefinite(M, "mass")
     load = None if moved is None else M @ moved
     made = _constrained if method == CRAIG_BAMPTON else _attached
-    shapes, omega, left, whole = made(K.tocsc(), M.tocsc(), np.asarray(boundary), 2 * modes + MORE, load)
+    with one_thread():
+        found = made(K.tocsc(), M.tocsc(), np.asarray(boundary), 2 * modes + MORE, load)
+        return _projected(K, M, C, boundary, load, *found)
+
+
+def _projected(K, M, C, boundary, load, shapes, omega, left, whole: bool) -> Reduction:
+    """K, M, C, boundary and load in shapes (n, p)."""
     size = np.abs(shapes)
     mass = shapes.T @ (M @ shapes)
     damping = None if C is None else matrices.trimmed(shapes.T @ (C @ shapes), size.T @ (abs(C) @ size))
@@ -107,15 +115,12 @@ def _refuse_indefinite(matrix, name: str) -> None:
 def _factor(K):
     """A solver of K (n, n), None where a motion of it takes no strain; PatchfemError where K is not positive."""
     try:
-        found = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    except RuntimeError:  # exactly singular
+        return Factor(K, STRAINLESS)
+    except Strainless:
         return None
-    pivots, size = found.U.diagonal(), np.empty(K.shape[0])
-    size[found.perm_c] = K.diagonal()
-    if (found.perm_r == found.perm_c).all() and (pivots < -STRAINLESS * size).any():
+    except NotConverged:
         raise PatchfemError("the stiffness is not positive: a motion of the coordinates gives energy back",
-                            "structure.reduced.stiffness")
-    return found if (pivots > STRAINLESS * size).all() else None
+                            "structure.reduced.stiffness") from None
 
 
 def _lowest(K, M, count: int, factor, shift: float) -> tuple:

@@ -10,7 +10,7 @@ from any_mesh_cases import of_grid
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import COATED, COATING
-from scipy.sparse import coo_matrix, csc_matrix
+from scipy.sparse import block_diag, coo_matrix, csc_matrix, csr_matrix, eye_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay
 from stiffness import stiffness_of
@@ -119,3 +119,41 @@ def test_order_cuts_of_a_square_grid_hold_the_fewest_nodes_and_the_factors_grow_
                                                   np.concatenate([c for _, c in both]))))
         kept.append(fronts.factorise(matrix, firsts).entries / (4 * n * n * np.log2(n)))
     assert max(kept) <= 1.2 * 31 / 4  # George 1973: 31/4 n^2 log2 n
+
+
+def grounded(pairs, count: int, ground: float):
+    """Stiffness (3 count, 3 count) of springs along random rows between pairs (e, 2) of nodes, each held besides."""
+    rows = np.random.default_rng(2).normal(size=(len(pairs), 6))
+    columns = (3 * pairs[:, :, None] + np.arange(3)).reshape(-1, 6)
+    stretch = coo_matrix((rows.ravel(), (np.repeat(np.arange(len(pairs)), 6), columns.ravel())),
+                         (len(pairs), 3 * count)).tocsr()
+    return stretch.T @ stretch + ground * eye_array(3 * count)
+
+
+@pytest.mark.parametrize("count", [1, 20, 700])
+def test_exact_factor_of_a_matrix_of_which_only_the_entries_are_known(count):
+    """Whatever the order of its unknowns, in parts without a path between them."""
+    pairs = scattered(count, 3)[1] if count > 3 else np.zeros((0, 2), int)
+    one = grounded(pairs, count, 0.1)
+    whole = block_diag([one, one, 5.0]).tocsr()
+    order = np.random.default_rng(4).permutation(whole.shape[0])
+    whole = whole[order][:, order]
+    load = np.random.default_rng(1).normal(size=(whole.shape[0], 3))
+    found = fronts.Factor(whole)
+    for given_load in (load, load[:, 0]):
+        np.testing.assert_allclose(whole @ found.solve(given_load), given_load, atol=1e-11)
+    assert found.fronts.entries < whole.shape[0]**2 / (6 if count > 500 else 1)
+
+
+def test_refuses_a_motion_without_strain_and_one_that_gives_energy_back_by_their_names():
+    pairs = scattered(300, 5)[1]
+    laplacian = np.zeros((300, 300))
+    for i, j in pairs:
+        laplacian[[i, j], [i, j]] += 1.0
+        laplacian[[i, j], [j, i]] -= 1.0
+    with pytest.raises(fronts.Strainless):
+        fronts.Factor(csr_matrix(laplacian), 1e-12)
+    laplacian[7, 7] -= 1e-3
+    with pytest.raises(NotConverged) as caught:
+        fronts.Factor(csr_matrix(laplacian), 1e-12)
+    assert not isinstance(caught.value, fronts.Strainless)

@@ -8,6 +8,7 @@ from scipy import sparse
 from scipy.io import mmwrite
 
 import patchfem as pf
+from patchfem.response.errors import GAPS
 
 COUNT = 40
 SCENE = """\
@@ -75,7 +76,8 @@ def test_always_bars_hold_the_run_of_the_whole_matrices(folder, method):
             found.append(run_of(folder, text.replace(pushed or "\0", f'force = "60 N"\n{mass}')))
         small, whole = found
         errors = {name: (abs(one.value - whole.measures[name].value), one.error) for name, one in small.measures.items()
-                  if one.error is not None and whole.measures.get(name) is not None and not name.startswith("ring_")}
+                  if one.error is not None and whole.measures.get(name) is not None and not name.startswith("ring_")
+                  and name not in GAPS}  # errors of each run itself
         assert len(errors) > 10 and all(gap <= bar + 1e-9 * gap for gap, bar in errors.values()), errors
         assert errors["relative_displacement_amplitude"][0] > 0
     assert any("keeps 2 boundary coordinates and 4 " in note for note in small.extra["notes"])
