@@ -2,9 +2,13 @@
 
     python tests/support/tabled_bars.py [SEED [CASES [SINGLES]]]
 
-Of each family CASES random cases are answered by `run_many` with and without lanes, in turn, from models that do not
-yet share their meshes, and the first SINGLES by runs of their own on the shared mesh. Printed are the cases per CPU
-second of both, the shares of measures and of cases within the sum of both bars, and the misses.
+Of each family of rigs CASES random cases are answered by `run_many` with and without lanes, in turn, from models that
+do not yet share their meshes, and the first SINGLES by runs of their own on the shared mesh. Printed are the cases per
+CPU second of both, the shares of measures and of cases within the sum of both bars, and the misses. Of benches it is
+told how far SINGLES of a batch are from runs of their own. With `times` the cases per CPU second of all families are
+printed, medians of three runs; benches are a quarter as many.
+
+    python tests/support/tabled_bars.py times [SEED [CASES]]
 """
 
 import sys
@@ -52,11 +56,16 @@ FAMILIES = {
     "tilt x friction": {"contact.tilt.angle": lambda r: 10 ** r.uniform(-6, -3.3)} | FRICTION,
     "frequency x load": {"drive.frequency": lambda r: r.uniform(100, 200),
                          "contact.load": lambda r: 10 ** r.uniform(1.3, 2.5)}}
+SLID = PATCH.split("[structure]")[0].replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"') \
+    + '[slide]\nkind = "sine"\namplitude = "3 um"\nfrequency = "10 Hz"\n[accuracy]\ntolerance = 1e-3\n'
+BENCHES = {"bench: amplitude x friction": {"slide.amplitude": lambda r: 10 ** r.uniform(-6.5, -5)} | FRICTION,
+           "bench: tilt x friction": {"contact.tilt.angle": lambda r: 10 ** r.uniform(-6, -3.3)} | FRICTION}
 
 
 def drawn(family: str, seed: int, count: int) -> list:
     """Random models of a family."""
-    r, base, keys = np.random.default_rng(seed), base_of(pf.load(PATCH)), FAMILIES[family]
+    r, base, keys = np.random.default_rng(seed), base_of(pf.load(SLID if family in BENCHES else PATCH)), \
+        (FAMILIES | BENCHES)[family]
     sets = [{key: float(one(r)) for key, one in keys.items()} for _ in range(count)]
     return [pf.build(base.changed(assignments(one))) for one in sets]
 
@@ -95,7 +104,36 @@ def printed(family: str, seed: int, count: int, singles: int) -> None:
         print("   ", case, row[0], f"{row[1]:.6g} ± {row[2]:.2g}, single {row[3]:.6g} ± {row[4]:.2g}", flush=True)
 
 
+def slid(family: str, seed: int, count: int, singles: int) -> None:
+    """Print how far benches of a batch are from runs of their own at most, over their value and floor."""
+    models = drawn(family, seed, count)
+    found, ones = pf.run_many(models), one_by_one.solve(meshes.meshed(models)[:singles])
+    gaps = [abs(column[case] - one[case]) / (abs(one[case]) + ones.floors[name][case])
+            for name, one in ones.values.items() for column in (found.values[name],) for case in range(singles)
+            if one[case] == one[case]]
+    bars = [abs(found.errors[name][case] - one[case]) / (abs(ones.values[name][case]) + ones.floors[name][case])
+            for name, one in ones.errors.items() for case in range(singles) if one[case] == one[case]]
+    same = list(found.outcome[:singles]) == list(ones.outcome)
+    print(f"{family}: {len(gaps)} measures of {singles} benches, apart by {max(gaps):.1e}, bars by {max(bars):.1e}, "
+          f"{'the same' if same else 'other'} outcomes", flush=True)
+
+
+def times(seed: int, count: int) -> None:
+    """Print cases per CPU second, the median of three, of every family."""
+    for family in (*FAMILIES, *BENCHES):
+        models = drawn(family, seed, count if family in FAMILIES else count // 4)
+        timed(models, True)
+        rates = sorted(len(models) / timed(models, True)[1] for _ in range(3))
+        print(f"{family}: {rates[1]:.1f} cases a CPU second, {rates[0]:.1f} to {rates[2]:.1f}", flush=True)
+
+
 if __name__ == "__main__":
+    if sys.argv[1:2] == ["times"]:
+        asked = [int(one) for one in sys.argv[2:]]
+        times(*(asked + [41001, 256][len(asked):]))
+        sys.exit()
     asked = [int(one) for one in sys.argv[1:]]
+    for name in BENCHES:
+        slid(name, *(asked + [41001, 256, 100][len(asked):]))
     for name in FAMILIES:
         printed(name, *(asked + [41001, 256, 100][len(asked):]))

@@ -20,7 +20,6 @@ from ...compiled import load
 from ...core import STICK, Outcome
 from ...dynamics.march import lanes
 from ...effects import has, listed
-from ...elasticity.lapack import one_thread
 from ...model.model import Model
 from ...model.source import placed
 from ...response import run_events
@@ -105,13 +104,8 @@ def no_lanes(model: Model) -> str:
 
 def solve(models: Sequence[Model], say=None) -> Answers:
     """Answers of models of a group."""
-    out, few = Answers.blank(len(models)), [replace(model, patch=replace(model.patch, gathers=True))
-                                            for model in models]
-    for first in range(0, len(few), TOGETHER):
-        with one_thread():  # more wait for each other longer than such small systems take
-            part = patches.solved_together(few[first:first + TOGETHER])
-            out.place(range(first, first + len(part)), _solved(part, say))
-    return out
+    few = [replace(model, patch=replace(model.patch, gathers=True)) for model in models]
+    return patches.pressed_first(few, TOGETHER, lambda part: _solved(part, say))
 
 
 def _solved(models: list, say) -> Answers:

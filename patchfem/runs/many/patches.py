@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Outcome, allowed
+from ...elasticity.lapack import one_thread
 from ...model.alike import Alike, some
 from ...model.model import Model
 from ..patch import kept, static
@@ -61,6 +62,16 @@ def solved_together(models: Sequence[Model]) -> list[Model]:
         for cases, one in zip(alike.values(), found):
             for case in cases if one is not None else ():
                 out[case] = replace(models[case], patch=replace(models[case].patch, solved=one))
+    return out
+
+
+def pressed_first(models: Sequence[Model], together: int, solve: Callable) -> Answers:
+    """Answers of models, so many at once, whose patches are pressed before `solve` gives those of a part."""
+    out = Answers.blank(len(models))
+    for first in range(0, len(models), together):
+        with one_thread():  # more wait for each other longer than such small systems take
+            part = solved_together(models[first:first + together])
+            out.place(range(first, first + len(part)), solve(part))
     return out
 
 

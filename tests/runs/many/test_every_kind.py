@@ -21,6 +21,7 @@ TEXTS = {
     "harmonic": RIG + '[accuracy]\nmethod = "harmonic"\n',
     "patch": RIG, "patch coulomb": RIG.replace(PLASTIC, PLASTIC.replace("elastic-plastic", "coulomb").replace(
         'bond_length = "1 um"\n', "")),
+    "bench": PATCH + SHEAR + PLASTIC + SLIDE,
     "bench wear": PATCH + PLASTIC + SLIDE + WEAR}
 # of the pressure at an end of bare pieces, the mean over a cell: its digits end there
 ENDS = {"pressure_peak": 1e-9, "loaded_fraction": 1e-9}
@@ -36,7 +37,7 @@ def cases(kind: str, seed: int, count: int) -> list:
         if "drive" in TEXTS[kind]:
             sets |= {"drive.acceleration": float(9.81 * 10 ** r.uniform(-0.3, 1)),
                      "drive.frequency": float(r.choice([120.0, 143.0, 160.0]))}
-        if "slide" in TEXTS[kind] and "wear" in kind:
+        if "bench" in kind:
             sets |= {"slide.amplitude": float(10 ** r.uniform(-5.3, -4.3))}
         out.append(pf.build(TEXTS[kind], **sets))
     return meshed(out)
@@ -72,6 +73,11 @@ def held_against_own_runs(kind: str, seed: int, count: int) -> int:
 @pytest.mark.parametrize("kind", TEXTS)
 def test_exact_many_are_runs_of_their_own(kind):
     assert held_against_own_runs(kind, 1, 2) == 2
+
+
+def test_exact_benches_that_stay_as_they_are_pressed_share_that():
+    taken = {kind: many.batch_of(cases(kind, 1, 2)[0]) for kind in ("bench", "bench wear")}
+    assert taken["bench"].name == "benches" and taken["bench wear"] is None
 
 
 @pytest.mark.slow

@@ -14,7 +14,6 @@ import numpy as np
 
 from ....core import Outcome
 from ....effects import has
-from ....elasticity.lapack import one_thread
 from ....model.model import Model
 from ....model.source import placed
 from ....response.errors import pieces_error
@@ -74,17 +73,11 @@ def solve(models: Sequence[Model], say=None) -> Answers:
 
 def solved(models: Sequence[Model], say, move: Callable, together: int) -> Answers:
     """Answers of models of one group, by so many; move: as `moved`."""
-    found = Answers.blank(len(models))
-    for first in range(0, len(models), together):
-        part = models[first:first + together]
-        with one_thread():  # more wait for each other longer than such small systems take
-            found.place(range(first, first + len(part)), _solved(part, say, move))
-    return found
+    return patches.pressed_first(models, together, lambda part: _solved(part, say, move))
 
 
 def _solved(models, say, move: Callable) -> Answers:
     begin, out = perf_counter(), Answers.blank(len(models))
-    models = patches.solved_together(models)
     held = dict.fromkeys(range(len(models)))
     for case in sorted(held, key=lambda case: id(models[case].patch.solved)):  # those of one patch share its elements
         held[case] = _pressed(models[case])
