@@ -80,12 +80,12 @@ def run_at(folder, omega: float, speed: float):
 
 
 @pytest.mark.skipif(not (FOLDER and FILE.is_file()), reason="PATCHFEM_DATA has no nlvib-beam.mat")
-@pytest.mark.parametrize("omega, near", [(110.0, 5.2092e-7), (123.4, 1.7514e-6), (200.0, 6.5124e-8)])
+@pytest.mark.parametrize("omega, near", [(110.0, 5.20919e-7), (123.4, 1.752136e-6), (200.0, 6.51239e-8)])
 def test_exact_beam_whose_friction_speed_goes_with_the_frequency(tmp_path, omega, near):
-    """6e-7 m times omega: almost a viscous damper; the peak is 1.7514 um at 123.4 rad/s."""
+    """6e-7 m times omega: almost a viscous damper; 123.4 rad/s is close to the peak."""
     found, truth = run_at(tmp_path, omega, 6e-7 * omega), balanced(omega, 6e-7 * omega, 31, 1024)
     np.testing.assert_allclose(found.value, truth, rtol=1e-7)
-    np.testing.assert_allclose(truth, near, rtol=1e-3)
+    np.testing.assert_allclose(truth, near, rtol=2e-6)
 
 
 @pytest.mark.skipif(not (FOLDER and FILE.is_file()), reason="PATCHFEM_DATA has no nlvib-beam.mat")
