@@ -131,6 +131,9 @@ EFFECTS = {
                                    ("frequency levels", "onset onset_length"),
                                    "steady endless"),
     "drive.waveform=file": _wave("a(t) straight between the rows of a table", ("file", "")),
+    "drive.waveform=random": _wave("a(t) = sum_k A_k cos 2 pi f_k t + B_k sin 2 pi f_k t, A_k, B_k normal of variance "
+                                   "G(f_k)/T", ("", "spectrum file from to seed"), "endless",
+                                   "patchfem.structure.noise"),
     "structure.stiffening": Effect("patchfem.dynamics.march.joints", "F = k_3 x^3 at the output"),
     "accuracy.method=exact": Effect("patchfem.dynamics.events.histories", "closed form or series between events"),
     "accuracy.method=march": Effect("patchfem.dynamics.march.loop_kernels",

@@ -126,3 +126,25 @@ def two_stop_amplitude(friction) -> float:
         return float(COULOMB_RESONANCE)
     slip = brentq(lambda s: float(two_stop_relation(s)[0]) - friction, low, high, xtol=1e-15, rtol=1e-14)
     return float(two_stop_relation(slip)[1])
+
+
+def shaken_rms(omega: float, zeta: float, level: float, band: tuple) -> tuple:
+    """Root mean squares of an oscillator on a shaken base: (relative displacement [m], absolute acceleration [m s-2]).
+
+    omega [rad/s]; zeta < 1: damping ratio; level [m2 s-3]: one-sided spectral density of the base acceleration between
+    the two frequencies of band [Hz], 0 and infinity for white noise. With u = f/f_0 both are integrals of
+    1/((1 - u^2)^2 + (2 zeta u)^2), that of the acceleration with 1 + (2 zeta u)^2 above it, whose antiderivatives are
+    logarithms of the poles u = +-(1 - zeta^2)^(1/2) +- i zeta. Source: Crandall and Mark, Random Vibration in
+    Mechanical Systems, ch. 2.
+    """
+    pole = np.sqrt(1 - zeta * zeta) + 1j * zeta
+    poles = np.array([pole, -pole, np.conj(pole), -np.conj(pole)])
+    slopes = 4 * poles**3 + 2 * (4 * zeta * zeta - 2) * poles
+    ends = np.array(band, float) * 2 * np.pi / omega
+    # logarithms of (end - pole) along a path that no pole crosses, its branch cut turned away; at infinity they cancel
+    turn = np.where(poles.imag > 0, 1j, -1j)
+    logs = np.array([np.log((end - poles) * turn) if np.isfinite(end) else np.log(turn) for end in ends])
+    found = [float(np.real(np.sum((1 + above * (2 * zeta * poles)**2) / slopes * (logs[1] - logs[0]))))
+             for above in (0.0, 1.0)]
+    f = omega / (2 * np.pi)
+    return float(np.sqrt(level * f * found[0]) / omega**2), float(np.sqrt(level * f * found[1]))

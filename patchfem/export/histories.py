@@ -33,6 +33,8 @@ def contents(result: Result) -> netcdf.Contents:
         data = netcdf.with_curve(data, extra["curve"])
     if "decay" in extra:
         data = netcdf.with_decay(data, extra["decay"])
+    if "spectra" in extra:
+        data = netcdf.with_spectra(data, extra["spectra"])
     if "wear" in extra:
         data = netcdf.with_wear(data, extra["wear"], {name: m.unit for name, m in result.measures.items()})
     if "regime" in extra:

@@ -193,6 +193,18 @@ def with_decay(data: Contents, decay) -> Contents:
     return data.also(out, {over: (over, decay.time, {"units": "s", "long_name": "time of the middle of a swing"})})
 
 
+def with_spectra(data: Contents, found) -> Contents:
+    """The contents with `response.stationary.Spectra` over frequency."""
+    columns = {"base_acceleration_spectrum": ("m2 s-3", found.drive, "one-sided density of the base acceleration"),
+               "relative_displacement_spectrum": ("m2 Hz-1", found.place, "one-sided density of the output"),
+               "absolute_acceleration_spectrum": ("m2 s-3", found.acceleration, "one-sided density of acceleration"),
+               "gain": ("s2", np.abs(found.gain), "size of H1, output over base acceleration"),
+               "phase": ("rad", np.angle(found.gain), "phase of H1"), "coherence": ("1", found.coherence, "coherence")}
+    return data.also({name: ("frequency", values, {"units": unit, "long_name": text})
+                      for name, (unit, values, text) in columns.items()},
+                     {"frequency": ("frequency", found.frequency, {"units": "Hz"})})
+
+
 def with_surfaces(data: Contents, gap) -> Contents:
     """The contents with the gap (m,) [m] of the unloaded surfaces, wear included; of strips (s, m), as each has it."""
     return data.also({"unloaded_gap": (("strip", "x")[-np.ndim(gap):], np.asarray(gap), _attributes("unloaded_gap"))})

@@ -10,6 +10,8 @@ from .paths import RECORDED, UNITS, rising
 from .records import SI, chosen
 from .universal import channels, sets_of
 
+SPECTRUM = {"frequency": {"Hz": 1.0, "kHz": 1e3},
+            "level": {"g^2/Hz": 9.80665**2, "m^2/s^3": 1.0, "(m/s^2)^2/Hz": 1.0}}
 KINDS = {"acceleration": 12, "force": 13}  # data types of a universal file
 
 
@@ -32,6 +34,22 @@ def read_signal(path, name: str) -> tuple:
     if not np.any(value):
         raise PatchfemError(f"{path}: {name} is 0 in every row, so nothing moves")
     return time - time[0], np.array(value)
+
+
+def read_spectrum(path) -> tuple:
+    """Read the spectrum of a random drive: frequency (k,) [Hz], rising from above 0, and level (k,) [m2 s-3] above 0.
+
+    CSV with a header like `frequency [Hz],level [g^2/Hz]`. PatchfemError names file and line, Missing where there is no
+    file.
+    """
+    table = read_columns(path, SPECTRUM, ("frequency", "level"), "frequency [Hz],level [g^2/Hz]", "a spectrum",
+                         "; drive.file is relative to the scene")
+    frequency, level = table.values["frequency"], table.values["level"]
+    wrong = np.flatnonzero((level <= 0) | (np.diff(frequency, prepend=0.0) <= 0))
+    if wrong.size:
+        raise PatchfemError(f"{path}:{wrong[0] + 2}: frequencies that rise from above 0 Hz and levels above 0 are "
+                            f"wanted, not {frequency[wrong[0]]:g} Hz with {level[wrong[0]]:g} m^2/s^3")
+    return frequency, level
 
 
 def _universal(path: Path, name: str) -> tuple:

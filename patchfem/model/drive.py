@@ -49,7 +49,8 @@ def recorded(scene) -> tuple:
     PatchfemError with file and line of the scene where the file has none.
     """
     try:
-        return record(scene.beside(scene.drive.file), scene.drive.kind)
+        path = scene.beside(scene.drive.file)
+        return signals.read_spectrum(path) if scene.drive.waveform == "random" else record(path, scene.drive.kind)
     except PatchfemError as error:
         raise type(error)(f"{scene.where('drive.file')}: {error}") from None
 

@@ -86,7 +86,9 @@ def _slide(path: Path, tables, whole: bool) -> None:
 
 
 def _drive(path: Path, tables, whole: bool) -> None:
-    if whole or tables.drive.kind is not None:
+    if tables.drive.waveform == "random":
+        drive.signals.read_spectrum(path)
+    elif whole or tables.drive.kind is not None:
         drive.record(path, tables.drive.kind)
 
 

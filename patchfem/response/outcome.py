@@ -6,6 +6,7 @@ import numpy as np
 
 from ..core import Measure, Outcome
 from ..structure import drive_sizes
+from . import stationary
 from .settling import CLASSES, GROWS, classes, classify, left_over, mean_amplitudes, steady_amplitude
 
 SMALL = 1e-12  # of the displacement a/omega^2 of the drive: a change of the amplitude that is round-off
@@ -18,14 +19,17 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
     free motion is left in them (`left_over`). A release or a step is steady once it is at rest, to the floor of its
     amplitude; else the same amplitudes decide, but a release grows only where a mode gains energy. A motion whose
     middle moves on is not steady (`moves_on`). A sweep or a recorded signal changes to the end: unless it leaves the
-    interface stuck it is transient, without a steady estimate. So is an interface that holds while what it holds still
+    interface stuck it is transient, without a steady estimate; a random one is done where both halves of its record
+    move as much. So is an interface that holds while what it holds still
     rises. What rises to a motion that is known to exist, `raw.bounded`, does not grow. level_cycles: of each level, 0
     without levels; slowest: rate [1/s] at which the slowest mode decays, below 0 where one gains energy.
     """
-    if raw.outcome is Outcome.STUCK and still_loads(raw.window, drive.period, tolerance):
+    if raw.outcome is Outcome.STUCK and not hasattr(drive, "band") and still_loads(raw.window, drive.period, tolerance):
         return Outcome.TRANSIENT, measures
     if raw.outcome is not None:
         return raw.outcome, measures
+    if hasattr(drive, "band"):
+        return Outcome.DONE if stationary.steady(raw.window, drive) else Outcome.TRANSIENT, measures
     if not drive.segments:
         return Outcome.TRANSIENT, measures
     amplitudes, extremes, last = raw.amplitudes, raw.extremes, drive.segments[-1]

@@ -27,6 +27,9 @@ def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dic
     """
     lacking = {name: _of_cycles(name, values, window, drive, beside) for name in CYCLIC
                if rubs or name in ACCELERATIONS}
+    if hasattr(drive, "band"):
+        lacking |= dict.fromkeys(("response_frequency", "response_damping"),
+                                 "H1 has no peak within the band of the drive")
     if rubs:
         lacking["slip_start_phase"] = _of_phase(values, drive)
     return {name: Measure(None, TABLE[name].unit, None, TABLE[name].floor, reason=reason)

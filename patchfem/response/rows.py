@@ -14,6 +14,7 @@ from ..core import Response, Row
 from ..dynamics import work_check as work_checks
 from ..dynamics.integrated import Integrated
 from ..structure import drive_sizes
+from . import stationary
 from .loops import Turn, drift, half_range, interface_loop, secant_stiffness, turns_of
 from .measures import REST, acceleration_peak, circular_mean, energy_balance, ledger_measures, slip_measures
 from .spectrum import FLOOR, odd_harmonics, wave_measures
@@ -122,6 +123,11 @@ class Seen:
         """The measures of the ledger at its end [J] by name, empty without a ledger."""
         return {} if self.ledger is None else ledger_measures(self.ledger)
 
+    @cached_property
+    def shaken(self) -> dict:
+        """What a stationary random drive shows (`stationary.measures`), by name; {} under any other."""
+        return stationary.measures(self.window, self.drive) if hasattr(self.drive, "band") else {}
+
     @property
     def work_check(self) -> float | None:
         """Gap [1] of the two books of friction work; None where the engine has no second one."""
@@ -166,6 +172,15 @@ def _moved(values: dict):
     """Amplitude [m] of what drifts: of the slip, of the motion where nothing slips; values as `first_harmonic`."""
     slip = np.abs(np.nan_to_num(np.asarray(values.get("slip_amplitude", 0.0), float)))
     return np.where(slip > 0, slip, np.abs(values.get("relative_displacement_amplitude", 0.0)))
+
+
+def _shaken(name: str, unit: str, floor: float, words: str) -> tuple:
+    """Rows of a measure of a random drive, and of the scatter of records about it."""
+    scatter = f"{name}_scatter"
+    return (Row(name, unit, floor, words, lambda s: s.shaken.get(name)),
+            Row(scatter, unit, floor, f"half-width of the interval of 95 % of {name} by the scatter of a finite "
+                "record, as another seed gives it", lambda s: s.shaken.get(scatter),
+                term=(name, lambda values: np.abs(values.get(name, 0.0)))))
 
 
 FOURTH = 0.2, 0.0  # of the change by half the samples: what is read off cubics between them is of fourth order
@@ -252,6 +267,12 @@ ROWS = (
     Row("work_check", "1", 1e-2,
         "friction work by the trapezoidal rule on the run's own samples against that of its ledger, relative",
         lambda s: s.work_check, group="energy"),
+    *_shaken("relative_displacement_rms", "m", 1e-10, "root mean square of the motion at the output about its mean, "
+             "under a random drive"),
+    *_shaken("absolute_acceleration_rms", "m s-2", 1e-4, "root mean square of the acceleration at the output, base "
+             "motion included, under a random drive"),
+    *_shaken("response_frequency", "Hz", 1e-3, "frequency of the largest peak of H1, the response to a random drive"),
+    *_shaken("response_damping", "1", 1e-5, "damping ratio of that peak, of structure and friction together"),
     Row("ring_frequency", "Hz", 1e-3, "frequency at which the rig rings while it sticks"),
     Row("ring_damping", "1", 1e-6, "damping ratio of that ringing"),
     Row("onset_level", "m s-2", 0.0,

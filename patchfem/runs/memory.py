@@ -149,7 +149,8 @@ def _of_rig(model: Model, engine: str, steps: int, numerics) -> list:
         window = max(2, numerics.window) * numerics.steps
         parts.append(Need(KEPT * width * window, f"{window} samples of the last cycles", "accuracy.steps_per_cycle"))
     rows = len(getattr(rig.drive, "breaks", ())) if not rig.drive.segments else 0
-    parts.append(Need(ROW * rows, f"{rows} rows of the drive", "drive.file"))
+    parts.append(Need(ROW * rows, f"{rows} rows of the drive",
+                      "drive.duration" if rig.waveform == "random" else "drive.file"))
     return parts
 
 

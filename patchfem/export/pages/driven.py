@@ -6,7 +6,7 @@ from pathlib import Path
 from ...core import G_N
 from ...scales import LADDERS, axis_unit
 
-PLAIN = {"m/s^2": ("g", 1 / G_N), "m/s": ("mm/s", 1e3), "Hz": ("Hz", 1.0)}
+PLAIN = {"m/s^2": ("g", 1 / G_N), "m/s": ("mm/s", 1e3), "Hz": ("Hz", 1.0), "m^2/s^3": ("g^2/Hz", G_N**-2)}
 
 
 def size(text) -> str:
@@ -41,6 +41,10 @@ def _drive(keys: dict) -> str:
         levels = keys["levels"]
         told = f"{len(levels)} levels of {what} from {size(levels[0])} to {size(levels[-1])}"
         return f"{told} at {size(keys['frequency'])}{where}"
+    if waveform == "random":
+        told = f"with the spectrum of {Path(keys['file']).name}" if "file" in keys else f"of {size(keys['spectrum'])}"
+        ends = "".join(f" {name} {size(keys[name])}" for name in ("from", "to") if name in keys)
+        return f"random {what} {told}{ends}, record {keys.get('seed', 0)}"
     level = size(next(keys[name] for name in ("displacement", "acceleration", "force") if name in keys))
     if waveform == "step":
         return f"a step of {level} in {what}{where}"

@@ -7,12 +7,13 @@ import numpy as np
 
 from ...effects import has
 from ...model.model import Model
-from ...structure.drive_sizes import sinusoidal
+from ...structure.drive_sizes import sinusoidal, slowest
 from .costs import pairs_of, steps_per_cycle
 from .engines import engine_of
 
 COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
 WHOLE = 1e-6  # of a cycle by which a run may miss a whole number of them: a record of 30 periods has 30
+SETTLED = 3.0  # decay times after which a start has e^-6 of its mean square left
 LEAST_KEPT = 100  # samples of a run that has no cycles
 
 
@@ -54,6 +55,9 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     accuracy, rig = model.accuracy, model.rig
     engine = engine_of(model, per_point)
     window = int(max(1, min(10, (rig.cycles + WHOLE) // 10)))
+    if rig.waveform == "random":  # all of the record but what the start leaves
+        rate = slowest(rig.modes) * rig.drive.period
+        window = int(max(1, rig.cycles - min(rig.cycles / 4, SETTLED / rate if rate else np.inf) + WHOLE))
     if rig.levels:
         window = min(window, int(rig.level_cycles + WHOLE))
     steps = steps_per_cycle(model)

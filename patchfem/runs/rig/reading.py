@@ -79,7 +79,7 @@ class Reader:
         own = self.integrated(run, drive)
         apart = {name: gap for name, gap in change(values, fewer).items() if gap > 0 and name not in GAPS}
         return {name: row_of(name).halves[0] * gap + row_of(name).halves[1] / self.steps
-                for name, gap in apart.items()} if own.loops else {}
+                for name, gap in apart.items()} if own.loops or hasattr(drive, "band") else {}
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """The Solution of a run; drive: where it is not the model's; more: other fields of it."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core import Outcome, PatchfemError
 from ...model.rig import BEYOND
-from ...response import reasons
+from ...response import reasons, stationary
 from ...response.coarser import estimate, left_open
 from ...response.errors import with_errors
 from ...response.outcome import settle, without_bars
@@ -140,6 +140,9 @@ def _extra(run: Coupled, notes: list) -> dict:
         out["elements" if hasattr(reduced, "yield_slide") else "shear_modes"] = int(np.size(reduced.stiffness))
     if raw.summed is not None:
         out["quadrature"] = raw.summed.engine
+    if rig.waveform == "random":
+        out["spectra"] = stationary.spectra(raw.window, rig.drive)
+        notes = [*notes, *stationary.short(run.measures, raw.window)]
     if rig.kind == "free" and run.estimated and (decay := decays.decay_of(raw)) is not None:
         out["decay"] = decay
     return out | {"still_rings": run.rings.remedies, "book": raw.book, "period": run.drive.period, "notes": notes}

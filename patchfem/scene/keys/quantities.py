@@ -25,6 +25,7 @@ KINDS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
     "frequency": {"Hz": 1.0, "kHz": 1e3},
     "acceleration": {"m/s^2": 1.0, "mm/s^2": 1e-3, "g": 9.80665, "in/s^2": 0.0254, "ft/s^2": 0.3048},
+    "acceleration spectrum": {"m^2/s^3": 1.0, "(m/s^2)^2/Hz": 1.0, "g^2/Hz": 9.80665**2},
     "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6, "nm/s": 1e-9, "in/s": 0.0254},
     "pressure": {
         "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9,
@@ -48,7 +49,8 @@ KINDS: dict[str, dict[str, float]] = {
 
 EXAMPLES: dict[str, str] = {
     "length": "12.7 mm", "area": "161 mm^2", "force": "26 lbf", "moment": "0.05 N m", "mass": "0.884 kg",
-    "density": "4370 kg/m^3", "time": "2 s", "frequency": "143 Hz", "acceleration": "5 g", "velocity": "5 mm/s",
+    "density": "4370 kg/m^3", "time": "2 s", "frequency": "143 Hz", "acceleration": "5 g",
+    "acceleration spectrum": "0.01 g^2/Hz", "velocity": "5 mm/s",
     "pressure": "121 GPa", "angle": "0.1 mrad", "temperature": "293.15 K", "stiffness": "5e6 N/m",
     "rotational stiffness": "1e4 N m/rad", "foundation stiffness": "1e13 Pa/m", "damping": "10 N s/m",
     "cubic stiffness": "1e12 N/m^3", "wear coefficient": "1e-14 m^2/N", "sweep rate": "0.5 Hz/s",

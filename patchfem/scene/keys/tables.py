@@ -247,8 +247,12 @@ class Drive(Table):
               "release")
     waveform: key(WaveName, "course of the drive in time") = "sine"
     frequency: key(Frequency | None, "frequency of a sine or of levels") = None
-    from_: key(Frequency | None, "frequency at which a sweep begins") = Field(None, alias="from")
-    to: key(Frequency | None, "frequency at which a sweep ends") = None
+    from_: key(Frequency | None, "frequency at which a sweep begins, or the lowest one of a random "
+               "drive") = Field(None, alias="from")
+    to: key(Frequency | None, "frequency at which a sweep ends, or the highest one of a random drive") = None
+    spectrum: key(quantity("acceleration spectrum", gt=0) | None, "one-sided spectral density of a random acceleration "
+                  "of the base, the same from `from` to `to`", "waveform `random` unless a file") = None
+    seed: key(whole(0, 2**32 - 1) | None, "number of the random record; 0 unless given") = None
     rate: key(quantity("sweep rate", gt=0) | None,
               "change of frequency per time of a linear sweep", "waveform `sweep` unless log_rate") = None
     log_rate: key(quantity("logarithmic sweep rate", gt=0) | None, "octaves per time of a logarithmic sweep") = None
@@ -271,7 +275,8 @@ class Drive(Table):
     cycles: key(Positive | None, "length of the run, of each level, in cycles of the drive or of the first mode that "
                 "is not rigid", "unless duration, a sweep or a file") = None
     duration: key(Seconds | None, "length of the run, of each level, in place of cycles") = None
-    file: key(Text | None, "record of the drive, a table with units or UFF") = None
+    file: key(Text | None, "record of the drive, a table with units or UFF; of a random drive a table of its "
+              "spectrum") = None
 
     @field_validator("levels", mode="before")
     @classmethod

@@ -34,6 +34,8 @@ def check_drive(draft: Draft) -> None:
         _sweep(draft, drive)
     if drive.kind in ("base", "force") and drive.waveform == "levels":
         _onset(draft, drive)
+    if drive.kind in ("base", "force") and drive.waveform == "random":
+        _random(draft, drive)
 
 
 def _onset(draft: Draft, drive: Any) -> None:
@@ -52,6 +54,22 @@ def _sweep(draft: Draft, drive: Any) -> None:
         draft.lacks("drive.rate", "or drive.log_rate instead, such as '1 oct/min'")
     if drive.from_ is not None and drive.from_ == drive.to:
         draft.say("drive.to", f"{drive.to:g} Hz is where the sweep starts; another frequency is wanted")
+
+
+def _random(draft: Draft, drive: Any) -> None:
+    level, table = draft.given("drive.spectrum"), draft.given("drive.file")
+    if drive.kind == "force":
+        draft.say("drive.kind", "a random drive shakes the base; give kind 'base', or a record of the force as "
+                                "waveform 'file'")
+    if level and table:
+        draft.say("drive.file", "spectrum and file exclude each other: keep one")
+    elif not level and not table:
+        draft.lacks("drive.spectrum", "or drive.file, a table with the header frequency [Hz],level [g^2/Hz]")
+    for key in ("from", "to") if level else ():
+        if not draft.given(f"drive.{key}"):
+            draft.lacks(f"drive.{key}", "a spectrum has two ends")
+    if drive.from_ is not None and drive.to is not None and drive.to <= drive.from_:
+        draft.say("drive.to", f"{drive.to:g} Hz does not lie above drive.from, {drive.from_:g} Hz")
 
 
 def _size(draft: Draft, drive: Any) -> None:
@@ -81,7 +99,7 @@ def drive_unused(drive: Any) -> list[str]:
         "base": ["force", "mass"],
         "force": ["acceleration", "displacement"],
         "free": ["acceleration", "force", "frequency", "from", "to", "rate", "log_rate", "levels", "onset",
-                 "onset_length", "file", "waveform"],
+                 "onset_length", "file", "waveform", "spectrum", "seed"],
     }
     return without.get(drive.kind, [])
 

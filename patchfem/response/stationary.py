@@ -1,0 +1,197 @@
+"""What a stationary random drive leaves behind: root mean squares, spectra, frequency response, each with its scatter.
+
+Segments of a sixteenth of the record overlap by half under Hann's window (Welch 1967). Their H1 = G_ax/G_aa is in the
+mean the transform of the response h(t) times the window's own correlation r(t) (Bendat and Piersol, Random Data, ch. 9
+and 11). So h r of a mode is fitted to the largest peak, and no window widens it. By how much another record of the same
+spectrum would differ is told by mean squares of parts of the record, and of the fit by leaving parts out (jackknife).
+Intervals are of 95 % by Student's t.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import least_squares
+from scipy.special import stdtrit
+
+PARTS = 16  # of the record, by which its scatter is told, and lengths of a segment in it
+GROUPS = 10  # of segments, each left out in turn
+WIDE = 6.0, 8.0  # half-width of the band of a fit, in half-power widths and in lines
+ENOUGH = 50.0  # decay times of the mode in a record, below which its parts hang together
+LEAST = 64  # samples of a segment
+
+
+class Record(NamedTuple):
+    """Even samples, `step` [s] apart: drive (k,) [m s-2]; place [m] and acceleration [m s-2] of the output, (k,)."""
+
+    step: float
+    drive: np.ndarray
+    place: np.ndarray
+    acceleration: np.ndarray
+
+
+class Spectra(NamedTuple):
+    """One-sided densities over frequency (q,) [Hz], of drive and acceleration [m2 s-3], of the place [m2 Hz-1]; H1 of
+    the place over the drive (q,) [s2], complex, and its coherence (q,)."""
+
+    frequency: np.ndarray
+    drive: np.ndarray
+    place: np.ndarray
+    acceleration: np.ndarray
+    gain: np.ndarray
+    coherence: np.ndarray
+
+
+def record_of(window, drive) -> Record:
+    """The Record of a Response `window`, as often as the rows of its drive: cubics through places and rates."""
+    kept = np.append(True, np.diff(window.time) > 1e-9 * drive.time[1])
+    time, step = window.time[kept], float(drive.time[1])
+    grid = time[0] + step * np.arange(int((time[-1] - time[0]) / step * (1 + 1e-12)))
+    place = CubicHermiteSpline(time, window.output[kept], window.output_rate[kept])(grid)
+    return Record(step, drive.values(grid), place, np.interp(grid, time, window.acceleration[kept]))
+
+
+def measures(window, drive) -> dict:
+    """Values by name of the rows that a stationary drive alone has, as far as the record shows them."""
+    record, out = record_of(window, drive), {}
+    for name, values, even in (("relative_displacement_rms", window.output, record.place),
+                               ("absolute_acceleration_rms", window.acceleration, record.acceleration)):
+        out[name], out[f"{name}_scatter"] = rms(window.time, values), rms_scatter(even)
+    found = peak(record, drive.band)
+    if found is not None:
+        for name, value, scatter in zip(("response_frequency", "response_damping"), *found):
+            out |= {name: value, f"{name}_scatter": scatter}
+    return {name: float(value) for name, value in out.items() if np.isfinite(value)}
+
+
+def short(found: dict, window) -> list:
+    """The sentence, in a list, on a record (a Response) that is short beside the mode it shows; found: Measure by name.
+    """
+    names = "response_frequency", "response_damping"
+    if any(name not in found or not found[name].value for name in names):
+        return []
+    at, zeta = (found[name].value for name in names)
+    span, decay = float(window.time[-1] - window.time[0]), 1 / (2 * np.pi * at * zeta)
+    if span >= ENOUGH * decay:
+        return []
+    return [f"the record holds {span / decay:.2g} decay times of the mode at {at:.4g} Hz, so the scatter is itself "
+            f"uncertain; drive.duration = '{1.5 * ENOUGH * decay:.2g} s' is enough"]
+
+
+def rms(time, values) -> float:
+    """Root mean square about the mean of samples (k,) at times (k,) [s], by the trapezoidal rule."""
+    span = time[-1] - time[0]
+    mean = np.trapezoid(values, time) / span
+    return float(np.sqrt(np.trapezoid((values - mean)**2, time) / span))
+
+
+def rms_scatter(values) -> float:
+    """Half-width of the interval of `rms` of even samples (k,), from the mean squares of PARTS of them."""
+    if values.size < PARTS:
+        return np.nan
+    square = (values - values.mean())**2
+    parts = square[:square.size // PARTS * PARTS].reshape(PARTS, -1).mean(axis=1)
+    total = np.sqrt(square.mean())
+    return float(stdtrit(PARTS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(PARTS) / (2 * total)) if total > 0 else 0.0
+
+
+def steady(window, drive) -> bool:
+    """Whether the mean squares of both halves of a Response differ by no more than their scatter lets them."""
+    place = record_of(window, drive).place
+    half = place.size // 2
+    first, last = place[:half], place[half:]
+    # an interval of a half has 2 standard errors, a difference of two in 4 of its own
+    return bool(abs(first.std() - last.std()) <= 2 * np.hypot(rms_scatter(first), rms_scatter(last)))
+
+
+def segments(record: Record) -> tuple:
+    """(frequency (q,) [Hz], transforms (3, m, q) of drive, place and acceleration over m segments, scaled so that
+    2 |X|^2 is a density)."""
+    size = max(min(LEAST, record.place.size), 2 * (record.place.size // (2 * PARTS)))
+    taper = np.sin(np.pi * np.arange(size) / size)**2  # Hann's, periodic
+    starts = np.arange(0, record.place.size - size + 1, size // 2)
+    cut = np.stack([one[starts[:, None] + np.arange(size)] for one in record[1:]])
+    cut = (cut - cut.mean(axis=2, keepdims=True)) * taper
+    return np.fft.rfftfreq(size, record.step), np.fft.rfft(cut) * np.sqrt(record.step / np.sum(taper**2))
+
+
+def spectra(window, drive) -> Spectra:
+    """The Spectra of a Response `window`, up to twice the highest frequency of the drive."""
+    frequency, (push, place, gain) = segments(record_of(window, drive))
+    own, other, far = (2 * np.mean(np.abs(one)**2, axis=0) for one in (push, place, gain))
+    cross = 2 * np.mean(push.conj() * place, axis=0)
+    driven = (frequency >= drive.band[0]) & (frequency <= drive.band[1])
+    safe = np.where(driven, own, np.inf)
+    kept = (frequency > 0) & (frequency <= 2 * drive.band[1])
+    with np.errstate(invalid="ignore"):
+        coherence = np.where(driven, np.abs(cross)**2 / (safe * np.maximum(other, 1e-300)), np.nan)
+    return Spectra(*(one[kept] for one in (frequency, own, other, far, np.where(driven, cross / safe, np.nan),
+                                           coherence)))
+
+
+def peak(record: Record, band: tuple) -> tuple | None:
+    """((frequency [Hz], damping ratio), half-widths of both) of the largest peak of H1 in a band [Hz] of the drive.
+
+    None where the band shows no peak: it is at an end, or no mode fits it, or the record is too short for segments.
+    """
+    if record.place.size < 2 * LEAST:
+        return None
+    frequency, (push, place, _) = segments(record)
+    span, line = 1 / (frequency[1]), frequency[1]
+    inside = np.flatnonzero((frequency >= band[0] + 2 * line) & (frequency <= band[1] - 2 * line))
+    if inside.size < 5 or len(push) < GROUPS:
+        return None
+    own, cross = (np.abs(push)**2)[:, inside], (push.conj() * place)[:, inside]
+    f, gain = frequency[inside], cross.sum(axis=0) / own.sum(axis=0)
+    top = int(np.argmax(np.abs(gain)))
+    if top in (0, f.size - 1) or not np.abs(gain[top]) > 0:
+        return None
+    high = np.flatnonzero(np.abs(gain) < np.abs(gain[top]) / np.sqrt(2))
+    left, right = high[high < top].max(initial=0), high[high > top].min(initial=f.size - 1)
+    width = float(f[right] - f[left])
+    theta = np.log([2 * np.pi * f[top], max(0.3 * width, 0.05 * line) / (2 * f[top])])
+    for _ in range(3):  # the band follows the width of the peak
+        at, half = np.exp(theta[0]) / (2 * np.pi), np.exp(theta.sum()) / (2 * np.pi)
+        near = np.abs(f - at) <= max(WIDE[0] * half, WIDE[1] * line)
+        theta = _fitted(f[near], gain[near], span, theta)
+    if near.sum() < 5 or not abs(f[top] - np.exp(theta[0]) / (2 * np.pi)) < max(width, 2 * line) or theta[1] > 0:
+        return None
+    which, others = np.arange(len(push)) * GROUPS // len(push), []
+    for group in range(GROUPS):
+        left_in = which != group
+        part = cross[left_in][:, near].sum(axis=0) / own[left_in][:, near].sum(axis=0)
+        others.append(np.exp(_fitted(f[near], part, span, theta)))
+    scale = np.array([1 / (2 * np.pi), 1.0])
+    spread = np.sqrt((GROUPS - 1) * np.var(others, axis=0)) * stdtrit(GROUPS - 1, 0.975)
+    return np.exp(theta) * scale, spread * scale
+
+
+def _fitted(f, gain, span: float, theta) -> np.ndarray:
+    """ln of (omega [rad/s], damping ratio) of the mode whose `blurred` response fits H1 (q,) at f (q,) [Hz], with a
+    complex constant beside it; theta: a start; span [s]: of a segment."""
+    size = np.abs(gain).max()
+
+    def left(theta):
+        column = blurred(f, *np.exp(theta), span)
+        design = np.stack([np.concatenate([one.real, one.imag]) for one in (
+            column, np.ones(f.size, complex), 1j * np.ones(f.size))], axis=1)
+        norms = np.linalg.norm(design, axis=0)
+        target = np.concatenate([gain.real, gain.imag]) / size
+        return design / norms @ np.linalg.lstsq(design / norms, target, rcond=1e-12)[0] - target
+
+    reach = np.array([0.5, 7.0])
+    return least_squares(left, theta, bounds=(theta - reach, theta + reach), xtol=1e-10, ftol=1e-10).x
+
+
+def blurred(f, omega: float, zeta: float, span: float) -> np.ndarray:
+    """Response (q,) [s2] of x'' + 2 zeta omega x' + omega^2 x = a at f (q,) [Hz] as segments of `span` [s] under Hann's
+    window show it in the mean: int_0^span h(t) r(t) exp(-2 pi i f t) dt, r the window's correlation, in closed form."""
+    own = omega * np.sqrt(complex(1 - zeta * zeta))
+    turn, out = 2j * np.pi / span, 0.0
+    for pole, sign in ((-zeta * omega + 1j * own, 1), (-zeta * omega - 1j * own, -1)):
+        q = pole - 2j * np.pi * f
+        late = (np.exp(q * span) - 1)  # the same at q +- turn
+        ramp = sum(share * (late / s - span) / (s * span) for share, s in (
+            (2 / 3, q), (1 / 6, q + turn), (1 / 6, q - turn)))
+        out = out + sign * (ramp + late * (1 / (q + turn) - 1 / (q - turn)) / (4j * np.pi))
+    return out / (2j * own)

@@ -1,0 +1,92 @@
+"""What a random record leaves behind: spectra against scipy's, a blurred peak against its integral, closed forms inside
+the scatter."""
+
+import numpy as np
+import pytest
+from random_shaking import CASES, NAMES, held, shaken
+from scipy.integrate import quad
+from scipy.signal import csd, welch
+
+from patchfem.closed_forms.dynamics import shaken_rms
+from patchfem.response import stationary
+from patchfem.structure.noise import noise
+
+
+def test_exact_spectra_are_those_of_scipy():
+    window, drive = shaken(100.0, 0.02, 4.0, 3)
+    record, found = stationary.record_of(window, drive), stationary.spectra(window, drive)
+    size = 2 * (record.place.size // (2 * stationary.PARTS))
+    asked = {"fs": 1 / record.step, "nperseg": size, "noverlap": size // 2, "detrend": "constant"}
+    f, push = welch(record.drive, **asked)
+    kept = (f > 0) & (f <= 2 * drive.band[1])
+    assert found.frequency == pytest.approx(f[kept], rel=1e-12) and found.drive == pytest.approx(push[kept], rel=1e-9)
+    for mine, values in ((found.place, record.place), (found.acceleration, record.acceleration)):
+        assert mine == pytest.approx(welch(values, **asked)[1][kept], rel=1e-9)
+    gain = (csd(record.drive, record.place, **asked)[1] / push)[kept]
+    inside = ~np.isnan(found.coherence)
+    assert found.gain[inside] == pytest.approx(gain[inside], rel=1e-9) and np.all(found.coherence[inside] <= 1 + 1e-12)
+    assert np.all((found.frequency[inside] >= drive.band[0]) & (found.frequency[inside] <= drive.band[1]))
+
+
+def test_exact_a_blurred_peak_is_the_integral_over_the_correlation_of_the_window():
+    omega, zeta, span = 60.0, 0.03, 1.7
+
+    def tapered(t):
+        x = t / span
+        correlation = (1 - x) * (2 + np.cos(2 * np.pi * x)) / 3 + np.sin(2 * np.pi * x) / (2 * np.pi)
+        own = omega * np.sqrt(1 - zeta**2)
+        return correlation * np.exp(-zeta * omega * t) * np.sin(own * t) / own
+
+    for f in (7.0, 9.5, 13.0):
+        real, imaginary = (quad(lambda t: tapered(t) * of(2 * np.pi * f * t), 0, span, limit=400)[0]  # noqa: B023
+                           for of in (np.cos, np.sin))
+        assert stationary.blurred(np.array([f]), omega, zeta, span)[0] == pytest.approx(real - 1j * imaginary, rel=1e-9)
+
+
+@pytest.mark.parametrize("zeta", [0.003, 0.05, 0.6])
+@pytest.mark.parametrize("band", [(20.0, 300.0), (90.0, 110.0), (150.0, 400.0)])
+def test_exact_root_mean_squares_in_closed_form_are_integrals(zeta, band):
+    omega = 2 * np.pi * 100
+
+    def place(f):
+        w = 2 * np.pi * f
+        return 1 / ((omega**2 - w * w)**2 + (2 * zeta * omega * w)**2)
+
+    ends = [f for f in (100 * (1 - 3 * zeta), 100.0, 100 * (1 + 3 * zeta)) if band[0] < f < band[1]] or None
+    squares = [quad(of, *band, points=ends, limit=900, epsrel=1e-11, epsabs=0)[0] for of in (
+        place, lambda f: place(f) * (omega**4 + (4 * np.pi * zeta * omega * f)**2))]
+    assert shaken_rms(omega, zeta, 1.0, band) == pytest.approx(np.sqrt(squares), rel=1e-9)
+
+
+def test_exact_white_noise_gives_the_root_mean_squares_of_the_textbook():
+    omega, zeta = 2 * np.pi * 100, 0.02
+    assert shaken_rms(omega, zeta, 2.0, (0.0, np.inf)) == pytest.approx(
+        np.sqrt([2 / (8 * zeta * omega**3), 2 * omega * (1 + 4 * zeta**2) / (8 * zeta)]), rel=1e-12)
+
+
+@pytest.mark.parametrize("count", [16, pytest.param(200, marks=pytest.mark.slow)])
+def test_closed_forms_lie_inside_the_scatter_of_records(count):
+    """200 records of the first case: the intervals of 95 % hold the truth of 95 % less three standard deviations."""
+    rows = np.array([held(*CASES[0], seed) for seed in range(count)])
+    inside = np.abs(rows[..., 0] - 1) <= rows[..., 1]
+    assert np.all(inside.mean(axis=0) >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / count)), dict(zip(NAMES, inside.mean(axis=0)))
+    far = rows[..., 0].std(axis=0) / np.sqrt(count)
+    assert np.all(np.abs(rows[..., 0].mean(axis=0) - 1) <= 4 * far)  # no window, and no start, shifts the mean
+    assert np.all(rows[..., 1].mean(axis=0) <= 4 * rows[..., 0].std(axis=0))  # nor are the intervals idle
+
+
+def test_exact_a_record_has_the_power_of_its_spectrum_between_its_rows():
+    """Lines of the record, straight between its rows, over 40 seeds: the mean power is the spectrum's."""
+    powers, (low, high), span = [], (20.0, 100.0), 5.0
+    for seed in range(40):
+        drive = noise((low, 50.0, high), (1.0, 4.0, 1.0), span, seed, 0.01)
+        f = np.arange(drive.time.size // 2 + 1) / span
+        lines = np.fft.rfft(drive.value[:-1]) / (drive.time.size - 1) * np.sinc(f * drive.time[1])**2
+        assert np.all(np.abs(lines[(f < low) | (f > high)]) < 1e-12)
+        powers.append(2 * np.abs(lines)**2 * span)
+    inside = (f >= low) & (f <= high)
+    level = np.exp(np.interp(np.log(f[inside]), np.log([low, 50.0, high]), np.log([1.0, 4.0, 1.0])))
+    share = np.mean(powers, axis=0)[inside] / level
+    assert share.mean() == pytest.approx(1, abs=4 / np.sqrt(40 * inside.sum()))
+    assert drive.values(drive.time[3]) == drive.value[3] and drive.duration == pytest.approx(span, rel=1e-12)
+    assert not np.array_equal(drive.value, noise((low, high), (1.0, 1.0), span, 0, 0.01).value)
