@@ -14,8 +14,8 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
-PARTS = 16  # of the record, by which its scatter is told, and lengths of a segment in it
-GROUPS = 10  # of segments, each left out in turn
+PARTS = 16  # lengths of a segment in the record
+GROUPS = 10  # parts of the record by which its scatter is told; of segments, each left out in turn
 WIDE = 6.0, 8.0  # half-width of the band of a fit, in half-power widths and in lines
 ENOUGH = 50.0  # decay times of the mode in a record, below which its parts hang together
 LEAST = 64  # samples of a segment
@@ -86,13 +86,18 @@ def rms(time, values) -> float:
 
 
 def rms_scatter(values) -> float:
-    """Half-width of the interval of `rms` of even samples (k,), from the mean squares of PARTS of them."""
-    if values.size < PARTS:
+    """Half-width of the interval of `rms` of even samples (k,), from the mean squares of GROUPS parts of them.
+
+    The interval of the mean square is one of its logarithm, as few swings have a skew one; its upper half counts.
+    """
+    if values.size < GROUPS:
         return np.nan
     square = (values - values.mean())**2
-    parts = square[:square.size // PARTS * PARTS].reshape(PARTS, -1).mean(axis=1)
-    total = np.sqrt(square.mean())
-    return float(stdtrit(PARTS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(PARTS) / (2 * total)) if total > 0 else 0.0
+    parts, mean = square[:square.size // GROUPS * GROUPS].reshape(GROUPS, -1).mean(axis=1), square.mean()
+    if not mean > 0:
+        return 0.0
+    share = stdtrit(GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(GROUPS) / mean
+    return float(np.sqrt(mean) * np.expm1(share / 2))
 
 
 def steady(window, drive) -> bool:
