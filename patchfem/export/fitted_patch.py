@@ -107,8 +107,10 @@ def lines_of(answer: dict) -> list:
         out.append(f"  {law:<16}{next(parts):>22}{next(parts):>22}   {values}")
     out += [f"  {line}" for line in sentences(answer["law"], answer)]
     if answer["mesh"] is not None:
-        stiff, loss = (_percent(abs(answer["mesh"][part]["largest"])) for part in PARTS)
-        out.append(f"  A coarser mesh changes the patch's own stiffness by {stiff} and its loss by {loss} at most.")
+        stiff, loss = (answer["mesh"][part] for part in PARTS)
+        out.append(f"  A coarser mesh changes the patch's own stiffness by {_percent(abs(stiff['largest']))} at most, "
+                   f"its loss by {_percent(abs(loss['largest']))}, at {short(loss['at'], 'm', 3)}, "
+                   f"{_percent(loss['rms'])} rms.")
     return out
 
 

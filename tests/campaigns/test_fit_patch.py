@@ -80,6 +80,15 @@ def test_a_rig_of_the_fitted_law_swings_as_that_of_the_patch(tmp_path):
     assert runs[1] == pytest.approx(runs[0], rel=abs(answer["laws"][answer["law"]]["stiffness"]["largest"]))
 
 
+@pytest.mark.parametrize("table", ['[contact.strips]\ncount = 3\nroll = "1 urad"\n', '[contact.holder]\n'
+                                   'tangential_stiffness = "5e6 N/m"\n'], ids=["strips", "holder"])
+def test_exact_the_slip_force_is_that_of_the_load(table):
+    """Whatever gives way, all elements together slip at mu N, which each law keeps."""
+    found = fit_patch(pf.load(RIG.replace("[contact.shear]\n", "[contact.shear]\n" + table)), [1e-8, 1e-6, 1e-4])
+    assert found.limit == pytest.approx(0.3 * found.load, rel=1e-9)
+    assert all(one.curves.force[-1] == pytest.approx(found.limit, rel=1e-6) for one in found.laws.values())
+
+
 def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bench.toml").write_text(JOINT + SLIDE)
