@@ -1,7 +1,9 @@
-"""The notebooks: short, without stored outputs, of the public names alone, and true from the first cell to the last."""
+"""Notebooks and the site's tasks with code: short, without stored outputs, of the public names alone, and true from the
+first cell to the last."""
 
 import ast
 import os
+import re
 from pathlib import Path
 
 import nbformat
@@ -12,9 +14,23 @@ from nbclient import NotebookClient
 import patchfem as pf
 
 ROOT = Path(__file__).parents[2]
-NAMES = ("own_joint", "misalignment", "before_after", "accuracy_time")
-BOOKS = {name: nbformat.read(ROOT / f"studies/notebooks/{name}.ipynb", 4) for name in NAMES}
-PICTURES = {"own_joint": 2, "misalignment": 1, "before_after": 1, "accuracy_time": 1}
+PICTURES = {"own_joint": 2, "misalignment": 1, "before_after": 1, "accuracy_time": 1, "backbone": 1, "measured_loop": 1,
+            "sweep_of_a_thousand": 1}
+TASKS = ("backbone", "measured_loop", "sweep_of_a_thousand")  # Markdown whose cells of code the site runs
+NAMES = tuple(PICTURES)
+
+
+def read(name: str):
+    """A notebook, or a task of the site with its text and its cells of code in turns."""
+    if name not in TASKS:
+        return nbformat.read(ROOT / f"studies/notebooks/{name}.ipynb", 4)
+    text = (ROOT / f"studies/site/tasks/{name}.md").read_text("utf-8").partition("\n---\n")[2]
+    parts = re.split(r"^```\{code-cell\} ipython3\n(.*?)^```\n", text, flags=re.S | re.M)
+    make = nbformat.v4.new_markdown_cell, nbformat.v4.new_code_cell
+    return nbformat.v4.new_notebook(cells=[make[k % 2](part) for k, part in enumerate(parts)])
+
+
+BOOKS = {name: read(name) for name in NAMES}
 
 
 def sources(name: str, kind: str) -> list:
@@ -53,9 +69,12 @@ def test_always_what_a_notebook_says_holds(name, kernel):
 
 
 def test_always_every_notebook_is_run_and_linked():
-    assert sorted(path.stem for path in (ROOT / "studies/notebooks").iterdir()) == sorted(NAMES)
+    assert sorted(path.stem for path in (ROOT / "studies/notebooks").iterdir()) == sorted(set(NAMES) - set(TASKS))
     pages = (ROOT / "studies/README.md").read_text("utf-8")
-    assert [name for name in NAMES if f"(notebooks/{name}.ipynb)" not in pages] == []
+    places = {name: f"site/tasks/{name}.md" if name in TASKS else f"notebooks/{name}.ipynb" for name in NAMES}
+    assert [name for name, place in places.items() if f"({place})" not in pages] == []
+    tasks = (ROOT / "studies/site/tasks").glob("*.md")
+    assert {path.stem for path in tasks if "code-cell" in path.read_text("utf-8")} == set(TASKS)
 
 
 @pytest.mark.parametrize("name", NAMES)

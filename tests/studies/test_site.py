@@ -1,5 +1,7 @@
 """The site: every effect has a scene that names it, every measure a line, every link of a page a target; built slow."""
 
+import ast
+import json
 import os
 import re
 import subprocess
@@ -16,7 +18,6 @@ ROOT = Path(__file__).parents[2]
 SITE = ROOT / "studies" / "site"
 sys.path.insert(0, str(SITE))
 check, examples, made, terms = (__import__(name) for name in ("check", "examples", "made", "terms"))
-WRITTEN = sorted([*SITE.glob("*.md"), *SITE.glob("tasks/*.md")])
 
 
 @pytest.fixture(scope="module")
@@ -61,11 +62,49 @@ def test_always_every_folder_of_the_package_is_told():
     assert re.findall(r"^## (\w+)$", made.code(), re.M) == order and len(order) > 20
 
 
-@pytest.mark.parametrize("page", WRITTEN, ids=lambda page: page.stem)
-def test_always_every_link_of_a_written_page_leads_somewhere(page):
-    for link in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text("utf-8")):
-        if not link.startswith(("http", "made/")):
-            assert (page.parent / link).exists(), link
+def sources() -> list:
+    """The pages of the repository that the site is built from, without those that a build makes."""
+    conf = (SITE / "conf.py").read_text("utf-8")
+    wanted = ast.literal_eval(re.search(r"include_patterns = (\[.*?\])", conf, re.S)[1])
+    found = {path for pattern in wanted for path in ROOT.glob(pattern.replace("**.md", "**/*.md"))}
+    return sorted(path for path in found if "made" not in path.parts and path != SITE / "README.md")
+
+
+def text_of(page: Path) -> str:
+    """The Markdown of a page, of a notebook that of its cells."""
+    text = page.read_text("utf-8")
+    if page.suffix != ".ipynb":
+        return text
+    return "\n".join("".join(cell["source"]) if cell["cell_type"] == "markdown" else
+                     f"```python\n{''.join(cell['source'])}\n```" for cell in json.loads(text)["cells"])
+
+
+def made_pages() -> set:
+    """Names of the pages that a build makes."""
+    return {"glossary.md", "commands.md", "python.md", "code.md", "effects/index.md",
+            *(f"effects/{made.slug(name)}.md" for name in made.SHOWN)}
+
+
+@pytest.mark.parametrize("page", sources(), ids=lambda page: str(page.relative_to(ROOT)))
+def test_always_a_page_leads_somewhere_and_its_python_is_python(page):
+    """Every link inside the repository has its file and its heading, every entry of a list of pages a page."""
+    text = text_of(page)
+    prose = re.sub(r"^```.*?^```|`[^`\n]*`", "", text, flags=re.S | re.M)
+    for link, name in re.findall(r"\]\(([^)#\s]*)#?([^)]*)\)", prose):
+        if link.startswith(("http", "made/")):
+            assert link.startswith("http") or link.removeprefix("made/") in made_pages(), link
+            continue
+        target = (page.parent / link).resolve() if link else page
+        assert target.exists(), link
+        heads = re.findall(r"^#+ (.*)$", target.read_text("utf-8"), re.M) if name and target.suffix == ".md" else ()
+        assert not name or name in {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}, name
+    for listed in re.findall(r"^```\{toctree\}\n(.*?)^```", text, re.S | re.M):
+        for line in (line for line in listed.splitlines() if line and not line.startswith(":")):
+            place = re.sub(r"^.*<(.*)>$", r"\1", line)
+            assert f"{place.removeprefix('made/')}.md" in made_pages() if place.startswith("made/") else any(
+                (page.parent / f"{place}{end}").exists() for end in (".md", ".ipynb")), line
+    for code in re.findall(r"^```(?:python|\{code-cell\} ipython3)\n(.*?)^```", text, re.S | re.M):
+        ast.parse(f"{{{code}}}" if code.startswith('"') else code)  # an entry of a dict
 
 
 def test_always_the_commands_of_a_page_run():
