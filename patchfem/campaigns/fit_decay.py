@@ -75,6 +75,8 @@ def read_curve(path) -> tuple:
     value = np.array([columns["frequency"], columns["damping"]])
     spread = np.array([columns[f"{name}_error"] / 2 if f"{name}_error" in columns else half * np.abs(one) for
                        name, half, one in zip(("frequency", "damping"), HALVES, value)])
+    if (spread < 0).any():
+        raise PatchfemError(f"{path}: an error below 0; give half the width of its interval, or leave the column out")
     if not (columns["amplitude"] > 0).all() or not (value[0] > 0).all():
         raise PatchfemError(f"{path}: amplitudes and frequencies are above 0")
     order = np.argsort(columns["amplitude"], kind="stable")
@@ -146,5 +148,6 @@ def _curve(model, amplitude, method: str) -> np.ndarray:
         raise PatchfemError(found.missing[method])
     one = found.curves[method]
     if one.amplitude.size != amplitude.size:
-        raise PatchfemError("the mode does not swing at all amplitudes of the file")
+        lost = ", ".join(f"{a:.3g} m" for a in np.setdiff1d(amplitude, one.amplitude)[:6])
+        raise PatchfemError(f"the model's mode does not swing at {lost}; leave out these rows, or narrow --free")
     return np.array([one.frequency, one.damping])

@@ -66,12 +66,17 @@ def _symmetric(path, values, wanted: str):
 
 
 def _named(path, names, wanted: str) -> str:
-    """The name under which a file holds the wanted matrix: one of NAMES, or the only one there is."""
+    """The name under which a file holds the wanted matrix: one of NAMES, or its only one that is no other matrix."""
     names = list(names)
     for known in NAMES[wanted]:
         for name in names:
             if name.rpartition(".")[2].lower() == known:
                 return name
+    other = [kind for kind, known in NAMES.items() if len(names) == 1 and
+             names[0].rpartition(".")[2].lower() in known]
+    if other:
+        raise PatchfemError(f"{path}: its one array, {names[0]}, is by its name the {other[0]}, not the {wanted}; name "
+                            f"the file of the {wanted}")
     if len(names) == 1:
         return names[0]
     held = ", ".join(names[:12]) or "none"

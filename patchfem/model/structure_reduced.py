@@ -92,6 +92,9 @@ def _placed(every: list, boundary: tuple, moved: tuple | None, driven: bool) -> 
         one = matrices.aligned(*every)[0]
     except PatchfemError as error:
         raise PatchfemError(str(error), "structure.reduced.mass") from None
+    if len(every) > 1 and not abs(every[0].values - every[1].values).nnz:
+        raise PatchfemError("holds the same numbers as the stiffness; name the file of the mass",
+                            "structure.reduced.mass")
     n = one.values.shape[0]
     rows = np.concatenate([_rows(each, one, n, "boundary") for each in boundary])
     if np.unique(rows).size < rows.size:

@@ -379,7 +379,7 @@ def _wanted(model: type[Table], name: str) -> str:
         clause = f"one of {', '.join(allowed)} is wanted" + (" (or a whole number)" if int in types else "")
     elif tuple in map(get_origin, types):
         many = "plain numbers are wanted, such as [1, 1.5]" if float in types else \
-            "two whole numbers are wanted, such as [1, 2]"
+            f"{'' if any(... in get_args(one) for one in types) else 'two '}whole numbers are wanted, such as [1, 2]"
         clause = "" if model_of(model, name) else many
     elif float in types:
         clause = "a plain number is wanted"

@@ -52,3 +52,6 @@ def test_the_verb_reads_a_curve_and_refuses_what_is_none(tmp_path, monkeypatch):
     both.write_text("amplitude [m],frequency [Hz],damping\n-1e-6,100,0.1\n2e-6,100,0.1\n")
     with pytest.raises(PatchfemError, match="above 0"):
         read_curve(both)
+    both.write_text("amplitude [m],frequency [Hz],frequency_error [Hz],damping\n1e-6,100,-1,0.1\n2e-6,100,1,0.1\n")
+    with pytest.raises(PatchfemError, match="an error below 0"):
+        read_curve(both)

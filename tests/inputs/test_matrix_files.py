@@ -196,6 +196,10 @@ def test_refuses_names_that_are_not_known_and_sizes_that_differ(tmp_path):
     np.savez(tmp_path / "a.npz", A=K, B=M)
     with pytest.raises(PatchfemError, match=r"holds no stiffness by a name that is known .* its arrays: A, B"):
         matrices.read(tmp_path / "a.npz", "stiffness")
+    np.savez(tmp_path / "k.npz", K=K)
+    for wanted in ("mass", "damping"):
+        with pytest.raises(PatchfemError, match=rf"its one array, K, is by its name the stiffness, not the {wanted}"):
+            matrices.read(tmp_path / "k.npz", wanted)
     one, small = (matrices.Matrix(sparse.csr_array(part)) for part in (K, M[:2, :2]))
     with pytest.raises(PatchfemError, match="differ in size: 4 x 4 and 2 x 2"):
         matrices.aligned(one, small)

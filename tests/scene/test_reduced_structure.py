@@ -123,6 +123,8 @@ REFUSED = {
     ("boundary", "[40, 25]", "[40, 41]"): "there is no coordinate 41: the matrices have 40, counted from 1",
     ("boundary", "[40, 25]", "[40, 40]"): "names 40 twice; each coordinate once",
     ("boundary", "[40, 25]", '["40:x", 2]'): "'40:x' names a node, but the files name none",
+    ("boundary", "[40, 25]", "[]"): "whole numbers are wanted, such as [1, 2]",
+    ("mass", '"both.npz"', '"k.mtx"'): "holds the same numbers as the stiffness; name the file of the mass",
     ("stiffness", "k.mtx", "k.txt"): "the name ends in '.txt'",
     ("stiffness", "k.mtx", "whole.mtx"): "there is no file",
     ("mass", "both.npz", "small.npz"): "the matrices differ in size: 40 x 40 and 9 x 9",
@@ -139,6 +141,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("key, old, new", REFUSED)
 def test_refuses_with_the_line_of_the_key(folder, key, old, new):
+    assert old in SCENE
     text = SCENE.replace(old, new, 1)
     answer = cli("run", _written(folder, text), "-o", folder / "out")
     assert answer.code == 2, answer.err
