@@ -28,8 +28,8 @@ def skin_asked(table: Asperities, beside) -> Asperities:
 
 
 def of_trace(path: Path) -> tuple:
-    """Moments of the trace in a file from its samples, and from every second one; a file is read once. PatchfemError
-    with the key for one that has no peaks of a surface."""
+    """Moments of the trace in a file, and the Peaks that every second sample tells, None where it tells none; a file is
+    read once. PatchfemError with the key for one that has no peaks of a surface."""
     try:
         return _read(path, path.stat().st_mtime_ns if path.exists() else 0)
     except PatchfemError as error:
@@ -39,6 +39,9 @@ def of_trace(path: Path) -> tuple:
 @lru_cache(maxsize=4)
 def _read(path: Path, stamp: int) -> tuple:
     trace = read_profile(path)
-    found = moments_of(trace), moments_of(trace, 2)
-    peaks_of(found[0])
-    return found
+    found = moments_of(trace)
+    peaks_of(found)
+    try:
+        return found, peaks_of(moments_of(trace, 2))
+    except PatchfemError:
+        return found, None

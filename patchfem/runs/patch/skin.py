@@ -8,7 +8,7 @@ import numpy as np
 from ...contact import skin_laws
 from ...contact.edges import BEARING
 from ...contact.strips import press_strips
-from ...core import Compliance, PatchfemError, Pressure, frozen_array
+from ...core import Compliance, Pressure, frozen_array
 from ...model import peaks as traces
 from ...scales import short
 from ...surface.roughness import peaks
@@ -53,9 +53,8 @@ def ranged(asked, pressure: float) -> list:
 
 def _half(asked, pressure: float) -> str:
     """The stiffness of the peaks that every second sample of the trace tells, as words."""
-    try:
-        one = peaks.peaks_of(traces.of_trace(Path(asked.skin.from_))[1])
-    except PatchfemError:
+    one = traces.of_trace(Path(asked.skin.from_))[1]
+    if one is None:
         return "are those of no such surface"
     new = {"radius": one.radius, "density": one.density, "height_deviation": one.deviation}
     return f"{mean_stiffness(replace(asked, skin=asked.skin.model_copy(update=new)), pressure):.3g} Pa/m"

@@ -18,6 +18,7 @@ SUMMITS = 0.8968  # of m_0/alpha, that the heights of summits scatter less than 
 NARROWEST = 1.5  # alpha of waves of one length in all directions
 PERSSON = 0.4, 0.5  # u_0 over the rms height: Persson 2007, and Pastewka et al. 2013 by simulation
 FEWEST = 16  # samples of a trace
+SPIKY = 0.1  # share of the samples from which they are a surface and no spikes
 ROUND = 1e-12  # of its heights, what levelling leaves of a straight line
 
 
@@ -53,7 +54,8 @@ def moments_of(trace: Profile, every: int = 1) -> Moments:
     Slope and curvature are first and second differences, which see a wave of length L as sinc(step/L) and sinc^2 of its
     own. PatchfemError for a trace of less than FEWEST such samples and for one without heights.
     """
-    tilted = even(despiked(trace))
+    clean = despiked(trace)
+    tilted = even(clean if (clean.missing & ~trace.missing).mean() <= SPIKY else trace)
     trace = level(tilted)
     z, step = trace.z[::every], every * trace.length / (trace.z.size - 1)
     if z.size < FEWEST:

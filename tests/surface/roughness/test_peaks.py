@@ -99,6 +99,8 @@ def test_refuses_what_no_surface_has():
     x = np.arange(256) * 1e-6
     with pytest.raises(PatchfemError, match=r"at least 1\.22"):
         peaks_of(moments_of(trace_of(np.sin(2 * np.pi * x / 2e-5), 1e-6)))  # one wave: alpha = 1
+    with pytest.raises(PatchfemError, match=r"at least 1\.22"):
+        peaks_of(moments_of(trace_of(1e-6 * (np.arange(64) % 2), 1e-6)))  # no spikes, though each is off its neighbours
     with pytest.raises(PatchfemError, match="is flat"):
         moments_of(trace_of(0.1 * x, 1e-6))
     with pytest.raises(PatchfemError, match="16 at least"):
@@ -162,6 +164,15 @@ def test_refuses_peaks_that_are_not_whole(keys, said, tmp_path):
     with pytest.raises(PatchfemError) as wrong:
         pf.plan(tmp_path / "scene.toml")
     assert said in str(wrong.value) and "asperities" in str(wrong.value)
+
+
+def test_a_short_trace_has_peaks_though_half_of_it_tells_none(tmp_path):
+    x = np.arange(24)
+    z = 2 * np.sin(0.5 * x) + 0.3 * np.random.default_rng(3).normal(size=24)
+    (tmp_path / "short.csv").write_text("x [um],z [um]\n" + "".join(f"{a},{b!r}\n" for a, b in zip(x, z.tolist())))
+    (tmp_path / "scene.toml").write_text(PATCH + 'from = "short.csv"\n')
+    assert any("every second sample are those of no such surface" in text for text in
+               pf.plan(tmp_path / "scene.toml").verdict)
 
 
 def test_profile_tells_two_faces_together(tmp_path):
