@@ -1,10 +1,11 @@
 """A rig as matrices and friction elements, for NLvib (.mat) and for TMDSimPy, pyHarm or one's own script (.npz).
 
-M q'' + D q' + K q + sum_e w_e f_e(w_e' q) = Fex1 cos(omega t), q being the coordinates of the rig's modes. NLvib takes
-M, D, K, Fex1 and the structures of `nonlinear_elements`: elasticDryFriction with stiffness and friction_limit_force, or
-tanhDryFriction with friction_limit_force and eps, its speed [m/s]. TMDSimPy takes M, K, C, and Q, T, kt, Fs of each
-JenkinsForce: one row of `direction`, its transpose, `stiffness` and `limit`. M, K, C, slide, output and force or base
-are those that structure.file reads.
+M q'' + D q' + K q + sum_e w_e f_e(w_e' q) = Fex1 cos(omega t). The first coordinates q are the slides of the
+interfaces, as elements of pyHarm act on coordinates, the others motions without slide; where slides depend on one
+another, all are those of the modes. NLvib takes M, D, K, Fex1 and the structures of `nonlinear_elements`:
+elasticDryFriction with stiffness and friction_limit_force, or tanhDryFriction with friction_limit_force and eps, its
+speed [m/s]. TMDSimPy takes M, K, C, and Q, T, kt, Fs of each JenkinsForce: one row of `direction`, its transpose,
+`stiffness` and `limit`. M, K, C, slide, output and force or base are those that structure.file reads.
 """
 
 from pathlib import Path
@@ -20,6 +21,7 @@ from ...runs.patch import result as patch_result
 from ...runs.rig import engines, numerics, pieces
 
 ENDINGS = (".mat", ".npz")
+DEPEND = 1e-6  # singular value of the slides over the largest, below which they depend on one another
 NLVIB = {"elements": "elasticDryFriction", "tanh": "tanhDryFriction"}
 
 
@@ -61,16 +63,24 @@ def matrices_of(model: Model) -> dict:
     """M, C, K (n, n) [kg, N s/m, N/m], output (n,), Fex1 (n,) [N] of the drive, force or base (n,), slide (i, n),
     Omega [rad/s] of a sine; without a sine Fex1 is that of 1 N or 1 m/s^2, and 0 of a release."""
     rig, modes = model.rig, model.rig.modes
-    n = modes.omega.size
+    turn, mass = _motions(modes.interfaces if rig.interfaces else np.zeros((0, modes.omega.size))), modes.mass
     sine = isinstance(rig.drive, BaseSine)
     size = rig.drive.acceleration if sine else float(rig.kind != "free")
-    push = -modes.base * modes.mass * size
-    found = {"base": np.array(modes.base)} if rig.kind == "base" else \
-        {"force": -np.array(modes.base)} if rig.kind == "force" else {}
-    found |= {"slide": np.array(modes.interfaces)} if rig.interfaces else {}
+    found = {"base": np.linalg.solve(turn, modes.base)} if rig.kind == "base" else \
+        {"force": -modes.base @ turn} if rig.kind == "force" else {}
+    found |= {"slide": modes.interfaces @ turn} if rig.interfaces else {}
     found |= {"Omega": rig.drive.omega} if sine else {}
-    return {"M": modes.mass * np.eye(n), "C": modes.mass * modes.dampers, "K": modes.mass * np.diag(modes.omega**2),
-            "output": np.array(modes.output), "Fex1": push, **found}
+    M, C, K = (mass * turn.T @ one @ turn for one in (np.eye(len(turn)), modes.dampers, np.diag(modes.omega**2)))
+    return {"M": M, "C": C, "K": K, "output": modes.output @ turn, "Fex1": -size * mass * modes.base @ turn, **found}
+
+
+def _motions(slides) -> np.ndarray:
+    """Modal coordinates (n, n) of those that are written, of slides (i, n)."""
+    i, n = slides.shape
+    if not i or i > n:
+        return np.eye(n)
+    left, size, right = np.linalg.svd(slides)
+    return np.hstack([right[:i].T / size @ left.T, right[i:].T]) if size[-1] > DEPEND * size[0] else np.eye(n)
 
 
 def _speeds(rig) -> bool:
@@ -97,7 +107,7 @@ def elements_of(model: Model) -> Elements:
     none = np.zeros(0)
     if not rig.interfaces:
         return Elements("elements", np.zeros((0, n)), none, none, none)
-    rows, laws = rig.modes.interfaces, [one.numbers for one in rig.interfaces]
+    rows, laws = rig.modes.interfaces @ _motions(rig.modes.interfaces), [one.numbers for one in rig.interfaces]
     if _speeds(rig):
         limit = np.array([law.static * (model.nominal_load if one.load is None else one.load)
                           for law, one in zip(laws, rig.interfaces)])
