@@ -131,6 +131,8 @@ EFFECTS = {
                                    ("frequency levels", "onset onset_length"),
                                    "steady endless"),
     "drive.waveform=file": _wave("a(t) straight between the rows of a table", ("file", "")),
+    "drive.waveform=tones": _wave("a(t) = sum_k a_k sin(2 pi f_k t + phi_k)", ("frequencies accelerations", "phases"),
+                                  "endless", "patchfem.structure.tones"),
     "drive.waveform=random": _wave("a(t) = sum_k A_k cos 2 pi f_k t + B_k sin 2 pi f_k t, A_k, B_k normal of variance "
                                    "G(f_k)/T", ("", "spectrum file from to seed"), "endless",
                                    "patchfem.structure.noise"),

@@ -30,8 +30,11 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
         return raw.outcome, measures
     if hasattr(drive, "band"):
         return Outcome.DONE if stationary.steady(raw.window, drive) else Outcome.TRANSIENT, measures
-    if not drive.segments:
+    if not drive.segments and not hasattr(drive, "beat"):
         return Outcome.TRANSIENT, measures
+    if not drive.segments:
+        found = classify(raw.amplitudes, tolerance, SMALL * drive_sizes.largest(drive) / drive_sizes.omega_of(drive)**2)
+        return found, without_bars(measures) if found is Outcome.GROWS else measures
     amplitudes, extremes, last = raw.amplitudes, raw.extremes, drive.segments[-1]
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
     floor = SMALL * drive_sizes.largest(drive) / drive_sizes.omega_of(drive)**2
@@ -146,7 +149,7 @@ def off_the_piece(outcome: Outcome | None, reach: float, length: float) -> Outco
 
 def changing_note(outcome: Outcome, drive) -> list:
     """The sentence, in a list, on measures under a drive that changes to the end; an empty list for other drives."""
-    if outcome is not Outcome.TRANSIENT or drive.segments:
+    if outcome is not Outcome.TRANSIENT or drive.segments or hasattr(drive, "beat"):
         return []
     return ["the drive changes to the end, so nothing settles: the measures are those of the last cycles; the whole "
             "motion is in result.nc"]

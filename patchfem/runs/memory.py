@@ -150,7 +150,7 @@ def _of_rig(model: Model, engine: str, steps: int, numerics) -> list:
         parts.append(Need(KEPT * width * window, f"{window} samples of the last cycles", "accuracy.steps_per_cycle"))
     rows = len(getattr(rig.drive, "breaks", ())) if not rig.drive.segments else 0
     parts.append(Need(ROW * rows, f"{rows} rows of the drive",
-                      "drive.duration" if rig.waveform == "random" else "drive.file"))
+                      "drive.duration" if rig.waveform != "file" else "drive.file"))
     return parts
 
 

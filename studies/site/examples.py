@@ -149,6 +149,8 @@ EXAMPLES = {
     "drive.waveform=levels": drive('kind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\nlevels = ["3 g", "4 g", '
                                    '"4.5 g", "5 g"]\ncycles = 40\n'),
     "drive.waveform=file": drive('kind = "base"\nwaveform = "file"\nfile = "shock.csv"\n'),
+    "drive.waveform=tones": drive('kind = "base"\nwaveform = "tones"\nfrequencies = ["140 Hz", "145 Hz"]\n'
+                                  'accelerations = ["3 g", "3 g"]\ncycles = 140\n'),
     "drive.waveform=random": drive('kind = "base"\nwaveform = "random"\nspectrum = "0.02 g^2/Hz"\nfrom = "50 Hz"\nto = '
                                    '"500 Hz"\nduration = "4 s"\n'),
     "structure.stiffening": (SOFT, '[structure.stiffening]\ncubic = "1e15 N/m^3"\n'),

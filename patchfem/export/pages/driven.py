@@ -41,6 +41,9 @@ def _drive(keys: dict) -> str:
         levels = keys["levels"]
         told = f"{len(levels)} levels of {what} from {size(levels[0])} to {size(levels[-1])}"
         return f"{told} at {size(keys['frequency'])}{where}"
+    if waveform == "tones":
+        return f"base acceleration of {' and '.join(map(size, keys['accelerations']))} at " + \
+            " and ".join(map(size, keys["frequencies"]))
     if waveform == "random":
         told = f"with the spectrum of {Path(keys['file']).name}" if "file" in keys else f"of {size(keys['spectrum'])}"
         ends = "".join(f" {name} {size(keys[name])}" for name in ("from", "to") if name in keys)

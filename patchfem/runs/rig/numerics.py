@@ -58,6 +58,8 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     if rig.waveform == "random":  # all of the record but what the start leaves
         rate = slowest(rig.modes) * rig.drive.period
         window = int(max(1, rig.cycles - min(rig.cycles / 4, SETTLED / rate if rate else np.inf) + WHOLE))
+    if rig.waveform == "tones" and rig.drive.beat <= rig.cycles:  # whole beats
+        window = int(rig.drive.beat * max(1, min(10, rig.cycles // (10 * rig.drive.beat))) + WHOLE)
     if rig.levels:
         window = min(window, int(rig.level_cycles + WHOLE))
     steps = steps_per_cycle(model)

@@ -263,6 +263,12 @@ class Drive(Table):
                       "acceleration; where a release starts", "kind `free` unless [structure.start]") = None
     levels: key(Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)] | None,
                 "accelerations of the base, or forces, one after the other, the state carried over") = None
+    frequencies: key(Annotated[tuple[Frequency, ...], Field(min_length=2, max_length=100)] | None, "frequencies of "
+                     "tones that drive together") = None
+    accelerations: key(Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=2)] | None,
+                       "acceleration of the base of each tone, zero to peak") = None
+    phases: key(Annotated[tuple[quantity("angle"), ...], Field(min_length=2)] | None, "phase of each tone at the "
+                "start; 0 unless given") = None
     onset: key(Literal["slip", "distortion", "gauge"], "what onset_level means: 'slip' the first irreversible motion "
                "(of what gives way elastically, beyond a thousandth of the slide over which it does), 'distortion' a "
                "third harmonic of the acceleration above 3 % of the first, 'gauge' half peak-to-peak at the output "

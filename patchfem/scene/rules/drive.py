@@ -34,6 +34,8 @@ def check_drive(draft: Draft) -> None:
         _sweep(draft, drive)
     if drive.kind in ("base", "force") and drive.waveform == "levels":
         _onset(draft, drive)
+    if drive.kind in ("base", "force") and drive.waveform == "tones":
+        _tones(draft, drive)
     if drive.kind in ("base", "force") and drive.waveform == "random":
         _random(draft, drive)
 
@@ -54,6 +56,18 @@ def _sweep(draft: Draft, drive: Any) -> None:
         draft.lacks("drive.rate", "or drive.log_rate instead, such as '1 oct/min'")
     if drive.from_ is not None and drive.from_ == drive.to:
         draft.say("drive.to", f"{drive.to:g} Hz is where the sweep starts; another frequency is wanted")
+
+
+def _tones(draft: Draft, drive: Any) -> None:
+    if drive.kind == "force":
+        draft.say("drive.kind", "tones shake the base; give kind 'base', or a record of the force as waveform 'file'")
+    for key in ("accelerations", "phases"):
+        given = getattr(drive, key)
+        if given is not None and drive.frequencies is not None and len(given) != len(drive.frequencies):
+            draft.say(f"drive.{key}", f"{len(given)} stand beside {len(drive.frequencies)} frequencies; one each is "
+                                      "wanted")
+    if drive.accelerations is not None and not any(drive.accelerations):
+        draft.say("drive.accelerations", "all are 0, so nothing moves")
 
 
 def _random(draft: Draft, drive: Any) -> None:
@@ -99,7 +113,8 @@ def drive_unused(drive: Any) -> list[str]:
         "base": ["force", "mass"],
         "force": ["acceleration", "displacement"],
         "free": ["acceleration", "force", "frequency", "from", "to", "rate", "log_rate", "levels", "onset",
-                 "onset_length", "file", "waveform", "spectrum", "seed"],
+                 "onset_length", "file", "waveform", "spectrum", "seed",
+                 "frequencies", "accelerations", "phases"],
     }
     return without.get(drive.kind, [])
 
