@@ -9,8 +9,9 @@ from ..compiled.inner import INNER, LEAN, njit
 
 FAST = {"reassoc", "contract", "arcp"}
 SET_VALUED = False  # whether a law holds without a stretch
-# of a law in lanes: whether its slope has a kink at no stretch; whether its stretches spread about their mean
-BENDS = SPREADS = False
+# of a law in lanes: whether its slope has a kink at no stretch; whether its stretch follows the slide in closed form,
+# `after`; whether its force changes within a layer of the speed, `parts`
+BENDS = FOLLOWS = LAYERS = False
 
 
 @njit(error_model="numpy", **LEAN)
@@ -44,10 +45,16 @@ def longest(num, turn):
 
 
 @njit(error_model="numpy", forceinline=True, **LEAN)
-def spreading(k, z, square, v, way):
-    """The `spreading` of laws of one stretch: 0, as the square of its mean is the mean of its square."""
-    return 0.0
+def after(k, z, square, dx, way):
+    """The `after` of laws whose rate alone is known: nothing."""
+    return z, square, 0.0
 
 
-__all__ = ["BENDS", "FAST", "INNER", "LEAN", "SET_VALUED", "SPREADS", "closed", "gives", "knee", "longest", "middle",
-           "spreading"]
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def parts(k, v, v1, h):
+    """The `parts` of laws without a layer: 1."""
+    return 1.0
+
+
+__all__ = ["BENDS", "FAST", "FOLLOWS", "INNER", "LAYERS", "LEAN", "SET_VALUED", "after", "closed", "gives", "knee",
+           "longest", "middle", "parts"]

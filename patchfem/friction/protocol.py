@@ -30,8 +30,9 @@ and of its load [N], by their rates alone. Those of `flags_kernels` belong to la
 
 A law of one stretch z may march in lanes (`dynamics.lanes`): flowing(k, z, v, way) -> (force, dz/dq in the direction
 `way`, slopes of the force over z and v) is all of it without an array or a branch, so that cases stand side by side; k
-are its numbers, in the UNITS. BENDS says that dz/dq has a kink at z = 0, SPREADS that its
-bonds have a mean square of the stretches of their own, whose rate is spreading(k, z, square, v, way).
+are its numbers, in the UNITS. BENDS says that dz/dq has a kink at z = 0; FOLLOWS that z follows the slide in closed
+form: after(k, z, square, dx, way) -> (z, mean square of the stretches, work) after a slide dx; LAYERS that the force
+changes within a layer of the speed, through which a step h from the speed v to v1 goes in parts(k, v, v1, h) parts.
 """
 
 from typing import NamedTuple

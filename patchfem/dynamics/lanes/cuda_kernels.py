@@ -25,7 +25,8 @@ def kernels(law: str) -> SimpleNamespace:
     """`march` and `read` of the loop of a law, with the arguments of `loop_kernels`."""
     home, known = __name__.rpartition(".")[0], {}
     inner = SimpleNamespace(njit=device, LEAN={}, INNER={})
-    retold(f"{home}.names_kernels", inner, known).LANES = 1
+    names = retold(f"{home}.names_kernels", inner, known)
+    names.LANES, names.GROUP = 1, 0
     loop = retold(f"{home}.loop_kernels", inner, known)
     if "." in law:  # of a stretch
         loop.law = retold(f"{home}.flowing_kernels", inner, known)

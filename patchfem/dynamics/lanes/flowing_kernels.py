@@ -1,25 +1,47 @@
 """A step of one mode under a law of one stretch, of one case: Runge and Kutta's of order 4, each side of a reversal and
-of a kink of the law by itself.
+of a kink of the law by itself, in parts where the speed passes a layer in which the force changes.
 
 Equation, in the angle of the drive: x'' + D x' + W x = P sin - f(z, x'), z' = g(z, x') x', z the stretch of the contact
 [m], the place of a case. f and g are those of `friction`, whose numbers have lengths in m and angles for times, so that
 a force is one over the mass [m]. Twin: a run by high order (`dynamics.smooth`).
 """
 
-from math import cos, sin
+from math import cos, nan, sin
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from ...friction.laws import tanh_kernels as friction
-from .names_kernels import FIRST_OF_LAW, LANES, MIDDLE, OWN, PLACE, WAY, D, H, P, V, W, X
-from .rigid_kernels import crossing
+from .names_kernels import (
+    ACCELERATION,
+    BASE,
+    FIRST_OF_LAW,
+    FORCE,
+    IN,
+    LANES,
+    LOST,
+    MIDDLE,
+    OUT,
+    OWN,
+    PASSED,
+    PLACE,
+    TURNED,
+    WAY,
+    D,
+    H,
+    P,
+    V,
+    W,
+    X,
+)
+from .rigid_kernels import crossing, highest
 from .rigid_kernels import foretell as foretell
 
 RESTS = TURNS_HELD = False  # it never holds
-# of its own state: friction, mean square of the stretches, friction work of the last step
-FELT, SQUARE, WORK = range(OWN, OWN + 3)
-OWN_STATE = 3
+# of its own state: friction, mean square of the stretches, friction work of the last step, whether that is read
+FELT, SQUARE, WORK, READS = range(OWN, OWN + 4)
+OWN_STATE = 4
 PARTS = 4  # of a step: a reversal and a kink on either side of it
+FINEST = 64  # parts of a step through a layer
 SHARE, HALVINGS = 0.5, 24  # irreversible share of the slide from which it slips; of the part of a step where it begins
 
 
@@ -63,6 +85,12 @@ def path(place, pe, place1, v1, room, i):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def followed(k, z, far, rises, way):
+    """Stretch after a slide `far` that raises it by `rises`, in closed form where the law has one."""
+    return friction.after(k, z, 0.0, far, way)[0] if friction.FOLLOWS else z + rises
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def run(room, i, state, way, drive, h):
     """(x, x', friction, place, mean square of the stretches; friction work) after an angle h in the direction `way`
     from the first five; drive: its sine at the start, in the middle and at the end."""
@@ -70,25 +98,22 @@ def run(room, i, state, way, drive, h):
     k, push = numbers(room, i), room[P * LANES + i]
     damp, square, half = room[D * LANES + i], room[W * LANES + i], h / 2
     g = friction.flowing(k, z, v, way)[1] * v
-    a, m = push * drive[0] - damp * v - square * x - f, friction.spreading(k, z, q, v, way)
-    v1, z1, q1 = v + half * a, z + half * g, q + half * m
+    a = push * drive[0] - damp * v - square * x - f
+    v1, z1 = v + half * a, followed(k, z, half * v, half * g, way)
     f1, gain, _, _ = friction.flowing(k, z1, v1, way)
-    g1, m1 = gain * v1, friction.spreading(k, z1, q1, v1, way)
-    a1 = push * drive[1] - damp * v1 - square * (x + half * v) - f1
-    v2, z2, q2 = v + half * a1, z + half * g1, q + half * m1
+    g1, a1 = gain * v1, push * drive[1] - damp * v1 - square * (x + half * v) - f1
+    v2, z2 = v + half * a1, followed(k, z, half * v1, half * g1, way)
     f2, gain, _, _ = friction.flowing(k, z2, v2, way)
-    g2, m2 = gain * v2, friction.spreading(k, z2, q2, v2, way)
-    a2 = push * drive[1] - damp * v2 - square * (x + half * v1) - f2
-    v3, z3, q3 = v + h * a2, z + h * g2, q + h * m2
+    g2, a2 = gain * v2, push * drive[1] - damp * v2 - square * (x + half * v1) - f2
+    v3, z3 = v + h * a2, followed(k, z, h * v2, h * g2, way)
     f3, gain, _, _ = friction.flowing(k, z3, v3, way)
-    g3, m3 = gain * v3, friction.spreading(k, z3, q3, v3, way)
-    a3 = push * drive[2] - damp * v3 - square * (x + h * v2) - f3
+    g3, a3 = gain * v3, push * drive[2] - damp * v3 - square * (x + h * v2) - f3
     part = h / 6
-    ve, ze = v + part * (a + 2 * (a1 + a2) + a3), z + part * (g + 2 * (g1 + g2) + g3)
-    qe = q + part * (m + 2 * (m1 + m2) + m3) if friction.SPREADS else ze * ze
-    fe = friction.flowing(k, ze, ve, way)[0]
+    far, ve = part * (v + 2 * (v1 + v2) + v3), v + part * (a + 2 * (a1 + a2) + a3)
     work = part * (f * v + 2 * (f1 * v1 + f2 * v2) + f3 * v3)
-    return (x + part * (v + 2 * (v1 + v2) + v3), ve, fe, ze, qe), work
+    ze = z + part * (g + 2 * (g1 + g2) + g3)
+    ze, qe, work = friction.after(k, z, q, far, way) if friction.FOLLOWS else (ze, ze * ze, work)
+    return (x + far, ve, friction.flowing(k, ze, ve, way)[0], ze, qe), work
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -118,10 +143,14 @@ def ahead(room, i, s0, c0, s1, c1, reads):
     way, state = room[WAY * LANES + i], begun(room, i)
     (x1, v1, f1, z1, q1), work = run(room, i, state, way, (s0, room[MIDDLE * LANES + i] * (s0 + s1), s1),
                                      room[H * LANES + i])
-    event = way * v1 < 0.0 or ((reads or friction.BENDS) and state[3] * z1 < 0.0) or (reads and (
-        v1 == 0.0 or sticking(state[1], way, state[3], room, i) != sticking(v1, way, z1, room, i)))
+    if friction.LAYERS:
+        event = friction.parts(numbers(room, i), state[1], v1, room[H * LANES + i]) > 1.0 or (
+            reads and (state[1] * v1 <= 0.0))
+    else:
+        event = way * v1 < 0.0 or ((reads or friction.BENDS) and state[3] * z1 < 0.0) or (reads and (
+            v1 == 0.0 or sticking(state[1], way, state[3], room, i) != sticking(v1, way, z1, room, i)))
     room[FELT * LANES + i], room[SQUARE * LANES + i] = state[2] if event else f1, state[4] if event else q1
-    room[WORK * LANES + i] = work
+    room[WORK * LANES + i], room[READS * LANES + i] = work, 1.0 if reads else 0.0
     return x1, v1, z1, event
 
 
@@ -148,6 +177,70 @@ def first_event(room, i, state, after, way, drive, h):
     return u, turns
 
 
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def cubic(y, y1, m, m1, u):
+    """A cubic with these values and slopes at the ends of [0, 1], at u."""
+    w = 1 - u
+    return w * w * ((1 + 2 * u) * y + u * m) + u * u * ((1 + 2 * w) * y1 - w * m1)
+
+
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def folds():
+    """Whether `advance` folds what a step shows of itself."""
+    return friction.LAYERS
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def furthest(x, v, x1, v1, h):
+    """Slide at the turn in a step that no event marks, that of its end without one."""
+    u = v / (v - v1)
+    return cubic(x, x1, h * v, h * v1, u) if friction.LAYERS and v * v1 < 0.0 else x1
+
+
+@njit(error_model="numpy", **LEAN)
+def through(room, i, s0, c0, s1, c1, h):
+    """`advance` of a law with a layer of speeds, in as many like parts as this asks for; adds to the sums of the step
+    what the trapezoidal rule leaves of them, and folds the peaks and the loop of the parts."""
+    k, state, work, u = numbers(room, i), begun(room, i), 0.0, 1.0
+    push, out, base = room[P * LANES + i], room[OUT * LANES + i], room[BASE * LANES + i]
+    damp, square = room[D * LANES + i], room[W * LANES + i]
+    v = state[1]
+    (_, v1, _, _, _), _ = run(room, i, state, 1.0, (s0, room[MIDDLE * LANES + i] * (s0 + s1), s1), h)
+    count = int(min(max(friction.parts(k, v, v1, h), 0.0), FINEST - 1.0)) + 1
+    part, s, c = h / count, s0, c0
+    half_sine, half_cosine = sin(part / 2), cos(part / 2)
+    xe, powers, squares = nan, 0.0, 0.0
+    for n in range(count):
+        middle, side = s * half_cosine + c * half_sine, c * half_cosine - s * half_sine
+        s2, c2 = middle * half_cosine + side * half_sine, side * half_cosine - middle * half_sine
+        after, done = run(room, i, state, 1.0, (s, middle, s2), part)
+        (x, v, f, _, _), (x1, v1, f1, _, _) = state, after
+        a, a1 = push * s - damp * v - square * x - f, push * s2 - damp * v1 - square * x1 - f1
+        if room[READS * LANES + i] > 0.0:
+            r, r1 = part * rise(v, a, 1.0, 0.0, room, i, 0), part * rise(v1, a1, 1.0, 0.0, room, i, 3)
+            best = highest(out * a + base * s, out * a1 + base * s2,
+                           part * (out * (push * c - damp * a - square * v) + base * c) - out * r,
+                           part * (out * (push * c2 - damp * a1 - square * v1) + base * c2) - out * r1)
+            room[ACCELERATION * LANES + i] = max(room[ACCELERATION * LANES + i], best)
+            room[FORCE * LANES + i] = max(room[FORCE * LANES + i], highest(f, f1, r, r1))
+            area = 0.5 * (f + f1) * (x1 - x)
+            room[TURNED * LANES + i] += area
+            room[PASSED * LANES + i] += abs(area)
+        if v * v1 <= 0.0 and v != 0.0:
+            at = zero(v, v1, part * a, part * a1)
+            u, xe = (n + at) / count, cubic(x, x1, part * v, part * v1, at)
+        powers += (s * v + s2 * v1) / (2 * count)
+        squares += (v * v + v1 * v1) / (2 * count)
+        work, state, s, c = work + done, after, s2, c2
+    v, (x1, v1, f1, z1, q1) = room[V * LANES + i], state
+    room[IN * LANES + i] += powers - (s0 * v + s1 * v1) / 2
+    room[LOST * LANES + i] += squares - (v * v + v1 * v1) / 2
+    room[FELT * LANES + i], room[SQUARE * LANES + i], room[WORK * LANES + i] = f1, q1, work
+    turned = xe == xe
+    way = 1.0 if v1 > 0.0 else -1.0 if v1 < 0.0 else -room[WAY * LANES + i]
+    return x1, v1, way, z1, u, xe if turned else x1, 0.0 if turned else v1, 0.0, xe if turned else x1, 0.0
+
+
 @njit(error_model="numpy", **LEAN)
 def advance(room, i, s0, c0, s1, c1, h):
     """(x, v, way, place at the end of a step h; share u of the step up to a turn; x, v and place there; x where the
@@ -155,6 +248,8 @@ def advance(room, i, s0, c0, s1, c1, h):
 
     The step ends and begins anew where the slide turns, and where the law has a kink at no stretch.
     """
+    if friction.LAYERS:
+        return through(room, i, s0, c0, s1, c1, h)
     state, way, at, work, u = begun(room, i), room[WAY * LANES + i], 0.0, 0.0, 1.0
     xe = ve = ze = 0.0
     for part in range(PARTS):
@@ -179,13 +274,6 @@ def advance(room, i, s0, c0, s1, c1, h):
     turned = way != room[WAY * LANES + i]
     xe, ve, ze = (xe, ve, ze) if turned else (x1, v1, z1)
     return x1, v1, way, z1, u if turned else 1.0, xe, ve, ze, xe, 0.0
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def cubic(y, y1, m, m1, u):
-    """A cubic with these values and slopes at the ends of [0, 1], at u."""
-    w = 1 - u
-    return w * w * ((1 + 2 * u) * y + u * m) + u * u * ((1 + 2 * w) * y1 - w * m1)
 
 
 @njit(error_model="numpy", **LEAN)

@@ -23,6 +23,7 @@ from .names_kernels import (
     F_LAST,
     FIRST,
     FORCE,
+    GROUP,
     HIGH,
     IN,
     LANES,
@@ -69,6 +70,7 @@ from .names_kernels import (
     W,
     X,
 )
+from .rigid_kernels import highest
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -93,10 +95,11 @@ def step(room, i, s0, c0, s1, c1, h):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def glide(room, i, s0, c0, s1, c1):
+def glide(room, i, s0, c0, s1, c1, h):
     """Move a lane over a step in which nothing happens; in another one it is left where it is and marked."""
     x, v, place = room[X * LANES + i], room[V * LANES + i], room[PLACE * LANES + i]
     x1, v1, place1, event = law.ahead(room, i, s0, c0, s1, c1, False)
+    far = law.furthest(x, v, x1, v1, h) if law.folds() else x1
     on = 0.0 if event else 1.0
     room[EVENT * LANES + i] = 1.0 - on
     room[X * LANES + i], room[V * LANES + i] = x if event else x1, v if event else v1
@@ -107,43 +110,35 @@ def glide(room, i, s0, c0, s1, c1):
     room[LOST * LANES + i] += on * (v1 * v1)
     room[POWER * LANES + i] += abs(power)
     high, low = room[HIGH * LANES + i], room[LOW * LANES + i]
-    room[HIGH * LANES + i] = high if event else max(high, x1)
-    room[LOW * LANES + i] = low if event else min(low, x1)
+    room[HIGH * LANES + i] = high if event else max(high, far)
+    room[LOW * LANES + i] = low if event else min(low, far)
     room[COS * LANES + i] += on * (x1 * c1)
     room[SIN * LANES + i] += on * (x1 * s1)
 
 
 @njit(error_model="numpy", forceinline=True, **LEAN)
-def happens(room, marked):
-    """Number of lanes with a case in which a step holds an event; writes which into `marked` (LANES + 1,)."""
+def happens(room, marked, busy):
+    """Number of the first lanes, `busy` of them, in which a step holds an event; writes which into `marked`
+    (LANES + 1,)."""
     count = 0
-    for i in range(LANES):
+    for i in range(busy):
         marked[count] = i
-        count += 1 if room[EVENT * LANES + i] > 0.0 and room[CASE * LANES + i] >= 0.0 else 0
+        count += 1 if room[EVENT * LANES + i] > 0.0 else 0
     return count
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def cycle(room, marked, table, h):
-    """Move all lanes over a cycle of the drive; table (2, n + 1): sine and cosine at the steps."""
+def cycle(room, marked, table, h, busy):
+    """Move the first lanes, `busy` of them, over a cycle of the drive; table (2, n + 1): sine and cosine at the
+    steps."""
+    width = (busy + (1 << GROUP) - 1) >> GROUP << GROUP
     for k in range(table.shape[1] - 1):
         s0, c0, s1, c1 = table[0, k], table[1, k], table[0, k + 1], table[1, k + 1]
         law.foretell(room, s0, c0)
-        for i in range(LANES):
-            glide(room, i, s0, c0, s1, c1)
-        for j in range(happens(room, marked)):
+        for i in range(width):
+            glide(room, i, s0, c0, s1, c1, h)
+        for j in range(happens(room, marked, busy)):
             step(room, marked[j], s0, c0, s1, c1, h)
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def highest(g0, g1, m0, m1):
-    """Largest size of a cubic over [0, 1] with these values and slopes at its ends, its vertex by the secant of the
-    slopes."""
-    ends = max(abs(g0), abs(g1))
-    w = m0 / (m0 - m1)
-    rise = g1 - g0
-    vertex = g0 + w * (m0 + w * (3 * rise - 2 * m0 - m1 + w * (m0 + m1 - 2 * rise)))
-    return max(ends, abs(vertex)) if m0 * m1 < 0.0 else ends
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -226,7 +221,8 @@ def look(room, i, s0, c0, s1, c1, h):
                highest(out * af + base * se, out * a1 + base * s1,
                        (h - t) * (moves1 * (push * ce - damp * af - square * ve) + base * ce) - moves1 * rf,
                        (h - t) * (moves1 * (push * c1 - damp * a1 - square * v1) + base * c1) - moves1 * r1))
-    room[ACCELERATION * LANES + i] = max(room[ACCELERATION * LANES + i], best)
+    if not law.folds():
+        room[ACCELERATION * LANES + i] = max(room[ACCELERATION * LANES + i], best)
     # sticks and releases
     stick, slips, furthest = law.held((x, v, a0, place), (xe, ve, ae, pe), way, room, i, t)
     stick1, slips1, furthest1 = law.held((xe, ve, af, pe), (x1, v1, a1, place1), way1, room, i, h - t)
@@ -248,15 +244,17 @@ def look(room, i, s0, c0, s1, c1, h):
     # the loop
     pull = law.at_turn(turn, way, place, pe, room, i)
     peak = max(highest(f0, before, r0, re), highest(after, f1, rf, r1))
-    room[FORCE * LANES + i] = max(room[FORCE * LANES + i], peak if turn == x1 else max(peak, abs(pull)))
+    if not law.folds():
+        room[FORCE * LANES + i] = max(room[FORCE * LANES + i], peak if turn == x1 else max(peak, abs(pull)))
     slipped, slipped1 = law.slid(xe, pe, room, i), law.slid(x1, place1, room, i)
     most, least = max(max(slipped, slipped1), max(furthest, furthest1)), \
         min(min(slipped, slipped1), min(furthest, furthest1))
     room[SLIP_HIGH * LANES + i] = max(room[SLIP_HIGH * LANES + i], most)
     room[SLIP_LOW * LANES + i] = min(room[SLIP_LOW * LANES + i], least)
     one, two = 0.5 * (f0 + before) * (xe - x), 0.5 * (after + f1) * (x1 - xe)
-    room[TURNED * LANES + i] += one + two
-    room[PASSED * LANES + i] += abs(one) + abs(two)
+    if not law.folds():
+        room[TURNED * LANES + i] += one + two
+        room[PASSED * LANES + i] += abs(one) + abs(two)
     room[C1 * LANES + i] += x1 * c1
     room[S1 * LANES + i] += x1 * s1
     room[C3 * LANES + i] += x1 * c1 * (4 * c1 * c1 - 3)
@@ -284,6 +282,16 @@ def fetch(case, i, cases, motion, room):
     room[WAS_X * LANES + i], room[WAS_V * LANES + i] = room[X * LANES + i], room[V * LANES + i]
     room[WAS_PLACE * LANES + i] = room[PLACE * LANES + i]
     law.begin(room, i)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def move(i, other, room, size):
+    """Put the case of another lane in the lane i; size: numbers of its table."""
+    for n in range(len(room) // LANES - size):
+        room[n * LANES + i] = room[n * LANES + other]
+    table, from_there = len(room) - size * (LANES - i), len(room) - size * (LANES - other)
+    for n in range(size):
+        room[table + n] = room[from_there + n]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -317,7 +325,8 @@ def repeats(i, room):
 
 @njit(error_model="numpy", cache=True, nogil=True, fastmath=FAST, **LEAN)
 def march(cases, order, motion, table, until, history, ended, room, marked):
-    """March cases up to the end of the cycle `until`, or of one that repeats. A lane that is done takes the next case.
+    """March cases up to the end of the cycle `until`, or of one that repeats. A lane that is done takes the next case,
+    or that of the last lane.
 
     cases (n, NUMBERS and those of its table); order (m,): numbers of those that march; motion (n, STATE and more): at
     their begin, and end; table (3, s + 1): sine and cosine at the steps of a cycle, and the step; history (n, c, 4):
@@ -327,27 +336,26 @@ def march(cases, order, motion, table, until, history, ended, room, marked):
     share, given = 2 / (table.shape[1] - 1), min(LANES, len(order))
     for i in range(LANES):
         fetch(order[min(i, given - 1)], i, cases, motion, room)
-        room[CASE * LANES + i] = order[i] if i < given else -1
     busy = given
     while busy > 0:
-        cycle(room, marked, table, table[2, 0])
-        for i in range(LANES):
+        cycle(room, marked, table, table[2, 0], busy)
+        i = 0
+        while i < busy:
             case, k = int(room[CASE * LANES + i]), int(room[CYCLE * LANES + i])
-            if case < 0:
-                continue
             same = repeats(i, room)
             turn_over(i, room, history, case, k, share)
             room[CYCLE * LANES + i] = k + 1
             if k + 1 < until and not same:
+                i += 1
                 continue
             ended[case] = k + 1
             bring(case, i, room, motion)
             if given < len(order):
                 fetch(order[given], i, cases, motion, room)
-                given += 1
+                given, i = given + 1, i + 1
             else:
-                room[CASE * LANES + i] = -1.0
                 busy -= 1
+                move(i, busy, room, cases.shape[1] - NUMBERS)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -402,6 +410,7 @@ def read(cases, order, motion, table, cycles, history, ended, shown, felt, room,
     steps = table.shape[1] - 1
     h = table[2, 0]
     for begin in range(0, len(order), LANES):
+        busy = min(LANES, len(order) - begin)
         for i in range(LANES):
             fetch(order[min(begin + i, len(order) - 1)], i, cases, motion, room)
             for n in range(SHOW, SHOW + SHOWN):
@@ -412,22 +421,21 @@ def read(cases, order, motion, table, cycles, history, ended, shown, felt, room,
                 room[CASE * LANES + i] = -1.0
         note(room, felt, 0, table[0, 0])
         for k in range(cycles):
-            for i in range(LANES):
+            for i in range(busy):
                 open_cycle(i, room)
             for j in range(steps):
                 s0, c0, s1, c1 = table[0, j], table[1, j], table[0, j + 1], table[1, j + 1]
                 law.foretell(room, s0, c0)
-                for i in range(LANES):
+                for i in range((busy + (1 << GROUP) - 1) >> GROUP << GROUP):
                     watch(room, i, s0, c0, s1, c1, h)
-                for i in range(happens(room, marked)):
+                for i in range(happens(room, marked, busy)):
                     look(room, marked[i], s0, c0, s1, c1, h)
                 note(room, felt, k * steps + j + 1, s1)
-            for i in range(LANES):
+            for i in range(busy):
+                close_cycle(i, room, k == 0, cycles, h)
                 case = int(room[CASE * LANES + i])
-                if case >= 0:
-                    close_cycle(i, room, k == 0, cycles, h)
-                    turn_over(i, room, history, case, ended[case] + k, 2 / steps)
-        for i in range(min(LANES, len(order) - begin)):
+                turn_over(i, room, history, case, ended[case] + k, 2 / steps)
+        for i in range(busy):
             for n in range(SHOWN):
                 shown[order[begin + i], n] = room[(SHOW + n) * LANES + i]
             bring(order[begin + i], i, room, motion)

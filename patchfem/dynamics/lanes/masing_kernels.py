@@ -15,10 +15,10 @@ from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from . import power_curve_kernels as curve
 from .names_kernels import CURVE, GK, HALF, LANES, LENGTH, OWN, PLACE, WAY, WHERE, D, H, K, P, V, W, X
-from .rigid_kernels import sticking
+from .rigid_kernels import folds, furthest, sticking
 
-__all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "foretell", "held", "path", "rise",
-           "slid", "sticking"]
+__all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "folds", "foretell", "furthest",
+           "held", "path", "rise", "slid", "sticking"]
 
 RESTS = False  # it never holds
 TURNS_HELD = True  # an event may leave a stick as it is

@@ -5,7 +5,7 @@ that a compiler knows the distance of any two and takes several lanes at once. L
 drive, so forces over the mass are in m and energies over it in m^2.
 """
 
-LANES = 32
+LANES, GROUP = 32, 3  # of which groups of two to this power march while one of them has a case
 CLOSE = 1e-9  # of the range of a cycle, by which the next one may differ that is the same
 
 # the motion: state, then sums of the run, then extremes and phasor of a cycle; whether the next step holds an event
@@ -29,7 +29,7 @@ SHOW = NUMBER + NUMBERS
  BEGUN) = range(SHOW, SHOW + 28)
 SHOWN = 28
 
-# which case a lane has, -1 none, its cycle and where that began
+# which case a lane has, its cycle and where that began
 CASE, CYCLE, WAS_X, WAS_V, WAS_PLACE = range(SHOW + SHOWN, SHOW + SHOWN + 5)
 OWN = SHOW + SHOWN + 5  # from here on what the state of a law has besides; it stands behind STATE in a motion
 

@@ -27,6 +27,17 @@ def root(y0, y1, m0, m1, least):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def highest(g0, g1, m0, m1):
+    """Largest size of a cubic over [0, 1] with these values and slopes at its ends, its vertex by the secant of the
+    slopes."""
+    ends = max(abs(g0), abs(g1))
+    w = m0 / (m0 - m1)
+    rise = g1 - g0
+    vertex = g0 + w * (m0 + w * (3 * rise - 2 * m0 - m1 + w * (m0 + m1 - 2 * rise)))
+    return max(ends, abs(vertex)) if m0 * m1 < 0.0 else ends
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def felt(x, v, way, place, sine, room, i):
     """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
     held, most = room[P * LANES + i] * sine - room[W * LANES + i] * x, room[GS * LANES + i]
@@ -42,6 +53,18 @@ def rise(v, a, way, place, room, i, when):
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def foretell(room, s0, c0):
     """Find nothing ahead of a step."""
+
+
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def folds():
+    """Whether `advance` folds what a step shows of itself."""
+    return False
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def furthest(x, v, x1, v1, h):
+    """Slide at the turn in a step that no event marks, of which there is none."""
+    return x1
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)

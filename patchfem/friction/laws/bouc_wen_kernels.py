@@ -10,10 +10,10 @@ from math import exp, expm1, inf, log, log1p, nan
 import numpy as np
 
 from ...compiled.inner import njit
-from ..flags_kernels import FAST, LEAN, SET_VALUED, SPREADS, closed, gives, knee, longest, middle, spreading
+from ..flags_kernels import FAST, FOLLOWS, LAYERS, LEAN, SET_VALUED, after, closed, gives, knee, longest, middle, parts
 
-__all__ = ["BENDS", "SET_VALUED", "SPREADS", "begin", "closed", "commit", "finish", "flow", "flowing", "gives", "knee",
-           "longest", "mean", "middle", "pull", "rate", "shown", "spreading", "state"]
+__all__ = ["BENDS", "FOLLOWS", "LAYERS", "SET_VALUED", "after", "begin", "closed", "commit", "finish", "flow",
+           "flowing", "gives", "knee", "longest", "mean", "middle", "parts", "pull", "rate", "shown", "state"]
 
 UNITS, BENDS = "N m 1 1", True  # of the numbers k of the law in lanes; as of `flags_kernels`
 

@@ -4,14 +4,15 @@ num: stiffness [N/m], kinetic and static force [N], v_s [m/s], micro-damping and
 constant speed of a step z relaxes towards +-g/stiffness over that length of path.
 """
 
-from math import exp, inf, nan
+from math import inf, nan
 
 from ...compiled.inner import njit
 from ..bonds.point_kernels import shape
-from ..flags_kernels import BENDS, FAST, LEAN, SET_VALUED, SPREADS, closed, gives, longest, middle, spreading
+from ..flags_kernels import BENDS, FAST, FOLLOWS, LAYERS, LEAN, SET_VALUED, after, closed, gives, longest, middle, parts
+from .exponential_kernels import decay
 
-__all__ = ["BENDS", "SET_VALUED", "SPREADS", "begin", "closed", "commit", "finish", "flow", "flowing", "gives", "knee",
-           "longest", "mean", "middle", "pull", "rate", "shown", "spreading", "state"]
+__all__ = ["BENDS", "FOLLOWS", "LAYERS", "SET_VALUED", "after", "begin", "closed", "commit", "finish", "flow",
+           "flowing", "gives", "knee", "longest", "mean", "middle", "parts", "pull", "rate", "shown", "state"]
 
 UNITS = "N/m N N m/s N_s/m N_s/m"  # of the numbers k of the law in lanes
 
@@ -30,7 +31,7 @@ def reach(k, v):
     """(length g/stiffness [m] over which z relaxes, its slope over v [s]) at a speed v [m/s]; where no friction is left
     at speed, a trace of the length at rest; k: numbers of the law."""
     ratio = v / k[3]
-    more = (k[2] - k[1]) * exp(-ratio * ratio)
+    more = (k[2] - k[1]) * decay(ratio * ratio)
     return max(k[1] + more, TRACE * k[2]) / k[0], -2 * ratio / k[3] * more / k[0]
 
 

@@ -11,14 +11,15 @@ from math import exp, expm1, inf, nan
 
 from ...compiled.inner import njit
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
-from ..flags_kernels import BENDS, FAST, LEAN, SET_VALUED, closed, gives, longest
+from ..flags_kernels import BENDS, FAST, LAYERS, LEAN, SET_VALUED, closed, gives, longest, parts
+from .exponential_kernels import decay
 
-__all__ = ["BENDS", "SET_VALUED", "begin", "closed", "commit", "finish", "flow", "flowing", "gives", "knee", "longest",
-           "mean", "middle", "pull", "rate", "shown", "spreading", "state"]
+__all__ = ["BENDS", "LAYERS", "SET_VALUED", "after", "begin", "closed", "commit", "finish", "flow", "flowing", "gives",
+           "knee", "longest", "mean", "middle", "parts", "pull", "rate", "shown", "state"]
 
 GROWTH, WEIGHT = 2, 8  # of num: where the growth and the weights begin
 FREE = 7  # of num: share of the bond length that stretches without damage
-UNITS, SPREADS = "N/m m", True  # of the numbers k of the law in lanes; as of `flags_kernels`
+UNITS, FOLLOWS = "N/m m", True  # of the numbers k of the law in lanes; as of `flags_kernels`
 
 
 @njit(error_model="numpy", **LEAN)
@@ -79,9 +80,13 @@ def flowing(k, z, v, way):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def spreading(k, z, square, v, way):
-    """Rate of the mean square of the stretches of these bonds [m2/s] at a speed v [m/s]."""
-    return (2 * z - way * square / k[1]) * v
+def after(k, z, square, dx, way):
+    """(stretch [m], mean square of the stretches [m2] of these bonds, work of their force [J]) after a slide dx [m] in
+    the direction `way`: they relax towards way eps over the path eps."""
+    end, far = way * k[1], way * dx / k[1]
+    rest, kept = z - end, decay(far)
+    return end + rest * kept, square * kept + 2 * end * (end * (1 - kept) + rest * far * kept), \
+        k[0] * end * (dx + rest * (1 - kept))
 
 
 @njit(error_model="numpy", **LEAN)

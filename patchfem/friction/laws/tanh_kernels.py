@@ -10,37 +10,30 @@ from ...compiled.inner import njit
 from ..flags_kernels import (
     BENDS,
     FAST,
+    FOLLOWS,
     LEAN,
     SET_VALUED,
-    SPREADS,
+    after,
     closed,
     gives,
     knee,
     longest,
     middle,
-    spreading,
 )
+from .exponential_kernels import decay
 
-__all__ = ["BENDS", "SET_VALUED", "SPREADS", "at_end", "begin", "closed", "commit", "finish", "flowing", "gives",
-           "knee", "longest", "mean", "middle", "rate", "shown", "spreading", "state"]
+__all__ = ["BENDS", "FOLLOWS", "LAYERS", "SET_VALUED", "after", "at_end", "begin", "closed", "commit", "finish",
+           "flowing", "gives", "knee", "longest", "mean", "middle", "parts", "rate", "shown", "state"]
 
-UNITS = "N s/m"  # of the numbers k of the law in lanes
-MOST = 18.0  # argument from which tanh is 1 to the last bit
+UNITS, LAYERS = "N s/m", True  # of the numbers k of the law in lanes; as of `flags_kernels`
+REACH = 5.0  # times v_0, to which the layer of the speed is taken
+SHARP, FINE = 20.0, 0.25  # times v_0 and the step, by which the speed may change in one within the layer; times v_0
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def hyperbolic(y):
-    """tanh(y) to 2e-13, by exp(-2 |y|) as the 64th power of seven terms of its series; no branch, so that a compiler
-    takes several lanes at once."""
-    size = min(abs(y), MOST)
-    z = size * (-2.0 / 64)
-    e = 1 + z * (1 + z * (1 / 2 + z * (1 / 6 + z * (1 / 24 + z * (1 / 120 + z * (1 / 720 + z / 5040))))))
-    e = e * e
-    e = e * e
-    e = e * e
-    e = e * e
-    e = e * e
-    e = e * e
+    """tanh(y) to 2e-13, by exp(-2 |y|); no branch, so that a compiler takes several lanes at once."""
+    e = decay(2 * abs(y))
     part = (1 - e) / (1 + e)
     return part if y > 0.0 else -part
 
@@ -50,6 +43,14 @@ def flowing(k, z, v, way):
     """(force, slope 0 of a stretch, that there is not, over the slide, slopes of the force over stretch and speed)."""
     part = hyperbolic(v * k[1])
     return k[0] * part, 0.0, 0.0, k[0] * k[1] * (1 - part) * (1 + part)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def parts(k, v, v1, h):
+    """How many parts of a step h from the speed v to v1 follow the layer of speeds in which tanh is not +-1; the finer
+    the step, the finer they are."""
+    near = 0.0 if v * v1 < 0.0 else min(abs(v), abs(v1))
+    return abs(v1 - v) * k[1] / max(SHARP * h, FINE) if near * k[1] < REACH else 1.0
 
 
 @njit(error_model="numpy", **LEAN)

@@ -70,6 +70,39 @@ def test_exact_the_hyperbolic_tangent_of_lanes():
     np.testing.assert_allclose([tangent(y) for y in places], np.tanh(places), rtol=0, atol=2e-13)
 
 
+def test_exact_the_exponential_of_lanes():
+    """Its error is below 2e-13, as its text states."""
+    decay = plain("patchfem.friction.laws.exponential_kernels").decay
+    places = np.concatenate([np.linspace(-1, 40, 5001), [-1e-9, 0.0, 1e-9, 1e300, np.inf]])
+    np.testing.assert_allclose([decay(y) for y in places], np.exp(-places), rtol=0, atol=2e-13)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_exact_bonds_of_lanes_follow_a_slide_in_closed_form(way):
+    """Stretch and mean square obey their rates, the work is the integral of the force."""
+    after, k, z, square = plain("patchfem.friction.laws.stretch_kernels").after, (3.0, 0.2), -0.15, 0.03
+    x = way * np.linspace(0, 1.5, 3001)
+    stretch, spread, work = np.array([after(k, z, square, one, way) for one in x]).T
+    assert (stretch[0], spread[0], work[0]) == pytest.approx((z, square, 0.0), abs=1e-15)
+    for found, rate in ((stretch, 1 - way * stretch / k[1]), (spread, 2 * stretch - way * spread / k[1]),
+                        (work, k[0] * stretch)):
+        np.testing.assert_allclose(np.gradient(found, x)[1:-1], rate[1:-1], rtol=0, atol=1e-5)
+
+
+@pytest.mark.share(0)
+@pytest.mark.parametrize("law, size, most", [(FLOWS[0], 0.005, 1e-5), (FLOWS[1], 0.0033, 1e-4)])
+def test_always_a_thin_layer_needs_no_fine_steps(law, size, most):
+    """A speed of reference of 1/200 of the speed, a bond length of 1/300 of the slide: so well do 128 steps a cycle
+    know the amplitude. Without parts of a step tanh erred by up to 1e-3, by rates of the stretch bonds ran away."""
+    some, tanh = cases(law, 40), law == FLOWS[0]
+    numbers = np.stack([some.slip, 0 * some.slip + 1 / size] if tanh else [some.slip / size, 0 * some.slip + size], 1)
+    some = some._replace(law=numbers, length=0 * some.slip + (0 if tanh else size),
+                         spring=0 * some.slip if tanh else some.slip / size)
+    reach = [np.ptp(run.march(law, some, 40, 4, steps).history[:, -4:, :2], axis=(1, 2)) / 2 for steps in (128, 2048)]
+    error = np.abs(reach[0] / reach[1] - 1)[reach[1] > 0.5]
+    assert error.max() < most and error.size > 10
+
+
 def test_exact_the_power_of_lanes():
     """Its error is below 3e-13 of it, as its text states."""
     power, r = plain("patchfem.dynamics.lanes.power_curve_kernels").power, np.random.default_rng(0)

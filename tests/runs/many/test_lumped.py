@@ -6,8 +6,10 @@ from batch_beside import held_against
 from scene_texts import MODE
 
 from patchfem.api import base_of, build, load
+from patchfem.model.alike import Alike
 from patchfem.runs.many import one_by_one
-from patchfem.runs.many.lumped import lumped
+from patchfem.runs.many.answers import Answers
+from patchfem.runs.many.lumped import columns, lumped
 from patchfem.scene.sets import assignments
 
 DRIVE = '[drive]\nkind = "{kind}"\n{kind_size}\nfrequency = "140 Hz"\ncycles = 40\n'
@@ -173,3 +175,15 @@ def test_always_few_cells_are_told_from_many():
             if np.isfinite(value[0]) and name not in ("energy_balance", "work_check"):
                 assert abs(value[0] - best.values[name][0]) <= found.errors[name][0] + found.floors[name][0], name
                 assert found.errors[name][0] <= 1e-3 * abs(value[0]) + found.floors[name][0], name
+
+
+def test_always_bonds_without_a_drift_are_not_warned_of_it():
+    """Where no case of a batch has a drift, there is no column of it."""
+    law = 'law = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"'
+    model = build(load(SCENE.format(law=law, kind="base", kind_size=SIZES["base"])))
+    found = Answers.blank(3)
+    alike = Alike(None, model, np.zeros((3, 0)), None, np.arange(3))
+    assert not columns._by_law(alike, found).any()
+    found.measure("drift_per_cycle", "m")
+    found.values["drift_per_cycle"][1] = 1e-6
+    assert columns._by_law(alike, found).tolist() == [False, True, False]

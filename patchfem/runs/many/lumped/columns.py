@@ -201,6 +201,8 @@ def _by_law(models: Alike, found: Answers) -> np.ndarray:
         return np.zeros(len(models), bool)
     if first.bonds.grows or first.bonds.order < 0 or first.bonds.reading != "stretch":
         return np.ones(len(models), bool)
+    if "drift_per_cycle" not in found.values:  # what moves no cycle long has none
+        return np.zeros(len(models), bool)
     drift, error = found.values["drift_per_cycle"], found.errors["drift_per_cycle"]
     return (np.abs(drift) > np.nan_to_num(error)) & (found.outcome != str(Outcome.TRANSIENT))
 
