@@ -337,19 +337,21 @@ def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None
         out, "report: out"), None if measured is None else _path(measured, "report: measured")))
 
 
-def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, histories: bool = False) -> Path:
+def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, histories: bool = False,
+           of: str = "") -> Path:
     """Write a results folder, or the structure of a scene (.toml), in another format, by the ending of `out`; its path.
 
     Fields: .pvd, .vtu, .vtkhdf, .csv (the interface); histories and loops: .uff, .mat, and .csv where `histories` asks
     for them or the folder has no fields; .py: a script that plays the last cycle in ParaView. Of a scene: matrices and
     friction elements, .mat for NLvib, .npz for TMDSimPy and pyHarm. frame: number of the frame of a .vtu or .csv, the
-    last one unless given. PatchfemError as `patchfem export` refuses.
+    last one unless given; of: the stress that a script colours, such as "sigma_yy". PatchfemError as `patchfem export`
+    refuses.
     """
     folder, out = _path(folder, "export"), _path(out, "export: out")
     if folder.suffix != ".toml":
-        chosen.export(folder, out, frame, histories)
-    elif frame is not None or histories:
-        raise PatchfemError("frame, histories: belong to a results folder; of a scene its structure is written")
+        chosen.export(folder, out, frame, histories, of)
+    elif frame is not None or histories or of:
+        raise PatchfemError("frame, histories, of: belong to a results folder; of a scene its structure is written")
     else:
         from .export.lab import structures  # its folder holds more than words
 

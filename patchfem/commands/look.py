@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from ..export import chosen, reports
 from ..export.lab import structures
-from .shared import Refused, Sets, flag, model_of, out_in
+from .shared import Refused, Sets, flag, model_of, out_in, word
 
 Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0, the pressed state; the last one unless "
                                              "given")]
@@ -18,7 +18,9 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
                                    "the last cycle in ParaView); histories.uff, .mat or .csv; of a scene its matrices "
                                    "and friction elements as .mat (NLvib) or .npz (TMDSimPy, pyHarm)")],
            frame: Frame = None, sets: Sets = (),
-           histories: flag("the histories and loops as .csv, not the interface") = False):
+           histories: flag("the histories and loops as .csv, not the interface") = False,
+           of: word("stress that a script for ParaView colours, such as sigma_yy or tau_xy; von_mises unless given",
+                    "--of") = ""):
     """Write the fields of a results folder in another format, or its histories and loops; of a fit the measured loop
     beside the fitted one; of a scene its structure for other programs.
 
@@ -27,10 +29,10 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
     if folder.suffix != ".toml":
         if sets:
             raise Refused("--set: belongs to a scene; a results folder has run")
-        print(chosen.export(folder, out, frame, histories))
+        print(chosen.export(folder, out, frame, histories, of))
         return
-    if frame is not None or histories:
-        raise Refused("--frame, --histories: belong to a results folder; of a scene its structure is written")
+    if frame is not None or histories or of:
+        raise Refused("--frame, --histories, --of: belong to a results folder; of a scene its structure is written")
     print(structures.export(model_of(folder, sets), out))
 
 

@@ -11,12 +11,13 @@ from .lab import write
 from .pages import player
 
 
-def export(folder: Path, out: Path, frame: int | None = None, histories: bool = False) -> str:
+def export(folder: Path, out: Path, frame: int | None = None, histories: bool = False, of: str = "") -> str:
     """Write the fields of a results folder, or its histories and loops, as the ending of `out` says; one line on what
     was written.
 
     A .csv has the interface, or the histories where these are asked for or the folder has no fields. PatchfemError for
-    an ending, a frame or histories that do not stand together.
+    an ending, a frame or histories that do not stand together. of: the stress that a script colours, von Mises' unless
+    given.
     """
     fields = (folder / lab.FIELDS).is_file() or not folder.is_dir()
     if out.suffix.lower() in lab.ENDINGS and (out.suffix != ".csv" or histories or not fields):
@@ -25,10 +26,12 @@ def export(folder: Path, out: Path, frame: int | None = None, histories: bool = 
         return write.export(folder, out)
     if histories:
         raise PatchfemError(f"--histories: they are written as {', '.join(lab.ENDINGS)}, not as {out.suffix or out}")
+    if of and out.suffix != ".py":
+        raise PatchfemError("--of: belongs to a script for ParaView, -o play.py; other fields hold every component")
     if out.suffix == ".py":
         if frame is not None:
             raise PatchfemError("--frame: a script plays the whole last cycle")
-        return paraview.write_script(folder, out)
+        return paraview.write_script(folder, out, of or "von_mises")
     return vtu.export(folder, out, frame)
 
 

@@ -80,17 +80,39 @@ def test_exact_paraview_colours_pressure_and_stress_alike_in_every_frame(bench, 
         frames = [series.frame(number) for number in film.numbers]
     line = frames[0].blocks["interface"]
     highest = max(one.blocks["interface"].point_data["normal_stress"].max() for one in frames)
-    ends = {"normal_stress": (0.0, highest), "von_mises": (0.0, film.tops[0])}
-    for (source, display), array in zip(simple.shown, (("CELLS", "von_mises"), ("POINTS", "normal_stress"))):
+    ends = {"contact_pressure": (0.0, 1e-6 * highest), "shown": (0.0, 1e-6 * film.tops[0])}
+    for (source, display), array in zip(simple.shown, (("CELLS", "shown"), ("POINTS", "contact_pressure"))):
         assert simple.coloured[id(display)] == array
         data = blocks_at(source, times_and_files(simple.shown[2][0].Input)[0][1])
         assert all(array[1] in (at_points if array[0] == "POINTS" else in_cells) for _, at_points, in_cells in data)
         table = simple.tables[array[1]]
         assert table.AutomaticRescaleRangeMode == "Never"
         assert [words for name, *words in table.called if name == "RescaleTransferFunction"] == [list(ends[array[1]])]
-        assert simple.bars[id(table)].ComponentTitle == "[Pa]"
+        assert simple.bars[id(table)].ComponentTitle == "[MPa]" and (display.Ambient, display.Diffuse) == (1.0, 0.0)
         assert display.called == [("SetScalarBarVisibility", simple.view, True)]
     assert len(line.points) == len(blocks_at(simple.shown[1][0], times_and_files(simple.shown[2][0].Input)[0][1])[0][0])
+
+
+@pytest.mark.parametrize("of, place", [("sigma_yy", 1), ("tau_xy", 3)])
+def test_exact_a_script_colours_a_component_in_megapascal(bench, tmp_path, monkeypatch, of, place):
+    """As far below 0 as above, whatever its sign; the script names it and the factors of the motion."""
+    assert cli("export", bench, "-o", tmp_path / "play.py", "--of", of).code == 0
+    simple = played(tmp_path / "play.py", monkeypatch)
+    (pieces, _), _, (clock, _) = simple.shown
+    (low, high), = (words for name, *words in simple.tables["shown"].called if name == "RescaleTransferFunction")
+    assert low == -high and high > 0 and "motion and gap x " in clock.Format
+    files = times_and_files(clock.Input)
+    with Series(bench) as series:
+        frame = series.frame(film_of(series).numbers[0])
+    for (_, _, cells), block in zip(blocks_at(pieces, files[0][1]), (frame.blocks["lower"], frame.blocks["upper"])):
+        assert cells["shown"] == pytest.approx(1e-6 * block.cell_data["stress"][:, place], rel=1e-6)
+
+
+def test_refuses_a_stress_that_is_none(bench, tmp_path):
+    wrong = cli("export", bench, "-o", tmp_path / "play.py", "--of", "sigma")
+    assert wrong.code == 2 and "the stresses are von_mises, sigma_xx" in wrong.err
+    other = cli("export", bench, "-o", tmp_path / "a.csv", "--of", "tau_xy")
+    assert other.code == 2 and "-o play.py" in other.err and not list(tmp_path.iterdir())
 
 
 def test_exact_paraview_plays_or_writes_the_cycle_from_any_folder(written, tmp_path, monkeypatch):

@@ -108,7 +108,7 @@ def test_always_a_page_leads_somewhere_and_its_python_is_python(page):
 
 
 def test_always_the_commands_of_a_page_run():
-    assert len(check.commands(SITE / "tasks" / "paraview.md")) == 8
+    assert len(check.commands(SITE / "tasks" / "paraview.md")) == 9
     assert check.faults(SITE / "tasks" / "paraview.md") == []
 
 

@@ -17,7 +17,7 @@ from vtkmodules.vtkIOXML import vtkXMLMultiBlockDataReader
 PROPERTIES = {"PVDReader": {"FileName"}, "WarpByVector": {"Input", "Vectors", "ScaleFactor"},
               "ExtractBlock": {"Input", "Selectors", "Assembly"}, "AnnotateTimeFilter": {"Input", "Format"},
               "RenderView": {"InteractionMode", "OrientationAxesVisibility", "ViewSize"},
-              "Display": {"LineWidth"},
+              "Display": {"LineWidth", "Ambient", "Diffuse"},
               "ScalarBar": {"Title", "ComponentTitle"}, "Table": {"AutomaticRescaleRangeMode"},
               "AnimationScene": {"PlayMode"}}
 CALLS = {"Display": {"SetScalarBarVisibility"}, "Table": {"ApplyPreset", "RescaleTransferFunction"},

@@ -1,7 +1,8 @@
 """The last cycle for ParaView: its fields as a .pvd and a script beside it that colours, warps and plays them.
 
 The fields carry two more point arrays: `motion`, the displacement as pictures draw it, whose gap is the gap, without
-the slide of the upper piece as a whole; and `slide`, that slide. So each has a factor of its own.
+the slide of the upper piece as a whole; and `slide`, that slide. So each has a factor of its own. What is coloured
+stands in MPa: `shown` in the cells of the pieces, `contact_pressure` at the points of the interface.
 """
 
 from dataclasses import replace
@@ -9,14 +10,21 @@ from pathlib import Path
 
 import numpy as np
 
+from ...core import PatchfemError
 from ...disk.whole import write_text
 from ..fields.series import Frame, Series
 from ..fields.vtu import frames_beside, write_pvd
 from .film import Film, film_of
 from .panels import moved, slide_of, upper_points
 
+MPA = 1e-6
+SHARPEST = 0.998  # share of the cells whose stress the colours of a component reach: the others stand out in corners
+STRESSES = {  # name -> (title, place in the stored stress xx, yy, zz, xy, yz, xz; None: of its own)
+    "von_mises": ("von Mises stress", None), "sigma_xx": ("stress sigma_xx", 0), "sigma_yy": ("stress sigma_yy", 1),
+    "sigma_zz": ("stress sigma_zz", 2), "tau_xy": ("shear stress tau_xy", 3)}
+
 SCRIPT = '''\
-"""Both pieces through the last cycle: von Mises stress in them, contact pressure on their interface.
+"""Both pieces through the last cycle: {title} in them, contact pressure on their interface.
 
     pvpython THIS.py            plays the cycle three times
     pvpython THIS.py cycle.png  writes a picture of every frame; .avi or .ogv where ParaView can write films
@@ -35,8 +43,8 @@ HERE = os.path.dirname(os.path.abspath(__file__)) if "__file__" in globals() els
 FIELDS = os.path.join(HERE, {fields!r})
 MOTION = {motion!r}  # factor of the motion and the gap
 SLIDE = {slide!r}  # factor of the slide of the upper piece as a whole
-MISES = {mises!r}  # Pa, ends of the colours in every frame
-PRESSURE = {pressure!r}  # Pa, ends of the colours in every frame
+STRESS = {stress!r}  # MPa, ends of the colours in every frame
+PRESSURE = {pressure!r}  # MPa, ends of the colours in every frame
 TIMES = 3  # the cycle is played
 PACE = {pace!r}  # frames per second of a film
 
@@ -69,7 +77,7 @@ pieces.Selectors = ["//lower", "//upper"]
 interface = simple.ExtractBlock(registrationName="interface", Input=slid)
 interface.Selectors = ["//interface"]
 clock = simple.AnnotateTimeFilter(registrationName="time", Input=reader)
-clock.Format = "time {{time:.6f}} s"
+clock.Format = "time {{time:.6f}} s; motion and gap x {motion:.4g}, slide x {slide:.4g}"
 
 view = simple.GetActiveViewOrCreate("RenderView")
 view.InteractionMode = "2D"
@@ -86,12 +94,13 @@ def show(source, where, name, title, ends, colours):
     table.RescaleTransferFunction(*ends)
     shown.SetScalarBarVisibility(view, True)
     bar = simple.GetScalarBar(table, view)
-    bar.Title, bar.ComponentTitle = title, "[Pa]"
+    bar.Title, bar.ComponentTitle = title, "[MPa]"
+    shown.Ambient, shown.Diffuse = 1.0, 0.0  # the colours of the bar, without light and shade
     return shown
 
 
-show(pieces, "CELLS", "von_mises", "von Mises stress", MISES, "Viridis (matplotlib)")
-show(interface, "POINTS", "normal_stress", "contact pressure", PRESSURE, "Inferno (matplotlib)").LineWidth = 6
+show(pieces, "CELLS", "shown", {title!r}, STRESS, {colours!r})
+show(interface, "POINTS", "contact_pressure", "contact pressure", PRESSURE, "Inferno (matplotlib)").LineWidth = 6
 simple.Show(clock, view)
 
 scene = simple.GetAnimationScene()
@@ -111,30 +120,53 @@ if not films:
 '''
 
 
-def write_script(folder: Path, out: Path) -> str:
+def write_script(folder: Path, out: Path, of: str = "von_mises") -> str:
     """Write the script `out`, and its fields beside it, for the last cycle of a results folder; one line on them.
 
-    Missing without fields or where `out` cannot be written; PatchfemError for fields of one moment: nothing moves.
+    of: the stress that colours the pieces, a key of STRESSES. Missing without fields or where `out` cannot be written;
+    PatchfemError for fields of one moment, in which nothing moves, and for a stress that is none.
     """
+    if of not in STRESSES:
+        raise PatchfemError(f"--of {of}: no stress of this name; the stresses are {', '.join(STRESSES)}")
     out = Path(out)
     fields = out.with_suffix(".pvd")
     with Series(folder) as series:
         film = film_of(series)
-        text = script(out, film)
-        write_pvd(fields, series, film.numbers, with_motion)
+        text = script(out, film, of, _ends(series, film, of))
+        write_pvd(fields, series, film.numbers, lambda frame: with_motion(frame, of))
         write_text(out, text)
     return f"{out}: {len(film.numbers)} frames, {fields.name} and {frames_beside(fields).name} beside it"
 
 
-def script(out: Path, film: Film) -> str:
-    """The text of the script `out` that plays a film."""
+def _ends(series: Series, film: Film, of: str) -> tuple:
+    """Ends of the colours of a stress [Pa]: those of the pictures; of a component as far above 0 as below."""
+    if of == "von_mises":
+        return 0.0, float(film.tops[0])
+    top = 0.0
+    for number in film.numbers:
+        values = stress_of(series.frame(number).cell_data, of)
+        top = max(top, float(np.quantile(np.abs(values[np.isfinite(values)]), SHARPEST, method="higher")))
+    return -top, top
+
+
+def stress_of(cell_data: dict, of: str) -> np.ndarray:
+    """A stress (cells,) [Pa] of STRESSES; tension is > 0."""
+    place = STRESSES[of][1]
+    return cell_data["von_mises"] if place is None else cell_data["stress"][:, place]
+
+
+def script(out: Path, film: Film, of: str, ends: tuple) -> str:
+    """The text of the script `out` that plays a film; ends: of the colours of the stress [Pa]."""
     fields = out.with_suffix(".pvd")
-    return SCRIPT.format(fields=fields.name, motion=film.factors[0], slide=film.aside, mises=(0.0, float(film.tops[0])),
-                         pressure=(0.0, film.pressure), pace=max(1, round(1 / film.seconds)))
+    return SCRIPT.format(fields=fields.name, motion=film.factors[0], slide=film.aside,
+                         stress=tuple(MPA * one for one in ends), pressure=(0.0, MPA * film.pressure),
+                         pace=max(1, round(1 / film.seconds)), title=STRESSES[of][0],
+                         colours="Viridis (matplotlib)" if of == "von_mises" else "Cool to Warm")
 
 
-def with_motion(frame: Frame) -> Frame:
-    """A frame whose blocks hold `motion` and `slide` (n, 3) [m] too, which add up to the drawn displacement."""
+def with_motion(frame: Frame, of: str = "von_mises") -> Frame:
+    """A frame whose blocks hold `motion` and `slide` (n, 3) [m] too, which add up to the drawn displacement, and what
+    the script colours [MPa]."""
     slide = np.zeros((len(frame.points), 3))
     slide[upper_points(frame), 0] = slide_of(frame)
     motion = np.column_stack([moved(frame), np.zeros(len(slide))]) - slide
@@ -142,6 +174,12 @@ def with_motion(frame: Frame) -> Frame:
     for name, block in frame.blocks.items():
         mine = slice(first, first + len(block.points))
         more = {"motion": motion[mine].astype(np.float32), "slide": slide[mine].astype(np.float32)}
-        blocks[name] = replace(block, point_data=block.point_data | more)
+        cells = {}
+        if "von_mises" in block.cell_data:
+            cells["shown"] = (MPA * stress_of(block.cell_data, of)).astype(np.float32)
+        if "normal_stress" in block.point_data:
+            more["contact_pressure"] = (MPA * block.point_data["normal_stress"]).astype(np.float32)
+        blocks[name] = replace(block, point_data=block.point_data | more, cell_data=block.cell_data | cells)
         first = mine.stop
-    return replace(frame, blocks=blocks, units=frame.units | {"motion": "m", "slide": "m"})
+    return replace(frame, blocks=blocks, units=frame.units | {"motion": "m", "slide": "m", "shown": "MPa",
+                                                              "contact_pressure": "MPa"})
