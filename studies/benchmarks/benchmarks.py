@@ -21,6 +21,9 @@ Of others, read from the folder that PATCHFEM_DATA names and not part of this pr
   17d5fc3f, examples/structures/data; MIT).
 - nlvib-beam.mat: matrices of example 08 of NLvib, a clamped beam with dry friction (GPL 3).
 
+- ForcedFrequencyResponses.mat: a longer Brake-Reuss beam on a shaker (M. Cenedese, BRBtesting, commit 2d42d3a; GPL 3;
+  Chen et al., MSSP 166, 2022, 108401). It is read to check MEASURED alone.
+
 Typed here, with their sources: BACKBONE, MEASURED and IWAN.
 
 Run: PATCHFEM_DATA=FOLDER python studies/benchmarks/benchmarks.py [PICTURE.svg]
@@ -33,6 +36,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.io import loadmat
+from scipy.optimize import least_squares
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "damper"))
@@ -42,6 +46,7 @@ import damper
 import patchfem as pf
 
 DATA = {"loop": "friction-damper-1hz.csv", "gap": "brb_surface_data.mat", "beam": "nlvib-beam.mat"}
+HELD = "ForcedFrequencyResponses.mat"
 LOOP_LAWS = ("coulomb", "stretch")
 
 # First bending mode of the Brake-Reuss beam with its measured gap, by 232 rough contact elements on a model of the
@@ -54,14 +59,13 @@ BACKBONE = np.array([
     (4.3087e-5, 166.3804, 3.3303e-2), (5.8046e-5, 163.1906, 3.7770e-2)])
 STUCK = 180.6274, 8.7796e-4  # frequency [Hz] and damping ratio of their smallest amplitude
 
-# A longer Brake-Reuss beam on a shaker, at eight held accelerations (BRBtesting of M. Cenedese, commit 2d42d3a,
-# ForcedFrequencyResponses.mat, ResponseControl; Chen et al., MSSP 166, 2022, 108401): amplitude [m], frequency [Hz] and
-# damping ratio with the half-widths of their 95 % intervals, by the circle of one mode through the 41 points of each.
+# A longer Brake-Reuss beam at eight held accelerations, as `held` reads them from HELD: amplitude [m], frequency [Hz]
+# and damping ratio, each with the half-width of its 95 % interval, the points taken as independent.
 MEASURED = np.array([
-    (1.96e-5, 80.379, 0.008, 1.59e-3, 0.08e-3), (7.90e-5, 80.204, 0.008, 2.03e-3, 0.09e-3),
-    (1.17e-4, 80.211, 0.010, 2.40e-3, 0.12e-3), (1.58e-4, 80.132, 0.012, 3.21e-3, 0.17e-3),
-    (1.98e-4, 80.266, 0.016, 4.11e-3, 0.20e-3), (2.37e-4, 80.344, 0.024, 5.22e-3, 0.30e-3),
-    (2.77e-4, 80.414, 0.022, 6.02e-3, 0.34e-3), (3.16e-4, 80.454, 0.024, 7.02e-3, 0.38e-3)])
+    (1.964e-5, 80.379, 0.007, 1.592e-3, 0.078e-3), (7.899e-5, 80.204, 0.008, 2.032e-3, 0.091e-3),
+    (1.175e-4, 80.211, 0.009, 2.401e-3, 0.123e-3), (1.576e-4, 80.132, 0.013, 3.210e-3, 0.166e-3),
+    (1.975e-4, 80.266, 0.016, 4.109e-3, 0.201e-3), (2.369e-4, 80.344, 0.023, 5.216e-3, 0.302e-3),
+    (2.768e-4, 80.414, 0.023, 6.015e-3, 0.344e-3), (3.164e-4, 80.454, 0.025, 7.017e-3, 0.389e-3)])
 
 # A mass on Iwan's law under 3.3 N (TMDSimPy's examples/sdof_iwan_hysteresis.py, run at commit 17d5fc3f): rad/s, half
 # peak-to-peak [m] by its 8 harmonics, 100 sliders and 1024 samples, and by 41 (0.3 rad/s:
@@ -135,6 +139,27 @@ def joint(path, folder: Path, bent: bool = False) -> dict:
     file = Path(folder) / f"gap_{'bent' if bent else 'measured'}.csv"
     np.savetxt(file, np.column_stack([x, z - z.min()]), "%.9g", ",", header="x [m],z [m]", comments="")
     return JOINT | {"profile": {"file": str(file)}}
+
+
+def held(path) -> np.ndarray:
+    """The rows of MEASURED: one mode through the 41 points of each held acceleration a, by least squares of the force
+    F/a = m ((f0/f)^2 - 1 + 2 i zeta f0/f) in its complex value."""
+    out = []
+    for one in loadmat(path, squeeze_me=True, struct_as_record=False)["FRdata"].ResponseControl:
+        f, force, a, phase = (np.asarray(getattr(one, name), float) for name in
+                              ("frequency", "force", "amplitude", "phase"))
+        turned = force / a * np.exp(1j * phase)
+
+        def miss(values, f=f, turned=turned):
+            m, f0, zeta = values * (1.0, 80.0, 1e-3)
+            gap = (m * ((f0 / f)**2 - 1 + 2j * zeta * f0 / f) - turned) / np.abs(turned).max()
+            return np.concatenate([gap.real, gap.imag])
+
+        found = least_squares(miss, (1.0, 1.0, 2.0))
+        spread = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)) * 2 * found.cost / (2 * f.size - 3))
+        f0, zeta = found.x[1] * 80.0, abs(found.x[2]) * 1e-3  # the sign of the phase is that of the file
+        out.append((a.mean() / (2 * np.pi * 80.2)**2, f0, 2 * 80.0 * spread[1], zeta, 2e-3 * spread[2]))
+    return np.array(out)
 
 
 def damper_rows(path) -> tuple:
