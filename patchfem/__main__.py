@@ -69,18 +69,18 @@ from .commands.streams import plain, ready
 
 # group -> verb -> (the module of its function, loaded where the verb is asked for; what it does; words of an example)
 SCREEN = {
-    "Start": {"demo": (start, "run the rig that comes with it", ""),
+    "Start": {"demo": (start, "run the bundled example rig", ""),
               "new": (start, "write a scene to start from", "joint -o joint.toml"),
               "check": (scene, "name every mistake", "joint.toml"),
               "plan": (scene, "say what would run, and its cost", "joint.toml"),
-              "run": (run, "run it: results and a page", "joint.toml")},
+              "run": (run, "compute results and a page", "joint.toml")},
     "Study": {"sweep": (sweep, "run many values of some keys", "tilts.toml"),
               "backbone": (study, "frequency and damping of a mode", "rig.toml --mode axial"),
               "fit": (study, "find values from a measurement",
                       "joint.toml --to loop.csv --free friction.static=0.1..0.8"),
               "cost": (study, "error against CPU seconds", "rig.toml")},
     "Surfaces": {"profile": (profile, "roughness of a trace or a scan", "before.csv"),
-                 "compare": (compare, "what wore off between the two", "before.csv after.csv")},
+                 "compare": (compare, "what wore off between two scans", "before.csv after.csv")},
     "Files": {"report": (look, "several runs on one page", "out/a out/b -o both.html"),
               "view": (look, "a picture or a film of the pieces", "out/joint -o joint.png"),
               "export": (look, "fields for ParaView; histories", "out/joint -o play.py"),
@@ -88,7 +88,7 @@ SCREEN = {
               "mesh": (scene, "the mesh of the pieces", "joint.toml -o pieces.vtu")},
     "About": {"doctor": (start, "what this installation has", ""),
               "schema": (start, "completion of scenes in an editor", "-o scene.json"),
-              "cite": (start, "BibTeX of what a scene stands on", "joint.toml")}}
+              "cite": (start, "BibTeX of a scene's sources", "joint.toml")}}
 VERBS = {verb: row[0] for verbs in SCREEN.values() for verb, row in verbs.items()}
 
 OUT_OF_MEMORY = "out of memory; `patchfem plan` names what takes most of it and the key that drives it"
@@ -189,7 +189,7 @@ def _guarded(words: list, before=lambda: None) -> int:
         return 0
     except (Refused, CycloptsError) as error:
         left = getattr(error, "unused_tokens", None)
-        said = f"no place for '{' '.join(left)}'; see `patchfem {words[0]} --help`" if left else str(error)
+        said = f"unexpected '{' '.join(left)}'; see `patchfem {words[0]} --help`" if left else str(error)
         say(plain(f"patchfem: {' '.join(said.split())}"))
         return 2
     except Ended as end:
@@ -211,7 +211,7 @@ def _guarded(words: list, before=lambda: None) -> int:
         gone = isinstance(error, FileNotFoundError) and not error.filename  # of what asks where it is
         say(plain("patchfem: the working folder is gone; change to one that is there" if gone else
                   f"{error.filename or 'patchfem'}: {error.strerror or error}"
-                  f"{'; name a shorter one' * (error.errno == ENAMETOOLONG)}"))
+                  f"{'; use a shorter name' * (error.errno == ENAMETOOLONG)}"))
         return 4
     except Exception as error:
         if isinstance(error, ImportError) and "failed to map" in str(error):  # a library that finds no room
@@ -239,9 +239,9 @@ def _interrupted() -> str:
     kept = [one for one in dict.fromkeys(there.KEPT) if one.is_dir()] if there else []
     text = "interrupted; nothing was replaced"
     if placed:
-        text = f"interrupted; whole and in place: {', '.join(placed[-3:])}" + \
+        text = f"interrupted; already complete: {', '.join(placed[-3:])}" + \
             " and more" * (len(placed) > 3)
-    return text + "".join(f"; what is kept in {there.shown(one)} goes on with --resume" for one in kept)
+    return text + "".join(f"; {there.shown(one)} continues with --resume" for one in kept)
 
 
 def _once_more(lost) -> None:

@@ -221,7 +221,7 @@ class SweepPlots:
         PatchfemError for what is no Dataset of a sweep, and for a measure that it has not.
         """
         if not hasattr(dataset, "coords") or not any(str(name).endswith("_error") for name in dataset):
-            raise PatchfemError("plot.sweep: the Dataset of pf.sweep is wanted, with measures and their errors")
+            raise PatchfemError("plot.sweep: the Dataset of pf.sweep is needed, with measures and their errors")
         figure = swept.draw.figure(dataset, measure, onto=ax)
         return figure.axes[0] if ax is None else ax
 
@@ -234,7 +234,7 @@ class SweepPlots:
         """
         ways = [way for way in backbones.WAYS if f"{way.replace('-', '_')}_amplitude" in getattr(dataset, "coords", ())]
         if not ways:
-            raise PatchfemError("plot.backbone: the Dataset of pf.backbone with at least one curve is wanted"
+            raise PatchfemError("plot.backbone: the Dataset of pf.backbone with at least one curve is needed"
                                 + "".join(f"; {why}" for why in [getattr(dataset, "attrs", {}).get("missing")] if why))
         curves = {way: SimpleNamespace(**{name: dataset[f"{way.replace('-', '_')}_{name}"].values
                                           for name in backbone_files.COLUMNS}) for way in ways}
@@ -291,7 +291,7 @@ def _ends_of(key: str, ends: Any) -> str:
     """"low..high" of such a text or of two values; PatchfemError for anything else."""
     pair = [ends] if isinstance(ends, str) else texts(key, ends)
     if not isinstance(ends, str) and len(pair) != 2:
-        raise PatchfemError(f"fit: free: {key}: (low, high) or a text such as '0.1..0.6' is wanted, not {ends!r:.60}")
+        raise PatchfemError(f"fit: free: {key}: (low, high) or a text such as '0.1..0.6' is needed, not {ends!r:.60}")
     return "..".join(pair)
 
 
@@ -320,7 +320,7 @@ def profile(*files: str | Path, cutoff: float | str | None = None, window: Itera
         asked["window"] = tuple(_metres(one, "profile: window") for one in listed)
     for name in ("cutoff", "tip"):
         if asked[name] is not None and not 0 < asked[name] < float("inf"):
-            raise PatchfemError(f"profile: {name}: a length above zero is wanted, not {asked[name]:g} m")
+            raise PatchfemError(f"profile: {name}: a length above zero is needed, not {asked[name]:g} m")
     reports = [roughness_report.report_of(surfaces.read_surface(_path(one, "profile"), units), **asked)
                for one in files]
     return {"profiles": [roughness.data_of(one) for one in reports], "means": roughness.means_data(reports)}
@@ -351,7 +351,7 @@ def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, 
     if folder.suffix != ".toml":
         chosen.export(folder, out, frame, histories, of)
     elif frame is not None or histories or of:
-        raise PatchfemError("frame, histories, of: belong to a results folder; of a scene its structure is written")
+        raise PatchfemError("frame, histories, of: belong to a results folder; a scene is exported as its structure")
     else:
         from .export.lab import structures  # its folder holds more than words
 
@@ -379,7 +379,7 @@ def import_(file: str | Path, out: str | Path, /, *, map: str | Iterable[str] = 
 
     file, out, given = _path(file, "import_"), _path(out, "import_: out"), imported.Estimate._fields
     if unknown := set(how) - set(given):
-        raise PatchfemError(f"import_: {unknown.pop()}: no setting; there are map, zero, {', '.join(sorted(given))}")
+        raise PatchfemError(f"import_: {unknown.pop()}: unknown setting; use map, zero, {', '.join(sorted(given))}")
     words = {name: _word(one, f"import_: {name}") for name, one in how.items()}
     return {"file": str(out), **imported.imported(file, out, _words(map, "import_: map"), zero,
                                                   imported.Estimate(decay=decay, **words))}
@@ -416,13 +416,13 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
     _word(direction, "compare: direction")
     if pairs is None and len(files) > 1 and any(Path(one).is_dir() for one in files):
         if len(files) > 2 or direction or units is not None or shift is not None or keep_spikes:
-            raise PatchfemError("compare: two results folders stand alone, without other files and settings of traces")
+            raise PatchfemError("compare: give two results folders alone, without other files or settings of traces")
         lost = worn.lost(*map(Path, files))
         return worn.data_of(lost, worn.verdict(lost))
     if pairs is None:
         return compared_data.data_of(*verdict.judged(files, direction, **how))
     if files:
-        raise PatchfemError("compare: files or a table of pairs are wanted, not both")
+        raise PatchfemError("compare: files or a table of pairs are needed, not both")
     return pairs_data.data_of(pairs_data.answers(pairs_tables.read_pairs(_path(pairs, "compare: pairs")), direction,
                                                  **how))
 
@@ -441,7 +441,7 @@ def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
 def _path(given: Any, what: str) -> Path:
     """The path of a file or folder; PatchfemError for anything else."""
     if not isinstance(given, str | Path):
-        raise PatchfemError(f"{what}: a path is wanted, not {given!r:.60}")
+        raise PatchfemError(f"{what}: a path is needed, not {given!r:.60}")
     return Path(given)
 
 
@@ -457,13 +457,13 @@ def _metres(given: Any, what: str) -> float | None:
         return parse(given, "length") if isinstance(given, str) else given if given is None else float(given)
     except (TypeError, ValueError) as error:
         raise PatchfemError(f"{what}: " + (str(error) if isinstance(given, str) else
-                            f"a length in m or a text such as '0.25 mm' is wanted, not {given!r:.60}")) from None
+                            f"a length in m or a text such as '0.25 mm' is needed, not {given!r:.60}")) from None
 
 
 def _word(given: Any, what: str) -> str:
     """A text; PatchfemError for anything else."""
     if not isinstance(given, str):
-        raise PatchfemError(f"{what}: a text is wanted, not {given!r:.60}")
+        raise PatchfemError(f"{what}: a text is needed, not {given!r:.60}")
     return given
 
 
@@ -538,7 +538,7 @@ class Plots:
 
     def levels(self, ax: Axes | None = None) -> Axes:
         """Amplitude level by level, or along the curve of steady motions over level or frequency."""
-        return self._drawn(ax, ("levels", "curve"), self._still() or 'the drive has no levels; take drive.waveform = '
+        return self._drawn(ax, ("levels", "curve"), self._still() or 'the drive has no levels; use drive.waveform = '
                            '"levels", or a sweep with accuracy.method = "harmonic"')
 
     def stress(self, ax: Axes | None = None) -> Axes:
@@ -549,7 +549,7 @@ class Plots:
 
         with TemporaryDirectory() as room:
             made = bodies.write_fields(self._result, Path(room) / "fields.vtkhdf")
-        return self._drawn(ax, ("bodies",), "the pieces do not touch, or their mesh is no grid", {"bodies": made})
+        return self._drawn(ax, ("bodies",), "the pieces do not touch, or their mesh is not a grid", {"bodies": made})
 
     def _still(self) -> str:
         if self._result.response is not None:
@@ -559,7 +559,7 @@ class Plots:
 
     def _drawn(self, ax: Axes | None, names: tuple, lack: str, more: dict | None = None) -> Axes:
         if ax is not None and not hasattr(ax, "errorbar"):
-            raise PatchfemError(f"plot.{names[0]}: matplotlib Axes are wanted as ax, not {ax!r:.60}")
+            raise PatchfemError(f"plot.{names[0]}: matplotlib Axes are needed as ax, not {ax!r:.60}")
         found = shown.axes(self._result, names, ax, more)
         if found is not None:
             return found

@@ -56,7 +56,7 @@ _SENTENCES = {
                             "drive, shorten the slide or lengthen the piece.",
     Outcome.LEAVES_GROOVES: "The inertia of the lifted mass took all of the load, so it left its grooves and the run "
                             "ended there; lower the drive or the lifted mass, or raise the load.",
-    Outcome.WORN_THROUGH: "Wear took all of a coating at its deepest place and the run ended there; ask for fewer "
+    Outcome.WORN_THROUGH: "Wear went through a coating at its deepest place, so the run ended; ask for fewer "
                           "cycles or make the coating thicker.",
     Outcome.NO_CONTACT: "The pieces do not touch; raise the load or close the gap.",
     Outcome.NOT_CONVERGED: "A solve did not reach its residual; the result is marked and must not be used.",

@@ -67,8 +67,8 @@ FINER = 3  # doublings of the steps of a decay
 DOWN = (1, 3)  # half swings of a reading, and of the one that shows how much the decay bends
 
 
-UNKNOWN = ("bonds have a loop in closed form for the stretch reading of order 1, a constant length, no breakaway and "
-           "pieces that do not give way alone")
+UNKNOWN = ("bonds have a loop in closed form only for the stretch reading of order 1 with constant length, no "
+           "breakaway and pieces rigid in shear")
 
 
 class Curve(NamedTuple):
@@ -151,8 +151,8 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
         joint = _joint(model, mode)
         wanted = _default(joint) if amplitudes is None else np.unique(np.asarray(amplitudes, float))
         if wanted[-1] > joint.model.rig.travel:
-            raise PatchfemError(f"an amplitude of {say(wanted[-1], 3)} lies beyond it; give smaller ones by "
-                                "--amplitudes", "structure.travel")
+            raise PatchfemError(f"an amplitude of {say(wanted[-1], 3)} lies beyond it; give smaller ones "
+                                "with --amplitudes", "structure.travel")
         curves, missing, richer = {}, {}, model.rig.richer
         other = None if richer is None else _joint(replace(model, rig=richer), mode)
         for way in methods:
@@ -186,7 +186,7 @@ def _beside(curve: Curve, other: Curve) -> Curve:
 
 def _joint(model: Model, name: str) -> Joint:
     if model.rig is None:
-        raise PatchfemError("a backbone is that of a rig: give the scene [structure] and [drive]", "structure")
+        raise PatchfemError("a backbone needs a rig: give the scene [structure] and [drive]", "structure")
     modes, number = model.rig.modes, _number(model.rig, name)
     patch, coarse = None, None
     if model.patch is not None:
@@ -201,13 +201,13 @@ def _joint(model: Model, name: str) -> Joint:
         raise PatchfemError("the load or the coefficient of friction is 0, so no friction acts; leave out the tables "
                             "of the contact for the backbone of the springs alone", "friction.static")
     if not (modes.omega[number] or joint.held[0]):
-        raise PatchfemError("the mode has 0 Hz and friction that gives way nowhere: it has no frequency of its own")
+        raise PatchfemError("the mode has 0 Hz and rigid friction, so it has no natural frequency")
     if not (joint.linear or model.rig.bends or np.abs(modes.interfaces @ joint.held[1]).max() > 0):
-        raise PatchfemError("the mode does not move the contact, so no friction acts on it; name another by --mode, or "
-                            "give it a slide")
+        raise PatchfemError("the mode does not move the contact, so no friction acts on it; choose another with "
+                            "--mode, or give it a slide")
     if not joint.reach > 0:
         raise PatchfemError("the mode does not move the output, so it has no amplitude there; give it an output, or "
-                            "another mode by --mode")
+                            "choose another with --mode")
     return joint
 
 
@@ -227,7 +227,7 @@ def _level(joint: Joint, amplitudes, way: str) -> Curve:
         g -= 2 * root(g).real
     kept, own = abs(root(g)), root(0.0)
     if not (own.imag and g < 2 * kept):
-        raise NotConverged("the mode does not swing: its damping ratio is 1 or more")
+        raise NotConverged("the mode does not oscillate: its damping ratio is 1 or more")
     omega, zeta = (abs(own.imag), -own.real / abs(own)) if way == "decay" else (kept, g / (2 * kept))
     f, zeta = np.full(amplitudes.size, omega / (2 * np.pi)), np.full(amplitudes.size, zeta)
     return Curve(amplitudes, f, ROUND * f, zeta, ROUND * np.abs(zeta), np.full(f.size, np.nan))
@@ -340,7 +340,7 @@ def _balanced(joint: Joint, amplitudes) -> Curve:
         raise NotConverged("no free motion of these amplitudes was found")
     swings = known & (found[1] < 1)  # a motion that loses more in a cycle does not swing
     if not swings.any():
-        raise NotConverged("the mode does not swing at these amplitudes: its damping ratio is above 1")
+        raise NotConverged("the mode does not oscillate at these amplitudes: its damping ratio is above 1")
     return Curve(amplitudes, found[0], error[0], found[1], error[1], found[2]).at(swings)
 
 
@@ -467,13 +467,13 @@ def _turned(joint: Joint, amplitudes) -> Curve:
     """Curve under rigid friction; it begins where the motion no longer holds on the way."""
     model, modes, load = joint.model, joint.model.rig.modes, _limit(joint)
     if model.rig.bends or not modes.omega.all():
-        raise PatchfemError("under rigid friction it is not known beside a spring that bends or a mode of 0 Hz")
+        raise PatchfemError("under rigid friction it is not known with a nonlinear spring or a mode of 0 Hz")
     f, row = model.friction, modes.interfaces[0]
     kinetic = load if f.kinetic is None else load * f.kinetic / f.static
     found = limit_cycles.relay_backbone(modes, row, (kinetic, load), amplitudes, joint.mode)
     kept = [(a, *one) for a, one in zip(amplitudes, found) if one is not None]
     if not kept:
-        raise NotConverged("under rigid friction no swing of these amplitudes slides from turn to turn; give larger "
+        raise NotConverged("under rigid friction no motion of these amplitudes slides all the time; give larger "
                            "ones")
     a = np.array([one[0] for one in kept])
     frequency, damping = np.array([(c.omega / (2 * np.pi), zeta) for _, c, zeta in kept]).T
@@ -488,7 +488,7 @@ def _static(joint: Joint, amplitudes) -> Curve:
     of the contact alone on a bench."""
     _refuse(joint, "static curve")
     if _rigid(joint.model):
-        raise PatchfemError("rigid friction gives way nowhere, so the held mode has no static curve")
+        raise PatchfemError("rigid friction has no stiffness, so the held mode has no static curve")
     if (known := _in_closed_form(joint, amplitudes)) is not None:
         return known
     try:
@@ -618,7 +618,7 @@ def _decayed(joint: Joint, amplitudes) -> Curve:
         found = engine.run(what, how, joint.patch, 0, None, None)
     error += reading
     if not known.any():
-        raise NotConverged("the release did not swing down through these amplitudes")
+        raise NotConverged("the release did not decay through these amplitudes")
     return Curve(amplitudes, best[0], error[0], best[1], error[1], np.full(amplitudes.size, np.nan)).at(known)
 
 
@@ -754,8 +754,8 @@ def _unworn(model: Model) -> tuple:
     return () if model.wear is None else ("the pieces count as new: [wear] is not carried into these curves",)
 
 
-LEFT_OUT = {"balance": "no free motion that swings was found there", "quasi-static": "the static curve ends there",
-            "decay": "the release, or one of the coarser runs beside it, did not swing there"}
+LEFT_OUT = {"balance": "no free oscillation was found there", "quasi-static": "the static curve ends there",
+            "decay": "the release, or one of its coarser check runs, did not oscillate there"}
 
 
 def _gaps(wanted, curves: dict) -> list:
@@ -770,8 +770,8 @@ def _gaps(wanted, curves: dict) -> list:
 
 
 WHY = {"decay": "a decay shows the mean over a cycle, in which it loses {:.2g} of its swing there",
-       "quasi-static": "the static curve takes the stiffness from tip to tip and, of several modes, keeps the shape of "
-                       "the force; the balance follows the first harmonic"}
+       "quasi-static": "the static curve uses the secant stiffness and a fixed force shape; the balance follows the "
+                       "first harmonic"}
 
 
 def _differences(curves: dict) -> list:

@@ -78,8 +78,8 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None, options: LoopOptio
     offsets = offsets_of(options.offsets, loop)
     everything = [*wanted, *(one.range for one in offsets)]
     if used <= len(everything):
-        raise PatchfemError(f"{to}: {used} rows that are not held cannot determine {len(everything)} values and their "
-                            "intervals")
+        raise PatchfemError(f"{to}: {used} rows that are not held out cannot determine {len(everything)} values and "
+                            "their intervals")
     bench = BenchModel(scene, loop, wanted, offsets, options.warm, say)
     scale = float(np.abs(loop.reading[~held]).max())
 
@@ -157,11 +157,11 @@ def _doubts(fitted: Fitted, led: bool) -> list:
     rms, step_error = fitted.rms, fitted.step_error
     out, peak, used = [], float(np.abs(loop.reading).max()), np.count_nonzero(~held)
     if rms > 1e-6 * peak and rows < FEWER * used:
-        out.append(f"the residual is correlated from row to row: its {used} rows tell as much as {max(rows, 1):.3g} "
-                   "independent ones, which the intervals count; the law or the instrument misses something")
+        out.append(f"the residual is correlated from row to row: its {used} rows count as {max(rows, 1):.3g} "
+                   "independent ones in the intervals; the law or the instrument misses something")
     if abs(loop.reading[0]) > 0.2 * peak and not has(scene.friction.law, "memoryless") and not held[0] and not led:
-        out.append(f"the first row carries {abs(loop.reading[0]) / peak:.0%} of the peak, where the model starts "
-                   "unstressed: name --warm-up, hold the first cycle out or begin the record at rest")
+        out.append(f"the first row is at {abs(loop.reading[0]) / peak:.0%} of the peak, but the model starts "
+                   "unstressed: use --warm-up, hold out the first cycle or begin the record at rest")
     if step_error > scene.accuracy.tolerance * peak:
         out.append(f"half the steps change the model by {step_error / peak:.1g} of the peak, more than the tolerance")
     return out

@@ -70,7 +70,7 @@ def read_curve(path) -> tuple:
     table = read_columns(path, units, tuple(f"decay_{name} {name}" for name in UNITS), HEADER, "a decay",
                          labels=True)
     if len(set(table.labels.get("method", ("",)))) > 1:
-        raise PatchfemError(f"{path}: the curves of several methods; keep the rows of one")
+        raise PatchfemError(f"{path}: curves of several methods; keep the rows of one")
     columns = {name.removeprefix("decay_"): one for name, one in table.values.items()}
     value = np.array([columns["frequency"], columns["damping"]])
     spread = np.array([columns[f"{name}_error"] / 2 if f"{name}_error" in columns else half * np.abs(one) for
@@ -78,7 +78,7 @@ def read_curve(path) -> tuple:
     if (spread < 0).any():
         raise PatchfemError(f"{path}: an error below 0; give half the width of its interval, or leave the column out")
     if not (columns["amplitude"] > 0).all() or not (value[0] > 0).all():
-        raise PatchfemError(f"{path}: amplitudes and frequencies are above 0")
+        raise PatchfemError(f"{path}: amplitudes and frequencies must be above 0")
     order = np.argsort(columns["amplitude"], kind="stable")
     return columns["amplitude"][order], value[:, order], np.maximum(spread, LEAST * np.abs(value))[:, order]
 
@@ -149,5 +149,5 @@ def _curve(model, amplitude, method: str) -> np.ndarray:
     one = found.curves[method]
     if one.amplitude.size != amplitude.size:
         lost = ", ".join(f"{a:.3g} m" for a in np.setdiff1d(amplitude, one.amplitude)[:6])
-        raise PatchfemError(f"the model's mode does not swing at {lost}; leave out these rows, or narrow --free")
+        raise PatchfemError(f"the model's mode does not oscillate at {lost}; leave out these rows, or narrow --free")
     return np.array([one.frequency, one.damping])

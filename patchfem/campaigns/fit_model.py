@@ -138,15 +138,15 @@ class BenchModel:
         law, slide = scene.friction, scene.slide
         aged = not has(law.law, "timeless") and not (has(law.law, "bonds") and law.rest_growth is None)
         if not aged and not (scene.normal is not None and scene.normal.amplitude):
-            self.notes.append(f"{loop.path} has no time: its rows are taken as even in time, which law '{law.law}' "
-                              "does not feel")
+            self.notes.append(f"{loop.path} has no time: its rows are taken as evenly spaced in time, which does "
+                              "not affect law '{law.law}'")
             return np.arange(float(loop.reading.size))
         move = np.abs(np.diff(loop.displacement))
         if slide.kind in ("constant", "triangle") and move.all():
-            self.notes.append(f"{loop.path} has no time: its rows follow each other at slide.speed")
+            self.notes.append(f"{loop.path} has no time: its rows are timed by slide.speed")
             return np.concatenate([[0.0], np.cumsum(move / slide.speed)])
-        raise PatchfemError(f"{loop.path}:1: no column time [s], which law '{law.law}' needs here (only a constant or "
-                            "triangle slide that never rests has its pace in the scene)")
+        raise PatchfemError(f"{loop.path}:1: no column time [s], which law '{law.law}' needs here (the scene sets the "
+                            "speed only for a constant or triangle slide without rests)")
 
     def _note_amplitude(self) -> None:
         slide, half = self.scene.slide, float(np.ptp(self.loop.displacement)) / 2

@@ -158,16 +158,16 @@ def _refuse(model: Model) -> None:
     """PatchfemError where a patch is no set of elastic-plastic elements of its own."""
     f, rig = model.friction, model.rig
     if model.patch is None or f is None:
-        raise PatchfemError("fit --from-patch wants a patch that slides: [contact] and [friction], with [slide] or "
+        raise PatchfemError("fit --from-patch needs a patch that slides: [contact] and [friction], with [slide] or "
                             "with [structure] and [drive]", "contact" if model.patch is None else "friction")
     named = [law for law in LAWS if has(law, "timeless") and "shear" in LAWS[law].carries.split()]
     for key, reason, holds in (
-            ("friction.law", f"'{f.law}' makes no elements that stick or slip of a patch, whose loops follow from one "
-             f"curve; use {' or '.join(named)}", f.law not in named),
-            ("friction.law", f"'{f.law}' gives way nowhere, so no stiffness is there to fit: add [contact.shear] or "
+            ("friction.law", f"'{f.law}' does not turn a patch into elements that stick or slip; "
+             f"use {' or '.join(named)}", f.law not in named),
+            ("friction.law", f"'{f.law}' is rigid, so there is no stiffness to fit: add [contact.shear] or "
              "contact.asperities.tangential_ratio", has(f.law, "set-valued") and not model.soft),
-            ("contact.grooves", "the load climbs their flanks, which is no law of the points; leave them out here, and "
-             "put them as [normal.grooves] beside the fitted law", model.grooves is not None),
+            ("contact.grooves", "the load climbs their flanks, which no fitted law describes; leave them out here and "
+             "add [normal.grooves] to the fitted law", model.grooves is not None),
             ("wear", "the loops are those of new pieces; leave [wear] out", model.kind != "patch" and
              model.wear is not None),
             ("structure.mode", "moves or turns the pieces out of the plane of the contact, so the load changes and the "
@@ -180,5 +180,5 @@ def _refuse(model: Model) -> None:
 def slides_of(lengths) -> np.ndarray | None:
     """The slides (k,) [m] that were asked for, None for none; PatchfemError for fewer than three, which fix no law."""
     if lengths is not None and len(lengths) < 3:
-        raise PatchfemError("--amplitudes: three at least are wanted, such as 0.1 um..10 um:25")
+        raise PatchfemError("--amplitudes: at least three are needed, such as 0.1 um..10 um:25")
     return None if lengths is None else np.asarray(lengths, float)

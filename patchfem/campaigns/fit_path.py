@@ -40,7 +40,7 @@ def offsets_of(names, loop: Loop) -> list:
     out = []
     for name in dict.fromkeys(part.strip() for one in names for part in one.split(",")):
         if name not in OFFSETS:
-            raise PatchfemError(f"--offset {name}: known are {' and '.join(OFFSETS)}")
+            raise PatchfemError(f"--offset {name}: unknown; use {' or '.join(OFFSETS)}")
         if name == "force":
             size, kind = float(np.abs(loop.reading).max()), "force" if loop.quantity == "force" else None
         else:
@@ -60,8 +60,8 @@ def whole_cycles(loop: Loop) -> int:
     behind = place * way < -SAME * np.ptp(place)
     back = np.flatnonzero(behind[:-1] & ~behind[1:])
     if not back.size:
-        raise PatchfemError(f"{loop.path}: --warm-up wants a record that comes back to its first displacement and "
-                            "passes it the same way; leave --warm-up out or record a whole cycle")
+        raise PatchfemError(f"{loop.path}: --warm-up needs a record that passes its first displacement again in "
+                            "the same direction; leave --warm-up out or record a whole cycle")
     return int(back[-1]) + 1
 
 

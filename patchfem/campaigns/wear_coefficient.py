@@ -61,24 +61,24 @@ def measured_of(text: str) -> Measured:
     if not equals:
         return _from_file(Path(text))
     if name not in QUANTITIES:
-        raise PatchfemError(f"--to {text}: {name} is not known; one of {', '.join(QUANTITIES)}, such as "
+        raise PatchfemError(f"--to {text}: {name} is not known; use one of {', '.join(QUANTITIES)}, such as "
                             '"worn_depth_max=2.5 um..3.5 um", or the JSON of compare')
     try:
         ends = [parse(part.strip(), "length") for part in value.split("..")]
     except ValueError as error:
         raise PatchfemError(f"--to {name}: {error}") from None
     if len(ends) > 2 or not 0 < ends[0] <= ends[-1]:
-        raise PatchfemError(f"--to {text}: one value above zero or low..high is wanted")
+        raise PatchfemError(f"--to {text}: one value above zero or low..high is needed")
     return Measured(name, (ends[0] + ends[-1]) / 2, ends[0], ends[-1], "--to")
 
 
 def _from_file(path: Path) -> Measured:
     try:
         if path.stat().st_size > LARGEST:
-            raise PatchfemError(f"{path}: more than {LARGEST} bytes; the JSON of compare is wanted")
+            raise PatchfemError(f"{path}: more than {LARGEST} bytes; the JSON of compare is needed")
         found = json.loads(path.read_text("utf-8"))
     except FileNotFoundError:
-        raise Missing(f"{path}: no such file; --to wants the JSON of compare or worn_depth_max=VALUE") from None
+        raise Missing(f"{path}: no such file; --to needs the JSON of compare or worn_depth_max=VALUE") from None
     except (OSError, ValueError, RecursionError) as error:
         raise PatchfemError(f"{path}: not the JSON of compare ({error})") from None
     found = found.get("measures", found) if isinstance(found, dict) else {}
@@ -99,7 +99,7 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
     """
     bounds, target = _bounds(free), measured_of(to)
     if model.patch is None:
-        raise PatchfemError(f"--to {target.name}: one point under [normal] has no depth; name [contact]", "normal")
+        raise PatchfemError(f"--to {target.name}: one point under [normal] has no depth; use [contact]", "normal")
     if model.wear.start is not None:
         raise PatchfemError(f"fit {KEY}: the depth of new pieces is fitted; leave it out", "wear.start")
 
@@ -120,7 +120,7 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
     else:
         raise NotConverged(f"fit {KEY}: {MOST_RUNS} runs end at {target.name} = {reached:.6g}, not {target.value:.6g}")
     if value < bounds.low:
-        raise PatchfemError(f"--free {KEY}: {target.name} = {target.value:.4g} wants {value:.4g} m^2/N, below the low "
+        raise PatchfemError(f"--free {KEY}: {target.name} = {target.value:.4g} needs {value:.4g} m^2/N, below the low "
                             f"bound {bounds.low:.4g}; lower it")
     low, high = (value * inverse(min(end, most)) / inverse(target.value) for end in (target.low, target.high))
     return Coefficient(float(value), float(low), float(high), target, float(reached), bounds, runs)
@@ -131,7 +131,7 @@ def _bounds(free) -> Range:
     if wrong:
         raise SceneError(wrong)
     if [one.key for one in found] != [KEY]:
-        raise PatchfemError(f"--free: beside [wear] only {KEY} is fitted, such as {KEY}=1e-16 m^2/N..1e-12 m^2/N")
+        raise PatchfemError(f"--free: with [wear] only {KEY} is fitted, such as {KEY}=1e-16 m^2/N..1e-12 m^2/N")
     return found[0]
 
 

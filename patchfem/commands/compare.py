@@ -38,13 +38,13 @@ from .streams import plain
 
 
 def compare(before: Path | None = None, after: Path | None = None, /, *other: Path,
-            pairs: Annotated[Path | None, Parameter(help="in place of files a table of them or of results folders, a "
-                             "pair in each line, such as pairs.csv with the columns before and after")] = None,
-            direction: word("x or y, along which the traces run; an areal scan has both") = "",
+            pairs: Annotated[Path | None, Parameter(help="a table of files or results folders instead, one pair per "
+                             "line, such as pairs.csv with the columns before and after")] = None,
+            direction: word("axis along which the traces run, x or y; an areal scan has both") = "",
             units: Units = "",
-            shift: word("known shift: what stands at x before stands at x + shift after, such as \"0 mm\" for traces "
+            shift: word("known shift, x after minus x before, such as \"0 mm\" for traces "
                         "from one mark") = "",
-            keep_spikes: flag("keep spikes, dropouts and dust, which are left out of traces otherwise") = False,
+            keep_spikes: flag("keep spikes, dropouts and dust, which are otherwise left out of traces") = False,
             scene: Annotated[Path | None, Parameter(name="--scene", help="press the patch of this scene with each "
                                                     "surface, such as rig.toml")] = None,
             set_: Sets = (), out: Out = None, json_: Json = False, quiet: Quiet = False):
@@ -56,17 +56,17 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """
     if direction not in ("", "x", "y"):
-        raise Refused(f"compare --direction {direction}: x or y is wanted")
+        raise Refused(f"compare --direction {direction}: x or y is needed")
     how = {"units": pair(units), "shift": quantity(shift, "length", "compare --shift"), "keep_spikes": keep_spikes}
     files = [one for one in (before, after, *other) if one is not None]
     if pairs is not None:
         if files or scene is not None:
-            raise Refused(f"compare --pairs {pairs}: the table alone is wanted, without "
+            raise Refused(f"compare --pairs {pairs}: give the table alone, without "
                           f"{'other files' if files else '--scene'}")
         _table(pairs, direction, how, placed(out, pairs.stem), json_, quiet)
         return
     if len(files) < 2:
-        raise Refused("compare: BEFORE and AFTER are wanted, or --pairs with a table of them")
+        raise Refused("compare: BEFORE and AFTER are needed, or --pairs with a table of them")
     if before.is_dir() or after.is_dir():
         _no_traces({"a third file": other, "--direction": direction, "--units": units, "--shift": shift,
                     "--keep-spikes": keep_spikes, "--scene": scene, "--set": set_})

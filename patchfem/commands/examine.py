@@ -60,7 +60,7 @@ def _cache() -> Finding:
     folder, why = compiled.cache_folder(), compiled.why_elsewhere()
     sizes = [one.stat().st_size for one in folder.rglob("*") if one.is_file()]
     return Finding("compiled code", not why, f"{len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}",
-                   why and f"{why}; name another folder in PATCHFEM_CACHE")
+                   why and f"{why}; set PATCHFEM_CACHE to another folder")
 
 
 def _threads() -> Finding:
@@ -78,7 +78,7 @@ def _window() -> Finding:
         fine, why = done.returncode == 0, (done.stderr.strip().splitlines() or ["it crashed"])[-1][:100]
     except (OSError, subprocess.TimeoutExpired) as error:
         fine, why = False, str(error)[:100]
-    cure = "" if fine else "apt-get install libgl1 libxrender1, or name a picture (view -o FILE.png), which needs none"
+    cure = "" if fine else "apt-get install libgl1 libxrender1, or write a picture (view -o FILE.png), which needs none"
     return Finding("the window by OpenGL", fine, "drawn" if fine else why, cure)
 
 
@@ -87,7 +87,7 @@ def _film() -> Finding:
     program = which("ffmpeg")
     found = "by ffmpeg" if program else _version("imageio-ffmpeg") and f"imageio-ffmpeg {_version('imageio-ffmpeg')}"
     return Finding("films (.mp4)", bool(found), found or "neither ffmpeg nor imageio-ffmpeg, optional",
-                   "" if found else "pip install imageio-ffmpeg, or take a .gif or .html, which need none")
+                   "" if found else "pip install imageio-ffmpeg, or use a .gif or .html, which need none")
 
 
 def _extras() -> Iterator[Finding]:

@@ -15,10 +15,10 @@ from .shared import Json, flag, note, texts, word
 class Estimate:
     """Options of a frequency response and its modes."""
 
-    segment: word("length of the segments of the estimate, such as \"2 s\" [the whole record where it begins and ends "
-                  "in rest, else an eighth]") = ""
+    segment: word("length of the segments of the estimate, such as \"2 s\" [the whole record if it begins and ends at "
+                  "rest, else an eighth]") = ""
     window: word("hann or none, such as none [hann where the record is cut into segments]") = ""
-    band: word("where modes are sought, such as \"20 Hz..400 Hz\"") = ""
+    band: word("band in which to find modes, such as \"20 Hz..400 Hz\"") = ""
     decay: flag("the record is a free decay: frequency and damping without an input") = False
     begin: word("where the free decay begins, such as \"0.2 s\" [at its largest value]") = ""
 
@@ -26,9 +26,9 @@ class Estimate:
 def import_(file: Path, /, *, out: Annotated[Path, Parameter(
         name=["-o", "--out"], help="table.csv of the records in SI, modes.toml for a scene, response.uff")],
             map_: texts('which channel of the file is what: "force=Load cell [lbf]", "displacement=12:+x", "time=t '
-                        '[s]", "force=run.load(:,2) [N]"; of shapes: slide=12:+x; may be repeated; without it channels '
-                        'are taken that say so themselves', "--map") = (),
-            zero: flag("count time and displacement from their first row") = False,
+                        '[s]", "force=run.load(:,2) [N]"; for shapes: slide=12:+x; may be repeated; without it the '
+                        'labels of the channels count', "--map") = (),
+            zero: flag("subtract the first row from time and displacement") = False,
             modes: Annotated[Estimate, Parameter(name="*")] = Estimate(), json_: Json = False):
     """Turn the records of a laboratory file (.uff: datasets 58 in the units of 164; .mat; .csv with units in its
     header) into the table that drive.file, slide.file and fit --to read, or into modes: of an input and a response, of

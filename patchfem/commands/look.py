@@ -9,14 +9,14 @@ from ..export import chosen, reports
 from ..export.lab import structures
 from .shared import Refused, Sets, flag, model_of, out_in, word
 
-Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0, the pressed state; the last one unless "
-                                             "given")]
+Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0 for the pressed state; the last one "
+                                             "unless given")]
 
 
 def export(folder: Path, /, *, out: Annotated[Path, Parameter(
         name=["-o", "--out"], help="fields.pvd (a series, for any ParaView), .vtu, .csv or .vtkhdf; cycle.py (plays "
-                                   "the last cycle in ParaView); histories.uff, .mat or .csv; of a scene its matrices "
-                                   "and friction elements as .mat (NLvib) or .npz (TMDSimPy, pyHarm)")],
+                                   "the last cycle in ParaView); histories.uff, .mat or .csv; for a scene its "
+                                   "matrices and friction elements as .mat (NLvib) or .npz (TMDSimPy, pyHarm)")],
            frame: Frame = None, sets: Sets = (),
            histories: flag("the histories and loops as .csv, not the interface") = False,
            of: word("stress that a script for ParaView colours, such as sigma_yy or tau_xy; von_mises unless given",
@@ -32,13 +32,13 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
         print(chosen.export(folder, out, frame, histories, of))
         return
     if frame is not None or histories or of:
-        raise Refused("--frame, --histories, --of: belong to a results folder; of a scene its structure is written")
+        raise Refused("--frame, --histories, --of: belong to a results folder; a scene is exported as its structure")
     print(structures.export(model_of(folder, sets), out))
 
 
 def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif, .mp4, .html: the last cycle") = None,
          frame: Frame = None,
-         magnify: Annotated[float | None, Parameter(help="what displacements are magnified by, such as 1000")] = None):
+         magnify: Annotated[float | None, Parameter(help="factor on displacements, such as 1000")] = None):
     """Show the pressed pieces of a results folder in a window, or draw them into a picture or a film.
 
     Example: patchfem view out/rig -o cycle.gif
@@ -48,8 +48,8 @@ def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif
 
 
 def report(*folders: Path, out: out_in("page.html, by default report.html here") = None,
-           measured: Annotated[Path | None, Parameter(help="file of a laboratory, or the table that `import` made of "
-                                                           "it: laid over the pictures of runs")] = None):
+           measured: Annotated[Path | None, Parameter(help="measured data to plot over the runs: a file of a "
+                                                           "laboratory or the table that `import` made")] = None):
     """Lay the results folders of several runs, or of several sweeps over the same keys, side by side on one page for a
     browser; for a single sweep, rebuild its page.
 

@@ -14,12 +14,12 @@ from .shared import Json, Refused, Units, flag, note, out_in, pair, quantity, wo
 
 def profile(file: Path, /, *more: Path,
             cutoff: word('wavelength that splits roughness from waviness (L-filter), such as "0.25 mm"') = "",
-            form: word("what is subtracted first: a degree from 1 (line or plane) to 9 such as 2, or cylinder") = "1",
-            s_filter: word('wavelength below which waves are left out first, such as "2.5 um"') = "",
+            form: word("form to subtract first: a degree from 1 (line or plane) to 9 such as 2, or cylinder") = "1",
+            s_filter: word('wavelength below which waves are removed first, such as "2.5 um"') = "",
             level: word('height over the mean line at which the material ratio is read, such as "0.5 um"') = "0 um",
-            ratios: word('material ratios whose heights are set side by side, such as "10,90" in percent') = "10,90",
-            window: word('the part between two cursors, such as "468 um,733 um"; of a scan four, '
-                         'first those of x') = "",
+            ratios: word('material ratios whose heights are compared, such as "10,90" in percent') = "10,90",
+            window: word('the part between two cursors, such as "468 um,733 um"; for a scan '
+                         'four, those of x first') = "",
             tip: word('radius of the stylus, against which the valleys are checked, such as "12.5 um"') = "",
             units: Units = "",
             out: out_in("folder for a page, its numbers, a table of them and the levelled heights, such as "
@@ -33,7 +33,7 @@ def profile(file: Path, /, *more: Path,
     for name, text in (("cutoff", cutoff), ("tip", tip), ("s-filter", s_filter)):
         asked[name] = quantity(text, "length", f"profile --{name}")
         if asked[name] is not None and asked[name] <= 0:
-            raise Refused(f"profile --{name} {text}: a length above zero is wanted")
+            raise Refused(f"profile --{name} {text}: a length above zero is needed")
     asked["settings"] = roughness_report.Settings(forms.form_of(form), asked.pop("s-filter"),
                                                   quantity(level, "length", "profile --level"), _ratios(ratios))
     reports = [roughness_report.report_of(read.read_surface(path, pair(units)), **asked) for path in (file, *more)]
@@ -64,12 +64,12 @@ def _ratios(text: str) -> tuple:
     except ValueError:
         first, second = 1.0, 0.0
     if not 0 <= first < second <= 1:
-        raise Refused(f"profile --ratios '{text}': two growing shares in percent are wanted, such as '10,90'")
+        raise Refused(f"profile --ratios '{text}': two rising percentages are needed, such as '10,90'")
     return first, second
 
 
 def _window(text: str) -> tuple:
     words = text.split(",")
     if len(words) not in (2, 4) or not all(map(str.strip, words)):
-        raise Refused(f"profile --window '{text}': two places are wanted, such as '468 um,733 um', of a scan four")
+        raise Refused(f"profile --window '{text}': two places are needed, such as '468 um,733 um', for a scan four")
     return tuple(quantity(word, "length", "profile --window") for word in words)

@@ -28,10 +28,10 @@ from .shared import (
 
 
 def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False,
-        resume: flag("go on with an interrupted run that has [wear] or marches in time") = False,
-        fresh: flag("condense the pieces anew, whatever is kept of them") = False,
+        resume: flag("continue an interrupted run that has [wear] or marches in time") = False,
+        fresh: flag("condense the pieces anew, without the cache") = False,
         no_page: NoPage = False, quiet: Quiet = False,
-        verbose: flag("where the seconds go, beside the answer", "-v", "--verbose") = False):
+        verbose: flag("also where the time went", "-v", "--verbose") = False):
     """Run SCENE and write its results folder, by default out/<scene name>.
 
     Example: patchfem run rig.toml --set "drive.acceleration=6 g" -o out/six

@@ -65,7 +65,7 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
     read = scene_of(scene, set_) if over is None else None
     if over is not None or read.sweep:
         if probe:
-            raise Refused("--probe solves the patch of one scene; name its values by --set and leave out what is swept")
+            raise Refused("--probe solves the patch of one scene; give its values by --set and leave out what is swept")
         _plan_sweep(scene, set_, over or Over(), json_, verbose)
         return
     found = plans.plan(read)

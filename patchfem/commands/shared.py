@@ -37,8 +37,8 @@ Sets = texts('a key of the scene with another value, such as "contact.load=30 lb
 Json = flag("the answer as one JSON object on stdout", "--json")
 Out = out_in("folder of the results, such as out/mine")
 Quiet = flag("nothing but faults", "-q", "--quiet")
-Units = word('units of x and z where a file names none or wrong ones, such as "mm,um"; of a matrix of heights its '
-             'pixel and the unit of z, such as "0.8 um,nm"')
+Units = word('units of x and z where a file names none or wrong ones, such as "mm,um"; for a matrix of heights '
+             'its pixel and the unit of z, such as "0.8 um,nm"')
 NoPage = flag("leave out report.html", "--no-page")
 
 

@@ -26,7 +26,7 @@ def new(kind: str = "", /, *, out: out_in("mine.toml in place of the screen") = 
         print(text, end="")
         return
     if out.exists():
-        raise Refused(f"{out}: is there already; name another file by -o, or remove it")
+        raise Refused(f"{out}: is there already; choose another file with -o, or remove it")
 
     whole.write_text(out, text)
     print(f"{out}: {starting.KINDS[kind]}\nnext: patchfem {starting.NEXT.get(kind, 'run')} {out}")

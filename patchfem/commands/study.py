@@ -64,12 +64,12 @@ def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle,
 ALL = "all"  # of the ways of a backbone
 
 
-def backbone(scene: Path, /, *, mode: word("a mode by its name, such as axial; of masses by its number; the first "
-                                           "unless given") = "",
+def backbone(scene: Path, /, *, mode: word("a mode by its name, such as axial, or with masses by its number; the "
+                                           "first unless given") = "",
              amplitudes: word('half peak-to-peak at the output, such as "1 um..1 mm:25"; around where the contact '
                               "slips unless given") = "",
              method: Annotated[Literal["balance", "decay", "quasi-static", "all"], Parameter(
-                 help="how the motion is found: the others tell what one leaves out, such as balance")] = ALL,
+                 help="how the motion is found, such as balance; the others show what one leaves out")] = ALL,
              out: Out = None, set_: Sets = (), no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
     """Frequency and damping of a mode of SCENE over its amplitude, the contact included; its drive does not act.
 
@@ -101,16 +101,16 @@ EXACT = 1e-12  # of a value, below which an error is round-off
 class Rows:
     """Options of a fit of a rig to rows."""
 
-    leave_out: word("a column such as frequency, input or run: a fit without each value of it, scored on what it did "
-                    "not see") = ""
+    leave_out: word("refit without each value of a column such as frequency, input or run, and score the rows left "
+                    "out") = ""
     starts: Annotated[int, Parameter(help="random starts inside the ranges, such as 20; the best training score is "
                                           "taken")] = 8
-    seed: Annotated[int, Parameter(help="of the random starts, such as 1")] = 0
+    seed: Annotated[int, Parameter(help="seed seed of the random starts, such as 1")] = 0
     unstable: Annotated[Literal["bound", "out", "read"], Parameter(
-        help="what rows flagged U count as in the fit: lower bounds, nothing, or as read, such as out")] = "bound"
-    placebo: texts('a whole fit with each value, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to see '
+        help="how rows flagged U count in the fit: lower bounds, nothing, or as read, such as out")] = "bound"
+    placebo: texts('repeat the fit with each value, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to see '
                    "whether the rows prefer the scene's own") = ()
-    resume: flag("go on from the starts that an interrupted fit has finished") = False
+    resume: flag("continue an interrupted fit from its finished starts") = False
 
 
 def fit(scene: Path, /, *, to: word(
@@ -118,14 +118,14 @@ def fit(scene: Path, /, *, to: word(
             'writes), rows.csv of a rig or its decay.csv (import --decay), compare.json or "worn_depth_max=2.5 '
             'um..3.5 um" of a scene with [wear]') = "",
         free: texts('a key to find and its range, such as "friction.static=0.1..0.6"; may be repeated') = (),
-        from_patch: flag("in place of --to and --free: Iwan, Bouc-Wen and elastic-plastic laws of one point from the "
-                         "loops of the scene's own patch, each with what it leaves out and as a scene") = False,
-        amplitudes: word('beside --from-patch: half peak-to-peak of the slide, such as "0.1 um..10 um:25"; from where '
+        from_patch: flag("in place of --to and --free: fit Iwan, Bouc-Wen and elastic-plastic laws of one point to "
+                         "the loops of the scene's own patch, each with its error and as a scene") = False,
+        amplitudes: word('with --from-patch: half peak-to-peak of the slide, such as "0.1 um..10 um:25"; from where '
                          "the patch begins to slip unless given") = "",
         hold: texts('rows that are only predicted, such as "frequency=135 Hz,150 Hz"') = (),
-        offset: texts("of a loop, free besides, such as force (what the record adds to it), displacement (how far its "
-                      "first row lies from the unstressed place)") = (),
-        warm_up: flag("of a loop: its whole cycles are driven once before it, unscored") = False,
+        offset: texts("for a loop, offsets to fit as well: force (constant over the record), displacement (of its "
+                      "first row from the unstressed place)") = (),
+        warm_up: flag("for a loop: drive its whole cycles once before it, unscored") = False,
         rows: Annotated[Rows, Parameter(name="*")] = Rows(),
         out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
     """Find values of keys of SCENE from what was measured: a bench from a friction loop, a rig from rows of frequency,

@@ -28,11 +28,11 @@ class Over:
     over: texts("table.key=v1,v2,... or table.key=1 mm..9 mm:9 (:9log, :9lin), may be repeated", "--over") = ()
     cases: Annotated[Path | None, Parameter(name="--cases", help="a file such as cases.csv with a column `table.key "
                                             "[unit]` per key, a case per row")] = None
-    random: Annotated[int, Parameter(name="--random", show_default=False, help="draw so many cases, such as "
-                                            "200; a range is then 1 mm..9 mm")] = 0
+    random: Annotated[int, Parameter(name="--random", show_default=False, help="draw this many cases, such "
+                                            "as 200, from ranges such as 1 mm..9 mm")] = 0
     sobol: Annotated[int, Parameter(name="--sobol", show_default=False, help="the same by Sobol's sequence, "
                                            "best in powers of 2, such as 256")] = 0
-    seed: Annotated[int, Parameter(name="--seed", help="of the draws, such as 1")] = 0
+    seed: Annotated[int, Parameter(name="--seed", help="seed seed of the draws, such as 1")] = 0
 
     def given(self) -> bool:
         """Whether any case is asked for."""
@@ -46,11 +46,11 @@ class Over:
     def request(self):
         """The request; Refused where its parts do not stand together."""
         if self.random and self.sobol:
-            raise Refused("--random and --sobol: one of them draws the cases")
+            raise Refused("--random and --sobol: use one of them to draw the cases")
         if min(self.random, self.sobol, self.seed) < 0:
-            raise Refused("--random, --sobol and --seed are whole numbers from 0 on")
+            raise Refused("--random, --sobol and --seed must be whole numbers >= 0")
         if (self.random or self.sobol) and not self.over:
-            raise Refused("--random and --sobol want --over table.key=low..high to draw from")
+            raise Refused("--random and --sobol need --over table.key=low..high to draw from")
         return ask.Request(self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed)
 
 
@@ -59,16 +59,16 @@ class Over:
 class By:
     """Who works, and on which part."""
 
-    jobs: Annotated[int, Parameter(name=["-j", "--jobs"], help="processes of this machine, such as 4")] = 1
+    jobs: Annotated[int, Parameter(name=["-j", "--jobs"], help="processes on this machine, such as 4")] = 1
     executor: word("dask (a cluster on this machine) or dask:ADDRESS, such as dask:tcp://10.0.0.2:8786",
                    "--executor") = ""
-    shard: word("such as 3/40: the third of 40 parts only, into a folder that all parts share", "--shard") = ""
+    shard: word("one part only, such as 3/40, into a folder that all parts share", "--shard") = ""
     collect: flag("only write the tables of a sweep whose cases are all done", "--collect") = False
-    device: word("what the lanes of a sweep run on, as yet only the processor, such as cpu", "--device") = "cpu"
+    device: word("what the lanes of a sweep run on: only cpu so far", "--device") = "cpu"
 
     def __post_init__(self):
         if self.device != "cpu":
-            raise Refused(f"--device {self.device}: the lanes of a sweep run on the cores of a processor alone as yet; "
+            raise Refused(f"--device {self.device}: the lanes of a sweep run only on processor cores so far; "
                           "leave --device out, or share the cases among processes or machines: -j N, --executor dask")
 
     def part(self) -> tuple | None:
@@ -77,15 +77,15 @@ class By:
             return None
         i, _, n = self.shard.partition("/")
         if not (i.isdecimal() and n.isdecimal() and 1 <= int(i) <= int(n)):
-            raise Refused(f"--shard {self.shard}: i/n with i from 1 to n is wanted, such as 3/40")
+            raise Refused(f"--shard {self.shard}: i/n with i from 1 to n is needed, such as 3/40")
         return int(i), int(n)
 
 
 def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out: Out = None, set_: Sets = (),
-          resume: flag("go on with what the folder holds") = False,
+          resume: flag("continue with what the folder holds") = False,
           keep: Annotated[Literal["none", "summaries", "results", "pages"] | None, Parameter(
-              help="of each case its summary.json (of 1000 cases at most, unless asked), its results folder, that with "
-                   "its report.html, or nothing beside its row, such as results")] = None,
+              help="kept of each case besides its row: summary.json (unless asked, of at most 1000 cases), results "
+                   "folder, that with report.html, or nothing, such as results")] = None,
           no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
     """Run SCENE for all combinations of the values of --over, or of its table [sweep]: sweep.csv, sweep.nc and
     report.html of them all, by default in out/<scene name>-sweep.
@@ -93,7 +93,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     Example: patchfem sweep rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9" -j 2
     """
     if no_page and keep == "pages":
-        raise Refused("sweep: --no-page leaves out every report.html, --keep pages asks for one of each case; name one "
+        raise Refused("sweep: --no-page leaves out every report.html, --keep pages writes one for each case; use one "
                       "of them")
     by = by or By()
     begin, part = perf_counter(), by.part()
@@ -116,14 +116,15 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
         line.end()
         if isinstance(why, core.Missing) and not line.done:
             raise
-        say(f"{str(why) or 'interrupted'}; {line.done} of {len(cases)} cases are kept; go on with: patchfem "
+        say(f"{str(why) or 'interrupted'}; {line.done} of {len(cases)} cases are kept; continue with: patchfem "
             f"{shlex.join([word for word in sys.argv[1:] if word != '--resume'])} --resume")
         raise Ended(getattr(why, "code", 130)) from None
     line.end()
     if part is not None:
         if json_ or not quiet:
             print(json.dumps({"cases": line.done, "folder": str(target)}) if json_ else
-                  f"shard {by.shard}: {line.done} cases in {target}; when all shards are done: the same with --collect")
+                  f"shard {by.shard}: {line.done} cases in {target}; when all shards are done, repeat it with "
+                  "--collect")
         return
     if signed and not found.messages and place.kept(len(cases)) == "none":
         receipt.write(target, signed)

@@ -459,5 +459,5 @@ def _told(say) -> None:
     if not PLAIN and not any(any(one.rglob(f"*.{ending}")) for one in _kept(_folder()) for ending in ("code", "nbi")):
         why = _placed()[1] or short(_folder() / "code", LEAST)
         say("compiling the time loop for this machine, " +
-            (f"at every command (10 to 30 s): {why}; name another folder in PATCHFEM_CACHE" if why else
+            (f"at every command (10 to 30 s): {why}; set PATCHFEM_CACHE to another folder" if why else
              "once (10 to 30 s)"))

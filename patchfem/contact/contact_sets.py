@@ -61,7 +61,7 @@ class ContactSets:
         self.load, self.moment, self.energy = float(force.sum()), float(force @ self.x), float(found.energy[0])
         self.size += float(np.abs(self.c @ force).max())
         if not self.load > 0:
-            raise PatchfemError("contact: the motion starts from a contact under load; raise contact.load")
+            raise PatchfemError("contact: the motion must start from a loaded contact; raise contact.load")
         self.kept = {}
         self.reference = self.contact_set(found.on)
 

@@ -34,8 +34,8 @@ from .strips_solve import (
 )
 from .unilateral import LIMIT
 
-NEGLECTED = ("the strips over the width do not feel each other: the shear between them is neglected; fields and "
-             "pictures show their mean where they name no strips, result.nc every strip")
+NEGLECTED = ("the shear between the strips over the width is neglected; fields and pictures show their mean "
+             "unless they name strips, result.nc has every strip")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -82,7 +82,7 @@ def strip_offsets(width: float, count: int) -> np.ndarray:
     PatchfemError for less than one strip or no width.
     """
     if not (count >= 1 and width > 0):
-        raise PatchfemError(f"contact.strips.count: {count} strips over {width:.6g} m; at least one is wanted")
+        raise PatchfemError(f"contact.strips.count: {count} strips over {width:.6g} m; at least one is needed")
     return (np.arange(count) + 0.5) * (width / count) - width / 2
 
 
@@ -194,10 +194,10 @@ def _refuse_roll(offsets, load, lateral) -> None:
     if lateral is None:
         return
     if load is None or offsets.size < 2:
-        raise PatchfemError("contact.strips.roll: a free roll wants a load and two strips at least")
+        raise PatchfemError("contact.strips.roll: a free roll needs a load and at least two strips")
     if load > 0 and not offsets.min() < lateral / load < offsets.max():
         raise PatchfemError(f"contact.strips.offset: the load line at {lateral / load:.6g} m lies beyond the middle of "
-                            f"the outermost strips at {offsets.max():.6g} m, which no pressure carries; raise "
+                            f"the outermost strips at {offsets.max():.6g} m, where no pressure can balance it; raise "
                             "contact.strips.count or lower the offset")
 
 

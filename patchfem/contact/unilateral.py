@@ -229,7 +229,7 @@ def undetermined(c, turns: bool, spring: float) -> str:
     except np.linalg.LinAlgError:
         return INDEFINITE
     if not turns:
-        return "contact: the equations of the contact set left the numbers; check that load, gap and stiffnesses are " \
+        return "contact: the equations of the contact set overflowed; check that load, gap and stiffnesses are " \
                "of ordinary size"
     holder = "raise" if spring > 0 else "name"
     return "contact: the nodes that touch do not determine the rotation; bring contact.load_line.offset nearer to " \

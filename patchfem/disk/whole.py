@@ -123,7 +123,7 @@ def room(path: Path) -> tuple[int, str]:
 def short(path: Path, need: int) -> str:
     """Path, need and room where `need` bytes have none, else ""."""
     there, where = room(path)
-    return f"{shown(path)}: no room: {size_of(need)} wanted, {size_of(there)} {where}" if need > there else ""
+    return f"{shown(path)}: no room: {size_of(need)} needed, {size_of(there)} {where}" if need > there else ""
 
 
 def fault(error: OSError, path: Path, partial: Path, need: int | None = None) -> Unwritten:
@@ -138,7 +138,7 @@ def fault(error: OSError, path: Path, partial: Path, need: int | None = None) ->
         if error.errno in FULL and not _places(path):
             return Unwritten(f"{shown(path)}: no room: the table of files of its disk (inodes) is full; remove files")
         if error.errno in FULL or (error.errno is None and left < NARROW):
-            wanted = f"{size_of(need)} wanted" if need is not None else f"more than {size_of(written)} wanted"
+            wanted = f"{size_of(need)} needed" if need is not None else f"more than {size_of(written)} needed"
             why = f" ({os.strerror(error.errno)})" if error.errno else ""
             there = there if limited else there + written
             return Unwritten(f"{shown(path)}: no room{why}: {wanted}, {size_of(there)} {where}")
@@ -148,11 +148,11 @@ def fault(error: OSError, path: Path, partial: Path, need: int | None = None) ->
 def unmade(error: OSError) -> str:
     """Why a folder could not be made, with the way out where there is one."""
     if error.errno == errno.ENAMETOOLONG:
-        return "its name is longer than the disk takes; name a shorter one with -o"
+        return "its name is longer than the disk allows; use a shorter one with -o"
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
         path = Path(error.filename or "")
         files = [shown(one) for one in (path, *path.parents) if one.is_file()]
-        return f"{files[0]} is a file; name another folder" if files else str(error.strerror)
+        return f"{files[0]} is a file; choose another folder" if files else str(error.strerror)
     return str(error.strerror)
 
 

@@ -94,7 +94,7 @@ def remedy(layers: Layers, coated: bool, least: float, size: tuple) -> str:
     if coated and not 1e-3 < ratio < 1e3:
         return (f"the Young's moduli of coating and substrate differ {max(ratio, 1 / ratio):.2g} times: bring them "
                 f"nearer, make the coating thicker, or leave it out")
-    return (f"the shortest cell is {say(least, 3)} in a piece of {say(size[0], 3)} x {say(size[1], 3)}: ask for "
+    return (f"the shortest cell is {say(least, 3)} in a piece of {say(size[0], 3)} x {say(size[1], 3)}: use "
             "longer cells (contact.element_size, or those of contact.mesh)")
 
 

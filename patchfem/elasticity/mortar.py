@@ -259,5 +259,5 @@ def _reason(grids, name: str, ripple: float, place: float) -> str:
 
 def _plain(c: tuple, x, side: str) -> None:
     if not (x.size >= 3 and np.all(np.diff(x) > 0) and all(part.shape == (x.size, x.size) for part in c)):
-        raise PatchfemError(f"contact.mesh: the {side} interface needs three nodes or more by rising x, each with its "
-                            "compliance")
+        raise PatchfemError(f"contact.mesh: the {side} interface needs at least three nodes with rising x, each with "
+                            "a compliance")

@@ -15,8 +15,8 @@ from .summary import write_json
 
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error")
 HEAD = ("method", "amplitude [m]", "frequency [Hz]", "frequency_error [Hz]", "damping", "damping_error")
-WAYS = {"balance": "The periodic motion that a negative damping of the whole rig keeps up. It is what a slow decay "
-                   "shows, and what a test in phase resonance follows.",
+WAYS = {"balance": "The periodic motion that a negative damping of the whole rig would sustain. It is what a slow "
+                   "decay shows, and what a test in phase resonance follows.",
         "decay": "A release from the largest amplitude, read from turn to turn.",
         "quasi-static": "One static force along the shape of the mode with the contact held, and the loops of the "
                         "friction law."}

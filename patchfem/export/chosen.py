@@ -41,5 +41,5 @@ def view(folder: Path, out: Path | None, frame: int | None = None, magnify: floa
         viewer.view(folder, out, frame, magnify)
         return ""
     if frame is not None or magnify is not None:
-        raise PatchfemError("--frame, --magnify: a page shows the last cycle and has a slider for each")
+        raise PatchfemError("--frame, --magnify: a page shows the last cycle and has sliders for both")
     return player.write_page(folder, out)

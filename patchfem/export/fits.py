@@ -69,8 +69,8 @@ def fit_into(whole, to: str, free: Sequence[str], options: Options, target: Path
     kind = "patch" if options.from_patch else kind_of(whole, to)
     _refuse(kind, options, heard.named)
     if options.from_patch == bool(to) or (options.from_patch and free):
-        raise PatchfemError(f"{heard.named('to')} MEASURED and {heard.named('free')} KEYS are wanted, or "
-                            f"{heard.named('from_patch')} alone, which fits laws of one point to the scene's own patch")
+        raise PatchfemError(f"{heard.named('to')} MEASURED and {heard.named('free')} KEYS are needed, or "
+                            f"{heard.named('from_patch')} alone, which fits lumped laws to the scene's own patch")
     slides = slides_of(axes.lengths(options.amplitudes, heard.named("amplitudes")) if options.amplitudes else None)
     with Folder(target, options.resume) as folder:
         if folder.dropped and heard.say is not None:
@@ -107,10 +107,10 @@ def _refuse(kind: str, options: Options, named: Callable) -> None:
     for name, least in (("starts", 1), ("seed", 0)):
         value = getattr(options, name)
         if not isinstance(value, int) or value < least:
-            wanted = "one at least is wanted" if least else "a whole number from 0 on is wanted"
+            wanted = "at least one is needed" if least else "a whole number >= 0 is needed"
             raise PatchfemError(f"{named(name)} {value}: {wanted}")
     if options.unstable not in UNSTABLE:
-        raise PatchfemError(f"{named('unstable')} {options.unstable}: one of {', '.join(UNSTABLE)} is wanted")
+        raise PatchfemError(f"{named('unstable')} {options.unstable}: one of {', '.join(UNSTABLE)} is needed")
 
 
 def _of_rows(whole, path: Path, free: Sequence[str], options: Options, folder: Folder, heard: Heard) -> dict:

@@ -178,7 +178,7 @@ def with_curve(data: Contents, curve: dict) -> Contents:
     return data.also(out)
 
 
-DECAY = {"amplitude": ("m", "half of a swing of the released output"),
+DECAY = {"amplitude": ("m", "half peak-to-peak of the released output"),
          "frequency": ("Hz", "frequency of the decay"), "damping": ("1", "damping ratio of the decay")}
 
 
@@ -190,7 +190,7 @@ def with_decay(data: Contents, decay) -> Contents:
         if name != "amplitude":
             out[f"decay_{name}_error"] = (over, getattr(decay, f"{name}_error"), {
                 "units": unit, "long_name": f"half-width of the interval of the {text}"})
-    return data.also(out, {over: (over, decay.time, {"units": "s", "long_name": "time of the middle of a swing"})})
+    return data.also(out, {over: (over, decay.time, {"units": "s", "long_name": "time of the middle of that cycle"})})
 
 
 def with_spectra(data: Contents, found) -> Contents:

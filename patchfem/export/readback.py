@@ -63,7 +63,7 @@ def _looked(name: str, one: Held, sizes: dict) -> None:
             raise ValueError(f"{name} has {size} values along {dim}, others {sizes[dim]}")
     if name in ALONG and not (one.values.ndim == 1 and one.values.size and numeric(one.values)
                               and np.isfinite(one.values).all()):
-        raise ValueError(f"{name} is no row of numbers")
+        raise ValueError(f"{name} is not a row of numbers")
     if one.values.dtype.kind == "f" and np.abs(one.values[np.isfinite(one.values)]).max(initial=0.0) > HUGE:
         raise ValueError(f"{name} holds a number beyond {HUGE:g}")
 

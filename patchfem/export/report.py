@@ -107,8 +107,8 @@ def _curve(data: dict) -> Picture | None:
 def _decay(data: dict) -> Picture | None:
     if "decay" not in data:
         return None
-    return Picture(charts.decay, (data["decay"],), "Frequency and damping ratio of the released output over half its "
-                   "swing, structure and friction together; bars are what the reading and the numerics leave open.")
+    return Picture(charts.decay, (data["decay"],), "Frequency and damping ratio of the released output against half "
+                   "its peak-to-peak, structure and friction together; bars show the errors of reading and numerics.")
 
 
 def _levels(data: dict) -> Picture | None:
@@ -147,7 +147,7 @@ def _interface(data: dict) -> Picture | None:
         caption += f"; shear stress in {len(fields['time']) - 1} frames of {span}, the largest resultant in colour"
     if charts.part_in_contact(data["x"], fields["normal_stress"][0]):
         length, scale = scales.axis_unit(data["x"], "m")
-        caption += f". Shown is the part in contact, of {(data['x'][-1] - data['x'][0]) * scale:.4g} {length} in all"
+        caption += f". Only the contact is drawn, of {(data['x'][-1] - data['x'][0]) * scale:.4g} {length} in all"
     return Picture(charts.interface, (data["x"], fields), caption + ".")
 
 
@@ -200,7 +200,7 @@ def _histories(data: dict) -> Picture | None:
     if kept:
         what = "reversals were kept: a band from the lowest to the highest of each cycle." \
             if kept * period > begin else f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
-        what = "turns and stops were kept, which the line joins." if swings else what
+        what = "turning points and stops were kept; the line joins them." if swings else what
         unit, scale = scales.axis_unit(history["time"], "s")
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
     # a swing that dies down has no band per cycle: its turns are kept, and the line through them shows it
@@ -316,7 +316,7 @@ def _measures(data: dict) -> Section:
             error = error or ("unknown" if m["error"] is None else DASH)
             cells += [error, f"<td class=v>{escape(unit)}</td>", escape(others(name, m))]
         rows.append([*cells, f"<td class=soft>{escape(means.get(name, ''))}</td>"])
-    note = (f"<p class=soft>The run holds {data['cycles']:.2g} of a cycle: measures per cycle are not those of a "
+    note = (f"<p class=soft>The run holds {data['cycles']:.2g} of a cycle, so measures per cycle do not cover a "
             "whole one.</p>") if part_of_cycle(data) else ""
     heads = ("measure", ">value", ">error (±)", "unit", "in a workshop's units", "what it is")
     return Section("measures", "Measures", table(heads, rows, "across many")
@@ -329,10 +329,10 @@ def _cost(data: dict) -> Section:
     summary = data["summary"]
     rows = [[escape(e["effect"]), escape(e["equations"]), f"{e['seconds']:.3f}"] for e in summary["effects"]]
     parts = ", ".join(f"{k} {v:.3f} s" for k, v in summary["seconds"].items())
-    shared = " The law and the modes share one loop; its time stands with the law." if summary["kind"] == "rig" else ""
+    shared = " The law and the modes share one loop, timed under the law." if summary["kind"] == "rig" else ""
     absent = shown_absent(summary["not_in_scene"], summary.get("numerics", {}).get("engine"))
     text = (table(("effect", "equations", ">seconds"), rows)
-            + f"<p class=soft>Seconds by the clock on the wall: {escape(parts)}.{shared}</p>"
+            + f"<p class=soft>Wall-clock seconds: {escape(parts)}.{shared}</p>"
             f"<details><summary>Not in the scene, so neither imported nor computed</summary><p class=soft>"
             f"{escape(', '.join(absent))}.</p></details>")
     return Section("cost", "What ran and what it cost", text)
@@ -344,7 +344,7 @@ def _origin(data: dict) -> Section:
     there = FILES[1:] if data["x"] is None else FILES
     files = "".join(f"<li><a href={name}>{name}</a>: {what}</li>" for name, what in there)
     again = "" if "command" not in data else \
-        f"<p>To run it again, beside its scene:</p><pre>{escape(data['command'])}</pre>"
+        f"<p>To run it again, in the folder of its scene:</p><pre>{escape(data['command'])}</pre>"
     return Section("origin", "Scene and files", f"{again}<p>Beside this page:</p><ul>{files}</ul>"
                    f"<details><summary>Scene</summary><pre>{escape(data['scene'])}</pre></details>"
                    "<details><summary>Scene in SI, every default written out</summary><pre>"

@@ -20,7 +20,7 @@ def report_of(folders: list, out: Path | None = None, measured: Path | None = No
     measured: a file of a laboratory, whose histories and loops are laid over those of the runs.
     """
     if not folders:
-        raise PatchfemError("report: name at least one results folder")
+        raise PatchfemError("report: give at least one results folder")
     many = [(folder / "sweep.csv").is_file() for folder in folders]
     if len(set(many)) > 1:
         raise PatchfemError(f"runs and sweeps cannot be laid side by side: {folders[many.index(True)]} is a sweep, "

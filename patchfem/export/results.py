@@ -42,9 +42,9 @@ class Folder:
 
     def __enter__(self) -> "Folder":
         if not self.target.name:
-            raise PatchfemError(f"{self.shown}: the root of the file system cannot be replaced; name another -o")
+            raise PatchfemError(f"{self.shown}: the root of the file system cannot be replaced; choose another -o")
         if Path.cwd().is_relative_to(self.target):
-            raise PatchfemError(f"{self.shown}: the working folder cannot be replaced by results; name another -o")
+            raise PatchfemError(f"{self.shown}: the working folder cannot be replaced by results; choose another -o")
         self._refuse_others()
         try:
             self.target.parent.mkdir(parents=True, exist_ok=True)
@@ -89,8 +89,8 @@ class Folder:
         """What is said when kept states are dropped, "" where there are none."""
         if not any(is_state(part.name) for part in self.path.iterdir()):
             return ""
-        return (f"note: {self.path.name} held the state of an interrupted run, which is dropped: this one begins anew; "
-                "--resume goes on with one")
+        return (f"note: {self.path.name} held the state of an interrupted run, now discarded; --resume would have "
+                "continued it")
 
     def _abandon(self) -> None:
         """Remove everything but a kept state; the folder too where there is none."""
@@ -117,9 +117,9 @@ def refuse_others(place: Path, shown, known, kind: str, dots: bool = False) -> N
     if not place.exists():
         return
     if not place.is_dir():
-        raise PatchfemError(f"{shown}: {place.name} is a file, a folder is wanted; name another -o")
+        raise PatchfemError(f"{shown}: {place.name} is a file, a folder is needed; choose another -o")
     others = sorted(one.name for one in place.iterdir() if one.name.removesuffix(".partial") not in known
                     and not (unfinished(one.name) or is_state(one.name)) and not (dots and one.name.startswith(".")))
     if others:
         raise PatchfemError(f"{shown}: {place.name} holds files that are not {kind} ({', '.join(others[:3])}"
-                            f"{', ...' if len(others) > 3 else ''}); name another -o")
+                            f"{', ...' if len(others) > 3 else ''}); choose another -o")

@@ -60,13 +60,13 @@ def read_summary(path: Path) -> dict:
             raise
         first = fault.errors(include_url=False)[0]
         at = ".".join(map(str, first["loc"]))
-        raise ValueError(f"{path.name} is no summary of a run: {at + ': ' * bool(at)}{first['msg']}") from None
+        raise ValueError(f"{path.name} is not a summary of a run: {at + ': ' * bool(at)}{first['msg']}") from None
 
 
 def _whole(digits: str) -> int:
     """A whole number; ValueError for one that no float can hold."""
     if len(digits) > 300:
-        raise ValueError(f"a whole number of {len(digits)} digits is none of a run")
+        raise ValueError(f"a whole number of {len(digits)} digits cannot come from a run")
     return int(digits)
 
 

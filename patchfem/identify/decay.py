@@ -43,7 +43,7 @@ def decay(time, value) -> Decay:
     PatchfemError for fewer than 32 rows, and where nothing decays.
     """
     if time.size < 32:
-        raise PatchfemError(f"{time.size} rows of a free decay; 32 are wanted")
+        raise PatchfemError(f"{time.size} rows of a free decay; at least 32 are needed")
     time, size = time - time[0], np.sqrt(np.mean((value - value.mean())**2))
     poles, last = np.empty(0), size
     rest = value - value.mean()
@@ -69,8 +69,8 @@ def _described(time, value, poles, misfit) -> Decay:
     energy = np.array([np.sum((shares[:, 2 * k + 1] + shares[:, 2 * k + 2])**2) for k in range(own.size)])
     kept = (rate > 0) & (energy > FAINT**2 * energy.max())
     if not kept.any():
-        raise PatchfemError("what rings in the record grows instead of decaying; begin it where nothing drives any "
-                            "more")
+        raise PatchfemError("what rings in the record grows instead of decaying; begin it after the drive has "
+                            "ended")
     w = np.hypot(own, rate)
     slopes = _slopes(time, value, poles)
     spread = misfit * np.std(value) * np.sqrt(np.maximum(np.diag(np.linalg.pinv(slopes.T @ slopes)), 0))

@@ -124,7 +124,7 @@ def driven_modes(step: float, force, response, quantity: str, estimate: Estimate
     kept = (w >= 2 * np.pi * max(band[0], estimate.frequency[0])) & (w <= 2 * np.pi * min(band[1], TOP / (2 * step)))
     kept &= (zeta > 2 * LOWEST) & (zeta < 0.99 * WIDEST)
     if not kept.any():
-        raise PatchfemError(f"no mode stands out of the response between {band[0]:g} and {band[1]:g} Hz")
+        raise PatchfemError(f"no mode is visible in the response between {band[0]:g} and {band[1]:g} Hz")
     order = np.flatnonzero(kept)[np.argsort(w[kept])]
     read = _read(estimate, w, zeta, power)
     coherence = None if estimate.coherence is None else \
@@ -143,7 +143,7 @@ def _grown(record: _Record, estimate: Estimate) -> tuple:
             break
         theta, rest = record.refined(better)
     if not theta.size:
-        raise PatchfemError("no mode stands out of the response; a record over a resonance is wanted")
+        raise PatchfemError("no mode is visible in the response; a record over a resonance is needed")
     return theta, rest
 
 

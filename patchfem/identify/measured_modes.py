@@ -40,7 +40,7 @@ def response_of(values: dict) -> str:
     """The one response among records; PatchfemError where there is none or several."""
     found = [name for name in POWER if name in values]
     if len(found) != 1:
-        raise PatchfemError(f"one response is wanted, {' or '.join(POWER)}; there are {', '.join(found) or 'none'}: "
+        raise PatchfemError(f"one response is needed, {' or '.join(POWER)}; there are {', '.join(found) or 'none'}: "
                             "choose by --map")
     return found[0]
 
@@ -50,7 +50,7 @@ def estimated(values: dict, segment: float | None = None, window: str | None = N
     lacking."""
     response, inputs = response_of(values), [name for name in INPUTS if name in values]
     if len(inputs) != 1 or "time" not in values:
-        raise PatchfemError("a frequency response wants time, a response and one input, force or base_acceleration; "
+        raise PatchfemError("a frequency response needs time, a response and one input, force or base_acceleration; "
                             "there are " + ", ".join(values) + ": choose by --map, or take a free decay by --decay")
     step = even_step(values["time"])
     count = None if segment is None else round(segment / step)
@@ -82,7 +82,7 @@ def _of_force(found: Modes) -> tuple:
                             "not at one place or one has the wrong sign, so the modal mass is not known")
     size = np.sqrt(np.abs(found.residue) / found.residue[0])
     turned = found.residue < 0
-    notes = [f"the mode at {f:.5g} Hz moves against the force, as it cannot at one place; its sign is left out"
+    notes = [f"the mode at {f:.5g} Hz moves against the force, which is impossible at one place; its sign is ignored"
              for f in found.frequency[turned]]
     return {"slide": size, "output": size}, 1 / float(found.residue[0]), notes
 
@@ -93,7 +93,7 @@ def _of_base(found: Modes) -> tuple:
     scale = max(1.0, float(np.sqrt(np.sum(size**2))))
     out = np.sign(taken) * size * scale
     return {"slide": out, "output": out, "base": size / scale}, None, \
-        ["the motion of the base tells no mass: set moving_mass"]
+        ["the motion of the base gives no mass: set moving_mass"]
 
 
 def _told(found: Modes) -> list:
@@ -113,7 +113,7 @@ def _noted(found: Modes, estimate: Estimate, step: float) -> list:
         k = int(np.argmax(np.where(wide, found.read / found.damping, 0)))
         notes.append(f"segments of {estimate.segment * step:.3g} s (window {estimate.window}) widen the peak at "
                      f"{found.frequency[k]:.5g} Hz: the estimate reads a damping of {found.read[k]:.4g}, the record "
-                     f"has {found.damping[k]:.4g}, which is written; a free decay (--decay) tells it without an input")
+                     f"has {found.damping[k]:.4g}, which is written; a free decay (--decay) gives it without an input")
     if found.misfit > LOOSE:
         notes.append(f"the modes leave {100 * found.misfit:.0f} % of the response (root mean square) unexplained: "
                      "noise, or a rig that is not linear")
@@ -124,7 +124,7 @@ def _freely(values: dict, begin: float | None) -> tuple:
     """(times, values, name) of the one response from `begin` [s] on, unless given from its largest value."""
     name = response_of(values)
     if "time" not in values:
-        raise PatchfemError("a free decay wants time; choose by --map")
+        raise PatchfemError("a free decay needs time; choose by --map")
     time, value = values["time"], values[name]
     start = int(np.argmax(np.abs(value - value[-value.size // 20:].mean()))) if begin is None else \
         int(np.searchsorted(time, begin))
@@ -149,7 +149,7 @@ def of_decay(values: dict, begin: float | None = None) -> Listed:
     found = decay(*_freely(values, begin)[:2])
     about = [f"damping {zeta:.4g} +- {error:.1g}, logarithmic decrement {fall:.4g}" for zeta, error, fall in
              zip(found.damping, found.error, found.decrement())]
-    notes = ["a free decay tells no mass and no share of each mode: set moving_mass, slide, base and output"]
+    notes = ["a free decay gives no mass and no share of each mode: set moving_mass, slide, base and output"]
     if found.misfit > LOOSE_DECAY:
         notes.append(f"the decay leaves {100 * found.misfit:.0f} % of the record unexplained: it is noisy or not "
                      "exponential, as where friction damps; the damping is a mean over it")

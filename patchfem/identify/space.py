@@ -57,7 +57,7 @@ def space(low, high, log=None) -> Space:
     wide = (low > 0) & (high > 10 * low)
     log = wide if log is None else np.array(log, bool)
     if log.shape != low.shape or (log & (low <= 0)).any():
-        raise ValueError("log wants one flag per bound, and low > 0 where it is set")
+        raise ValueError("log needs one flag per bound, and low > 0 where it is set")
     return Space(low, high, log)
 
 

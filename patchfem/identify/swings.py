@@ -42,15 +42,15 @@ def half_swings(time, value) -> HalfSwings:
     PatchfemError for a trace in which nothing swings, or with fewer than FEWEST samples of a half swing.
     """
     if time.size < 4 * FEWEST:
-        raise PatchfemError(f"{time.size} rows of a free decay; {4 * FEWEST} are wanted at least")
+        raise PatchfemError(f"{time.size} rows of a free decay; at least {4 * FEWEST} are needed")
     tracked = _followed(time, value, _first(time, value))
     tries = [tracked, tracked]
     for _ in range(PASSES if len(tracked) > 2 else 0):
         tries = [_again(time, value, one, viscous) for viscous, one in enumerate(tries) if len(one) > 2]
     best = min(tries, key=lambda one: _noise(one).mean() if len(one) > 2 else np.inf, default=[])
     if len(best) < 3:
-        raise PatchfemError("no three half swings of a free decay stand out of the noise; begin the record where "
-                            "nothing drives any more (--begin), and take 10 samples of a cycle at least")
+        raise PatchfemError("fewer than three half cycles of a free decay rise above the noise; begin the record after "
+                            "the drive has ended (--begin), and take at least 10 samples per cycle")
     noise = _noise(best)
     columns = np.array([one[:5] for one in best]).T
     size = np.abs(columns[1])
@@ -72,7 +72,7 @@ def _first(time, value) -> tuple:
         part = time - time[0] <= 1 / f
         if np.count_nonzero(part) < 2 * FEWEST:
             raise PatchfemError(f"the record has {np.count_nonzero(part)} samples of a cycle of {f:.4g} Hz; "
-                                f"{2 * FEWEST} at least are wanted")
+                                f"at least {2 * FEWEST} are needed")
         turn = 2 * np.pi * f * (time[part] - time[0])
         columns = np.stack([np.ones(turn.size), np.cos(turn), np.sin(turn)], axis=1)
         x = np.linalg.lstsq(columns, value[part], rcond=None)[0]

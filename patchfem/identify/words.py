@@ -26,7 +26,7 @@ def remarks(found: Fit, names) -> list:
         elif i not in told:
             out.append(f"{name} is not determined: the rows allow the whole of its range")
     if found.failures:
-        out.append(f"{found.failures} of {found.evaluations} evaluations failed and were passed over, the first: "
+        out.append(f"{found.failures} of {found.evaluations} evaluations failed and were skipped, the first: "
                    f"{found.reason}")
     if found.outcome is Outcome.NOT_CONVERGED:
         out.append(f"not converged: the best descent did not settle within {MOST} evaluations, and no other start "

@@ -35,7 +35,7 @@ def lines_of(path: Path, what: str, remedy: str = ""):
             while data := file.read(BLOCK):
                 seen += len(data)
                 if seen > LARGEST:
-                    raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB of text; keep every few rows of {what}")
+                    raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB of text; thin out the rows of {what}")
                 *whole, last = decoder.decode(data).split("\n")
                 if whole:
                     begun.append(whole[0])
@@ -52,13 +52,13 @@ def lines_of(path: Path, what: str, remedy: str = ""):
 
 def header_of(path, line: str, units: Mapping, wanted: tuple, header: str, labels: bool) -> tuple:
     """Names of the columns as they stand, and the factor of each column of numbers; arguments as in `read_columns`."""
-    asked = f"a header like `{header}` is wanted, not '{line.strip()[:80]}'"
+    asked = f"a header like `{header}` is needed, not '{line.strip()[:80]}'"
     found = [_HEAD.fullmatch(cell) for cell in line.split(",")]
     if not all(found):
         raise PatchfemError(f"{path}:1: {asked}")
     names = [one[1] for one in found]
     if len(set(names)) < len(names):
-        raise PatchfemError(f"{path}:1: {asked} (a column stands twice)")
+        raise PatchfemError(f"{path}:1: {asked} (a column is given twice)")
     factors = {}
     for name, unit in ((one[1], one[2]) for one in found):
         if name in units:
@@ -66,10 +66,10 @@ def header_of(path, line: str, units: Mapping, wanted: tuple, header: str, label
                 raise PatchfemError(f"{path}:1: {asked} ({name} without a unit)")
             if (unit or "") not in units[name]:
                 known = ", ".join(text for text in units[name] if text)
-                raise PatchfemError(f"{path}:1: {name} [{unit}]: the unit is not known; one of {known}")
+                raise PatchfemError(f"{path}:1: {name} [{unit}]: unknown unit; use one of {known}")
             factors[name] = units[name][unit or ""]
         elif unit is not None and not labels:
-            raise PatchfemError(f"{path}:1: {asked} (with a unit are known: {', '.join(units)})")
+            raise PatchfemError(f"{path}:1: {asked} (columns with a unit: {', '.join(units)})")
     absent = [one for one, *others in map(str.split, wanted) if not {one, *others} & set(names)]
     if absent:
         raise PatchfemError(f"{path}:1: {asked} (no column {', '.join(absent)})")
@@ -85,7 +85,7 @@ def cells_of(path, number: int, line: str, names) -> dict:
     if len(cells) != len(names):
         count = _WORDS[len(names)] if len(names) < len(_WORDS) else str(len(names))
         listed = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
-        raise PatchfemError(f"{path}:{number}: {count} cells are wanted, {listed}, not '{line.strip()[:80]}'")
+        raise PatchfemError(f"{path}:{number}: {count} cells are needed, {listed}, not '{line.strip()[:80]}'")
     return dict(zip(names, cells))
 
 
@@ -95,5 +95,5 @@ def number_of(path, number: int, name: str, cell: str, factor: float) -> float:
         raise PatchfemError(f"{path}:{number}: {name}: '{cell[:80]}' is not a finite number")
     value = float(cell) * factor
     if abs(value) > BEYOND:
-        raise PatchfemError(f"{path}:{number}: {name}: {value:g} in SI is beyond what can be computed with, {BEYOND:g}")
+        raise PatchfemError(f"{path}:{number}: {name}: {value:g} in SI is outside the computable range, {BEYOND:g}")
     return value

@@ -61,7 +61,7 @@ def _columns(path: Path) -> list:
     names = [one[1] for one in heads]
     if len(names) > WIDEST or len(lines) < 3 or any(NUMBER.fullmatch(name) for name in names):
         raise PatchfemError(f"{path}:1: a header like `time [s],displacement [mm],force [N]` over at least two rows is "
-                            f"wanted, not '{lines[0][:80]}'")
+                            f"needed, not '{lines[0][:80]}'")
     rows = []
     for number, line in enumerate(lines[1:], 2):
         cells = [_bare(cell) for cell in line.split(mark)]

@@ -37,7 +37,7 @@ class Loop:
         name, equals, text = (part.strip() for part in hold.partition("="))
         wanted = [one.strip() for one in text.split(",")]
         if not equals or not all(wanted):
-            raise PatchfemError(f"--hold {hold}: column=value,value is wanted, such as cycle=1,2")
+            raise PatchfemError(f"--hold {hold}: column=value,value is needed, such as cycle=1,2")
         if name not in self.labels:
             known = ", ".join(self.labels) or "none"
             raise PatchfemError(f"--hold {name}: no such column of labels in {self.path} (there: {known}); "
@@ -67,8 +67,8 @@ def read_loop(path, units: Mapping = UNITS) -> Loop:
     values = {own_name(name, found.values): column for name, column in found.values.items()}
     read = [name for name in BESIDE if name in values]
     if len(read) != 1:
-        raise PatchfemError(f"{path}:1: " + ("force and friction_ratio stand side by side: keep one" if read else
-                            f"no column force, a header like `{HEADER}` is wanted (or friction_ratio for the force)"))
+        raise PatchfemError(f"{path}:1: " + ("force and friction_ratio are both given: keep one" if read else
+                            f"no column force; write a header like `{HEADER}` (or friction_ratio for the force)"))
     place, time = values["displacement"], values.get("time")
     if time is not None:
         rising(path, time)

@@ -135,7 +135,7 @@ def _fields(data, at: int, order: str):
     for first in range(0, len(names), wide):
         kind, body, at = _element(data, at, order)
         if kind != _MATRIX:
-            raise ValueError("a field that is no array")
+            raise ValueError("a field that is not an array")
         if body:
             yield names[first:first + wide].split(b"\0")[0].decode("latin-1"), memoryview(body)
 
@@ -215,7 +215,7 @@ def _texts(data, known: _Known, order: str) -> np.ndarray:
             kind, stored, at = _element(data, at, order)
             flag, shape, name, inner = _described(stored, order)
             if kind != _MATRIX or flag & 0xFF != _CHAR:
-                raise ValueError("a cell that is no text")
+                raise ValueError("a cell that is not text")
             one = _Known(_CHAR, shape, name.decode("latin-1"), inner, len(stored))
             found.append(_texts(stored, one, order)[0])
     out = np.empty(len(found), dtype=object)

@@ -50,7 +50,7 @@ def _symmetric(path, values, wanted: str):
     values = sparse.csr_array(values)
     if np.iscomplexobj(values.data):
         if np.abs(values.data.imag).max(initial=0.0) > 0:
-            raise PatchfemError(f"{path}: the {wanted} is complex; motion in time takes real matrices: give hysteretic "
+            raise PatchfemError(f"{path}: the {wanted} is complex; motion in time needs real matrices: give hysteretic "
                                 "damping as a ratio, half the loss factor")
         values = values.real
     if values.shape[0] != values.shape[1] or not values.shape[0]:
@@ -61,7 +61,7 @@ def _symmetric(path, values, wanted: str):
     skew, most = abs(values - values.T).max(), abs(values).max()
     if skew > SKEW * most:
         raise PatchfemError(f"{path}: the {wanted} is not symmetric: entries differ from the transpose by {skew:.3g}, "
-                            f"{skew / most:.2g} of the largest; gyroscopic and follower terms have no modes here")
+                            f"{skew / most:.2g} of the largest; gyroscopic and follower terms are not supported")
     return ((values + values.T) / 2).tocsr()
 
 
@@ -80,7 +80,7 @@ def _named(path, names, wanted: str) -> str:
     if len(names) == 1:
         return names[0]
     held = ", ".join(names[:12]) or "none"
-    raise PatchfemError(f"{path}: holds no {wanted} by a name that is known ({', '.join(NAMES[wanted])}); its arrays: "
+    raise PatchfemError(f"{path}: holds no {wanted} by a known name ({', '.join(NAMES[wanted])}); its arrays: "
                         f"{held}")
 
 
@@ -134,7 +134,7 @@ def _matlab(path: Path, wanted: str) -> Matrix:
 
 def _numpy(path: Path, wanted: str) -> Matrix:
     if not zipfile.is_zipfile(path):
-        raise PatchfemError(f"{path}: is no archive of NumPy arrays")
+        raise PatchfemError(f"{path}: is not an archive of NumPy arrays")
     with np.load(path, allow_pickle=False) as file:
         if {"format", "shape", "data"} <= set(file.files):
             return Matrix(sparse.csr_array(sparse.load_npz(path)))

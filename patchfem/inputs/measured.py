@@ -53,5 +53,5 @@ def _row(path, number: int, cells: dict, factors: dict) -> Row:
     if below:
         raise PatchfemError(f"{path}:{number}: {below}: '{cells[below][:40]}' is below 0")
     if values["frequency"] is None or values["input"] is None:
-        raise PatchfemError(f"{path}:{number}: frequency and input are wanted in every row")
+        raise PatchfemError(f"{path}:{number}: frequency and input are needed in every row")
     return Row(**values, flag=flag)

@@ -57,7 +57,7 @@ def output4(path) -> dict:
     try:
         found = _binary(data) if 0 in data[:8] else _text(data.decode("ascii"))
     except (ValueError, IndexError, KeyError, struct.error, UnicodeDecodeError) as error:
-        raise PatchfemError(f"{path}: no readable OUTPUT4 file ({error})") from None
+        raise PatchfemError(f"{path}: not a readable OUTPUT4 file ({error})") from None
     if not found:
         raise PatchfemError(f"{path}: holds no matrix")
     return {name: Cards(entries.matrix()) for name, entries in found.items()}
@@ -66,7 +66,7 @@ def output4(path) -> dict:
 def _kind(number: int) -> int:
     """Words of a number of a type of OUTPUT4."""
     if number in (3, 4):
-        raise ValueError("a matrix is complex; write its real part alone")
+        raise ValueError("a matrix is complex; write only its real part")
     return {1: 1, 2: 2}[number]
 
 
@@ -150,7 +150,7 @@ def punched(path) -> dict:
             name = fields[1].upper()
             if fields[2] == "0" and name not in forms:
                 if int(fields[4]) > 2:
-                    raise ValueError("it is complex; write its real part alone")
+                    raise ValueError("it is complex; write only its real part")
                 forms[name], entries[name] = int(fields[3]), []
                 continue
             column = int(fields[2]), int(fields[3] or 0)
@@ -158,7 +158,7 @@ def punched(path) -> dict:
                 if fields[k]:
                     entries[name].append(((int(fields[k]), int(fields[k + 1] or 0)), column, real(fields[k + 2])))
         except (ValueError, IndexError, KeyError) as error:
-            raise PatchfemError(f"{path}:{number}: no readable DMIG card ({error})") from None
+            raise PatchfemError(f"{path}:{number}: not a readable DMIG card ({error})") from None
     if not forms:
         raise PatchfemError(f"{path}: holds no DMIG card; punch the matrices with EXTSEOUT(DMIGPCH) or a DMAP alter")
     return {name: _of_cards(entries[name], forms[name]) for name in forms}

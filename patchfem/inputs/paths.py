@@ -41,9 +41,9 @@ def read_path(path, units: Mapping = UNITS) -> tuple:
 def _check(path, time, *places) -> None:
     for name, column in zip(("time", "displacement", "lateral"), (time, *places)):
         if (first := column[0]) != 0:
-            raise PatchfemError(f"{path}:2: {name} starts at {first:g}: the slide starts at 0, 0, where the pieces are "
-                                f"pressed; subtract the first {name} from the column, or let `patchfem import --zero` "
-                                "count from the first row")
+            raise PatchfemError(f"{path}:2: {name} starts at {first:g}: a slide must start at 0, 0, where the pieces "
+                                f"are pressed; subtract the first {name} from the column, or let `patchfem import "
+                                "--zero` count from the first row")
     rising(path, time)
     if not any(column.any() for column in places):
         raise PatchfemError(f"{path}: displacement is 0 in every row, so nothing slides")
@@ -58,4 +58,4 @@ def rising(path, time) -> None:
     if back.size:
         k = back[0]
         raise PatchfemError(f"{path}:{k + 3}: time {time[k + 1]:g} s does not follow {time[k]:g} s; strictly rising "
-                            "time is wanted")
+                            "time is needed")

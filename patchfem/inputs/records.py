@@ -70,11 +70,11 @@ def wanted(texts, names=UNITS) -> list:
     for text in (part for whole in texts for part in re.split(r",(?=\s*\w+\s*=)", whole)):
         parts = _ASKED.fullmatch(text)
         if parts is None:
-            raise PatchfemError(f"--map {text}: NAME=CHANNEL or NAME=CHANNEL [unit] is wanted, such as "
+            raise PatchfemError(f"--map {text}: NAME=CHANNEL or NAME=CHANNEL [unit] is needed, such as "
                                 "\"force=Load cell [lbf]\"")
         name, source, unit = parts[1], parts[2], parts[3] or ""
         if name not in names:
-            raise PatchfemError(f"--map {name}: not known; one of {', '.join(names)}")
+            raise PatchfemError(f"--map {name}: unknown; use one of {', '.join(names)}")
         if unit and name in UNITS:
             factor_of(name, unit, "--map ")
         if name in [one.quantity for one in found]:
@@ -87,7 +87,7 @@ def factor_of(quantity: str, unit: str, where: str = "") -> float:
     """Factor to SI of a unit of a quantity; PatchfemError, which starts with `where`, for one that is not known."""
     known, plain = UNITS[quantity], plain_unit(unit)
     if plain not in known:
-        raise PatchfemError(f"{where}{quantity} [{unit[:40]}]: the unit is not known; one of "
+        raise PatchfemError(f"{where}{quantity} [{unit[:40]}]: unknown unit; use one of "
                             f"{', '.join(one for one in known if one)}")
     return known[plain]
 
@@ -131,7 +131,7 @@ def found(path, channels: list, source: str) -> Channel:
         if len(same) == 1:
             return same[0]
         if same:
-            raise PatchfemError(f"{path}: {len(same)} channels are '{source}'; name one by its number, among "
+            raise PatchfemError(f"{path}: {len(same)} channels are '{source}'; choose one by its number, among "
                                 f"{listed(channels)}")
     if source.isdecimal() and 1 <= int(source) <= len(channels):
         return channels[int(source) - 1]
@@ -150,9 +150,9 @@ def checked(path, values: dict, notes: list) -> Records:
     time that does not rise."""
     sizes = {name: len(column) for name, column in values.items()}
     if len(set(sizes.values())) > 1:
-        raise PatchfemError(f"{path}: channels of unlike length: {', '.join(f'{n} {k}' for n, k in sizes.items())}")
+        raise PatchfemError(f"{path}: channels of different length: {', '.join(f'{n} {k}' for n, k in sizes.items())}")
     if min(sizes.values()) < 2:
-        raise PatchfemError(f"{path}: at least two samples are wanted")
+        raise PatchfemError(f"{path}: at least two samples are needed")
     for name, column in values.items():
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
@@ -161,7 +161,7 @@ def checked(path, values: dict, notes: list) -> Records:
     if back.size:
         k = back[0]
         raise PatchfemError(f"{path}: time {values['time'][k + 1]:.9g} s of sample {k + 2} does not follow "
-                            f"{values['time'][k]:.9g} s; strictly rising time is wanted")
+                            f"{values['time'][k]:.9g} s; strictly rising time is needed")
     return Records(Path(path), {name: frozen_array(column) for name, column in values.items()}, notes)
 
 

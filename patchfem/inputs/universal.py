@@ -76,10 +76,11 @@ def _channel(path, number: int, one: dict, scale, notes: list) -> Channel:
         if label or scale is None:
             notes.append(f"record {number} ({quantity}): " + (f"its unit '{label[:20]}' is not known" if label else
                          "it has no unit") + ("; dataset 164 is followed" if scale is not None else
-                                              "; its values are taken as SI, or name the unit with --map"))
+                                              "; its values are taken as SI; if they are not, give the unit with "
+                                              "--map"))
     direction = int(one["rsp_dir"])
     if direction < 0:
-        notes.append(f"record {number} points along -{_axis(direction)}; its sign is turned")
+        notes.append(f"record {number} points along -{_axis(direction)}; its sign is reversed")
         values = -values
     name = _text(one["id1"]) or f"record {number}"
     return Channel(name, f"{int(one['rsp_node'])}:+{_axis(direction)}" if direction else "", quantity, label,

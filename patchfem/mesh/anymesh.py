@@ -139,7 +139,7 @@ def pieces(raw: Tagged, where) -> PairMesh:
                                                        raw.quads[mine[count:]].ravel()])))
     shared = np.intersect1d(owned["lower"][1], owned["upper"][1]).size
     if shared:
-        raise PatchfemError(f"{where}: the two pieces share {shared} nodes; each needs interface nodes of its own")
+        raise PatchfemError(f"{where}: the two pieces share {shared} nodes; each needs its own interface nodes")
     lower, upper = _piece(raw, "lower", *owned["lower"], where), _piece(raw, "upper", *owned["upper"], where)
     apart = np.abs(lower.x[[0, -1]] - upper.x[[0, -1]]).max()
     if apart > CLOSE * lower.length:
@@ -243,9 +243,9 @@ def _interface(points, nodes, side: str, where) -> np.ndarray:
         if not flat.any() and not wrong.any():
             raise PatchfemError(f"{where}: no node of {name} lies on y = 0, where rounded faces touch; the nearest is "
                                 f"{abs(y).min():.6g} m off it")
-        raise PatchfemError(f"{where}: {name} is not the straight line y = 0, with edges rounded away by a slope up to "
-                            f"{STEEP:g}: the node at x = {x[off]:.6g} m lies {abs(y[off]):.6g} m off it; shapes belong "
-                            "into the gap ([contact.crown], [contact.tilt])")
+        raise PatchfemError(f"{where}: {name} is not the straight line y = 0 (rounded edges may reach a slope of "
+                            f"{STEEP:g}): the node at x = {x[off]:.6g} m lies {abs(y[off]):.6g} m off it; shapes "
+                            "belong in the gap ([contact.crown], [contact.tilt])")
     if points[:, 1].min() < -close:
         raise PatchfemError(f"{where}: the {side} piece reaches {-points[:, 1].min():.6g} m across y = 0; the lower "
                             "piece lies at y <= 0, the upper one at y >= 0")
@@ -263,10 +263,10 @@ def _joined(mesh: PieceMesh, side: str, where) -> None:
     near = cKDTree(mesh.points).query_pairs(CLOSE * mesh.length, output_type="ndarray")
     if len(near):
         x, y = mesh.points[near[0, 0]]
-        raise PatchfemError(f"{where}: {len(near)} pairs of nodes of the {side} piece lie on one another, the first at "
-                            f"x = {x:.6g} m, {y:.6g} m from the interface; merge them")
+        raise PatchfemError(f"{where}: {len(near)} pairs of nodes of the {side} piece coincide, the first at x "
+                            f"= {x:.6g} m, {y:.6g} m from the interface; merge them")
     if np.unique(ends[:, 0] * count + ends[:, 1]).size < len(ends):
-        raise PatchfemError(f"{where}: cells of the {side} piece lie on one another")
+        raise PatchfemError(f"{where}: cells of the {side} piece overlap")
     key = ends.min(axis=1) * count + ends.max(axis=1)
     order = np.argsort(key, kind="stable")
     twice = np.flatnonzero(key[order][1:] == key[order][:-1])
@@ -286,7 +286,7 @@ def _joined(mesh: PieceMesh, side: str, where) -> None:
     gone = ~np.isin(wanted[:, 0] * count + wanted[:, 1], key[~inner])
     if gone.any():
         x = mesh.x[np.argmax(gone)]
-        what = f"{where}: {side}_interface has a hole or leaves out nodes behind x = {x:.6g} m"
+        what = f"{where}: {side}_interface has a hole or leaves out nodes after x = {x:.6g} m"
         raise PatchfemError(unbuilt(what, "make it one stretch"))
 
 

@@ -183,7 +183,7 @@ def _tagged(nodes: dict, elements: dict, node_sets: dict, element_sets: dict, ho
 
     sizes = {len(where) for where in nodes.values()}
     if sizes - {2} and sizes - {3}:
-        raise PatchfemError("nodes need two or three coordinates, all of them alike")
+        raise PatchfemError("all nodes need two coordinates, or all three")
     name = {}
     for tag in CELLS:
         for number in element_sets.get(tag, ()):
@@ -199,7 +199,7 @@ def _tagged(nodes: dict, elements: dict, node_sets: dict, element_sets: dict, ho
         for number in element_sets.get(tag, ()):
             corners = elements.get(number, ())
             if len(corners) != 2:
-                raise PatchfemError(f"{tag} holds element {number}, which is no line element")
+                raise PatchfemError(f"{tag} holds element {number}, which is not a line element")
             numbers += corners
         edges[tag] = np.array(places(tag, numbers), np.int64)
     points = np.array(list(nodes.values()), float) if nodes else np.empty((0, 2))

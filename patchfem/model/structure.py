@@ -34,7 +34,7 @@ def modes_of(scene, own: ModalBasis | None = None) -> ModalBasis:
     if bonded is None or bonded.wavelength is not None:  # interlocking is no spring: it acts in the march
         return found
     if len(found.interfaces) != 1 and not scene.structure.mode:
-        raise PatchfemError(f"{scene.where('structure.bonded')}: stands beside one contact, but the rig has "
+        raise PatchfemError(f"{scene.where('structure.bonded')}: is for one contact, but the rig has "
                             f"{len(found.interfaces)} interfaces; write a spring between the same places")
     return module_of("structure.bonded").bonded(found, bonded.stiffness, bonded.damping)
 
@@ -73,7 +73,7 @@ def own_modes(scene, joint: float | None = None) -> ModalBasis:
         return module_of("structure.bonded").freed(found, held, 0.0 if bonded is None else bonded.damping)
     except PatchfemError as error:
         raise PatchfemError(f"{scene.where('structure.measured')}: {error}; give the frequencies of the bolted rig, a "
-                            "softer joint, or leave 'measured' out where they are those without the joint") from None
+                            "softer joint, or leave 'measured' out if they are those without the joint") from None
 
 
 def of_a_patch(scene) -> bool:
@@ -101,8 +101,8 @@ def stiffness_of(one, load: float) -> float:
     if 0 < held < inf and not curved:
         return held
     why = "holds rigidly" if held == inf else "holds with no one stiffness" if curved else "holds nothing"
-    raise PatchfemError(f"{one.key}: law '{f.law}' {why} here, so its stiffness cannot be taken off the modes; name "
-                        "what gives way ([contact.shear], or a law with a stiffness such as iwan), or give the modes "
+    raise PatchfemError(f"{one.key}: law '{f.law}' {why} here, so its stiffness cannot be taken off the modes; add "
+                        "an elastic part ([contact.shear], or a law with a stiffness such as iwan), or give the modes "
                         "without the joint", "structure.measured")
 
 

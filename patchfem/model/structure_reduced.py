@@ -123,7 +123,7 @@ def _rows(text, one: matrices.Matrix, n: int, key: str) -> np.ndarray:
         count = count or last - first + 1
         step = (last - first) / max(count - 1, 1)
         if not 1 <= first <= last <= n or step != int(step) or (step == 0 and count > 1):
-            raise PatchfemError(f"'{text}' is no range of whole rows from 1 to {n}; 'a..b:n' are n rows from a to b",
+            raise PatchfemError(f"'{text}' is not a range of rows from 1 to {n}; 'a..b:n' are n rows from a to b",
                                 where)
         return np.arange(first - 1, last, max(int(step), 1))
     if one.places is None:
@@ -132,7 +132,7 @@ def _rows(text, one: matrices.Matrix, n: int, key: str) -> np.ndarray:
         return np.flatnonzero(one.places[:, 1] == AXES.index(text) + 1)
     found = _PLACE.fullmatch(text)
     if found is None:
-        raise PatchfemError(f"'{text}' is no place; node:direction is wanted, such as \"1201:x\"", where)
+        raise PatchfemError(f"'{text}' is not a place; node:direction is needed, such as \"1201:x\"", where)
     place = int(found[1]), AXES.index(found[2]) + 1 if found[2] else 0
     rows = np.flatnonzero((one.places == place).all(axis=1))
     if not rows.size:

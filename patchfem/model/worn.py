@@ -41,8 +41,8 @@ class WornBefore:
         asked, cycles = float(self.scene["wear"]["cycles"]), f"{self.cycles:.6g}"
         if self.cycles < asked * (1 - 1e-9):
             cycles += f" of {asked:.6g}"
-        return (f"goes on from {self.path.parent.name}/{self.path.name}, up to {say(float(self.depth.max()), 3)} worn "
-                f"off in {cycles} cycles; cycles count from there, worn_volume and worn_depth_max from new pieces")
+        return (f"continues from {self.path.parent.name}/{self.path.name}, up to {say(float(self.depth.max()), 3)} "
+                f"worn off in {cycles} cycles; cycles count from there, worn_volume and worn_depth_max from new pieces")
 
     def on(self, x) -> np.ndarray:
         """Worn depth (m,) [m] at x (m,) [m] of an interface; PatchfemError unless it is as long."""
@@ -55,8 +55,9 @@ class WornBefore:
         off = np.interp(x, self.x, self.gap) - gap
         off = float(np.abs(off - np.polyval(np.polyfit(x, off, 1), x)).max())
         if off > SAME * float(np.ptp(gap)) + FLAT:
-            raise PatchfemError(f"{self.path}: its new surfaces differ from those of this scene by {say(off, 3)}; name "
-                                "a run of the same pieces, with as long elements where they are rough", KEY)
+            raise PatchfemError(f"{self.path}: its new surfaces differ from those of this scene by {say(off, 3)}; "
+                                "choose a run of the same pieces, with elements of the same length if they are "
+                                "rough", KEY)
 
     def missing(self, name: str, value: float) -> float | None:
         """Error of a measure of wear at the end of that run, and how far `value`, found of its depth on another mesh,
@@ -67,7 +68,7 @@ class WornBefore:
     def _as_long(self, first: float, last: float) -> None:
         if not np.allclose(self.x[[0, -1]], (first, last), rtol=1e-6, atol=0):
             raise PatchfemError(f"{self.path}: worn on an interface of {say(float(np.ptp(self.x)))}, and this one has "
-                                f"{say(last - first)}; name a run of the same pieces", KEY)
+                                f"{say(last - first)}; choose a run of the same pieces", KEY)
 
 
 def read(path: Path) -> WornBefore:
@@ -86,10 +87,10 @@ def read(path: Path) -> WornBefore:
     except UNREADABLE:
         raise PatchfemError(f"{path}: not the result.nc of a run with [wear] over a patch; name one", KEY) from None
     if strips:
-        raise PatchfemError(f"{path}: worn strip by strip, from which no run can go on yet; name a run without "
+        raise PatchfemError(f"{path}: worn strip by strip, which no run can continue yet; choose a run without "
                             "[contact.strips]", KEY)
     if not right:
-        raise PatchfemError(f"{path}: its worn depth is no row of depths along a patch; run that scene again", KEY)
+        raise PatchfemError(f"{path}: its worn depth is not a row of depths along a patch; run that scene again", KEY)
     return found
 
 
@@ -100,6 +101,6 @@ def of_pieces(path: Path, tables: Tables) -> WornBefore:
                 {"wear.upper_share": each["wear"]["upper_share"]} for each in (found.scene, here))
     unlike = [key if "." in key else f"contact.{key}" for key in {**one, **two} if one.get(key) != two.get(key)]
     if unlike:
-        raise PatchfemError(f"{path}: worn on other pieces: {', '.join(unlike)} differ; name a run of the same "
-                            "pieces", KEY)
+        raise PatchfemError(f"{path}: worn on other pieces: {', '.join(unlike)} differ; choose a run of the "
+                            "same pieces", KEY)
     return found

@@ -66,16 +66,16 @@ def unclosed(values, window, drive) -> dict:
 
 def _of_phase(values, drive) -> str:
     if not sinusoidal(drive):
-        return "the drive does not end as a sine, so it gives a slip no phase"
+        return "the drive does not end as a sine, so slip has no phase"
     stuck = getattr(values.get("stick_fraction"), "value", values.get("stick_fraction"))
     if stuck == 1.0:
         return f"{HOLDS}, so no slip starts"
-    return "the interface never sticks in the last cycles, so no slip starts out of a stick"
+    return "the interface never sticks in the last cycles, so no slip follows a stick"
 
 
 def _of_cycles(name: str, values, window, drive, beside: float) -> str:
     if not sinusoidal(drive):
-        return "only a drive that ends as a sine has it"
+        return "it needs a drive that ends as a sine"
     if not whole(window.time[-1] - window.time[0], drive):
         return "the run holds no whole cycle of the drive"
     if name in ACCELERATIONS and ACCELERATIONS[0] in values:

@@ -178,8 +178,8 @@ def _shaken(name: str, unit: str, floor: float, words: str) -> tuple:
     """Rows of a measure of a random drive, and of the scatter of records about it."""
     scatter = f"{name}_scatter"
     return (Row(name, unit, floor, words, lambda s: s.shaken.get(name)),
-            Row(scatter, unit, floor, f"half-width of the interval of 95 % of {name} by the scatter of a finite "
-                "record, as another seed gives it", lambda s: s.shaken.get(scatter),
+            Row(scatter, unit, floor, f"half-width of the 95 % interval of {name} from the scatter between "
+                "finite records (other seeds)", lambda s: s.shaken.get(scatter),
                 term=(name, lambda values: np.abs(values.get(name, 0.0)))))
 
 
@@ -219,8 +219,8 @@ ROWS = (
         lambda s: s.slip.get("stick_fraction"), 0.35, group="friction", term=("1", lambda _: 1.0),
         halves=(2.5, 0.5)),
     Row("slip_start_phase", "rad", 1e-3,
-        "phase of the base displacement at which slip of the interface as a whole, in the mean of slip_amplitude, "
-        "starts after a stick, modulo pi; printed in degrees",
+        "phase of the base displacement at which the mean slip, that of slip_amplitude, starts after a stick, modulo "
+        "pi; printed in degrees",
         lambda s: s.slip.get("slip_start_phase"), 1.0, group="friction", term=("pi", lambda _: np.pi),
         halves=(2.5, 1.0)),
     Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together", lambda s: s.load,

@@ -22,7 +22,7 @@ MAPPED, CODE = 60e6, 150e6  # of address space beside what is used: packages, an
 CODE_PART = "compiled code"
 CURES = {"contact.element_size": "make contact.element_size larger", "contact.mesh": "give contact.mesh fewer nodes on "
          "its interface", "accuracy.tail": "loosen accuracy.tail or accuracy.merge", "structure": "give fewer modes",
-         "slide.file": "keep every few rows of slide.file", "drive.file": "keep every few rows of drive.file"}
+         "slide.file": "thin out the rows of slide.file", "drive.file": "thin out the rows of drive.file"}
 
 
 class EngineCode(NamedTuple):

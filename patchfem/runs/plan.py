@@ -27,7 +27,7 @@ GROUPS = {  # group -> (what it is, SI unit of its value)
     "drive_amplitude_over_bond_length": ("amplitude of the drive over the bond length", "1"),
     "amplitude_over_bond_length": ("amplitude of the slide over the bond length", "1"),
     "slip_length": ("elastic slide of the pieces before the patch slips", "m"),
-    "tilt_over_first_opening": ("tilt over the one at which an edge lifts off", "1"),
+    "tilt_over_first_opening": ("tilt over the tilt at which an edge lifts off", "1"),
     "share_of_the_spread": ("factor of eq. 2.15 for the spread across the width", "1"),
 }
 
@@ -151,8 +151,8 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: list) -> list:
         out.append(f"the pieces shear elastically {about}" if model.patch.shear else
                    f"the pieces are rigid in shear here; elastic ones give way {about}, which [contact.shear] adds")
     if model.kind == "rig" and model.soft and model.rig.load_varies:
-        out.append(f"{model.soft} by tangential modes of all nodes, as the load changes with the motion; half as many "
-                   "check them")
+        out.append(f"{model.soft}: tangential modes of all nodes, because the load changes with the motion; half as "
+                   "many give the error")
     return out
 
 
@@ -200,6 +200,6 @@ def _groove_words(model: Model) -> list:
     if model.grooves is None or not load > 0:
         return []
     g, mu = model.grooves, model.friction.static
-    return [f"the grooves hold like a spring N k^2 A = {g.stiffness(load):.4g} N/m about their bottom, and up to "
+    return [f"the grooves act as a spring N k^2 A = {g.stiffness(load):.4g} N/m at their bottom and hold up to "
             f"{g.capacity(load, mu):.4g} N on their steepest flank, where friction alone holds mu N = {mu * load:.4g} "
             "N"]

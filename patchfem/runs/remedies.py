@@ -20,7 +20,7 @@ SIZE = "contact.element_size"  # an even mesh finds the ends of a contact at fir
 OF_PEAK = ("pressure_peak", "loaded_fraction")
 OF_SAMPLES = ("stick_fraction", "slip_start_phase")  # of a cycle of a balance, however many harmonics it has
 RINGS = "ring_"  # measures of a ring beside the motion, which an engine without steps need not have
-READ = "no setting is known to make it better; read it by its error"
+READ = "no setting is known to improve it; judge it by its error"
 # what a run answers first, named before what misses its tolerance by more
 FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_ratio_peak",
          "pressure_peak", "contact_fraction")
@@ -64,7 +64,7 @@ def _said(seen, wide: dict, remedy: str) -> str:
     tolerance, names = seen.model.accuracy.tolerance, _first(seen, wide)
     known, left = [_known(seen.measures[name]) for name in names], len(wide) - len(names)
     more = "".join(f", {name} {one}" for name, one in zip(names[1:], known[1:], strict=True))
-    others = f" ({left} other measure{'s' * (left > 1)} beside {'it' if len(names) == 1 else 'them'})" if left else ""
+    others = f" ({left} other measure{'s' * (left > 1)} besides {'it' if len(names) == 1 else 'them'})" if left else ""
     return f"{names[0]} is known {known[0]}{more}, the tolerance is {tolerance:g}{others}; {remedy}"
 
 
@@ -96,12 +96,12 @@ def _finer_mesh(seen, wide: dict, coarse) -> str:
     if not wide.keys() - set(patch_rows.DECISIVE):
         return f"a mesh finer than {nodes} interface nodes would take too long; {wider}"
     if asked.chosen and _locks(seen, wide):
-        return "cells of any mesh leave that in plane strain at this Poisson's ratio; read it by its error"
+        return "any mesh has this error in plane strain at this Poisson's ratio; judge it by its error"
     tighter = _climbing(seen, coarse)
     if tighter is None:
         finer = f"points closer than {say(seen.patch.averaging, 3)}" if seen.patch.averaging and \
             seen.patch.sharper else f"a mesh finer than {nodes} interface nodes"
-        return f"{finer} would take too long; read {'them by their errors' if len(wide) > 1 else 'it by its error'}"
+        return f"{finer} would take too long; judge {'them by their errors' if len(wide) > 1 else 'it by its error'}"
     return f"the mesh ({nodes} interface nodes) was not refined for this quantity; set accuracy.tolerance = " \
            f"{tighter:.3g} for a finer one"
 
@@ -197,7 +197,7 @@ def _to_a_sample(cycles: float, steps: int) -> str:
     """As many steps, up to twice as many, as end a run of so many cycles closest to the end that was asked for; they
     have a half and a quarter."""
     found = min(range(4 * ceil(steps / 4), 2 * steps + 4, 4), key=lambda n: abs(cycles * n - round(cycles * n)))
-    return f"the run ends between two samples; set accuracy.steps_per_cycle = {found}, which has one nearer to its end"
+    return f"the run ends between two samples; set accuracy.steps_per_cycle = {found}, which puts one closer to its end"
 
 
 def _finer_bonds(accuracy) -> str:
@@ -227,7 +227,7 @@ def _unproven(model, steps: int, name: str, wide: dict) -> str:
             "relative_displacement_amplitude" in wide:
         return f"{seen}; leave out accuracy.steps_per_cycle, and they are doubled until the displacement meets the " \
                "tolerance"
-    return f"{seen}, so more steps are not known to cure it; read it by its error"
+    return f"{seen}, so more steps are not known to cure it; judge it by its error"
 
 
 def _finer_under(seen, coarse) -> str:

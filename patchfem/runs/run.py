@@ -130,7 +130,7 @@ def _keeping(kept: KeptState | None, what: Plan, patch):
         return kept.path.parent / f"march_{number}.npz"
 
     if kept.resume and model.wear is None and not path(1).is_file():
-        raise PatchfemError(f"{kept.path.parent.name}: no interrupted run is kept there; run without --resume")
+        raise PatchfemError(f"{kept.path.parent.name}: no interrupted run is saved there; run without --resume")
     return resume.keeping(resume.Keeper(path, state_key(model, patch, kept.version), kept.resume))
 
 

@@ -65,7 +65,7 @@ def read(texts: Iterable[str], sampled: bool = False) -> tuple[list[Axis | Span]
     for text in texts:
         key, equals, values = (part.strip() for part in text.partition("="))
         if not equals or not key:
-            wrong.append(f"--over {text}: table.key=v1,v2,... or table.key=low..high:n is wanted, such as "
+            wrong.append(f"--over {text}: table.key=v1,v2,... or table.key=low..high:n is needed, such as "
                          "contact.tilt.angle=1e-6 rad..1e-2 rad:9")
             continue
         _add(found, wrong, key, values, sampled)
@@ -80,7 +80,7 @@ def lengths(text: str, name: str) -> list[float]:
     except ValueError as error:
         raise PatchfemError("; ".join(f"{name}: {line}" for line in str(error).split("\n"))) from None
     if values[0] <= 0:
-        raise PatchfemError(f"{name}: {values[0]:g} m; lengths above 0 are wanted, such as 1 um..1 mm:9")
+        raise PatchfemError(f"{name}: {values[0]:g} m; lengths above 0 are needed, such as 1 um..1 mm:9")
     return values
 
 
@@ -98,7 +98,7 @@ def _axis(key: str, text: str, sampled: bool) -> Axis | Span:
     for piece in pieces:
         try:
             if not piece:
-                raise ValueError("an empty value; one stands between two commas")
+                raise ValueError("an empty value between two commas")
             ends = _RANGE.fullmatch(piece) if ".." in piece and _is_number(key) else None
             if ends is None:
                 out.append(piece)
@@ -149,14 +149,14 @@ def values_of(key: str, texts: Iterable[str], distinct: bool = True) -> Axis:
 def of_table(table: Any) -> tuple[list[Axis | Span], list[tuple[str, str]]]:
     """(axes, mistakes as (key, message)) of the table [sweep] as it was written: "table.key" = "v1,v2,..."."""
     if not isinstance(table, dict) or not table:
-        return [], [("sweep", "keys with their values are wanted, such as "
+        return [], [("sweep", "keys with their values are needed, such as "
                               '"contact.tilt.angle" = "1e-6 rad..1e-2 rad:9"')]
     found, wrong = [], []
     for key, values in _flat(table):
         if isinstance(values, list):
             values = ",".join(map(str, values))
         if not isinstance(values, str):
-            wrong.append((f"sweep.{key}", "a text of values is wanted, such as \"0.1..0.6:6\""))
+            wrong.append((f"sweep.{key}", "a text of values is needed, such as \"0.1..0.6:6\""))
             continue
         mistakes: list[str] = []
         _add(found, mistakes, key, values, False)
@@ -181,7 +181,7 @@ def _no_table(key: str, texts: tuple) -> None:
         return
     items = ".NAME" if get_origin(model.model_fields[name].annotation) is tuple else ""
     first = sorted(keys(inner), key=lambda one: not inner.model_fields[keys(inner)[one]].is_required())[:4]
-    raise ValueError(f"a table, not a value; name a key in it: {', '.join(f'{key}{items}.{one}' for one in first)}")
+    raise ValueError(f"a table, not a value; choose a key in it: {', '.join(f'{key}{items}.{one}' for one in first)}")
 
 
 def _types(key: str) -> tuple:
@@ -259,7 +259,7 @@ def _ends(key: str, low: str, high: str) -> tuple:
 def _is_log(low: Fraction, high: Fraction, how: str | None) -> bool:
     positive = low > 0 and high > 0
     if how == "log" and not positive:
-        raise ValueError("a logarithmic range wants both ends > 0")
+        raise ValueError("a logarithmic range needs both ends > 0")
     return how == "log" or (how is None and positive and max(low / high, high / low) >= _TEN)
 
 
@@ -268,7 +268,7 @@ def _steps(key: str, low: str, high: str, count: str | None, how: str | None) ->
     first, last, unit = _ends(key, low, high)
     number = int(count) if count else 0
     if not 2 <= number <= MOST:
-        raise ValueError(f"{low}..{high}: the number of values is wanted behind a colon, from 2 to {MOST}, such as :9")
+        raise ValueError(f"{low}..{high}: give the number of values after a colon, from 2 to {MOST}, such as :9")
     if first == last:
         raise ValueError(f"{low}..{high}: both ends are the same value")
     log = _is_log(first, last, how)
@@ -278,7 +278,7 @@ def _steps(key: str, low: str, high: str, count: str | None, how: str | None) ->
 def _span(key: str, low: str, high: str, count: str | None, how: str | None) -> Span:
     first, last, unit = _ends(key, low, high)
     if float not in _types(key):
-        raise ValueError(f"{low}..{high}: a whole number is drawn from a list of its values, such as 1,2,3")
+        raise ValueError(f"{low}..{high}: list the values of a whole number, such as 1,2,3")
     if count:
         raise ValueError(f"{low}..{high}:{count}: values are drawn between the ends; leave :{count} out")
     if first == last:

@@ -74,7 +74,7 @@ class TooDeep(ValueError):
     """A key of more than DEEPEST parts; `line`: where it stands, from 1."""
 
     def __init__(self, line: int) -> None:
-        super().__init__(f"a key of more than {DEEPEST} parts; table.key is wanted")
+        super().__init__(f"a key of more than {DEEPEST} parts; table.key is needed")
         self.line = line
 
 

@@ -42,7 +42,7 @@ def ranges(texts: Iterable[str]) -> tuple[list[Range], list[str]]:
     named = [one.key for one in found]
     wrong += [f"--free {key}: stands twice" for key in dict.fromkeys(named) if named.count(key) > 1]
     if not found and not wrong:
-        wrong.append("--free: at least one table.key=low..high is wanted, such as friction.static=0.1..0.6")
+        wrong.append("--free: at least one table.key=low..high is needed, such as friction.static=0.1..0.6")
     return found, wrong
 
 
@@ -50,7 +50,7 @@ def _range(text: str) -> Range:
     key, equals, bounds = (part.strip() for part in text.partition("="))
     low, dots, high = (part.strip() for part in bounds.partition(".."))
     if not equals or not dots or not low or not high:
-        raise ValueError(f"{text}: table.key=low..high is wanted, such as friction.bond_length=0.2 um..20 um")
+        raise ValueError(f"{text}: table.key=low..high is needed, such as friction.bond_length=0.2 um..20 um")
     try:
         model, name = _numeric(key)
         a, b = (_value(name, key, one) for one in (low, high))

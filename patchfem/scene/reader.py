@@ -124,12 +124,12 @@ def apply_set(draft: Draft, assignment: str) -> None:
         assignment.encode()
     except UnicodeEncodeError:
         shown = assignment.encode(errors="backslashreplace").decode()
-        draft.refuse_set(f"{shown}: holds bytes that are no UTF-8 text; write it in UTF-8")
+        draft.refuse_set(f"{shown}: holds bytes that are not UTF-8 text; save it as UTF-8")
         return
     key, equals, text = assignment.partition("=")
     pieces = pieces_of(key)
     if not equals or not all(pieces):
-        draft.refuse_set(f"{assignment}: table.key=value is wanted, such as contact.load=26 lbf")
+        draft.refuse_set(f"{assignment}: table.key=value is needed, such as contact.load=26 lbf")
         return
     place: Any = draft.raw
     for index, piece in enumerate(pieces):
@@ -318,11 +318,11 @@ def _nested(draft: Draft, model: type[Table], name: str, inner: type[Table], val
     if get_origin(model.model_fields[name].annotation) is tuple:
         if isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
             return tuple(_table(draft, inner, item, f"{path}.{index}") for index, item in enumerate(value))
-        draft.say(path, f"an array of tables [[{path}]] is wanted, not {_show(value)}")
+        draft.say(path, f"an array of tables [[{path}]] is needed, not {_show(value)}")
     elif isinstance(value, dict):
         return _table(draft, inner, value, path)
     else:
-        draft.say(path, f"a table [{path}] is wanted, not {_show(value)}")
+        draft.say(path, f"a table [{path}] is needed, not {_show(value)}")
     return None
 
 
@@ -368,23 +368,23 @@ def _wanted(model: type[Table], name: str) -> str:
     """Requirement of a key, as a clause of a message."""
     annotation = model.model_fields[name].annotation
     types = (annotation, *_types(model, name))
-    clause = "a text in quotes is wanted"
+    clause = "a text in quotes is needed"
     if kind := kind_of(model, name):
         clause = quantities.wanted(kind)
         if tuple in map(get_origin, types):
-            clause = f"an array of quantities is wanted, such as ['{quantities.EXAMPLES[kind]}']"
+            clause = f"an array of quantities is needed, such as ['{quantities.EXAMPLES[kind]}']"
     elif Material in types:
-        clause = 'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is wanted'
+        clause = 'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
     elif allowed := _allowed(model, name):
-        clause = f"one of {', '.join(allowed)} is wanted" + (" (or a whole number)" if int in types else "")
+        clause = f"one of {', '.join(allowed)} is needed" + (" (or a whole number)" if int in types else "")
     elif tuple in map(get_origin, types):
-        many = "plain numbers are wanted, such as [1, 1.5]" if float in types else \
-            f"{'' if any(... in get_args(one) for one in types) else 'two '}whole numbers are wanted, such as [1, 2]"
+        many = "plain numbers are needed, such as [1, 1.5]" if float in types else \
+            f"{'' if any(... in get_args(one) for one in types) else 'two '}whole numbers are needed, such as [1, 2]"
         clause = "" if model_of(model, name) else many
     elif float in types:
-        clause = "a plain number is wanted"
+        clause = "a plain number is needed"
     elif int in types:
-        clause = "a whole number is wanted"
+        clause = "a whole number is needed"
     return clause
 
 
@@ -396,12 +396,12 @@ def _message(model: type[Table], name: str, error: Any, value: Any) -> str:
         bound = str(bound) if isinstance(bound, int) else f"{bound:g}"
         return f"must be {sign} {bound}, not {_show(value)}; {_wanted(model, name)}"
     if error["type"] == "too_short" and value and error["ctx"]["min_length"] > 1:
-        return f"at least {error['ctx']['min_length']} values are wanted, not {len(value)}"
+        return f"at least {error['ctx']['min_length']} values are needed, not {len(value)}"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
     if allowed and isinstance(value, str):
         return f"unknown value {_show(value)}; {choices(value, allowed)}"
-    return f"{_wanted(model, name) or 'something else is wanted'}, not {_show(value)}"
+    return f"{_wanted(model, name) or 'another value is needed'}, not {_show(value)}"
 
 
 def _show(value: Any) -> str:

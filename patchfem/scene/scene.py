@@ -277,7 +277,7 @@ def _unquoted(text: str, line: int) -> str:
     key, value = found[1], found[2].strip()
     point = re.fullmatch(r"([-+]?)(\d*)\.(\d*)((?:[eE][-+]?\d+)?)", value)
     if point and (point[2] or point[3]):
-        return f"; a digit stands on both sides of a point: {key} = {point[1]}{point[2] or 0}.{point[3] or 0}{point[4]}"
+        return f"; put a digit on both sides of the point: {key} = {point[1]}{point[2] or 0}.{point[3] or 0}{point[4]}"
     if re.fullmatch(r"[-+]?\d+,\d+", value):
         return f"; a decimal is written with a point: {key} = {value.replace(',', '.')}"
     if value.lower() in ("true", "false"):
@@ -286,7 +286,7 @@ def _unquoted(text: str, line: int) -> str:
         return f"; a share is a plain number: {key} = {float(percent[1]) / 100:.12g}"
     quoted = re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE]$)[a-zA-Z%\u00b5\u03bc][a-zA-Z\u00b5\u03bc/^0-9 -]*|"
                           r"[a-zA-Z][\w./ -]*", value)
-    return f'; a quantity or a word stands in quotes: {key} = "{value}"' if quoted and len(value) < 60 else ""
+    return f'; put a quantity or a word in quotes: {key} = "{value}"' if quoted and len(value) < 60 else ""
 
 
 def _finish(found: tables.Tables, kind: str) -> tables.Tables:

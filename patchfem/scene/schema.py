@@ -69,10 +69,10 @@ def _selected(model: type[Table], key: str) -> str:
     """Which keys each value of a selector wants, or which values of its selector want or use a key; "" for others."""
     selector, values = next((each for table, *each in SELECTORS.values() if issubclass(model, table)), ("", {}))
     if key == selector:
-        return "; ".join(f"'{value}' wants {', '.join(needs.split())}" for value, (needs, _) in values.items() if needs)
+        return "; ".join(f"'{value}' needs {', '.join(needs.split())}" for value, (needs, _) in values.items() if needs)
     wanted, used = ([f"'{value}'" for value, words in values.items() if key in words[place].split()]
                     for place in (0, 1))  # fmt: skip
-    return "; ".join(f"{verb} {selector} {', '.join(found)}" for verb, found in (("wanted by", wanted),
+    return "; ".join(f"{verb} {selector} {', '.join(found)}" for verb, found in (("needed by", wanted),
                                                                                 ("used by", used)) if found)
 
 

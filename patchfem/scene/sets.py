@@ -87,8 +87,8 @@ def _written(key: str, value: Any) -> str:
     if isinstance(value, bool | str):
         return json.dumps(value, ensure_ascii=False)
     if not isinstance(value, Real):
-        raise SceneError([f"--set: {key}: {value!r:.60} is no value of a scene; a text as in a scene, a number in SI, "
-                          "a boolean or a list of them is wanted"])
+        raise SceneError([f"--set: {key}: {value!r:.60} is not a value of a scene; a text as in a scene, a number in "
+                          "SI, a boolean or a list of them is needed"])
     kind = _kind(key)
     if kind is not None:
         return json.dumps(format_si(value, kind))

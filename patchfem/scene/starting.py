@@ -28,7 +28,7 @@ NEXT = {"beam": "backbone", "damper": "sweep", "shroud": "sweep", "misalignment"
 def text_of(kind: str) -> str:
     """The text of a scene of one of KINDS; PatchfemError for any other word."""
     if kind not in KINDS:
-        raise PatchfemError(f"{kind}: no kind of scene; {choices(kind, KINDS)}")
+        raise PatchfemError(f"{kind}: unknown kind of scene; {choices(kind, KINDS)}")
     return (HERE / f"{kind}.toml").read_text(encoding="utf-8")
 
 

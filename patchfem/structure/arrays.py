@@ -44,7 +44,7 @@ def read(path) -> dict:
         why = str(error).removeprefix(f"{path}: ")
         raise PatchfemError(f"structure.file: {path} cannot be read ({why})") from None
     except Exception as error:  # a damaged file raises whatever its reader trips over
-        raise PatchfemError(f"structure.file: {path} cannot be read ({error}); plain arrays are wanted, no objects") \
+        raise PatchfemError(f"structure.file: {path} cannot be read ({error}); plain arrays are needed, not objects") \
             from None
 
 
@@ -113,7 +113,7 @@ def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
     M, K, C = (_square(data, key, where) for key in ("M", "K", "C"))
     n = len(M)
     if n == 0:
-        raise PatchfemError(f"{where}: M holds no coordinate; a square matrix [kg] of at least one is wanted")
+        raise PatchfemError(f"{where}: M holds no coordinate; a square matrix [kg] of at least one is needed")
     if pairs and "slide" in data:
         raise PatchfemError(f"{where}: holds slide, and [[structure.interface]] names interfaces as well: keep one")
     over = [k for pair in pairs for k in pair if k > n]
@@ -125,7 +125,7 @@ def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
         faces = faces.reshape(-1, n) if faces.size % n == 0 else faces
     output = data.get("output", faces[0] if faces is not None and len(faces) else None)
     if output is None:
-        _lacks(data, "output (n,), what the accelerometer feels (or slide)", where)
+        _lacks(data, "output (n,), what the accelerometer measures (or slide)", where)
     force = None
     if forced:
         force = np.eye(n)[pushed - 1] if pushed else data.get("force", output)
@@ -166,13 +166,13 @@ def _of_modes(data, pairs, pushed, forced, mass, where) -> ModalBasis:
         raise PatchfemError(f"{where}: damping must be >= 0, not {damping.min():g}")
     # round-off of a singular D
     if damping.ndim == 2 and np.linalg.eigvalsh(damping + damping.T).min() < -1e-9 * np.abs(damping).max():
-        raise PatchfemError(f"{where}: damping feeds energy in; a positive matrix D [1/s] is wanted")
+        raise PatchfemError(f"{where}: damping adds energy; a positive matrix D [1/s] is needed")
     zeta, coupled = matrices.split(damping, omega) if damping.ndim == 2 else (frozen_array(damping), None)
     output = _numbers(data, "output", where, (n,)) if "output" in data else faces[0]
     base = -(_numbers(data, "force", where, (n,)) if "force" in data else output) if forced \
         else _numbers(data, "base", where, (n,))
     if not forced and np.sum(base**2) > 1 + 1e-9:  # modes of unit mass hold at most the whole of it
-        raise PatchfemError(f"{where}: the sum of base^2 over the modes is {np.sum(base**2):.6g}; <= 1 is wanted")
+        raise PatchfemError(f"{where}: the sum of base^2 over the modes is {np.sum(base**2):.6g}; <= 1 is needed")
     moved = {key: frozen_array(_numbers(data, key, where, (n,))) for key in PATCH if key in data and data[key].any()}
     return ModalBasis(_names(data, n, where) or tuple(f"mode {k + 1}" for k in range(n)), frozen_array(omega), zeta,
                       frozen_array(faces[0]), frozen_array(base), frozen_array(output), mass, coupled,
@@ -183,7 +183,7 @@ def _numbers(data, key, where, *shapes) -> np.ndarray:
     """Array data[key] as finite real numbers of one of the shapes (None in a shape: any length); (n,) without one."""
     value = matrices.without_phase(data[key], key)
     if value.dtype.kind not in "iufb":
-        raise PatchfemError(f"{where}: {key} holds no real numbers")
+        raise PatchfemError(f"{where}: {key} does not hold real numbers")
     value = value.astype(float)
     if not shapes:
         value = value.ravel()

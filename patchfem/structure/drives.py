@@ -149,7 +149,7 @@ class Recorded:
 
     def __post_init__(self):
         if len(self.time) < 2 or self.time[0] != 0 or not np.all(np.diff(self.time) > 0):
-            raise PatchfemError("drive.file: at least two rows with times that rise from 0 s are wanted")
+            raise PatchfemError("drive.file: at least two rows with times that rise from 0 s are needed")
 
     @property
     def segments(self) -> tuple:

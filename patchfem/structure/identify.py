@@ -148,8 +148,8 @@ def poles(omega, data, power) -> tuple:
         theta, cost = better, less
     theta = _pruned(fit, _polished(fit, theta, cost))
     if not theta.size:
-        raise PatchfemError("structure.file: no mode stands out of the frequency responses; responses over a "
-                            "resonance are wanted")
+        raise PatchfemError("structure.file: no mode is visible in the frequency responses; responses over a "
+                            "resonance are needed")
     w, zeta = np.exp(np.split(theta, 2))
     order = np.argsort(w)
     return w[order], zeta[order], fit, np.concatenate([np.log(w[order]), np.log(zeta[order])])
@@ -229,7 +229,7 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     keep = frequency > 0
     omega = 2 * np.pi * frequency[keep]
     if omega.size < 8 or (np.diff(omega) <= 0).any():
-        raise PatchfemError("structure.file: at least 8 rising frequencies are wanted")
+        raise PatchfemError("structure.file: at least 8 rising frequencies are needed")
     data = np.stack([measured[place, ref][0][keep] for place in places], axis=1)
     alive = np.abs(data).max(axis=0) > 0
     if not alive[places.index(ref)]:

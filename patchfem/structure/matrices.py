@@ -91,7 +91,7 @@ def _modes(root, K, stretch) -> tuple:
     square, turned = eigh((unit + unit.T) / 2)
     least = len(K) * ROUND * np.abs(square).max(initial=0.0)
     if square[0] < -least:
-        raise PatchfemError(f"structure: K is not positive semidefinite: one shape has the stiffness "
+        raise PatchfemError(f"structure: K is not positive semidefinite: the stiffness of one shape is "
                             f"{square[0]:.3g} 1/s^2 over its mass, {square[0] / square[-1]:.2g} of the largest; give "
                             "symmetric springs >= 0 and the matrix with all its digits")
     return np.sqrt(np.where(square <= least, 0.0, square)), turned
@@ -145,7 +145,7 @@ def without_phase(values, name):
         remedy = f"; for a loss factor eta (here about {share:.3g}) give K without it, and C = eta K/omega [N s/m] " \
             "at the frequency of the drive"
     raise PatchfemError(f"structure: {name} is complex, imaginary parts up to {share:.2g} of the real ones; motion in "
-                        f"time takes real matrices{remedy}")
+                        f"time needs real matrices{remedy}")
 
 
 def _symmetric(matrix, name, shape=None) -> np.ndarray:
@@ -154,7 +154,7 @@ def _symmetric(matrix, name, shape=None) -> np.ndarray:
     try:
         matrix = np.asarray(without_phase(matrix, name), float)
     except (TypeError, ValueError):
-        raise PatchfemError(f"structure: {name} is no matrix of real numbers") from None
+        raise PatchfemError(f"structure: {name} is not a matrix of real numbers") from None
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
         raise PatchfemError(f"structure: {name} must be square, not of shape {matrix.shape}")
     if shape is not None and matrix.shape != shape:
@@ -165,7 +165,7 @@ def _symmetric(matrix, name, shape=None) -> np.ndarray:
     skew, most = np.abs(matrix - matrix.T).max(), np.abs(matrix).max()
     if skew > SKEW * most:
         raise PatchfemError(f"structure: {name} is not symmetric: entries differ from the transpose by {skew:.3g}, "
-                            f"{skew / most:.2g} of the largest; gyroscopic and follower terms have no modes here")
+                            f"{skew / most:.2g} of the largest; gyroscopic and follower terms are not supported")
     return (matrix + matrix.T) / 2
 
 
@@ -173,8 +173,8 @@ def _damper(phi, C):
     D = trimmed(phi.T @ C @ phi, np.abs(phi).T @ np.abs(C) @ np.abs(phi))
     least = eigh(D, eigvals_only=True)
     if least[0] < -1e-9 * max(abs(least[-1]), abs(least[0])):  # round-off of a singular C
-        raise PatchfemError(f"structure: C feeds energy in: one shape has the damping {least[0]:.3g} 1/s over its "
-                            "mass; dampers >= 0 are wanted")
+        raise PatchfemError(f"structure: C adds energy: the damping of one shape is {least[0]:.3g} 1/s over its "
+                            "mass; dampers >= 0 are needed")
     return D
 
 
@@ -204,7 +204,7 @@ def _row(row, n, name) -> np.ndarray:
     try:
         row = np.asarray(without_phase(row, name), float)
     except (TypeError, ValueError):
-        raise PatchfemError(f"structure: {name} holds no real numbers") from None
+        raise PatchfemError(f"structure: {name} does not hold real numbers") from None
     if row.ndim == 2 and 1 in row.shape and name != "slide":
         row = row.ravel()
     if row.shape[-1:] != (n,) or row.ndim > (2 if name == "slide" else 1):

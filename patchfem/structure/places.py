@@ -34,7 +34,7 @@ class Shapes:
         for part in text.split(","):
             found = _PLACE.fullmatch(part.strip())
             if found is None:
-                raise PatchfemError(f"structure.{key}: '{text}' is no place; node:direction is wanted, such as "
+                raise PatchfemError(f"structure.{key}: '{text}' is not a place; node:direction is needed, such as "
                                     "\"12:+x\", or \"12:+x, 13:-x\" for the motion of 12 relative to 13")
             node, sign, axis = int(found[1]), -1.0 if found[2] == "-" else 1.0, AXES.index(found[3])
             if (node, axis) not in self.motion:

@@ -238,7 +238,7 @@ def _rows_of(stiffness, mass) -> np.ndarray:
                             "coordinate of the boundary its mass", "structure.reduced.mass") from None
     least = 1e-12 * square[-1] * len(square)
     if square[0] < -least:
-        raise PatchfemError(f"the stiffness is not positive: one shape has {square[0]:.3g} 1/s^2 over its mass, "
+        raise PatchfemError(f"the stiffness is not positive: one shape has {square[0]:.3g} 1/s^2 per mass, "
                             f"{square[0] / square[-1]:.2g} of the largest", "structure.reduced.stiffness")
     held = square > least
     return (np.sqrt(square[held])[:, None] * shapes[:, held].T) @ mass

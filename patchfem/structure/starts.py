@@ -25,8 +25,8 @@ def _coordinates(basis: ModalBasis, values) -> np.ndarray:
         return np.zeros(n)
     values, own = np.asarray(values, float), n if basis.shapes is None else len(basis.shapes)
     if values.shape != (own,):
-        raise PatchfemError(f"structure.start: {values.size} values stand for {own} modes or masses; one for each is "
-                            "wanted")
+        raise PatchfemError(f"structure.start: {values.size} values are given for {own} modes or masses; one for "
+                            "each is needed")
     if basis.shapes is None:
         return values
     return np.linalg.lstsq(basis.shapes, values, rcond=None)[0] if own != n else np.linalg.solve(basis.shapes, values)

@@ -90,7 +90,7 @@ def _responses(sets, factors) -> Shapes:
         what = f"response {one['rsp_node']}:{one['rsp_dir']:+d} over {one['ref_node']}:{one['ref_dir']:+d}"
         if kind not in POWER or over not in FORCE:
             raise PatchfemError(f"structure.file: {what} is type {kind} over {over}; displacement (8), velocity "
-                                "(11) or acceleration (12) over force (13) is wanted")
+                                "(11) or acceleration (12) over force (13) is needed")
         if len(one["x"]) != x.size or not np.allclose(one["x"], x, rtol=1e-6, atol=0):
             raise PatchfemError(f"structure.file: {what} has other frequencies than the first; all must share them")
         if not np.isfinite(one["data"]).all() or not np.iscomplexobj(one["data"]):
@@ -115,5 +115,5 @@ def _unit(label, notes) -> float:
 def _place(node, direction) -> tuple:
     if not 1 <= abs(direction) <= len(AXES):
         raise PatchfemError(f"structure.file: direction {direction} of node {node}; +-1 to +-6 for x, y, z, rx, ry, rz "
-                            "is wanted")
+                            "is needed")
     return (1.0 if direction > 0 else -1.0), (int(node), abs(direction) - 1)

@@ -45,7 +45,7 @@ class Areal:
         count = self.z.shape[axis]
         if not -count <= k < count:
             name = ("row", "column")[axis]
-            raise PatchfemError(f"{self.source}: no {name} {k}; the scan has {count} of them, from 0 on")
+            raise PatchfemError(f"{self.source}: no {name} {k}; the scan has {count} of them, counted from 0")
         return k
 
     def _trace(self, along, heights, name: str) -> Profile:
@@ -89,7 +89,7 @@ def level(scan: Areal, degree: int) -> Areal:
     normal = np.einsum("mik,mj,ml->jilk", pairs.reshape(-1, degree + 1, degree + 1), along, along, optimize=True)
     normal = normal[terms][:, terms]
     if count < len(normal) or np.linalg.matrix_rank(normal / count, tol=1e-12, hermitian=True) < len(normal):
-        raise PatchfemError(f"{scan.source}: {count} heights, all in one line; a plane wants three that are not"
+        raise PatchfemError(f"{scan.source}: {count} heights, all in one line; a plane needs three that are not"
                             if degree == 1 else f"{scan.source}: {count} heights do not determine a polynomial of "
                             f"degree {degree}; use a lower degree")
     mean = scan.z[there].mean()

@@ -65,7 +65,7 @@ def element_for(waves, power, kept: float) -> float:
     """
     total = power.sum()
     if not 0 < kept < 1:
-        raise PatchfemError(f"the share kept is {kept:g}; it lies between 0 and 1")
+        raise PatchfemError(f"the share kept is {kept:g}; it must lie between 0 and 1")
     if total == 0:
         return np.inf
     lost = np.cumsum(power[::-1])[::-1] / total  # in this wave and all shorter ones

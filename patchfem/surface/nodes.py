@@ -17,11 +17,11 @@ def placed(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
     both lengths where the trace does not cover the patch.
     """
     if how not in ("auto", "own", "centred"):
-        raise PatchfemError(f"placing of a profile '{how}' is not known; use auto, own or centred")
+        raise PatchfemError(f"unknown placing '{how}' of a profile; use auto, own or centred")
     x = _nodes(x)
     there = profile.x[~profile.missing]
     if there.size < 2:
-        raise PatchfemError(f"{profile.source}: {there.size} heights; a trace wants two at least")
+        raise PatchfemError(f"{profile.source}: {there.size} heights; a trace needs at least two")
     shift, notes = 0.0, profile.notes
     if how == "centred" or (how == "auto" and not _covers(there, x)):
         shift = float(x[0] + x[-1] - there[0] - there[-1]) / 2
@@ -81,7 +81,7 @@ def _primitive(profile: Profile, at) -> np.ndarray:
 def _nodes(x) -> np.ndarray:
     x = np.asarray(x, dtype=np.float64)
     if x.ndim != 1 or x.size < 2 or not (np.diff(x) > 0).all():
-        raise PatchfemError("the nodes under a profile must be two or more and grow along x")
+        raise PatchfemError("a profile needs two or more nodes with rising x")
     return x
 
 

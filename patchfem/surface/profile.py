@@ -79,17 +79,17 @@ def even(profile: Profile) -> Profile:
         return profile
     known, heights = profile.x[there], profile.z[there]
     if known.size < 2:
-        raise PatchfemError(f"{profile.source}: {known.size} heights; a trace wants two at least")
+        raise PatchfemError(f"{profile.source}: {known.size} heights; a trace needs at least two")
     x, notes = profile.x[(profile.x >= known[0]) & (profile.x <= known[-1])], profile.notes
     if not whole:
-        notes += (f"{profile.source}: {(~there).sum()} of {there.size} heights are missing; straight lines stand in "
-                  f"their place, the longest over {say(float(np.diff(known).max()))}",)
+        notes += (f"{profile.source}: {(~there).sum()} of {there.size} heights are missing; straight lines replace "
+                  f"them, the longest over {say(float(np.diff(known).max()))}",)
     if not regular:
         step = max(float(np.percentile(steps, 10)), float(x[-1] - x[0]) / _MOST)
         count = int(np.ceil((x[-1] - x[0]) / step * (1 - 1e-9))) + 1
         x = np.linspace(x[0], x[-1], count)
         notes += (f"{profile.source}: samples lie {say(float(steps.min()))} to {say(float(steps.max()))} apart; the "
-                  f"trace is read off every {say(float(x[1] - x[0]))} along its straight lines",)
+                  f"trace is resampled every {say(float(x[1] - x[0]))} by straight lines",)
     return replace(profile, x=frozen_array(x), z=frozen_array(np.interp(x, known, heights)), notes=notes)
 
 
@@ -105,7 +105,7 @@ def cleaned(profile: Profile, longest: float) -> Profile:
     bad = lost | peaked
     good = np.flatnonzero(~bad)
     if good.size < 2:
-        raise PatchfemError(f"{profile.source}: {good.size} usable heights; a trace wants two at least")
+        raise PatchfemError(f"{profile.source}: {good.size} usable heights; a trace needs at least two")
     if good.size == bad.size:
         return profile
     x = profile.x[good]
@@ -125,10 +125,10 @@ def _counts(profile: Profile, lost, peaked, widest: float):
     n, name = profile.x.size, profile.source
     if peaked.any():
         first = profile.x[np.argmax(peaked)]
-        yield (f"{name}: {peaked.sum()} of {n} heights are spikes, more than {SPIKE:g} robust standard deviations off "
-               f"the median of {WINDOW} samples (the first at x = {say(first)}); straight lines stand in their place")
+        yield (f"{name}: {peaked.sum()} of {n} heights are spikes, more than {SPIKE:g} robust standard deviations "
+               f"from the median of {WINDOW} samples (the first at x = {say(first)}); straight lines replace them")
     if lost.any():
-        yield (f"{name}: {lost.sum()} of {n} heights are missing; straight lines stand in their place, "
+        yield (f"{name}: {lost.sum()} of {n} heights are missing; straight lines replace them, "
                f"the longest over {say(widest)}")
 
 

@@ -34,17 +34,17 @@ def bounded(path, columns: tuple, names: tuple, at, factors: tuple) -> None:
     columns: (n,) each, in the units of the file, with their factors to metres; at: (n,) lines or None.
     """
     if names[-1] == "z" and np.isfinite(columns[-1]).sum() < 2:
-        raise PatchfemError(f"{path}: {np.isfinite(columns[-1]).sum()} heights; a trace wants two at least")
+        raise PatchfemError(f"{path}: {np.isfinite(columns[-1]).sum()} heights; a trace needs at least two")
     for name, values in zip(names, columns):
         bad = np.isinf(values) if name == "z" else ~np.isfinite(values)
         if bad.any():
             first = int(np.argmax(bad))
-            raise PatchfemError(f"{_where(path, at, first)}: {name} is {values[first]:g}; finite numbers are wanted")
+            raise PatchfemError(f"{_where(path, at, first)}: {name} is {values[first]:g}; finite numbers are needed")
     for name, values, factor in zip(names, columns, factors):
         worst = int(np.nanargmax(np.abs(values)))
         if abs(values[worst]) > LONGEST / factor:
             raise PatchfemError(f"{_where(path, at, worst)}: {name} is {float(values[worst]) * factor:.4g} m; is its "
-                                "unit right? a missing height is written nan")
+                                "unit right? write a missing height as nan")
 
 
 def _where(path, at, k: int) -> str:
@@ -86,7 +86,7 @@ def _single(path, x, z, at, factor: float) -> tuple:
         raise PatchfemError(f"{_where(path, at, other)}: x turns back, {say(x[one] * factor)} and then "
                             f"{say(x[other] * factor)}; a trace runs one way: keep one trace per file")
     if x[-1] == x[0]:
-        raise PatchfemError(f"{path}: every sample lies at x = {say(x[0] * factor)}; a trace wants two places at least")
+        raise PatchfemError(f"{path}: every sample lies at x = {say(x[0] * factor)}; a trace needs at least two places")
     if (step > same).all():
         return x, z, ()
     group = np.concatenate([[0], np.cumsum(step > same)])
@@ -95,7 +95,7 @@ def _single(path, x, z, at, factor: float) -> tuple:
         mean = np.bincount(group, np.nan_to_num(z)) / heights
     first = int(np.argmax(step <= same)) + 1
     place = f"sample {first + 1}" if at is None else f"line {at[first]}"
-    note = f"{path}: {x.size - mean.size} samples lie where another one does (the first in {place}): mean taken"
+    note = f"{path}: {x.size - mean.size} samples share a place with another (the first in {place}): mean used"
     return np.bincount(group, x) / np.bincount(group), mean, (note,)
 
 
@@ -107,7 +107,7 @@ def plausible(path, x, z, stated: str = "") -> tuple:
     """
     there = np.sort(z[np.isfinite(z)], axis=None)
     if there.size < 2:
-        raise PatchfemError(f"{path}: {there.size} heights; a trace wants two at least")
+        raise PatchfemError(f"{path}: {there.size} heights; a trace needs at least two")
     length, span = float(x[-1] - x[0]), float(there[-1] - there[0])
     if length < SHORTEST:
         raise PatchfemError(f"{path}: the profile is {say(length, 3)} long; is the unit of x right?")
@@ -122,6 +122,6 @@ def plausible(path, x, z, stated: str = "") -> tuple:
         return (f"{steep}, and {say(most)} without the {few} highest and the {few} lowest of {there.size}; write "
                 "nan for those that are faults of the measurement",)
     if not stated:
-        raise PatchfemError(f"{steep}; is the unit of z right? a missing height is written nan; profile and compare "
-                            "take --units over those of a header")
+        raise PatchfemError(f"{steep}; is the unit of z right? write a missing height as nan; --units of profile "
+                            "and compare overrides the header")
     return (f"{steep}: {stated}",)

@@ -136,7 +136,7 @@ def _shifted_sum(moved, fixed, by: int, out) -> None:
 def _surfaces(lower, upper) -> tuple:
     low, up = np.array(lower, float, order="C"), np.array(upper, float, order="C")
     if low.ndim != 2 or low.shape != up.shape or not low.size or not np.isfinite([low, up]).all():
-        raise PatchfemError("two rough surfaces want finite heights on one and the same raster, "
+        raise PatchfemError("two rough surfaces need finite heights on one and the same raster, "
                             f"not {low.shape} and {up.shape}")
     return low, up
 
@@ -144,11 +144,11 @@ def _surfaces(lower, upper) -> tuple:
 def _reach(stroke: float, step: float, points: int) -> int:
     """The stroke in steps."""
     if not (np.isfinite([stroke, step]).all() and step > 0 and stroke >= 0):
-        raise PatchfemError(f"a stroke of zero or more and a step above zero are wanted, not {stroke:g} and {step:g} m")
+        raise PatchfemError(f"a stroke of zero or more and a step above zero are needed, not {stroke:g} and {step:g} m")
     reach = round(stroke / step)
     if abs(stroke - reach * step) > 1e-6 * step or 2 * reach > points:
         raise PatchfemError(f"a stroke of {stroke:g} m on a raster of {points} steps of {step:g} m: it is made of "
-                            f"whole steps, the nearest {reach * step:g} m, and half a period is the most")
+                            f"whole steps, the nearest {reach * step:g} m, and at most half a period")
     return reach
 
 

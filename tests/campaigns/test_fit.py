@@ -320,7 +320,7 @@ def test_always_doubtful_records_are_named(tmp_path):
                      table(tmp_path / "loop.csv", time[20:], slide[20:], late + 3 * np.sin(np.arange(61) / 9)),
                      free_of("friction.static", "friction.bond_length"))
     assert [any(text in one for one in found.warnings) for text in
-            ("correlated from row to row", "the first row carries", "slide.amplitude is 1.2e-05 m")] == [True] * 3
+            ("correlated from row to row", "the first row is at", "slide.amplitude is 1.2e-05 m")] == [True] * 3
 
 
 # ---- the pace of a record without time
@@ -332,7 +332,7 @@ def test_exact_time_is_made_up_only_where_no_law_feels_it(tmp_path):
     loop = tmp_path / "loop.csv"
     loop.write_text(text)
     found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, free_of("friction.static", "friction.bond_length"))
-    assert found.found.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and "even in time" in found.warnings[0]
+    assert found.found.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and "evenly spaced" in found.warnings[0]
     with pytest.raises(PatchfemError, match=r"loop.csv:1: no column time .s., which law 'tanh' needs here"):
         fit_loop(scene_of(tmp_path, "tanh"), loop, free_of("friction.static"))
     pace = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "2 mm/s"\n'
@@ -342,7 +342,7 @@ def test_exact_time_is_made_up_only_where_no_law_feels_it(tmp_path):
     loop.write_text("displacement [um],force [N]\n" + "\n".join(f"{q},{31 * s}" for q, s in zip(where, both)))
     found = fit_loop(scene_of(tmp_path, "tanh", "friction.static=0.31", slide=pace), loop,
                      free_of("friction.reference_speed"))
-    assert found.found.values == pytest.approx([1.7e-3], rel=1e-6) and "follow each other at" in found.warnings[0]
+    assert found.found.values == pytest.approx([1.7e-3], rel=1e-6) and "are timed by" in found.warnings[0]
 
 
 # ---- the verb
@@ -388,10 +388,10 @@ def test_always_a_fit_cut_short_ends_with_3(asked, monkeypatch, tmp_path):
 
 @pytest.mark.parametrize("free, says", [
     ("friction.static=0.6..0.1", "friction.static: the low bound 0.6 must lie below the high bound 0.1"),
-    ("friction.static=0.1..0.1", "must lie below"), ("friction.static=0.1..nan", "a plain number is wanted, not nan"),
+    ("friction.static=0.1..0.1", "must lie below"), ("friction.static=0.1..nan", "a plain number is needed, not nan"),
     ("friction.static=-0.1..1", "friction.static: must be >= 0, not -0.1"), ("friction.law=1..2", "holds no number"),
     ("friction.bond_length=1..2", "a bare number without a unit"), ("friction.statc=0..1", "did you mean 'static'?"),
-    ("friction.bond_length=1 N..2 N", "'N' is a unit of force"), ("friction.static", "table.key=low..high is wanted"),
+    ("friction.bond_length=1 N..2 N", "'N' is a unit of force"), ("friction.static", "table.key=low..high is needed"),
     ("friction=0..1", "holds no number"), ("contact.pairs=1..3", "holds no number"), ("x=1..2", "not a key of a scene"),
     ("friction.static=0..1,friction.static=0..2", "friction.static: stands twice"),
     ("friction.bond_length=1 um..1e999 um", "too large"), ("contact.load=1 N..2 N", "[contact] and [normal] exclude"),
@@ -406,17 +406,17 @@ BODY = "0,0,0\n1,1,1\n2,2,1\n3,3,1\n4,4,1\n"
 
 
 @pytest.mark.parametrize("text, says", [
-    ("", ":1: a header like"), (HEAD, ":1: a measured loop is at least two rows"),
+    ("", ":1: a header like"), (HEAD, ":1: a measured loop needs at least two rows"),
     ("time [s],displacement [um]\n" + "0,0\n1,1\n", ":1: no column force"),
-    ("time [s],displacement [um],force\n" + BODY, ":1: a header like `time [s],displacement [um],force [N]` is wanted"),
-    ("time [s],displacement [um],force [lb]\n" + BODY, ":1: force [lb]: the unit is not known; one of N, kN, lbf"),
+    ("time [s],displacement [um],force\n" + BODY, ":1: a header like `time [s],displacement [um],force [N]` is needed"),
+    ("time [s],displacement [um],force [lb]\n" + BODY, ":1: force [lb]: unknown unit; use one of N, kN, lbf"),
     ("time [s],force [N]\n0,1\n", ":1: a header like"), ("time [s],displacement [um],force [N],x [\n", ":1: a head"),
-    ("displacement [um],force [N],friction_ratio\n0,0,0\n1,1,1\n", ":1: force and friction_ratio stand side by side"),
-    (HEAD + "0,0,0\n1,1\n", ":3: three cells are wanted, time, displacement and force, not '1,1'"),
+    ("displacement [um],force [N],friction_ratio\n0,0,0\n1,1,1\n", ":1: force and friction_ratio are both given"),
+    (HEAD + "0,0,0\n1,1\n", ":3: three cells are needed, time, displacement and force, not '1,1'"),
     (HEAD + "0,0,0\n1,1,\n", ":3: force: '' is not a finite number"),
     (HEAD + "0,0,0\n1,1,1\n1,2,1\n", ":4: time 1 s does not follow 1 s"),
     (HEAD + "0,5,0\n1,5,1\n", "displacement is the same in every row"),
-    (HEAD + "0,0,0\n1,5,0\n", "force is 0 in every row"), (HEAD + "0,0,0\n1,5,1\n", "2 rows that are not held cannot"),
+    (HEAD + "0,0,0\n1,5,0\n", "force is 0 in every row"), (HEAD + "0,0,0\n1,5,1\n", "2 rows that are not held out"),
 ])  # fmt: skip
 def test_refuses_a_broken_loop_by_line(asked, text, says, tmp_path):
     (tmp_path / "loop.csv").write_text(text)
@@ -446,7 +446,7 @@ def test_refuses_other_requests(asked, tmp_path):
     free = ["--free", "friction.static=0.1..0.7"]
     for words, code, says in (
             (["--hold", "cycle=3"], 2, "no row of"), (["--hold", "run=3"], 2, "no such column of labels"),
-            (["--hold", "cycle"], 2, "column=value,value is wanted"), (["--hold", "cycle=1,2"], 2, "0 rows that are")):
+            (["--hold", "cycle"], 2, "column=value,value is needed"), (["--hold", "cycle=1,2"], 2, "0 rows that are")):
         answer = cli(*asked, *free, *words)
         assert answer.code == code and says in answer.err, answer.err
     assert cli(*asked[:3], tmp_path / "none.csv", *free).code == 4

@@ -138,7 +138,7 @@ def test_always_the_story_of_the_guide_runs_and_says_its_verdict(tmp_path, monke
     (("half", "new"), "new: a run without [wear], which wore nothing; the worn one comes second"),
     (("other", "worn"), "worn: two patches, not one before and after: contact.tilt differ"),
     (("new", "point"), "point: a run without [contact] has no surfaces to compare"),
-    (("new", "nowhere"), "nowhere: there is no such folder"), (("empty", "worn"), "empty: no results folder"),
+    (("new", "nowhere"), "nowhere: there is no such folder"), (("empty", "worn"), "empty: not a results folder"),
     (("file.csv", "worn"), "file.csv: a file, while")])
 def test_refuses_bad_folders_by_name(runs, tmp_path, names, told):
     (runs / "empty").mkdir(exist_ok=True)

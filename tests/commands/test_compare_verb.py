@@ -103,7 +103,7 @@ def test_always_a_scene_is_pressed_with_both(files, tmp_path):
     peak, share = (found["measures"][name] for name in ("pressure_peak", "contact_fraction"))
     assert peak["after"]["value"] < 0.6 * peak["before"]["value"]  # worn plateaus carry more of the load
     assert share["after"]["value"] > share["before"]["value"]
-    assert any(text.startswith("energy of the friction loop per cycle: the scene tells none") for text in
+    assert any(text.startswith("energy of the friction loop per cycle: this scene does not compute it") for text in
                found["lacking"])
     page = (out / "report.html").read_text()
     assert page.count("<figure>") == 4 and "Pressure along the patch" in page
@@ -143,7 +143,7 @@ def test_exact_python_gives_what_the_command_writes(files, compared):
     assert found["verdict"] == "worn, waves reduced"
 
 
-@pytest.mark.parametrize("count, direction, says", [(3, "", "compare: 3 files; two"), (2, "z", "x or y is wanted")])
+@pytest.mark.parametrize("count, direction, says", [(3, "", "compare: 3 files; two"), (2, "z", "x or y is needed")])
 def test_refuses_from_python_what_the_command_refuses(files, count, direction, says):
     with pytest.raises(pf.PatchfemError, match=says):
         pf.compare(*(files[0],) * count, direction=direction)
@@ -157,8 +157,8 @@ def test_refuses_a_scene_without_a_patch(files, tmp_path):
 
 
 @pytest.mark.parametrize("words, says", [
-    (("--direction", "z"), "compare --direction z: x or y is wanted"),
-    (("third.csv",), "compare: 3 files; two are wanted, or four"),
+    (("--direction", "z"), "compare --direction z: x or y is needed"),
+    (("third.csv",), "compare: 3 files; two are needed, or four"),
 ])
 def test_refuses_with_exit_code_2(files, words, says):
     answer = cli("compare", *files[:2], *words)

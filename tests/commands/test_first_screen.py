@@ -161,7 +161,7 @@ def test_exact_a_level_between_two_others_does_not_claim_the_tolerance():
         return least_known(SimpleNamespace(plan=SimpleNamespace(model=model), measures=measures))
 
     jump, fine = Measure(5 * 9.80665, "m s-2", 9.80665, 9.80665), Measure(2.0, "J", 1e-2)
-    between = "jump_level, 5.0 ± 1.0 g, is known to the distance of two levels of the drive"
+    between = "jump_level, 5.0 ± 1.0 g, is known to the step between drive levels"
     assert said(jump_level=jump, loop_area=fine) == "Every measure with an error meets the tolerance 0.01; worst: " \
         f"loop_area, 2.000 ± 0.010 J; {between}, which the scene sets."
     assert said(jump_level=jump) == f"{between}."
@@ -234,7 +234,7 @@ def test_refuses_with_the_key_that_was_meant(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text(text_of("rig"), "utf-8")
     swept = cli("sweep", path, "--over", "contact.tilt=1 urad,2 urad", "-o", tmp_path / "sweep")
-    assert swept.code == 2 and "contact.tilt: a table, not a value; name a key in it: contact.tilt.angle" in swept.err
+    assert swept.code == 2 and "contact.tilt: a table, not a value; choose a key in it: contact.tilt.angle" in swept.err
     bare = cli("check", path, "--set", "acceleration=20 g")
     assert bare.code == 2 and "acceleration: unknown key; did you mean 'drive.acceleration'?" in bare.err
     lost = cli("help")

@@ -77,13 +77,13 @@ def test_always_the_interval_of_a_mean_holds_the_truth_in_95_of_100():
 
 
 @pytest.mark.parametrize("text, says", [
-    ("before,then\na.csv,b.csv\n", ":1: a header like `before,after` is wanted, not 'before,then' (no column after)"),
+    ("before,then\na.csv,b.csv\n", ":1: a header like `before,after` is needed, not 'before,then' (no column after)"),
     ("before,after\n\n", ": no pair below its header"),
-    ("before,after\na.csv\n", ":2: two cells are wanted, before and after, not 'a.csv'"),
-    ("before,after\na.csv,\n", ":2: after: the name of a file is wanted"),
-    ("before,after,direction\na.csv,b.csv,z\n", ":2: direction: x, y or nothing is wanted, not 'z'"),
-    ("before,after\na.csv,b.csv\na.csv,b.csv\n", ":3: the pair of line 2 again"),
-    ("", ":1: a header like `before,after` is wanted"),
+    ("before,after\na.csv\n", ":2: two cells are needed, before and after, not 'a.csv'"),
+    ("before,after\na.csv,\n", ":2: after: the name of a file is needed"),
+    ("before,after,direction\na.csv,b.csv,z\n", ":2: direction: x, y or nothing is needed, not 'z'"),
+    ("before,after\na.csv,b.csv\na.csv,b.csv\n", ":3: repeats line 2"),
+    ("", ":1: a header like `before,after` is needed"),
 ])
 def test_refuses_a_table_that_is_none(tmp_path, text, says):
     path = tmp_path / "pairs.csv"
@@ -96,9 +96,9 @@ def test_refuses_a_table_that_is_none(tmp_path, text, says):
 
 @pytest.mark.parametrize("words, code, says", [
     (("--pairs", "nowhere.csv"), 4, "nowhere.csv: no such table"),
-    (("a.csv", "b.csv", "--pairs", "pairs.csv"), 2, "the table alone is wanted, without other files"),
-    (("a.csv",), 2, "compare: BEFORE and AFTER are wanted, or --pairs"),
-    (("--pairs", "pairs.csv", "--scene", "rig.toml"), 2, "the table alone is wanted, without --scene"),
+    (("a.csv", "b.csv", "--pairs", "pairs.csv"), 2, "give the table alone, without other files"),
+    (("a.csv",), 2, "compare: BEFORE and AFTER are needed, or --pairs"),
+    (("--pairs", "pairs.csv", "--scene", "rig.toml"), 2, "give the table alone, without --scene"),
 ])
 def test_refuses_with_the_exit_code_of_the_contract(tmp_path, monkeypatch, words, code, says):
     monkeypatch.chdir(tmp_path)

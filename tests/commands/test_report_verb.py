@@ -79,7 +79,7 @@ def test_refuses_what_cannot_stand_side_by_side(swept, tmp_path):
     assert cli("report").code == 2
     (tmp_path / "empty").mkdir()
     answer = cli("report", tmp_path / "empty")
-    assert answer.code == 2 and "no results folder: it has no summary.json" in answer.err
+    assert answer.code == 2 and "not a results folder: it has no summary.json" in answer.err
     case = next((swept / "first" / "cases").iterdir())
     answer = cli("report", swept / "first", case)
     assert answer.code == 2 and "first is a sweep" in answer.err

@@ -165,7 +165,7 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
     assert 2 <= held < 6 and sum(row["outcome"] != "" for row in rows(out)) == held  # its tables have what there is
     told = json.loads((out / "sweep.json").read_text())
     assert told["cases"]["unfinished"] == 6 - held
-    assert told["answer"].startswith(f"{6 - held} of 6 cases have no answer yet; what follows is of the others.")
+    assert told["answer"].startswith(f"{6 - held} of 6 cases have no answer yet; what follows covers the others.")
     assert (out / "report.html").is_file()
     monkeypatch.setattr(many, "answers", real)
     text = "cases have an answer from an interrupted sweep"
@@ -222,8 +222,8 @@ def test_exact_one_object_on_stdout(scene, tmp_path):
     (["--over", "normal.load=-1 N,-2 N"], ["-1 N", "-2 N"]),
     (["--set", "drive.cycles=0", "--over", "normal.load=1 N,2 N"], ["drive.cycles: must be > 0"]),
     ([], ["nothing to sweep over"]),
-    (["--over", "normal.load=1 N,2 N", "--device", "cuda"], ["--device cuda: the lanes of a sweep run on the cores"]),
-    (["--over", "friction.static=0.1..0.2:4000", "--over", "normal.load=1 N..2 N:4000"], ["16000000 cases are more"]),
+    (["--over", "normal.load=1 N,2 N", "--device", "cuda"], ["--device cuda: the lanes of a sweep run only on"]),
+    (["--over", "friction.static=0.1..0.2:4000", "--over", "normal.load=1 N..2 N:4000"], ["16000000 cases exceed"]),
 ])
 def test_refuses_before_anything_runs(scene, tmp_path, words, says):
     answer = cli("sweep", scene, *words, "-o", tmp_path / "a")
@@ -396,7 +396,7 @@ def test_refuses_a_key_of_the_file_and_of_the_line(scene, tmp_path):
 
 
 @pytest.mark.parametrize("words, says", [
-    (["--random", "4"], "want --over"),
+    (["--random", "4"], "need --over"),
     (["--random", "4", "--sobol", "4", "--over", "friction.static=0.1..0.2"], "one of them"),
     (["--random", "4", "--over", "friction.static=0.1..0.2:3"], "leave :3 out"),
     (["--over", "friction.static=0.1,0.2", "--shard", "5/4"], "--shard 5/4"),

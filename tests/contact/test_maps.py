@@ -99,13 +99,13 @@ def test_refuses_to_hide_what_did_not_converge(monkeypatch):
 
     def failing(operator, ask, start):
         if ask.load == 2 * LOAD:
-            raise NotConverged("as the test wants it")
+            raise NotConverged("as the test needs it")
         return solve(operator, ask, start)
     monkeypatch.setattr(maps, "solve", failing)
     found = press_map(pair, np.zeros(101), [LOAD, 2 * LOAD, 3 * LOAD], [0.0, 1e-4])
     assert (found.outcome[1] == Outcome.NOT_CONVERGED).all() and np.isnan(found.peak[1]).all()
     assert (found.outcome[[0, 2]] == Outcome.DONE).all()
-    assert found.reasons == {(1, a, 0): "as the test wants it" for a in (0, 1)}
+    assert found.reasons == {(1, a, 0): "as the test needs it" for a in (0, 1)}
 
 
 @pytest.mark.parametrize("change, word", [({"loads": []}, "loads"), ({"loads": [np.nan]}, "loads"),

@@ -39,7 +39,7 @@ def test_always_a_run_without_room_names_path_need_and_room_and_keeps_the_older_
     with limited(size):
         answer = cli("run", scene, "-o", out)
     assert answer.code == 4 and len(answer.err.splitlines()) == 1 and "out.partial/" in answer.err, answer.err
-    assert "wanted" in answer.err and f"{size / 1e3:.3g} kB is the limit on the size of a file" in answer.err
+    assert "needed" in answer.err and f"{size / 1e3:.3g} kB is the limit on the size of a file" in answer.err
     assert [one.name for one in out.iterdir()] == ["summary.json"] and (out / "summary.json").read_text() == "older"
     assert sorted(one.name for one in tmp_path.iterdir()) == ["out", "scene.toml"]
 
@@ -140,7 +140,7 @@ def test_refuses_before_it_writes_what_has_no_room(tmp_path):
     assert there > 0 and ("free" in where or "limit" in where)
     with limited(100):
         assert room(tmp_path / "a") == (100, "is the limit on the size of a file (ulimit -f)")
-        with pytest.raises(Missing, match=r"a: no room: 101 bytes wanted, 100 bytes is the limit"), \
+        with pytest.raises(Missing, match=r"a: no room: 101 bytes needed, 100 bytes is the limit"), \
                 whole(tmp_path / "a", 101):
             raise AssertionError("written")
         write_text(tmp_path / "a", "x" * 100)
@@ -179,12 +179,12 @@ def test_exact_who_is_interrupted_says_what_was_replaced(tmp_path, monkeypatch, 
     said = []
     monkeypatch.setattr("patchfem.__main__.say", said.append)
     assert cli("schema", "-o", "a.json").code == 130
-    assert said == ["interrupted; whole and in place: a.json" if after else "interrupted; nothing was replaced"]
+    assert said == ["interrupted; already complete: a.json" if after else "interrupted; nothing was replaced"]
     assert (Path("a.json").read_text() == "older") != after and [one.name for one in tmp_path.iterdir()] == ["a.json"]
 
 
 def test_always_a_file_inside_a_draft_without_room_names_need_and_room(tmp_path):
-    with limited(1000), pytest.raises(Missing, match=r"a\.json: no room.*: 2 kB wanted, 1 kB is the limit"):
+    with limited(1000), pytest.raises(Missing, match=r"a\.json: no room.*: 2 kB needed, 1 kB is the limit"):
         write_inside(tmp_path / "a.json", 2000 * "x")
     write_inside(tmp_path / "a.json", "\udce4 is no letter")
     assert (tmp_path / "a.json").read_text() == "? is no letter"
@@ -193,7 +193,7 @@ def test_always_a_file_inside_a_draft_without_room_names_need_and_room(tmp_path)
 def test_exact_a_full_table_of_files_is_told_as_that(tmp_path, monkeypatch):
     """It said how many bytes were free, beside the few that were wanted."""
     place = os.statvfs(tmp_path)
-    for found, said in ((9, 0), "inodes"), ((9, 5), "wanted"), ((0, 0), "wanted"):  # the last has no such table
+    for found, said in ((9, 0), "inodes"), ((9, 5), "needed"), ((0, 0), "needed"):  # the last has no such table
         full = SimpleNamespace(f_files=found[0], f_favail=found[1], f_bavail=place.f_bavail, f_frsize=place.f_frsize)
         monkeypatch.setattr(os, "statvfs", lambda path, full=full: full)
         with pytest.raises(Missing, match=said), whole(tmp_path / "a"):
@@ -205,13 +205,13 @@ def test_always_a_folder_under_a_file_names_the_file(tmp_path, words):
     (tmp_path / "bench.toml").write_text(BENCH)
     (tmp_path / "FILE").write_text("")
     answer = cli(words[0], tmp_path / "bench.toml", *words[1:], "-o", tmp_path / "FILE" / "x")
-    assert answer.code == 4 and f"{tmp_path / 'FILE'} is a file; name another folder" in answer.err
+    assert answer.code == 4 and f"{tmp_path / 'FILE'} is a file; choose another folder" in answer.err
 
 
 def test_always_a_name_that_is_too_long_wants_a_shorter_one(tmp_path):
     (tmp_path / "bench.toml").write_text(BENCH)
     answer = cli("run", tmp_path / "bench.toml", "-o", tmp_path / ("a" * 250))
-    assert answer.code == 4 and answer.err.rstrip().endswith("name a shorter one")
+    assert answer.code == 4 and answer.err.rstrip().endswith("use a shorter name")
 
 
 def test_always_a_working_folder_that_is_gone_is_named(tmp_path, monkeypatch):

@@ -75,7 +75,7 @@ def test_exact_an_interrupted_march_goes_on_to_the_same_bits(tmp_path, often, ki
         often.saved.clear()
         often.stop = stop
         answer = cli(*words, out, *["--resume"] * partial.is_dir())
-        assert answer.code == 130 and "out.partial goes on with --resume" in answer.err, answer.err
+        assert answer.code == 130 and "out.partial continues with --resume" in answer.err, answer.err
         assert partial.is_dir() and all(is_state(one.name) for one in partial.iterdir())
     often.saved.clear()
     often.stop = 0
@@ -90,7 +90,7 @@ def test_refuses_the_state_of_another_march(tmp_path, often):
     scene.write_text(RIGS["one slide"], "utf-8")
     words = ("run", scene, "--no-page", "-o", tmp_path / "out", "--resume")
     answer = cli(*words)
-    assert answer.code == 2 and "no interrupted run is kept there; run without --resume" in answer.err
+    assert answer.code == 2 and "no interrupted run is saved there; run without --resume" in answer.err
     assert sorted(one.name for one in tmp_path.iterdir()) == ["scene.toml"]
     often.stop = 5
     assert cli(*words[:-1]).code == 130
@@ -148,8 +148,8 @@ def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):
         assert run.returncode == -9 and left == {"out.partial", ".out.writer"}
     else:
         assert run.returncode == 130 and left == {"out.partial"}
-        assert said.strip().startswith("interrupted; nothing was replaced; what is kept in ")
-        assert said.strip().endswith("out.partial goes on with --resume") and len(said.splitlines()) == 1
+        assert said.strip().startswith("interrupted; nothing was replaced; ")
+        assert said.strip().endswith("out.partial continues with --resume") and len(said.splitlines()) == 1
     assert cli("run", scene, "--no-page", "-q", "-o", out, "--resume").code == 0
     assert {one.name for one in tmp_path.iterdir()} == {"scene.toml", "out"}
     assert os.path.getsize(out / "result.nc") > 10_000

@@ -192,7 +192,7 @@ def test_refuses_a_bare_piece_too_slender_for_its_cells_by_their_length_and_long
     young, nu, length, height = 200e9, 0.0, 1e-4, 20.0
     layers = Layers((young, nu), (young, nu), "stress")
     fine, coarse = (of_grid(graded_grid(length, height, length / cells), seed=1) for cells in (96, 3))
-    with pytest.raises(NotConverged, match=r"shortest cell is 1.04 um in a piece of 100 um x 20 m: ask for longer"):
+    with pytest.raises(NotConverged, match=r"shortest cell is 1.04 um in a piece of 100 um x 20 m: use longer"):
         assemble(fine, layers)
     normal, *_ = condense(assemble(coarse, layers))
     share = coarse.tributary() / length

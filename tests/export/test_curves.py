@@ -173,7 +173,7 @@ def test_exact_a_page_without_curve_or_levels_has_neither():
             "measures": {}, "effects": [], "not_in_scene": [], "warnings": [], "notes": [], "seconds": {}}}  # fmt: skip
     assert "Floquet" not in report.page(data) and "<h2>Levels" not in report.page(data)
     text = report.page(data | {"summary": data["summary"] | {"seconds": {"total": 0.434, "files": 0.1}}})
-    assert "computed in 0.43 s" in text and "Seconds by the clock on the wall: total 0.434 s, files 0.100 s" in text
+    assert "computed in 0.43 s" in text and "Wall-clock seconds: total 0.434 s, files 0.100 s" in text
 
 
 def test_exact_levels_over_more_than_three_decades_are_drawn_over_their_logarithm():

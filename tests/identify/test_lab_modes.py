@@ -118,7 +118,7 @@ def test_exact_the_base_tells_shares_and_no_mass():
                      (0, np.inf))
     np.testing.assert_allclose(found.rows["base"]**2, RESIDUE / 2, rtol=1e-6)
     np.testing.assert_allclose(found.rows["output"] * found.rows["base"], RESIDUE / 2, rtol=1e-6)
-    assert found.mass is None and "tells no mass" in found.notes[-1]
+    assert found.mass is None and "gives no mass" in found.notes[-1]
     found = of_drive({"time": TIME, "base_acceleration": base, "acceleration": base - relative}, None, None,
                      (0, np.inf))
     assert np.sum(found.rows["base"]**2) == pytest.approx(1, rel=1e-9)  # more is not possible, the output grows
@@ -133,7 +133,7 @@ def test_refuses_records_by_name():
         of_drive({"time": TIME, "acceleration": response}, None, None, (0, np.inf))
     with pytest.raises(PatchfemError, match="between 300 and 400 Hz"):
         of_drive({"time": TIME, "force": force, "acceleration": response}, None, None, (300, 400))
-    with pytest.raises(PatchfemError, match="one response is wanted"):
+    with pytest.raises(PatchfemError, match="one response is needed"):
         of_decay({"time": TIME, "force": force})
     with pytest.raises(PatchfemError, match="the input is zero"):
         h1(STEP, 0 * force, response)

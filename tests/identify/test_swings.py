@@ -65,7 +65,7 @@ def test_exact_any_trace_tells_the_amplitude_of_the_displacement(name, power):
 
 def test_refuses_what_holds_no_decay():
     rng, t = np.random.default_rng(0), np.arange(500) / 1000
-    with pytest.raises(PatchfemError, match=r"stand out of the noise|samples of a cycle"):
+    with pytest.raises(PatchfemError, match=r"rise above the noise|samples of a cycle"):
         half_swings(t, rng.normal(size=t.size))
     with pytest.raises(PatchfemError, match="rows of a free decay"):
         half_swings(t[:9], t[:9])

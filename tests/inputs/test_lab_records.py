@@ -124,7 +124,7 @@ def test_refuses_values_that_are_not_finite(tmp_path):
     ("1,2\n3,4\n5,6\n", ":1: a header like"), ("time [s],force [N]\n0,1\n1\n", ":3: 1 cells under 2 columns"),
     ("time [s];force [N]\n0;1\n1;2,5\n", ":3: force [N]: '2,5' has a decimal comma".replace(" [N]", "")),
     ("time [s],force [N]\n0,1\n1,nan\n", ":3: force: 'nan' is not a finite number"),
-    ("time [s],force [lb]\n0,1\n1,2\n", "force [lb]: the unit is not known"),
+    ("time [s],force [lb]\n0,1\n1,2\n", "force [lb]: unknown unit"),
     ("time [s],force\n0,1\n1,2\n", "'force' has no unit"), ("time [s],A\n0,1\n1,2\n", "no channel says what it is")])
 def test_refuses_tables_by_line(tmp_path, text, says):
     (tmp_path / "a.csv").write_text(text)

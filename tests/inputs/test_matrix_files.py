@@ -161,14 +161,14 @@ BAD = {"a.mtx": ("hello\n", "cannot be read"), "b.mtx": ("1 2\n3 4\n", "neither 
        "h.mtx": ("%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 0.02\n", "is complex; motion in time"),
        "i.mtx": ("0 1 2.0\n", "count from 1"), "j.mtx": ("1.5 1 2.0\n", "must be whole numbers"),
        "a.pch": ("$ nothing\n", "holds no DMIG card"),
-       "b.pch": ("DMIG    KAAX    X\n", "b.pch:1: no readable DMIG card"),
+       "b.pch": ("DMIG    KAAX    X\n", "b.pch:1: not a readable DMIG card"),
        "c.pch": (f"DMIG    KAAX    {0:8d}{6:8d}{4:8d}\n", "it is complex"),
-       "d.pch": (punched("KAAX", K, True).replace("4.0", "4.x"), "no readable DMIG card ('4.x"),
-       "a.op4": ("nothing\n", "no readable OUTPUT4 file"), "b.op4": ("", "holds no matrix"),
+       "d.pch": (punched("KAAX", K, True).replace("4.0", "4.x"), "not a readable DMIG card ('4.x"),
+       "a.op4": ("nothing\n", "not a readable OUTPUT4 file"), "b.op4": ("", "holds no matrix"),
        "c.op4": (output4_text("KAAX", K, False, False).replace("       6       2KAAX", "       6       4KAAX"),
                  "a matrix is complex"),
-       "d.op4": (output4_text("KAAX", K, False, False)[:150], "no readable OUTPUT4 file"),
-       "a.npz": ("PK no archive", "is no archive"), "a.mat": ("x" * 200, "damaged or of version 4")}
+       "d.op4": (output4_text("KAAX", K, False, False)[:150], "not a readable OUTPUT4 file"),
+       "a.npz": ("PK no archive", "is not an archive"), "a.mat": ("x" * 200, "damaged or of version 4")}
 
 
 @pytest.mark.parametrize("name", BAD)
@@ -194,7 +194,7 @@ def test_always_refuses_damaged_binary_matrices_by_a_sentence(tmp_path):
 
 def test_refuses_names_that_are_not_known_and_sizes_that_differ(tmp_path):
     np.savez(tmp_path / "a.npz", A=K, B=M)
-    with pytest.raises(PatchfemError, match=r"holds no stiffness by a name that is known .* its arrays: A, B"):
+    with pytest.raises(PatchfemError, match=r"holds no stiffness by a known name .* its arrays: A, B"):
         matrices.read(tmp_path / "a.npz", "stiffness")
     np.savez(tmp_path / "k.npz", K=K)
     for wanted in ("mass", "damping"):

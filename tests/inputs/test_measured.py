@@ -46,16 +46,16 @@ def test_exact_units_of_a_table(tmp_path):
 @pytest.mark.parametrize("text, wanted", [
     ("", ":1: {like}, not ''"),
     ("frequency,input [g]\n", ":1: {like}, not 'frequency,input [g]' (frequency without a unit)"),
-    ("frequency [Hz],input [lb]\n", ":1: input [lb]: the unit is not known; one of g, m/s^2"),
-    ("frequency [Hz],speed [m/s]\n", ":1: {like}, not 'frequency [Hz],speed [m/s]' (with a unit are known: "),
+    ("frequency [Hz],input [lb]\n", ":1: input [lb]: unknown unit; use one of g, m/s^2"),
+    ("frequency [Hz],speed [m/s]\n", ":1: {like}, not 'frequency [Hz],speed [m/s]' (columns with a unit: "),
     ("frequency [Hz],flag\n", ":1: {like}, not 'frequency [Hz],flag' (no column input)"),
     ("flag\n", ":1: {like}, not 'flag' (no column frequency, input)"),
-    (HEAD + "143,5,6.0,,\n143,6\n", ":3: five cells are wanted, frequency, input"),
+    (HEAD + "143,5,6.0,,\n143,6\n", ":3: five cells are needed, frequency, input"),
     (HEAD + "143,5,six,,\n", ":2: acceleration: 'six' is not a finite number"),
     (HEAD + "143,5,\"6,0\",,\n", ":2: acceleration: '6,0' is not a finite number"),
     (HEAD + "143,5,6.0,,\n143,5,6.0,,X\n", ":3: flag 'X'"),
-    (HEAD + ",5,6.0,,\n", ":2: frequency and input are wanted"),
-    (HEAD + "143,,6.0,,\n", ":2: frequency and input are wanted"),
+    (HEAD + ",5,6.0,,\n", ":2: frequency and input are needed"),
+    (HEAD + "143,,6.0,,\n", ":2: frequency and input are needed"),
     (HEAD + "143,5,1e999,,\n", ":2: acceleration: '1e999' is not a finite number"),
     (HEAD + "1" * 200_000 + ",5,6,,\n", ":2: frequency: '1111"),
     (HEAD + "1" * 200_000 + ",\"5\",6,,\n", ":2: its quotes cannot be read (field larger than field limit"),
@@ -67,7 +67,7 @@ def test_refuses_a_faulty_table(tmp_path, text, wanted):
     path.write_text(text, "utf-8")
     with pytest.raises(PatchfemError) as caught:
         read_table(path)
-    wanted = wanted.replace("{like}", "a header like `frequency [Hz],input [g],flag` is wanted")
+    wanted = wanted.replace("{like}", "a header like `frequency [Hz],input [g],flag` is needed")
     assert str(caught.value).startswith(f"{path}{wanted}")
 
 

@@ -24,7 +24,7 @@ def test_exact_a_universal_file_is_read_back(tmp_path):
     time, value = read_signal(path, "acceleration")
     assert time == pytest.approx(t, abs=1e-9)
     assert value == pytest.approx(np.sin(W * t), abs=1e-6)
-    with pytest.raises(PatchfemError, match="force is wanted, 0 of 1"):
+    with pytest.raises(PatchfemError, match="force is needed; 0 of the 1"):
         read_signal(path, "force")
 
 

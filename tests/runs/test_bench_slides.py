@@ -236,8 +236,8 @@ HEAD = "time [s],displacement [um]\n"
 @pytest.mark.parametrize("text, says", [
     ("", ":1: a header like"), ("0,0\n1,1\n", ":1: a header like"), ("time,displacement\n0,0\n1,1\n", ":1: a header"),
     ("time [s],displacement [um],x [m]\n", ":1: a header"), ("time [s],time [s]\n", ":1: a header"),
-    ("time [s],displacement [N]\n0,0\n1,1\n", ":1: displacement [N]: the unit is not known; one of m, km"),
-    (HEAD, ":1: a path is at least two rows"), (HEAD + "0,0\n\n", ":2: a path is at least two rows"),
+    ("time [s],displacement [N]\n0,0\n1,1\n", ":1: displacement [N]: unknown unit; use one of m, km"),
+    (HEAD, ":1: a path needs at least two rows"), (HEAD + "0,0\n\n", ":2: a path needs at least two rows"),
     (HEAD + "0,0\n1,nan\n", ":3: displacement: 'nan' is not a finite number"),
     (HEAD + "0,0\n1,1e999\n", ":3: displacement: '1e999' is not"), (HEAD + "0,0\n1;1\n", ":3: two cells"),
     (HEAD + "0,0\n\n1,1\n", ":3: two cells"), (HEAD + "0,0\n1,1,2\n", ":3: two cells"),

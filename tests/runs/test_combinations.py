@@ -87,7 +87,7 @@ def walk(text: str, sets: list) -> str:
     except SceneError as error:
         for message in error.mistakes:
             assert re.search(r": [a-z]+(\.[\w[\]-]+)+: ", message), message
-            assert re.search(r"\b(use|leave|put|set|name|give|wanted|built|belongs)\b", message), message
+            assert re.search(r"\b(use|leave|put|set|name|give|needed|choose|built|belongs)\b", message), message
         return "refused"
     assert ran(scene)
     return "ran"
@@ -151,7 +151,7 @@ def test_always_the_words_stand_in_few_files():
     (PATCH + RUBS + SHAKEN, [*BONDS, *LOWER, "accuracy.quadrature=merged"], "accuracy.quadrature",
      "'merged' beside the pressure on the lower piece in a rig: use 'recursion' or 'auto'"),
     (MASSES.format(FACE.format(2)), ["structure.interface.1.law=convolution", "structure.interface.1.bond_length=1 um"],
-     "structure.interface[2].law", "law 'convolution' beside other interfaces: use law"),
+     "structure.interface[2].law", "law 'convolution' with other interfaces: use law"),
     (MASSES.format(FACE.format(2)), ["structure.interface.1.law=tanh", "structure.interface.1.reference_speed=1 mm/s",
                                      "accuracy.method=harmonic"], "accuracy.method", "'harmonic' beside several inter"),
 ])

@@ -211,7 +211,7 @@ def test_always_a_balanced_motion_that_does_not_last_is_said():
     starts = one_harmonic(balance_of(finder.modes, finder.group, 512), drive.omega, drive.acceleration)
     other = periodic_point(finder.modes, drive, finder.group, 15, start=starts[2])
     found, _ = finder.point(model.rig.drive, other)
-    assert found.outcome is Outcome.NOT_CONVERGED and "does not last" in found.message
+    assert found.outcome is Outcome.NOT_CONVERGED and "is unstable" in found.message
     assert found.values["relative_displacement_amplitude"] > 20e-6
 
 
@@ -291,7 +291,7 @@ def test_exact_the_plan_prints_stiffness_and_capacity():
 
 @pytest.mark.parametrize(("text", "sets", "key", "words"), [
     (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "which lock with static = 2"),
-    (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "= 6.3662e-06 m is wanted"),
+    (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "= 6.3662e-06 m is needed"),
     (RIG, ["accuracy.method=exact"], "accuracy.method", "no exact solution exists beside [normal.grooves]"),
     (RIG, ["accuracy.method=newmark"], "accuracy.method", "beside [normal.grooves]"),
     (RIG, ["friction.law=convolution", "friction.bond_length=1 um"], "friction.law",
@@ -315,7 +315,7 @@ def test_refuses_what_grooves_cannot_stand_beside(text, sets, key, words):
 
 def test_refuses_grooves_under_a_static_patch_and_soft_pieces():
     patch = BLOCK + GROOVES
-    with pytest.raises(SceneError, match=r"contact\.grooves: .*climbed by what slides"):
+    with pytest.raises(SceneError, match=r"contact\.grooves: .*needs what slides"):
         loads(patch)
     soft = BENCH.replace(f'[normal]\nload = "115 N"\n{GROOVES}', patch + "\n[contact.shear]")
     with pytest.raises(SceneError, match=r"friction\.law: 'tanh' beside \[contact\.shear\]"):

@@ -91,8 +91,8 @@ def test_exact_a_mesh_with_a_hole_says_so_with_its_area(tmp_path):
     m.quads, m.quad_tags = np.delete(m.quads, gone, axis=0), np.delete(m.quad_tags, gone)
     FORMATS["vtu"][1](m, whole[1])
     said = [[text for text in ran(HELD.format(path), False).extra["notes"] if "hole" in text] for path in whole]
-    told = f"contact.mesh: the lower piece has 1 hole inside, {1e6 * area:.3g} mm^2 in all; draw the cells that are"
-    assert gone.size == 2 and said == [[], [f"{told} missing if none was meant"]]
+    told = f"contact.mesh: the lower piece has 1 hole inside, {1e6 * area:.3g} mm^2 in all; fill any that"
+    assert gone.size == 2 and said == [[], [f"{told} is not intended"]]
 
 
 def test_exact_a_tall_piece_says_its_share_of_the_load_under_which_it_buckles():

@@ -153,7 +153,7 @@ def test_always_auto_takes_the_cheaper_engine():
 
 def test_always_the_plan_says_what_both_engines_cost():
     said = " ".join(pf.plan(pf.load(RIG)).verdict)
-    assert "1 element by engine piecewise: about" in said and "by steps at this tolerance" in said
+    assert "1 element by engine piecewise: about" in said and "by time steps at this tolerance" in said
 
 
 def test_refuses_an_exact_run_without_end():

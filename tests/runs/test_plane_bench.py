@@ -156,7 +156,7 @@ def test_exact_the_table_is_read_in_any_order_of_columns(tmp_path):
 @pytest.mark.parametrize("text, says", [
     (L_SHAPE + "9,4\n", ":6: three cells"), (L_SHAPE + "9,4,x\n", ":6: lateral: 'x' is not a finite"),
     (L_SHAPE.replace("0,0,0", "0,0,3"), ":2: lateral starts at 3e-06"),
-    (L_SHAPE.replace("lateral [um]", "lateral [s]"), ":1: lateral [s]: the unit is not known"),
+    (L_SHAPE.replace("lateral [um]", "lateral [s]"), ":1: lateral [s]: unknown unit"),
     (L_SHAPE.replace("lateral [um]", "sideways [um]"), ":1: a header like"),
     (L_SHAPE.replace("lateral [um]", "time [s]"), ":1: a header like"),
     ("time [s],displacement [um],lateral [um]\n0,0,0\n1,0,0\n", "nothing slides")])

@@ -107,13 +107,13 @@ def test_exact_a_resumed_run_has_the_same_bits():
 
 
 @pytest.mark.parametrize("sets, told", [
-    (['wear.friction.depth=["1 um","2 um"]'], "wear.friction.depth: depths that rise from 0 are wanted"),
-    (['wear.friction.depth=["0 um","1 um","3 um"]'], "2 factors at 3 depths; one at each is wanted"),
-    (['wear.friction.depth=["0 um"]'], "wear.friction.depth: at least 2 values are wanted, not 1"),
-    (["wear.friction.coefficient_factor=[1.1,2]"], "1.1 at depth 0, where [friction] itself tells the new contact"),
+    (['wear.friction.depth=["1 um","2 um"]'], "wear.friction.depth: depths that rise from 0 are needed"),
+    (['wear.friction.depth=["0 um","1 um","3 um"]'], "2 factors at 3 depths; one at each is needed"),
+    (['wear.friction.depth=["0 um"]'], "wear.friction.depth: at least 2 values are needed, not 1"),
+    (["wear.friction.coefficient_factor=[1.1,2]"], "1.1 at depth 0, where [friction] itself describes the new contact"),
     (["friction.law=coulomb", "wear.friction.bond_length_factor=[1,2]"], "law 'coulomb' has no bond length"),
     (["contact.grooves.wavelength=80 um", "contact.grooves.amplitude=20 um", "wear.friction.coefficient_factor=[1,2]"],
-     "locks on the flanks of the new grooves, of slope 1.5708; factors below 1.59155 are wanted"),
+     "locks on the flanks of the new grooves, of slope 1.5708; factors below 1.59155 are needed"),
 ])
 def test_refuses_a_table_that_makes_no_sense(sets, told):
     with pytest.raises(SceneError) as error:

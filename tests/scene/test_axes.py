@@ -68,14 +68,14 @@ def test_exact_a_text_gives_the_value_beside_it():
     ("contact.tilt.angle=1 mm..2 rad:9", "'mm' is a unit of length"),
     ("contact.lod=3 N", "did you mean 'load'"),
     ("friction.law=coulom", "did you mean 'coulomb'"),
-    ("friction.static=a", "a plain number is wanted"),
-    ("friction.static=0.1..0.6", "the number of values is wanted behind a colon"),
+    ("friction.static=a", "a plain number is needed"),
+    ("friction.static=0.1..0.6", "give the number of values after a colon"),
     ("friction.static=0.1..0.6:1", "from 2 to 10000000"), ("friction.static=0.1..0.6:10000001", "from 2 to 10000000"),
-    ("friction.static=-inf", "a plain number is wanted, not -inf"), ("structure.mode.axial.slide=nan", "not nan"),
+    ("friction.static=-inf", "a plain number is needed, not -inf"), ("structure.mode.axial.slide=nan", "not nan"),
     ("contact.load=nan N", "is not a finite number"), ("friction.static=-1..2:3log", "both ends > 0"),
     ("friction.static=0.1..0.1:3", "both ends are the same"),
     ("friction.static=0.1,,0.2", "an empty value"),
-    ("contact.pairs=1..4:3", "a whole number is wanted"),
+    ("contact.pairs=1..4:3", "a whole number is needed"),
     ("contact.tilt.angle=1 mrad,0.001 rad", "stands twice"),
     ("contact.tilt.angle", "table.key=v1,v2"),
 ])
@@ -96,7 +96,7 @@ def test_exact_drawn_values_lie_between_the_ends():
     np.testing.assert_allclose(span.axis([0, 0.25, 0.5, 1]).values, [1e-3, 10**-2.5, 1e-2, 1e-1], rtol=1e-14)
     even = axis("friction.static=0.2..0.6:lin", sampled=True)
     np.testing.assert_allclose(even.axis([0, 0.25, 1]).values, [0.2, 0.3, 0.6], rtol=1e-14)
-    assert "from a list of its values" in read(["contact.pairs=1..4"], True)[1][0]
+    assert "list the values of a whole number" in read(["contact.pairs=1..4"], True)[1][0]
     assert "leave :9 out" in read(["friction.static=0.2..0.6:9"], True)[1][0]
 
 

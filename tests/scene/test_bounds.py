@@ -55,7 +55,7 @@ def test_refuses_signs_that_no_file_can_hold():
 
 def test_refuses_words_of_set_that_are_no_text():
     assert mistakes(PATCH, "contact.load=26 lbf\udcff") == [
-        "--set: contact.load=26 lbf\\udcff: holds bytes that are no UTF-8 text; write it in UTF-8"]
+        "--set: contact.load=26 lbf\\udcff: holds bytes that are not UTF-8 text; save it as UTF-8"]
 
 
 @pytest.mark.parametrize("word", ["x" * 3000 + " = 1\n", "[" + "x" * 3000 + "]\n"])
@@ -69,7 +69,7 @@ def test_exact_a_long_name_is_cut(word):
     (POINT + "b = {" + ".".join("a" * 20_000) + " = 1}\n", 3)])
 def test_refuses_a_key_of_many_parts_at_once(text, line):
     begin = time.process_time()
-    assert mistakes(text) == [f"a.toml:{line}: a key of more than 50 parts; table.key is wanted"]
+    assert mistakes(text) == [f"a.toml:{line}: a key of more than 50 parts; table.key is needed"]
     assert time.process_time() - begin < 1  # the square of the parts: 30 s
 
 

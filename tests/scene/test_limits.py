@@ -39,17 +39,17 @@ REFUSED = [
      "accuracy.method", "'harmonic' with a law that jumps beside structure.bonded.wavelength"),
 ]
 PLAIN = [
-    (RIG, [SHEAR, "friction.static=0"], "friction.static", "no point carries friction; static > 0 is wanted"),
+    (RIG, [SHEAR, "friction.static=0"], "friction.static", "no point carries friction; static > 0 is needed"),
     (PATCH_BENCH, [SHEAR, "friction.static=0"], "friction.static", "or leave out [contact.shear]"),
     (RIG, ["accuracy.method=exact"], "accuracy.method", "no exact solution exists for law 'nonlocal'; use 'march'"),
     (RIG, ["accuracy.method=exact", PLASTIC, "structure.stiffening.cubic=1e12 N/m^3"], "accuracy.method",
      "no exact solution exists beside [structure.stiffening]; use 'march' or leave"),
     (RIG, ["accuracy.method=exact", PLASTIC, SHEAR, "structure.mode.second.pitch=1 rad/m"], "accuracy.method",
      "no exact solution exists beside a mode's pitch"),
-    (LINEAR, ["drive.cycles=0.2"], "drive.cycles", "at least a quarter of a cycle is wanted, cycles >= 0.25, not 0.2"),
+    (LINEAR, ["drive.cycles=0.2"], "drive.cycles", "at least a quarter of a cycle is needed, cycles >= 0.25, not 0.2"),
     (LINEAR, [STEADY, "drive.kind=free", "drive.displacement=1 mm"], "accuracy.method", "steady motion under a sine"),
     (LINEAR, [STEADY, "drive.waveform=step"], "accuracy.method", "use 'march' or leave method out"),
-    (RIG, ["drive.cycles=1e-9"], "drive.cycles", "at least a quarter of a cycle is wanted"),
+    (RIG, ["drive.cycles=1e-9"], "drive.cycles", "at least a quarter of a cycle is needed"),
 ]
 
 
@@ -87,7 +87,7 @@ def test_refuses_a_rig_in_which_nothing_slides():
 
 def test_refuses_a_duration_below_a_quarter_of_a_cycle():
     text = LINEAR.replace("cycles = 200", 'duration = "1 ms"')
-    assert f"a.toml:{line_of(text, 'duration')}: drive.duration: at least a quarter of a cycle is wanted" in only(text)
+    assert f"a.toml:{line_of(text, 'duration')}: drive.duration: at least a quarter of a cycle is needed" in only(text)
     assert only(text).endswith("duration >= 0.00174825 s, not 0.001 s")
     assert loads(text, sets=["drive.duration=1.75 ms"]).drive.duration == 1.75e-3
     assert loads(LINEAR, sets=["drive.cycles=0.25"]).drive.cycles == 0.25
@@ -130,7 +130,7 @@ def test_exact_what_runs_is_let_through(text, sets, kind):
         (RIG, ["friction.kinetic=0.2"], "friction.kinetic has no effect while the bond length is constant; "
                                         "add rest_growth and slip_growth"),
         (PATCH, ["contact.mesh=a.msh", "contact.element_size=100 um"],
-         "contact.element_size is not used beside contact.mesh, whose elements are those of the file"),
+         "contact.element_size is not used with contact.mesh, whose file gives the elements"),
     ],
 )  # fmt: skip
 def test_exact_remarks_on_what_has_no_effect(text, sets, remark):
@@ -144,9 +144,9 @@ def test_exact_remarks_on_what_has_no_effect(text, sets, remark):
     [
         ("contact.load=26#", "contact.load", "'#' is ambiguous"),
         ("contact.load=26 # heavy", "contact.load", "unknown unit '# heavy'"),
-        ("friction.static=0.3#", "friction.static", "a plain number is wanted, not '0.3#'"),
+        ("friction.static=0.3#", "friction.static", "a plain number is needed, not '0.3#'"),
         ("accuracy.steps_per_cycle=400 # fine", "accuracy.steps_per_cycle", "not '400 # fine'"),
-        ("contact.shear={} # on", "contact.shear", "a table [contact.shear] is wanted, not '{} # on'"),
+        ("contact.shear={} # on", "contact.shear", "a table [contact.shear] is needed, not '{} # on'"),
     ],
 )
 def test_refuses_a_hash_in_a_set_as_part_of_its_value(one, key, says):

@@ -84,7 +84,7 @@ def test_always_every_unit_of_a_kind_parses_as_its_factor(kind, data):
 @pytest.mark.parametrize(
     "text, kind, says",
     [
-        (5, "force", "a bare number without a unit; a force with its unit is wanted, such as '26 lbf'"),
+        (5, "force", "a bare number without a unit; a force with its unit is needed, such as '26 lbf'"),
         (5.0, "length", "such as '12.7 mm'"),
         ("26", "force", "'26' is a bare number without a unit"),
         (True, "force", "true is not a quantity"),

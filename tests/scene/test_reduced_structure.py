@@ -123,7 +123,7 @@ REFUSED = {
     ("boundary", "[40, 25]", "[40, 41]"): "there is no coordinate 41: the matrices have 40, counted from 1",
     ("boundary", "[40, 25]", "[40, 40]"): "names 40 twice; each coordinate once",
     ("boundary", "[40, 25]", '["40:x", 2]'): "'40:x' names a node, but the files name none",
-    ("boundary", "[40, 25]", "[]"): "whole numbers are wanted, such as [1, 2]",
+    ("boundary", "[40, 25]", "[]"): "whole numbers are needed, such as [1, 2]",
     ("mass", '"both.npz"', '"k.mtx"'): "holds the same numbers as the stiffness; name the file of the mass",
     ("stiffness", "k.mtx", "k.txt"): "the name ends in '.txt'",
     ("stiffness", "k.mtx", "whole.mtx"): "there is no file",
@@ -133,9 +133,9 @@ REFUSED = {
     ("mass", "both.npz", "named.mtx"): "names nodes and directions and another does not",
     ("damping", '"both.npz"\nboundary', "1.5\nboundary"): "must be < 1, not 1.5",
     ("modes", "modes = 4", "modes = -1"): "must be >= 0, not -1",
-    ("moved", "modes = 4", 'modes = 4\nmoved = ["1..60"]'): "'1..60' is no range of whole rows from 1 to 40",
+    ("moved", "modes = 4", 'modes = 4\nmoved = ["1..60"]'): "'1..60' is not a range of rows from 1 to 40",
     ("unit", "modes = 4", 'modes = 4\nunit = "1 kg"'): "'kg' is a unit of mass, but this is a length",
-    ("slide", "modes = 4", "modes = 4\nslide = [1, 0]"): "stands beside [friction]",
+    ("slide", "modes = 4", "modes = 4\nslide = [1, 0]"): "is given with [friction]",
 }
 
 

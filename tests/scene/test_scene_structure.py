@@ -161,7 +161,7 @@ def test_exact_starts_of_a_scene():
     (["structure.interface.0.between=[0, 9]"], "structure.interface[1].between", "there is no mass 9"),
     (["structure.interface.0.load=-1 N"], "structure.interface[1].load", "must be >= 0"),
     (["structure.output_mass=3"], "structure.output_mass", "there is no mass 3"),
-    (["structure.masses=[]"], "structure.masses", "at least one mass is wanted"),
+    (["structure.masses=[]"], "structure.masses", "at least one mass is needed"),
     (["structure.masses=['1 kg', '0 kg']"], "structure.masses[2]", "must be > 0"),
     (["structure.spring.0.stiffness=-1 N/m"], "structure.spring[1].stiffness", "must be >= 0"),
     (["structure.start.displacement=['1 mm']"], "structure.start.displacement", "1 value for 2 masses; one for each"),
@@ -271,7 +271,7 @@ def test_refuses_files_at_the_line_of_the_scene(tmp_path):
     with pytest.raises(PatchfemError, match=r"structure\.file: lacks slide"):
         modes_of(write_scene(tmp_path, POINT + FILE))
     late = write_scene(tmp_path, FILE + '[structure.start]\nvelocity = ["1 m/s"]\n')
-    with pytest.raises(PatchfemError, match=r":8: structure\.start: 1 values stand for 2 modes or masses"):
+    with pytest.raises(PatchfemError, match=r":8: structure\.start: 1 values are given for 2 modes or masses"):
         start_state(late, modes_of(late))
     with pytest.raises(SceneError, match=r"structure\.file: there is no file"):
         write_scene(tmp_path, FILE.replace("rig.npz", "other.npz"))
@@ -358,7 +358,7 @@ def test_refuses_other_masses_beside_a_contact_by_the_same_way_out(rest):
     pair = "[1, 2]" if "masses" in rest else "[1, 0]"
     spring = f'[[structure.spring]]\nbetween = {pair}\nstiffness = "200 kN/m"\n'
     found = refusal(BLOCK + COULOMB + "[structure]\n" + rest + spring + PUSH)
-    assert "beside [contact], give" in found and "write [[structure.interface]]" not in found
+    assert "with [contact], give" in found and "write [[structure.interface]]" not in found
     assert ('frequency = "41.0936 Hz"' in found) == ("moving" in rest)
 
 

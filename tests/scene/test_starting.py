@@ -69,5 +69,5 @@ def test_always_the_beam_goes_from_the_bolted_to_the_free_frequency():
 
 
 def test_refuses_a_kind_that_is_not_there():
-    with pytest.raises(PatchfemError, match="joitn: no kind of scene; did you mean 'joint'"):
+    with pytest.raises(PatchfemError, match="joitn: unknown kind of scene; did you mean 'joint'"):
         text_of("joitn")

@@ -116,7 +116,7 @@ def test_refuses_responses_without_scale_or_modes():
     H = responses([143], [0.003], np.ones((2, 1)))
     flat = np.random.default_rng(0).normal(size=(BAND.size, 2)) @ [1, 1j]
     for measured, says in (({((2, 0), (1, 0)): (H[:, 1], 0)}, "no response at the driven place itself (1:x)"),
-                           ({((1, 0), (1, 0)): (flat, 0)}, "no mode stands out"),
+                           ({((1, 0), (1, 0)): (flat, 0)}, "no mode is visible"),
                            ({((1, 0), (1, 0)): (0 * flat, 0)}, "the response at 1:x itself is zero"),
                            ({((1, 0), (1, 0)): (-H[:, 0], 0)}, "check its sign"),
                            ({((1, 0), (1, 0)): (H[:, 0], 0), ((2, 0), (1, 0)): (H[:, 1], 2)}, "are mixed")):

@@ -48,7 +48,7 @@ def test_exact_base_step_leaves_masses_in_space():
 
 
 def test_refuses_starts_that_fit_no_mode():
-    with pytest.raises(PatchfemError, match="1 values stand for 2 modes or masses"):
+    with pytest.raises(PatchfemError, match="1 values are given for 2 modes or masses"):
         starts.given(modes([2.0, 5.0], [1.0, 0.0]), [1.0])
     with pytest.raises(PatchfemError, match="no mode moves the output"):
         starts.released(modes([2.0], [0.0]), 1.0)

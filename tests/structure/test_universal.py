@@ -139,7 +139,7 @@ def test_exact_places_give_the_basis(tmp_path):
 
 @pytest.mark.parametrize("where, says", [
     ({"slide_at": "99:+y"}, "structure.slide_at: the file has no motion of 99:y; it has 11:x, 11:y, 11:z"),
-    ({"slide_at": "twelve"}, "structure.slide_at: 'twelve' is no place; node:direction is wanted"),
+    ({"slide_at": "twelve"}, "structure.slide_at: 'twelve' is not a place; node:direction is needed"),
     ({"slide_at": "12:+x"}, "structure.slide_at: no mode of the file moves '12:+x'"),
     ({"slide_at": "12:+y", "output_at": "11:+z"}, "structure.output_at: no mode of the file moves"),
     ({"slide_at": "12:+ry"}, "structure.slide_at: the file has no motion of 12:ry"),

@@ -173,9 +173,9 @@ def advance(state: SlipState, operators: Operators, step: Step, friction: float)
 def _meant(step: Step, operators: Operators, friction: float) -> None:
     named = [step.load, step.approach, step.moment, step.spring, step.shear, step.slide]
     if (step.load is None) == (step.approach is None) or (step.shear is None) == (step.slide is None):
-        raise PatchfemError("contact: a step wants load or approach, and shear or slide")
+        raise PatchfemError("contact: a step needs load or approach, and shear or slide")
     if step.moment is not None and step.load is None:
-        raise PatchfemError("contact.load_line: a moment wants a load, not an approach")
+        raise PatchfemError("contact.load_line: a moment needs a load, not an approach")
     if not all(np.isfinite(v) for v in named if v is not None) or not np.isfinite(friction):
         raise PatchfemError("contact: the loads and motions of a step and friction.static must be finite")
     if friction < 0 or (step.load is not None and step.load < 0) or step.spring < 0:

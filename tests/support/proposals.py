@@ -19,7 +19,7 @@ WORD = r"'[^']*'|\"[^\"]*\""
 LIST = rf"((?:{WORD})(?:(?:, | or )(?:{WORD}))*)"
 SUCH = re.compile(r"such as ('[^']*'|\[[^]]*\])")
 USE = re.compile(rf"\b(?:use|or) (?:(law|waveform|kind) )?{LIST}")
-ONE_OF = re.compile(r"one of ((?:[\w-]+, )+[\w-]+)(?: is wanted|$)")
+ONE_OF = re.compile(r"one of ((?:[\w-]+, )+[\w-]+)(?: is needed|$)")
 MEANT = re.compile(r"did you mean '(\w+)'")
 PRINTED = {"reading": "stretch", "order": 1}
 

@@ -26,7 +26,7 @@ def rounded_pair(length: float, height: float, coating: float, radius: float, fi
     reach = length / 2 - flat
     if not (0 < flat < length / 2 and reach <= radius * (1 + 1e-12) and 0 <= coating and 0 < fine <= coarse):
         raise PatchfemError(f"rounded edges: a flat of half width {flat:.6g} m and a radius of {radius:.6g} m do not "
-                            f"fit a length of {length:.6g} m; want 0 < length/2 - flat <= radius, 0 < fine <= coarse")
+                            f"fit a length of {length:.6g} m; need 0 < length/2 - flat <= radius, 0 < fine <= coarse")
     drop = radius - np.sqrt(max(radius**2 - reach**2, 0.0))
     if coating + drop >= height:
         raise PatchfemError(f"rounded edges: coating and fillet take {coating + drop:.6g} m of {height:.6g} m")

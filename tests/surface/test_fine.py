@@ -108,6 +108,6 @@ def test_refuses_fine_waves_with_the_numbers_and_the_remedy():
 def test_refuses_missing_heights_and_no_share():
     with pytest.raises(PatchfemError, match=r"a\.csv: 1 heights are missing; clean the trace first"):
         fine_share(Profile(X, np.where(X == X[7], np.nan, X), "a.csv"), 1.0)
-    with pytest.raises(PatchfemError, match="the share kept is 1; it lies between 0 and 1"):
+    with pytest.raises(PatchfemError, match="the share kept is 1; it must lie between 0 and 1"):
         element_for(*spectrum(sine(X, 1.0, LENGTH)), 1.0)
     assert element_for(*spectrum(Profile(X, 0 * X, "a")), 0.9) == np.inf

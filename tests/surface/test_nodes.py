@@ -161,11 +161,11 @@ def test_refuses_missing_heights_bad_nodes_and_other_words():
         on_nodes(trace(x, np.where(x == x[50], np.nan, x)), EVEN)
     for nodes in (EVEN[:1], EVEN[::-1], np.zeros((2, 2))):
         for function in (on_nodes, placed):
-            with pytest.raises(PatchfemError, match="the nodes under a profile must be two or more and grow along x"):
+            with pytest.raises(PatchfemError, match="a profile needs two or more nodes with rising x"):
                 function(trace(x, x), nodes)
-    with pytest.raises(PatchfemError, match="placing of a profile 'middle' is not known; use auto, own or centred"):
+    with pytest.raises(PatchfemError, match="unknown placing 'middle' of a profile; use auto, own or centred"):
         placed(trace(x, x), EVEN, "middle")
-    with pytest.raises(PatchfemError, match=r"before\.csv: 1 heights; a trace wants two at least"):
+    with pytest.raises(PatchfemError, match=r"before\.csv: 1 heights; a trace needs at least two"):
         placed(trace(x, np.where(x == x[50], 0, np.nan)), EVEN)
 
 

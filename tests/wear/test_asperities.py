@@ -200,9 +200,9 @@ def test_exact_band_of_a_sine():
 
 
 @pytest.mark.parametrize("change, message", [
-    ({"upper": np.zeros((40, 61))}, "two rough surfaces want finite heights on one and the same raster"),
-    ({"stroke": 5e-6}, "it is made of whole steps, the nearest 6.4e-06 m, and half a period is the most"),
-    ({"stroke": 31 * STEP}, "half a period is the most"),
+    ({"upper": np.zeros((40, 61))}, "two rough surfaces need finite heights on one and the same raster"),
+    ({"stroke": 5e-6}, "it is made of whole steps, the nearest 6.4e-06 m, and at most half a period"),
+    ({"stroke": 31 * STEP}, "at most half a period"),
     ({"stroke": -STEP}, "a stroke of zero or more"),
     ({"worn": np.nan}, "worn is a depth of zero or more"),
     ({"upper_share": 1.1}, "upper_share lies between 0 and 1"),

@@ -50,8 +50,8 @@ class Asked:
         scene, drive = self.scene, self.scene.drive
         where = f"{scene.path}: fit --to {measured.name}: "
         if scene.kind not in ("rig", "linear"):
-            raise PatchfemError(f"{where}rows of frequency and input are those of a rig, and this is a {scene.kind} "
-                                "scene; a bench is fitted to a loop with a column displacement")
+            raise PatchfemError(f"{where}rows of frequency and input need a rig, but this is a {scene.kind} scene; "
+                                "fit a bench to a loop with a displacement column")
         if drive.kind != "base" or drive.waveform != "sine":
             raise PatchfemError(f"{where}each row is one sine of the base; set drive.kind = 'base' and drive.waveform "
                                 "= 'sine'")
@@ -72,7 +72,7 @@ class Asked:
         except SceneError:
             return
         self.sets.append(steady)
-        self.notes.append("the scene names no method: its steady motions are fitted, by 'harmonic'")
+        self.notes.append("the scene sets no method, so its steady motions are fitted with 'harmonic'")
 
     def model(self, values) -> Model:
         """The model with values (n,) of the free keys, at the drive of the scene; SceneError where they make none."""

@@ -46,7 +46,7 @@ class Cells:
         if name == "run":
             return [self.runs[k] for k in self.row]
         if name not in ("frequency", "input", "flag"):
-            raise PatchfemError(f"{self.path}: no column {name} to hold or leave out; frequency, input, flag or run")
+            raise PatchfemError(f"{self.path}: no column {name} to hold or leave out; use frequency, input, flag, run")
         return [getattr(self.rows[k], name) for k in self.row]
 
     def chosen(self, one: str) -> np.ndarray:
@@ -56,14 +56,14 @@ class Cells:
         """
         name, equals, values = (part.strip() for part in one.partition("="))
         if not equals or not values:
-            raise PatchfemError(f"--hold {one}: column=value,value is wanted, such as frequency=135 Hz,150 Hz")
+            raise PatchfemError(f"--hold {one}: column=value,value is needed, such as frequency=135 Hz,150 Hz")
         here, out = self.column(name), np.zeros(self.row.size, bool)
         for text in (part.strip() for part in values.split(",")):
             named = np.array([self._is(name, value, text) for value in here])
             if not named.any():
                 known = ", ".join(dict.fromkeys(_shown(name, value) for value in here))
-                raise PatchfemError(f"--hold {name}={text}: no row of {self.path.name} with a reading has it; there "
-                                    f"are {known}")
+                raise PatchfemError(f"--hold {name}={text}: no row of {self.path.name} with a reading has this "
+                                    f"value; it has {known}")
             out |= named
         return out
 
@@ -108,7 +108,7 @@ def cells_of(path: Path) -> Cells:
     row, felt, measured = [], [], []
     for k, one in enumerate(rows):
         if not (one.frequency > 0 and one.input > 0):
-            raise PatchfemError(f"{path}: row {k + 1}: frequency and input above zero are wanted")
+            raise PatchfemError(f"{path}: row {k + 1}: frequency and input above zero are needed")
         if one.acceleration == 0:
             raise PatchfemError(f"{path}: row {k + 1}: an acceleration of 0 has no ratio; leave the cell empty")
         for value, is_felt in ((one.acceleration, True), (one.displacement, False)):

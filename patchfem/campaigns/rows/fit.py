@@ -113,8 +113,8 @@ def fit_rows(question: Question, options: RowsOptions, say: Callable | None = No
     computed = Computed(asked, say)
     parts = cells.parts(options.leave_out, ~held) if options.leave_out else []
     if len(parts) == 1:
-        raise PatchfemError(f"--leave-out {options.leave_out}: the rows that are not held have one value of it, so "
-                            "that nothing would be left")
+        raise PatchfemError(f"--leave-out {options.leave_out}: all rows that are not held out have the same value, "
+                            "so nothing would be left")
     for _, part in parts:
         _enough(cells, ~held & ~part, count, how)
     placebos = [(text, question.asked(cells.conditions, text)) for one in options.placebos
@@ -164,13 +164,13 @@ def _texts(one: str, wanted) -> list:
     """The --set strings of a placebo; PatchfemError where the fit or the rows would put another value in its place."""
     key, equals, values = (part.strip() for part in one.partition("="))
     if not equals or not values:
-        raise PatchfemError(f"--placebo {one}: table.key=value,value is wanted, such as "
+        raise PatchfemError(f"--placebo {one}: table.key=value,value is needed, such as "
                             "structure.mode.yaw.frequency=110 Hz,138 Hz")
     if key in ("drive.frequency", "drive.acceleration"):
-        raise PatchfemError(f"--placebo {one}: the rows give the drive; name a value of the rig")
+        raise PatchfemError(f"--placebo {one}: the rows give the drive; choose a value of the rig")
     if any(key == each.key for each in wanted):
-        raise PatchfemError(f"--placebo {one}: the key is free, so that every fit would find its own value of it; "
-                            "leave it out of --free, or name another key")
+        raise PatchfemError(f"--placebo {one}: the key is free, so every fit would find its own value; leave it "
+                            "out of --free, or use another key")
     return [f"{key}={value.strip()}" for value in values.split(",")]
 
 
@@ -208,6 +208,6 @@ def _said(cells: Cells, asked: Asked, found: Found, logs, how: Search) -> list:
         out.append(f"no bounded motion is found at {'; '.join(lost)}: each counts as a factor of {np.exp(MOST):.0f}")
     alone = int((found.rms <= np.nanmin(found.rms) * 1.01).sum())
     if alone == 1 and how.starts > 1:
-        out.append(f"only one of {how.starts} starts ends within 1 % of the least training score: more --starts may "
+        out.append(f"only one of {how.starts} starts ends within 1 % of the best training score: more --starts may "
                    "find a better one")
     return out

@@ -41,8 +41,8 @@ def asked_of(path: Path, sets: Sequence[str], request: Request) -> tuple[Asked, 
     swept = {asked.place(axis.key): axis.key for axis in cases.axes}
     both = [(one, swept.get(asked.place(".".join(pieces_of(one.partition("=")[0]))))) for one in sets]
     if any(key for _, key in both):
-        raise SceneError([f"--set {one}: {key} is swept, so every case has a value of its own; leave --set out, or the "
-                          "key out of the sweep" for one, key in both if key])
+        raise SceneError([f"--set {one}: {key} is swept, so every case has its own value; remove --set, or the key "
+                          "from the sweep" for one, key in both if key])
     return asked, cases
 
 
@@ -53,8 +53,8 @@ def cases_of(asked: Asked, request: Request) -> Cases:
     """
     parts, wrong = [], []
     if min(request.count, request.seed) < 0 or (request.sobol and not request.count):
-        raise SceneError([f"a draw of {request.count} cases with seed {request.seed}: whole numbers from 0 on are "
-                          "wanted, and at least one case of Sobol's sequence"])
+        raise SceneError([f"a draw of {request.count} cases with seed {request.seed}: whole numbers >= 0 are "
+                          "needed, and at least one case for Sobol's sequence"])
     if request.file is not None:
         rows, wrong = table.read(request.file)
         parts += [rows] if rows is not None else []
@@ -66,7 +66,7 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         if not axes and not mistakes:
             wrong.append(f"{asked.path}: nothing to sweep over; add --over table.key=v1,v2,... or a table [sweep]")
     twice = {axis.key for part in parts for axis in part.axes} & {axis.key for axis in axes}
-    wrong += [f"--over {key}: stands in {request.file} too" for key in sorted(twice)]
+    wrong += [f"--over {key}: is also in {request.file}" for key in sorted(twice)]
     if not wrong:
         wrong += _same(asked, [axis.key for axis in (*axes, *(one for part in parts for one in part.axes))])
     if wrong:
@@ -75,7 +75,7 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         raise SceneError([*asked.mistakes(first), *wrong])
     count = prod([*map(len, parts), *([request.count] if request.count else [len(axis.texts) for axis in axes])])
     if count > MOST:
-        raise SceneError([f"{asked.path}: {count} cases are more than one sweep holds ({MOST}); sweep parts of the "
+        raise SceneError([f"{asked.path}: {count} cases exceed the limit of one sweep ({MOST}); sweep parts of the "
                           "ranges, or draw from them with --sobol N"])
     if request.count and axes:
         parts.append(samples.drawn(axes, request.count, request.sobol, request.seed))
@@ -93,7 +93,7 @@ def _same(asked: Asked, keys: Sequence[str]) -> list[str]:
     for key in keys:
         place = asked.place(key)
         if first.setdefault(place, key) != key:
-            wrong.append(f"--over {key}: stands twice, as {first[place]} too")
+            wrong.append(f"--over {key}: is given twice, also as {first[place]}")
     return wrong
 
 

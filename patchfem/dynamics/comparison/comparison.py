@@ -82,7 +82,7 @@ def grid(modes: ModalBasis, drive, laws, over: tuple, start: Start | None, stick
     (duration, steps_per_cycle), n, i = over, modes.omega.size, len(modes.interfaces)
     table, compiled = rows(laws, i, stick_speed), loops()
     if steps_per_cycle < 4:
-        raise PatchfemError(f"accuracy.steps_per_cycle = {steps_per_cycle}: at least 4 steps per cycle are wanted")
+        raise PatchfemError(f"accuracy.steps_per_cycle = {steps_per_cycle}: at least 4 steps per cycle are needed")
     h = drive.period / steps_per_cycle
     most = MOST_NUMBERS / (2 * n + 2 * i + 3)
     if not 0.5 < duration / h <= most:

@@ -47,10 +47,10 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     or "force" (N); relax in (0, 1]; most: iterations per step. PatchfemError for values that cannot be.
     """
     if convergence not in CRITERIA:
-        raise PatchfemError(f"accuracy.convergence: '{convergence}' is none of {', '.join(CRITERIA)}")
+        raise PatchfemError(f"accuracy.convergence: '{convergence}' is not one of {', '.join(CRITERIA)}")
     if not 0 < tolerance < np.inf or not 0 < relax <= 1 or most < 2:
-        raise PatchfemError(f"accuracy.convergence_tolerance = {tolerance:g}, relax = {relax:g}, most = {most}: wanted "
-                            "are a finite tolerance > 0, 0 < relax <= 1 and at least 2 iterations")
+        raise PatchfemError(f"accuracy.convergence_tolerance = {tolerance:g}, relax = {relax:g}, most = {most}: a "
+                            "finite tolerance > 0, 0 < relax <= 1 and at least 2 iterations are needed")
     found = grid(modes, drive, laws, (duration, steps_per_cycle), start)
     maps, coupling = kernels(modes, found.h), modes.dampers - np.diag(np.diag(modes.dampers))
     solve = np.linalg.inv(np.eye(modes.omega.size) + maps[:, 1, 3:] * coupling)
@@ -64,12 +64,12 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
 
 
 def _admitting(convergence: str, tolerance: float, share: float) -> list:
-    """Warning, as a list, of a criterion that lets the friction be wrong by a share of its limit."""
+    """Warning, as a list, of a criterion that allows a friction error of a share of its limit."""
     if share <= ADMITTED:
         return []
     cure = f"divide accuracy.convergence_tolerance by {np.ceil(share / ADMITTED):.0f}" if convergence == "force" else \
         'set accuracy.convergence = "force"'
-    return [f"a {convergence} that changes by less than {tolerance:g} lets the friction be wrong by {share:.3g} of its "
+    return [f"a {convergence} that changes by less than {tolerance:g} allows a friction error of {share:.3g} of its "
             f"limit; {cure}"]
 
 
@@ -77,12 +77,12 @@ def _warnings(modes, laws, found: Grid, failures, steps: int) -> list:
     out, (*_, residual, iterations) = [], found.filled
     left = np.abs(residual) / found.laws[:, 1]
     if left.max(initial=0.0) > ADMITTED:
-        out.append(f"the steps accepted left up to {left.max():.3g} and on the average {left[1:].mean():.3g} of the "
+        out.append(f"accepted steps left up to {left.max():.3g} and on average {left[1:].mean():.3g} of the "
                    "friction limit between the law and the force used")
     if failures:
         out.append(f"{failures} of {iterations.size - 1} steps ended without convergence after the last iteration")
     turn = found.h * max(elastic_rates(modes, laws), default=0.0)
     if turn > TURN:
-        out.append(f"the elastic part of the friction turns by {turn:.2g} rad in a step (limit {TURN:g}); set "
+        out.append(f"the elastic friction oscillates through {turn:.2g} rad in a step (limit {TURN:g}); set "
                    f"accuracy.steps_per_cycle = {steps * int(np.ceil(turn / TURN))}")
     return out

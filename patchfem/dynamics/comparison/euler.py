@@ -51,4 +51,4 @@ def _warnings(modes, laws, h, steps: int) -> list:
             out.append(f"a step of {h:.3g} s is above 2 v_0 m/limit = {2 / pace:.3g} s: the friction changes its sign "
                        "from step to step while the interface hardly moves")
     return out + [f"explicit Euler takes {h * rate / 2:.3g} off the damping ratio of the elastic contact, which has "
-                  "none of its own" for rate in elastic_rates(modes, laws)]
+                  "no damping" for rate in elastic_rates(modes, laws)]

@@ -22,7 +22,7 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     suffices. Other laws are solved at the end of the step. PatchfemError for values that cannot be.
     """
     if stick_speed is not None and not (np.isfinite(stick_speed) and stick_speed >= 0):
-        raise PatchfemError(f"accuracy.stick_speed = {stick_speed:g} m/s: a finite speed >= 0 is wanted")
+        raise PatchfemError(f"accuracy.stick_speed = {stick_speed:g} m/s: a finite speed >= 0 is needed")
     found = grid(modes, drive, laws, (duration, steps_per_cycle), start, stick_speed)
     h, faces = found.h, modes.interfaces
     inverse = np.linalg.inv(np.eye(modes.omega.size) + h / 2 * modes.dampers + h * h / 4 * np.diag(modes.omega**2))
@@ -41,7 +41,7 @@ def _warnings(modes, laws, found: Grid, by_force, stops) -> list:
         static = row[2] + added_static(modes, face, row[3], h)
         if not by_force and static > 1.01 * row[1]:
             out.append(f"the stick speed {row[3]:g} m/s at a step of {h:.3g} s holds the interface up to "
-                       f"{static:.3g} N instead of {row[1]:.3g} N, and the more the smaller the step; set "
+                       f"{static:.3g} N instead of {row[1]:.3g} N, and more for smaller steps; set "
                        f'accuracy.stick_speed = "{low_speed(modes, face, row[1], h):.2g} m/s"')
         drop = 0.5 * stops * modes.mass * row[3]**2 / np.sum(face**2)
         out.append(f"below {row[3]:g} m/s the interface is stopped at once ({stops} times, up to {drop:.3g} J in all): "

@@ -147,7 +147,7 @@ class SampledRun(GroovesRun):
         """Mark the run not_converged when steps did not meet their error; what was computed is kept."""
         if self.ledger[7]:
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"{int(self.ledger[7])} of {self.done} steps did not come to their end over the grooves; "
+            self.message = (f"{int(self.ledger[7])} of {self.done} steps did not converge over the grooves; "
                             "raise accuracy.steps_per_cycle")
 
     def strained(self) -> float:

@@ -66,7 +66,7 @@ class How(NamedTuple):
 def _values(given, what: str, noun: str) -> np.ndarray:
     values = np.asarray(given, float)
     if values.size < 2 or not (np.isfinite(values).all() and values.min() > 0):
-        raise PatchfemError(f"{what} wants two or more positive {noun}")
+        raise PatchfemError(f"{what} needs two or more positive {noun}")
     return values
 
 

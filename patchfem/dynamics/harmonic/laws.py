@@ -127,7 +127,7 @@ class Jenkins(Law):
     def __post_init__(self):
         k, w = (np.atleast_1d(np.asarray(v, float)) for v in (self.stiffness, self.limit_slide))
         if k.shape != w.shape or not (np.isfinite(k).all() and np.isfinite(w).all()) or k.min() <= 0 or w.min() < 0:
-            raise PatchfemError("Jenkins elements want as many stiffnesses > 0 as limit slides >= 0, all finite")
+            raise PatchfemError("Jenkins elements need as many stiffnesses > 0 as limit slides >= 0, all finite")
         order = np.argsort(w, kind="stable")
         k, w = k[order], w[order]
         object.__setattr__(self, "stiffness", frozen_array(k))

@@ -453,8 +453,9 @@ class Run:
                 for array, old in zip((*self.contact, *self._moving()), begin):
                     array[...] = old
                 did, status = self._steps(did - 1, rows)[0], 1
-                self.message = (f"a step from {say(self._out(rows[did]), 3)} on flings the motion out of all bounds: "
-                                "beyond a softening spring's barrier nothing holds it; the run ended before that step")
+                self.message = (f"a step from {say(self._out(rows[did]), 3)} on throws the motion out of bounds: "
+                                "nothing holds it beyond the barrier of a softening spring; the run ended before that "
+                                "step")
             self.done += did
             parts.append(rows[:did + 1])
             self._judge(status)

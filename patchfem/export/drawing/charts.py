@@ -319,7 +319,7 @@ def caption(found: dict) -> str:
     what, parts = axis_of(found)[1], [regime for regime, _, _ in spans(found)]
     count, folds = np.asarray(found["amplitude"]).size, len(found.get("folds", ()))
     text = f"Half peak-to-peak of the steady motion over the {what}, {count} points; "
-    text += "colour and line tell the regime: " + ", ".join(dict.fromkeys(parts)) + "."
+    text += "colour and line show the regime: " + ", ".join(dict.fromkeys(parts)) + "."
     if folds:
         text += f" The curve turns back at {folds} fold{'s' if folds > 1 else ''}."
     return text + (" Shaded: no bounded motion." if not np.all(np.isfinite(found["amplitude"])) else "")

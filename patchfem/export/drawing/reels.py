@@ -58,7 +58,7 @@ def _ffmpeg(path: Path) -> str:
 
         program = get_ffmpeg_exe()
     if program is None:
-        raise Missing(f"{path}: .mp4 is written by ffmpeg, which is not there; pip install imageio-ffmpeg, or name a "
+        raise Missing(f"{path}: .mp4 is written by ffmpeg, which is not there; pip install imageio-ffmpeg, or use a "
                       ".gif or .html")
     return program
 
@@ -78,4 +78,4 @@ def _mp4(path: Path, images: Iterator, seconds: float) -> None:
     said = run.communicate()[1].decode(errors="replace").strip().splitlines()[-1:]
     if run.returncode:
         said = said or [f"code {run.returncode}"]
-        raise Missing(f"{path}: ffmpeg could not write it ({said[0]}); name a .gif or .html")
+        raise Missing(f"{path}: ffmpeg could not write it ({said[0]}); use a .gif or .html")

@@ -62,7 +62,7 @@ def view(folder: Path, out: Path | None, frame: int | None = None, magnify: floa
 
 def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> None:
     if frame is not None:
-        raise PatchfemError(f"--frame: {out.suffix} shows the whole last cycle; name a .png for one frame")
+        raise PatchfemError(f"--frame: {out.suffix} shows the whole last cycle; use a .png for one frame")
     reels.ready(out)
     with Series(folder) as series:
         with whole(out) as partial:
@@ -72,10 +72,10 @@ def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> 
 
 def _window(one: Frame, head: str, magnify) -> None:
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise Missing("view: there is no screen for a window (DISPLAY is not set); name a picture with -o FILE.png")
+        raise Missing("view: there is no screen for a window (DISPLAY is not set); write a picture with -o FILE.png")
     why = no_opengl()
     if why is not None:
-        raise Missing(f"view: no working OpenGL for a window ({why}); name a picture with -o FILE.png")
+        raise Missing(f"view: no working OpenGL for a window ({why}); write a picture with -o FILE.png")
     plotter(one, head, magnify).show(title=f"patchfem: {head}")
 
 

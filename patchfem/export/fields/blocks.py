@@ -9,7 +9,7 @@ NAMES = ("lower", "upper", "interface")
 PARTS = (*NAMES, "strips")  # the last of a patch that wears in strips; the place of a name is its code in `part`
 MEANINGS = {"stress_error": "share of a cell in the estimated error of the stress: square root of the strain energy of "
             "the recovered less the computed stress over the strain energy of both pieces (Zienkiewicz-Zhu); the"
-            " squares of all cells add up; an indicator of where the mesh is coarse, no bound of a stress"}
+            " squares of all cells add up; an indicator of where the mesh is coarse, not a bound on a stress"}
 CODES = {"part": dict(enumerate(PARTS)), "material": {0: "substrate", 1: "coating"},
          "status": {0: "open", 1: "stick", 2: "slip"}}
 

@@ -98,11 +98,11 @@ class Series:
         wanted(points.ndim == 2 and points.shape[1] == 3 and len(points) and numeric(points)
                and np.abs(points).max() < HUGE, f"{name}/Points are no places")  # NaN is not below it
         wanted(all(one.ndim == 1 and one.size and one.dtype.kind in "iu" for one in (nodes, ends, types)),
-               f"{name}: its cells are no whole numbers")
+               f"{name}: its cells are not whole numbers")
         sizes = np.diff(ends.astype(np.int64))
         wanted(len(sizes) == len(types) and ends[0] == 0 and ends[-1] == len(nodes) and sizes.min() >= 2
                and sizes.max() <= MOST and nodes.min() >= 0 and nodes.max() < len(points),
-               f"{name}: its cells are not of its points")
+               f"{name}: its cells refer to points that it lacks")
         for kind, size in ("PointData", len(points)), ("CellData", len(types)):
             lacks = sorted(set(LEAST[name][kind]) - set(group[kind]))
             wanted(not lacks, f"{name}/{kind} lacks {', '.join(lacks)}")
@@ -111,7 +111,7 @@ class Series:
                 wanted(rows.dtype.kind in "iuf" and rows.shape[1:] == TAILS.get(one, ()),
                        f"{name}/{kind}/{one} holds {rows.ndim}-dimensional {rows.dtype}")
                 wanted(first.shape == self.times.shape and first.dtype.kind in "iu" and first.min() >= 0
-                       and first.max() + size <= len(rows), f"{name}/{kind}/{one} does not reach to the last frame")
+                       and first.max() + size <= len(rows), f"{name}/{kind}/{one} does not reach the last frame")
 
     def __enter__(self) -> "Series":
         return self

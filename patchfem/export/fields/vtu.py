@@ -41,7 +41,7 @@ def export(folder: Path, out: Path, frame: int | None = None) -> str:
         raise PatchfemError(f"{out}: fields are exported as {', '.join(ENDINGS)}, the last cycle with a script "
                             "for ParaView as .py; histories and loops as .uff, .mat, .csv --histories")
     if frame is not None and out.suffix in (".pvd", ".vtkhdf"):
-        raise PatchfemError(f"--frame: {out.suffix} holds the whole series; name a .vtu or .csv for one frame")
+        raise PatchfemError(f"--frame: {out.suffix} holds the whole series; use a .vtu or .csv for one frame")
     with Series(folder) as series:
         return _export(series, out, -1 if frame is None else frame)
 
@@ -49,7 +49,7 @@ def export(folder: Path, out: Path, frame: int | None = None) -> str:
 def _export(series: Series, out: Path, number: int) -> str:
     if out.suffix == ".vtkhdf":
         if out.exists() and out.samefile(series.path):
-            raise PatchfemError(f"{out}: is the file that is exported; name another -o")
+            raise PatchfemError(f"{out}: is the file to export; choose another -o")
         with whole(out, series.path.stat().st_size) as partial:
             shutil.copyfile(series.path, partial)
         return f"{out}: {len(series)} frames"
@@ -80,7 +80,7 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
     strange = sorted(one.name for one in old if not FRAME.fullmatch(one.name) and not unfinished(one.name))
     if strange:
         raise PatchfemError(f"{folder}: holds files that are not frames of patchfem ({', '.join(strange[:3])}); "
-                            "name another -o")
+                            "choose another -o")
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:

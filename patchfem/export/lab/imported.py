@@ -56,7 +56,7 @@ def _table(file: Path, out: Path, asked, zero: bool) -> dict:
     rows = len(next(iter(values.values())))
     moved = [f"{name} starts at {values[name][0]:g} {records.SI[name]}" for name in ("time", "displacement", "lateral")
              if "displacement" in values and name in values and values[name][0] != 0]
-    notes = [*found.notes, *([f"{', '.join(moved)}: slide.file wants a table that starts at 0; --zero counts from the "
+    notes = [*found.notes, *([f"{', '.join(moved)}: slide.file needs a table that starts at 0; --zero counts from the "
                               "first row"] if moved else [])]
     return {"rows": rows, "units": units, "notes": notes, "told": f"{rows} rows of {', '.join(values)}"}
 
@@ -142,5 +142,5 @@ def _band(text: str) -> tuple:
     low, dots, high = text.partition("..")
     ends = [_quantity(one, "frequency", f"--band {one}") for one in (low.strip(), high.strip()) if dots]
     if not ends or None in ends or not 0 <= ends[0] < ends[1]:
-        raise PatchfemError(f'--band {text}: two rising frequencies are wanted, such as "20 Hz..400 Hz"')
+        raise PatchfemError(f'--band {text}: two rising frequencies are needed, such as "20 Hz..400 Hz"')
     return tuple(ends)

@@ -17,7 +17,7 @@ def fragment(found, source: str) -> str:
     in words."""
     lines = [f"# modes of {plain(source)}, by {program()}"] + [f"# {plain(note)}" for note in found.notes]
     mass = f'moving_mass = "{found.mass!r} kg"' if found.mass is not None else \
-        'moving_mass = "1 kg"  # assumed: the record does not tell it'
+        'moving_mass = "1 kg"  # assumed: not in the record'
     lines += ["", "[structure]", mass]
     for k, (f, zeta, about) in enumerate(zip(found.frequency.tolist(), found.damping.tolist(), found.about)):
         lines += ["", "[[structure.mode]]", f'name = "mode {k + 1}"', f'frequency = "{f!r} Hz"',

@@ -93,11 +93,11 @@ def _refuse(model: Model) -> None:
     rig = model.rig
     why = (engines.ENGINES["newmark"] if _speeds(rig) else engines.PIECES).lacks(model, steady=True)
     if why.startswith("for law"):
-        raise PatchfemError(f"{why.removeprefix('for ')} is no set of elements that stretch and slip; use law "
+        raise PatchfemError(f"{why.removeprefix('for ')} is not a set of elements that stretch and slip; use law "
                             "'elastic-plastic', 'iwan' or 'tanh', or law 'coulomb' with [contact.shear]",
                             f"{rig.interfaces[0].key}.law")
     if why:
-        raise PatchfemError(f"matrices and friction elements have no form {why}; leave that out of the scene",
+        raise PatchfemError(f"matrices and friction elements cannot be written {why}; leave that out of the scene",
                             "structure")
 
 

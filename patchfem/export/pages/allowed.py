@@ -165,7 +165,7 @@ def _moving(limits: Limits) -> str:
     ends = sorted((one for one in moving if one.beyond is not None or not one.whole), key=lambda one: one.value)
     if not ends:
         far = _at(limits, moving[0], limits.most) + _brackets(_gap(limits, moving[0], limits.most))
-        return "" if limits.lost else f"{name} may reach {far}: nothing that moves changes by {100 * WITHIN:g} %"
+        return "" if limits.lost else f"{name} may reach {far}: no measure of the motion changes by {100 * WITHIN:g} %"
     least, *_, last = *ends, ends[-1]
     what = "anything that moves" if not limits.lost else "the " + " or the ".join(label(one.name) for one in moving)
     held = f"before {what} changes by {100 * WITHIN:g} %"
@@ -249,12 +249,11 @@ def table(limits: Limits, measures: dict) -> str:
         first = short(one.first, measures[one.name][2], 4, zero_below(one.name))
         rows.append([linked(label(one.name), one.name), escape(first), _change(one.changed), by, escape(far)])
     several = int(np.sum(np.asarray(key["values"], float) == np.min(np.asarray(key["values"], float)))) > 1
-    least = " Of the values of the other keys those are told that allow least." if several else ""
+    least = " For the other keys the values that allow least are given." if several else ""
     return (f"<p class=soft>{escape(key['name'])} grows from {escape(at(limits.found[0].start))}. A measure has left "
-            "its first value where it differs from it by so much and by more than both numerical errors; cases that "
-            "miss their tolerance do not count, nor those that did not settle where settled ones have the measure."
-            f"{least}</p>" + document.table(
-                ("measure", ">first case", ">change up to the last", "leaves by", "where"), rows, "wide"))
+            "its first value if it differs from it by this much and by more than both numerical errors. Cases that "
+            f"miss their tolerance do not count, nor do unsettled cases if settled ones have the measure.{least}</p>"
+            + document.table(("measure", ">first case", ">change up to the last", "leaves by", "where"), rows, "wide"))
 
 
 def _change(share: float) -> str:

@@ -56,9 +56,9 @@ def read(folder: Path) -> FinishedRun:
         summary = read_summary(folder / "summary.json")
         resolved = tomllib.loads((folder / "scene.resolved.toml").read_text(encoding="utf-8"))
         if not isinstance(resolved.get("drive", {}), dict):
-            raise ValueError("scene.resolved.toml: drive is no table")
+            raise ValueError("scene.resolved.toml: drive is not a table")
     except FileNotFoundError as fault:
-        raise PatchfemError(f"{folder}: no results folder: it has no {Path(fault.filename).name}") from None
+        raise PatchfemError(f"{folder}: not a results folder: it has no {Path(fault.filename).name}") from None
     except (ValueError, OSError, RecursionError) as fault:
         raise PatchfemError(f"{folder}: its results cannot be read: {fault}") from None
     return FinishedRun(folder.resolve().name, summary, resolved, _arrays(folder / "result.nc"))

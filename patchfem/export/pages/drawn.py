@@ -39,7 +39,7 @@ def _of_rows(table: dict, most: int) -> Drawn:
     kinds = np.unique(np.asarray(table["outcome"], str), return_index=True)[1]
     ends = np.array(sorted({*ends, *kinds.tolist()}), int)
     cases = np.union1d(_evenly(number, max(most - ends.size, FEWEST)), ends)
-    return Drawn(cases, f"Drawn are {cases.size} of {number} cases: evenly spread ones, and those at which a measure "
+    return Drawn(cases, f"{cases.size} of {number} cases are drawn: evenly spread ones, and those at which a measure "
                         "or a key is largest or smallest.")
 
 
@@ -61,7 +61,7 @@ def _of_grid(table: dict, first: str | None, most: int) -> Drawn:
                    zip(table["keys"], chosen, along) if some.size < values.size)
     told = "" if not ends else f"; the one with the largest {label(first)} is among them" if not there[ends[0]] else \
         f"; those with the largest and the smallest {label(first)} are among them"
-    return Drawn(np.flatnonzero(there), f"Drawn are {int(there.sum())} of {number} cases: {of}{told}.")
+    return Drawn(np.flatnonzero(there), f"{int(there.sum())} of {number} cases are drawn: {of}{told}.")
 
 
 def _evenly(number: int, most: int) -> np.ndarray:

@@ -85,9 +85,9 @@ def _left(outcome: np.ndarray) -> str:
     """What holds of all that follows: how many cases of an interrupted sweep have no answer, and that of those that run
     none has settled; "" where neither is so."""
     count, ran = int(np.sum(outcome == "")), outcome[(outcome != "") & (outcome != FAILED)]
-    said = f"{count} of {outcome.size} cases have no answer yet; what follows is of the others." if count else ""
+    said = f"{count} of {outcome.size} cases have no answer yet; what follows covers the others." if count else ""
     if ran.size and not np.isin(ran, SETTLED).any():
-        said += " No case has settled; what follows is of the motions as they ended."
+        said += " No case has settled; what follows describes the motions as they ended."
     return said.strip()
 
 

@@ -136,7 +136,7 @@ def table(peaks: list) -> str:
     rows = [[escape(one.held), *cells, plain(one.width, 2) if np.isfinite(one.width) else "&ndash;"]
             for one, cells in zip(peaks, told)]
     return (f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve, by a parabola "
-            "of 1/y&sup2; over f&sup2; through the largest case and its neighbours; a case that has not settled "
-            "counts by its steady estimate where that is known to 1 %, else it is left out. "
+            "of 1/y&sup2; over f&sup2; through the largest case and its neighbours. An unsettled case counts by "
+            "its steady estimate if that is known to 1 %, else it is left out. "
             "A width is given where the curve falls to its peak/&radic;2 on both sides within the swept range.</p>"
             + document.table(("", ">at [Hz]", ">height", ">half-power width [Hz]"), rows, "wide"))

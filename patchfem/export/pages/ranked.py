@@ -110,8 +110,8 @@ def picture(ranks: dict) -> str:
                  f"<td class=bars>{_bar(one)}</td>"] for one in shares]
         parts.append(f"<h3>{linked(label(name), name)}</h3>"
                      + document.table(("key", ">alone", ">total", ">from, to", ""), rows, "wide", "shares"))
-    return ("<p class=soft>Shares of the variance over the cases: what a key makes alone (dark) and with all that it "
-            "takes part in (light). The line is the interval of the total.</p>" + "".join(parts))
+    return ("<p class=soft>Shares of the variance over the cases: a key alone (dark) and with its interactions "
+            "(light). The line is the interval of the total.</p>" + "".join(parts))
 
 
 def _bar(one) -> str:
@@ -135,5 +135,5 @@ def spread(found: dict) -> str:
     if not rows:
         return ""
     return (document.table(("measure", ">5 %", ">half", ">95 %", "unit", ">cases"), rows, "wide") +
-            "<p class=soft>So many of the drawn cases have less, of those that meet the tolerance and, where any "
-            "case has settled, have settled.</p>")
+            "<p class=soft>Share of the drawn cases with less; only cases that meet the tolerance count and, if "
+            "any case has settled, only settled ones.</p>")

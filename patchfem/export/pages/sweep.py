@@ -104,7 +104,7 @@ def _explorer(said: str) -> str:
             "<p class=soft>Bands show the numerical error. Hollow points (dots in a map) miss the tolerance. Crosses, "
             "shading and hatching mark cases that did not "
             f"settle. A click on a case opens it.</p>{thinned}<noscript><p class=verdict>The pictures need "
-            "JavaScript; the numbers stand in sweep.csv.</p></noscript>")
+            "JavaScript; the numbers are in sweep.csv.</p></noscript>")
 
 
 def _change(table: dict, limits: allowed.Limits) -> list:

@@ -179,7 +179,7 @@ def least_known(result: Result) -> str:
 
     steps = [name for name in wide if name in BETWEEN]
     name = max(wide.keys() - set(steps), key=lambda one: ("±" in told[one], wide[one], one), default="")
-    of_steps = f"{', '.join(map(known, steps))}, is known to the distance of two levels of the drive"
+    of_steps = f"{', '.join(map(known, steps))}, is known to the step between drive levels"
     if not name:
         return f"{of_steps}."
     but = f"; {of_steps}, which the scene sets" if steps else ""

@@ -37,15 +37,15 @@ def lines_of(fine: Moments | None, coarse: Moments | None) -> list:
     soft, stiff = (1 / (share * fine.height) for share in reversed(PERSSON))
     decay = sum(PERSSON) / 2 * fine.height
     half = one["stiffness_half_sampled"]
-    told = "every second sample tells of no such surface" if half is None else \
+    told = "every second sample describes no such surface" if half is None else \
         f"every second sample of the trace gives {_per(half)}, {100 * (half / one['stiffness'] - 1):+.2g} %"
     return ["  to paste into a scene, if the other face is smooth (peaks of Greenwood and Williamson, radius "
             f"{short(one['radius'], 'm', 3)}, {one['density']:.3g} 1/m^2):",
             "    [contact.asperities]", '    law = "hertz"', f'    rms_height = "{fine.height * 1e6:.5g} um"',
             f"    rms_slope = {fine.slope:.5g}", f'    rms_curvature = "{fine.curvature:.5g} 1/m"',
             f"  Under {LIGHT:g} of the modulus of the pair their stiffness over the pressure is "
-            f"{_per(one['stiffness'])}; {told}: waves shorter than the samples are not in it.",
-            f"  By the theory of waves of all lengths (Persson) it is {_per(soft)} to {_per(stiff)}; that is "
+            f"{_per(one['stiffness'])}; {told}. Waves shorter than the sampling are missing.",
+            f"  Persson's theory of waves of all lengths gives {_per(soft)} to {_per(stiff)}, as does "
             f'law = "exponential" with decay_length = "{decay * 1e6:.3g} um".']
 
 

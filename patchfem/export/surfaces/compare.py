@@ -41,8 +41,8 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
 DRAWN = 1_000_000  # heights that a histogram and an Abbott curve are drawn from, spread over a larger scan
 NOTE = ("Interval: 95 %. Shift, depth and area: of this place, from the noise of the unworn heights. Ratios: of the "
-        "surface, as far as one trace before and one after can tell, for Gaussian heights that are alike everywhere; "
-        "traces of one place vary together, so theirs are narrower.")
+        "surface, from one trace before and one after, for Gaussian heights with the same statistics everywhere; "
+        "traces of one place vary together, so their intervals are narrower.")
 
 
 def shown(one: Quantity) -> tuple:

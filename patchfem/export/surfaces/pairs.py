@@ -15,7 +15,7 @@ from . import compare, pictures, worn
 TRACES, SCANS = ("worn_depth_mean", "amplitude_ratio"), ("worn_volume", "worn_depth_mean")  # the main numbers
 ABOUT = ("Mean over the pairs that have the number, each with equal weight. Interval: 95 % of the mean, by Student's t "
          "from the scatter of the pairs, or from their own intervals where that is wider; an error that all pairs "
-         "share, as of the calibration, is not in it. Scatter: standard deviation of one pair.")
+         "share, such as calibration, is not included. Scatter: standard deviation of one pair.")
 
 
 def answers(asked: list, direction: str = "", done=None, **how) -> list[dict]:
@@ -50,12 +50,12 @@ def notes(rows: list) -> list:
     firsts = [(pairs.group_of(row), row["before"]) for row in done]
     if len(set(firsts)) < len(firsts):
         out.append("some pairs share the surface before: its errors are in all of them, and the intervals of the means "
-                   "do not know it")
+                   "do not include this")
     for group, count, found in pairs.means_of(rows):
         less = [f"{words(name)} ({one.count})" for name, one in found.items() if one.count < count]
         if less:
             out.append(f"{title(*group)}: fewer than all {count} have {', '.join(less)}; such a mean says nothing "
-                       "of the other pairs")
+                       "about the other pairs")
     return out
 
 

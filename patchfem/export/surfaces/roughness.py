@@ -18,13 +18,13 @@ from .areal import write_columns, write_profile, write_x3p
 
 ALONG = ("PSm", "RSm", "dominant_wavelength", "Sal")  # lengths along the surface; all others are heights
 AREAL = ("Interval: 5 to 95 %, of the mean over all scans of this size on a surface with Gaussian heights and the "
-         "spectrum of this scan, wider where the kurtosis is above 3. It does not know a surface that differs from "
-         "place to place, nor waves longer than the scan.")
+         "spectrum of this scan, wider where the kurtosis is above 3. It does not cover a surface that differs "
+         "from place to place, nor waves longer than the scan.")
 MEANS = ("Interval: 95 % of the mean, by Student's t from the scatter of the files, each with equal weight; an error "
-         "that all share, as of the calibration, is not in it. Scatter: standard deviation of one file.")
+         "that all share, such as calibration, is not included. Scatter: standard deviation of one file.")
 INTERVAL = ("Interval: 5 to 95 %, of the mean over all traces of this length on a surface with Gaussian heights and "
-            "the spectrum of this trace, wider where the kurtosis is above 3. It does not know a surface that differs "
-            "from place to place.")
+            "the spectrum of this trace, wider where the kurtosis is above 3. It does not cover a surface that "
+            "differs from place to place.")
 
 
 def shown(one: Quantity, unit: tuple | None = None) -> tuple:
@@ -62,8 +62,8 @@ def heading(report: RoughnessReport) -> str:
     if report.cutoff is None:
         fits = fitting_cutoff(report.length + report.step, report.step)  # a step for each sample
         text += "; no cut-off, so no roughness profile" + (
-            f' (--cutoff "{say(fits)}" is the longest standard one with five sections here)' if fits else
-            ", and no standard cut-off has five sections here")
+            f' (--cutoff "{say(fits)}" is the longest standard one that fits five times here)' if fits else
+            ", and no standard cut-off fits five times here")
         return text + (f"; S-filter at {say(short)}, half of it trimmed at each end" if short else "")
     return (f"{text}; Gaussian filter at {say(report.cutoff)}, half of it trimmed at each end, "
             + (f"S-filter at {say(short)}, the same" if short else "no filter for short waves"))
@@ -76,7 +76,7 @@ def _areal_filters(short: float | None, cutoff: float | None, holes: bool) -> st
         return "; no filter"
     surface = " (the S-L surface)" if short and cutoff else " (the S-F surface)" if short else ""
     return (f"; Gaussian {' and '.join(parts)}{surface}, half of {'each' if parts[1:] else 'it'} trimmed at each border"
-            + ("; beside a hole the weights on measured heights are scaled to a sum of one" if holes else ""))
+            + ("; near a hole the weights on measured heights are scaled to a sum of one" if holes else ""))
 
 
 def lines_of(report: RoughnessReport, verbose: bool = False) -> list:
@@ -267,10 +267,10 @@ def figures(report: RoughnessReport) -> list:
     if report.kind == "areal":
         flat = report.scan
         return [(pictures.scan(flat.x, flat.y, flat.z), "Heights that the parameters are read from and their "
-                 "distribution; colours end at all but the outermost 0.2 % of the points.",
+                 "distribution; colours cover all but the outermost 0.2 % of the points.",
                  f"Map and histogram of the heights of {report.source}: {_said(report['Sq'])} root mean square"),
                 (pictures.draw([pictures.bearing(report.abbott, report.core, ("Smr1", "Smr2"))]),
-                 "Abbott curve of these heights; dashed the straight line of its core.",
+                 "Abbott curve of these heights; dashed: the straight line of its core.",
                  f"Abbott curve of {report.source}: core height {_said(report['Sk'])}")]
     lines = "the waviness on it" if report.waviness is not None else "no cut-off was given"
     height = report["Pt"]
@@ -283,7 +283,7 @@ def figures(report: RoughnessReport) -> list:
     kind = "roughness profile" if report.roughness is not None else "levelled trace"
     count, wave = report.spectrum.tapers, report["dominant_wavelength"]
     out.append((pictures.statistics(report.abbott, report.core, report.spectrum, report.band, report.cutoff),
-                f"Left: Abbott curve of the {kind}; dashed the straight line of its core. Right: spectrum of the "
+                f"Left: Abbott curve of the {kind}; dashed: the straight line of its core. Right: spectrum of the "
                 f"levelled trace, the mean of {count} sine tapers, with its 95 % band by chi-square of {2 * count} "
                 "degrees of freedom.",
                 f"Abbott curve and power spectral density; the dominant wavelength is {_said(wave)}"))

@@ -34,10 +34,10 @@ TEXTS = {"worn_volume": ("m3", "material lost over the whole patch, both pieces 
          "worn_depth_max": ("m", "largest worn depth"), "worn_depth_mean": ("m", "worn volume over the area"),
          "worn_area": ("m2", "worn volume over the width"),
          "worn_share": ("1", "share of the patch that lost more than the error of the depth"),
-         "hidden_wear": ("m", "mean of the highest straight line of wear that no worn depth lies below: even wear and "
-                              "a wedge, which a trace of just this part could not show alone")}
-PLANE = "mean of the highest plane of wear that no worn depth lies below: even wear and wedges, which a scan of just " \
-    "this part could not show alone"
+         "hidden_wear": ("m", "mean of the highest straight line below all worn depths: even wear and a wedge, which "
+                              "a trace of this part alone could not show")}
+PLANE = "mean of the highest plane below all worn depths: even wear and wedges, which a scan of this part alone " \
+    "could not show"
 
 
 class Worn(NamedTuple):
@@ -91,7 +91,7 @@ def lost(before: Path, after: Path) -> Lost:
             raise Missing(f"{path}: there is no such folder")
         if not path.is_dir():
             raise PatchfemError(f"{path}: a file, while {other} is a folder: two files of surfaces or two results "
-                                "folders are wanted")
+                                "folders are needed")
     first, second = read(before), read(after)
     if not second.wears:
         raise PatchfemError(f"{after}: a run without [wear], which wore nothing; the worn one comes second")
@@ -106,7 +106,7 @@ def read(path: Path) -> Worn:
         raise PatchfemError(f"{path}: a run without [contact] has no surfaces to compare")
     file = path / "result.nc"
     if not file.is_file():
-        raise PatchfemError(f"{path}: no results folder of a run: it has no result.nc")
+        raise PatchfemError(f"{path}: not a results folder of a run: it has no result.nc")
     names = {*NEEDED, "strip_offset", "worn_depth", "time", "slide", "relative_displacement", "friction_force",
              "wear_cycle"}
     held = {name: one.values for name, one in variables(file, names)[1].items()}
@@ -114,16 +114,16 @@ def read(path: Path) -> Worn:
         for name, dimensions in NEEDED.items():
             wanted(name in held, f"no {name} in it; run the scene again")
             wanted(numeric(held[name]) and held[name].ndim in dimensions and np.isfinite(held[name]).all(),
-                   f"{name} is no field along the patch")
+                   f"{name} is not a field along the patch")
         size = held["x"].size
         wanted(size > 1 and all(held[name].shape[-1] == size for name in (*NEEDED, "worn_depth") if name in held),
-               "its fields are of unlike length")
-        wanted((np.diff(held["x"]) > 0).all() and held["weight"].sum() > 0, "x is no row of places")
+               "its fields differ in length")
+        wanted((np.diff(held["x"]) > 0).all() and held["weight"].sum() > 0, "x is not a row of places")
         y = held.get("strip_offset")
         shape = (size,) if y is None else (y.size, size)
         depth = held["worn_depth"][-1] if "worn_depth" in held else np.zeros(size)
         wanted(all(one.shape in ((size,), shape) for one in (depth, held["unloaded_gap"])),
-               "its fields are not of its strips")
+               "its fields do not match its strips")
     area, gap, depth = (np.broadcast_to(one, shape) for one in (held["weight"], held["unloaded_gap"], depth))
     cycles = float(held["wear_cycle"][-1]) if "wear_cycle" in held else 0.0
     return Worn(run, str(path), held["x"], y, area if y is None else area / y.size, gap, depth,
@@ -186,7 +186,7 @@ def _between(first: Worn, second: Worn) -> Lost:
              for text in one.run.summary.get("warnings", ())]
     if float(depth.min()) < -off:
         notes.append(f"at {place_of(second, np.argmin(depth))} the later run is worn less by "
-                     f"{say(-float(depth.min()), 3)}: it does not go on from the earlier one")
+                     f"{say(-float(depth.min()), 3)}: it does not continue the earlier one")
     track = _track(x, depth, off, length * volume / area) if second.y is None else {}  # strips have a map
     return Lost(first, second, gaps, depth, values, track, notes)
 
@@ -314,7 +314,7 @@ def verdict(one: Lost) -> tuple:
     mean, unseen, track = one.values["worn_depth_mean"], one.values["hidden_wear"], one.track
     if not mean.value > 0:
         return "nothing was worn between the two runs", []
-    head, x = f"worn by {say(mean.value, 3)} in the mean over the patch", one.after.x
+    head, x = f"worn by {say(mean.value, 3)} on average over the patch", one.after.x
     seen, ends = "trace" if one.after.y is None else "scan", hidden(one.after, one.depth)
     if track and one.values["worn_share"].value < 0.999:
         mean, unseen, seen = track["depth_mean"], track["hidden_wear"], "trace within this part"

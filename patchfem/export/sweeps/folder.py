@@ -136,7 +136,7 @@ class Writer:
 
     def _fault(self, error) -> Missing:
         why = str(error) if isinstance(error, Unwritten) else error.strerror
-        return Missing(f"{self.shown}: a case cannot be written ({why}); what is whole is kept")
+        return Missing(f"{self.shown}: a case cannot be written ({why}); complete cases are kept")
 
 
 class Folder:

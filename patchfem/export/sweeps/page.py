@@ -116,12 +116,12 @@ def read_table(folder: Path) -> dict:
             head, *rows = csv.reader(file)
         wanted(rows and "outcome" in head and "message" in head, "sweep.csv has no case")
         lengths = {number for number, row in enumerate(rows, 2) if len(row) != len(head)}
-        wanted(not lengths, f"sweep.csv: a row of {len(head)} fields is wanted in line {min(lengths, default=0)}")
+        wanted(not lengths, f"sweep.csv: a row of {len(head)} fields is needed in line {min(lengths, default=0)}")
         with h5netcdf.File(folder / "sweep.nc", "r") as file:
             return _whole(_table(folder, [dict(zip(head, row)) for row in rows], head[:head.index("outcome")], file))
     except FileNotFoundError as fault:
         name = Path(fault.filename).name if fault.filename else "sweep.nc"
-        raise PatchfemError(f"{folder}: no folder of a sweep: it has no {name}") from None
+        raise PatchfemError(f"{folder}: not the folder of a sweep: it has no {name}") from None
     except Exception as fault:  # damaged files have many ways to fail
         said = " ".join(str(fault).split())[:200]
         raise PatchfemError(f"{folder}: its sweep cannot be read: {said or type(fault).__name__}") from None
@@ -161,7 +161,7 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
     held = {name: float(file.attrs[name]) for name in ("tolerance", "patch_length", "patch_width")
             if name in file.attrs}
     title = tomllib.loads(text).get("title") or folder.resolve().name
-    wanted(isinstance(title, str) and isinstance(sets, list), "sweep.nc: its scene or its --set are none")
+    wanted(isinstance(title, str) and isinstance(sets, list), "sweep.nc: its scene or its --set cannot be read")
     return {**titles(columns, title), **_shared(held, columns),
             "version": str(file.attrs["source"]).removeprefix("patchfem "), "scene": text, "seconds": float("nan"),
             "command": shlex.join(["patchfem", "sweep", str(file.attrs["scene_file"]),

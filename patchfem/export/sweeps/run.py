@@ -62,7 +62,7 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
         if not (place.resume or shared):
             if there.size and not folder.whole() and say is not None:
                 say(f"note: {there.size} of {len(cases)} cases have an answer from an interrupted sweep and are run "
-                    "again; --resume takes them as they are")
+                    "again; --resume keeps them")
             there = there[:0]
         left = np.setdiff1d(wanted, there)
         if left.size:
@@ -141,8 +141,8 @@ def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> Answ
         found = folder.answers(Answers.blank(len(cases), folder.target))
         missing = int(np.sum(found.outcome == ""))
         if missing:
-            raise Missing(f"{target}: {missing} of {len(cases)} cases have no answer; run their shards again, or go on "
-                          "with --resume")
+            raise Missing(f"{target}: {missing} of {len(cases)} cases have no answer; run their shards again, or "
+                          "continue with --resume")
         write_tables(asked, cases, found, folder, page, True)
         folder.tidy(False)
     return found

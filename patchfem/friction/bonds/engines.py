@@ -52,7 +52,7 @@ class Choice:
 def impossible(engine: str, reading: str, order: float) -> str:
     """Why an engine cannot sum such a law and what can; empty where it can."""
     if engine == "recursion" and (reading != "stretch" or order != 1):
-        return "sums reading = \"stretch\" with order = 1 alone; use \"auto\" or \"merged\""
+        return "sums only reading = \"stretch\" with order = 1; use \"auto\" or \"merged\""
     return ""
 
 

@@ -22,7 +22,7 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
         warnings = [*warnings, *unbounded_bonds(model.bonds), *unripe(model.bonds, model.speed)]
         if f.reading == "report" and model.load_varies:
             warnings = [*warnings, "as printed a bond keeps the pressure it formed under: while the load falls the "
-                        "friction may exceed mu_s N; reading = \"stretch\" keeps to it"]
+                        "friction may exceed mu_s N; reading = \"stretch\" never does"]
     steps = steps_of(model)
     frames = FRAMES if patch is not None else 0
     fine = bench.run(model, patch, steps, frames, watch=Watch(None, say, progress))

@@ -84,7 +84,7 @@ def refuse_opening(asked, pieces: Compliance) -> None:
     limit = brentq(closing, 0.0, asked.offset, xtol=1e-4 * abs(asked.offset))
     holder = "raise" if asked.spring > 0 else "name"
     raise PatchfemError(f"the load line lies {say(asked.offset, 6)} off the middle; beyond {say(limit, 3)} the "
-                        f"middle of the piece opens as the load grows, so no one load closes it by "
+                        f"middle of the piece opens as the load grows, so no single load closes it by "
                         f"{say(asked.approach, 6)}; bring contact.load_line.offset nearer, {holder} "
                         "contact.holder.rotational_stiffness or give "
                         "contact.load in place of the approach", "contact.approach.distance")

@@ -65,8 +65,8 @@ def groups(model: Model) -> dict:
 def assembled(asked) -> str:
     """The sentence on what assembles the stiffness of the pieces of a `PatchModel`."""
     if asked.mesh is not None:
-        return "scikit-fem's forms assemble the pieces of contact.mesh, the stencil of a tensor grid those that are one"
-    return "scikit-fem's forms assemble the pieces, whose ends are no tensor grid" if asked.outlined else \
+        return "scikit-fem's forms assemble the pieces of contact.mesh, or a stencil those that are a tensor grid"
+    return "scikit-fem's forms assemble the pieces, whose ends are not a tensor grid" if asked.outlined else \
         "the stencil of a tensor grid assembles the pieces"
 
 

@@ -81,7 +81,7 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
 
 def strained(asked, patch) -> list:
     """Warnings where the answer leaves small strains, or where cells of a given size lock."""
-    beyond = ["the contact reaches the place where a rounded end is 0.097 steep, beyond which nothing touches here; "
+    beyond = ["the contact reaches the slope of 0.097 of a rounded end, beyond which contact is not computed; "
               "lower the tilt or the load"] if beyond_gentle(patch) else []
     return strained_by(asked, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond)
 
@@ -97,8 +97,8 @@ def strained_by(asked, top: float, approach: float, beyond=()) -> list:
     stiff = max(m.poisson for m in stuff)
     if asked.plane == "strain" and stiff > LOCKS and not asked.chosen:
         cure = "split the elements of contact.mesh" if asked.mesh is not None else "leave out contact.element_size"
-        out.append(f"Poisson's ratio {stiff:g} in plane strain (limit {LOCKS:g}): on cells of a given size, which lock "
-                   f"towards 0.5, values are off by up to twice their bars; {cure}")
+        out.append(f"Poisson's ratio {stiff:g} in plane strain (limit {LOCKS:g}): cells of a given size lock towards "
+                   f"0.5, so errors reach up to twice their bars; {cure}")
     return out
 
 
@@ -129,22 +129,22 @@ def left_out(model, patch, coarse) -> list:
     out = [f"scikit-fem's forms assemble the {' and the '.join(by_forms)} piece"] if by_forms else []
     out += [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
     if patch.sharper and patch.averaging is not None:
-        out.append(f"static measures come from points {say(patch.averaging, 3)} apart, whose short waves are those of "
-                   "layers without ends, where these have the smaller errors; the mesh of "
-                   f"{patch.x.size} interface points serves fields and motion")
+        out.append(f"static measures come from points {say(patch.averaging, 3)} apart (short waves as in endless "
+                   "layers), where these have the smaller errors; the mesh of "
+                   f"{patch.x.size} interface points gives fields and motion")
     elif patch.sharper:
         out.append("static measures come from Gauss-Lobatto cells of order 4 where these have the smaller errors; the "
-                   f"bilinear mesh of {patch.x.size} interface points serves fields and motion")
+                   f"bilinear mesh of {patch.x.size} interface points gives fields and motion")
     elif patch.averaging is not None and not asked.gap.rough:
-        out.append(f"the profile is averaged over {say(patch.averaging, 3)} where it bears; what another length "
-                   "changes stands in the errors")
+        out.append(f"the profile is averaged over {say(patch.averaging, 3)} where it carries load; the errors "
+                   "include the effect of another length")
     if asked.skin is not None and patch.pressure.load > 0:
         bears = patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0)
         out += skin.ranged(asked, float(patch.pressure.load / bears))
     if patch.strips is not None:
         out.append(patch.strips.note)
     if patch.pair.coupling > COUPLED and model.kind != "patch":
-        out.append("the pieces are unlike: the coupling between shear and normal closing is left out; it is "
+        out.append("the pieces differ: the coupling between shear and normal closing is left out; it is "
                    f"{patch.pair.coupling:.2g} of the tangential compliance")
     if model.kind == "patch":
         out += frictionless(asked, patch)
@@ -168,7 +168,7 @@ def frictionless(asked, patch) -> list:
     stuck = normal - cross @ np.linalg.solve(patch.pieces.tangential[here], cross.T)
     more = one @ np.linalg.solve(stuck, one) / (one @ np.linalg.solve(normal, one)) - 1
     beta = abs(_dundurs(asked))
-    return [f"the pieces are unlike (Dundurs' beta {beta:.2g} at the interface) and the pressure is that of a "
+    return [f"the pieces differ (Dundurs' beta {beta:.2g} at the interface) and the pressure is that of a "
             "frictionless contact, whose faces slide on each other as they are pressed; perfect stick would raise "
             f"normal_stiffness by {100 * more:.2g} %, friction by less"]
 
@@ -194,7 +194,7 @@ def drawn_otherwise(pair) -> list:
         count, area = recognise.holes(body)
         if count:
             out.append(f"contact.mesh: the {side} piece has {count} hole{'s' * (count > 1)} inside, {area:.3g} m2 in "
-                       "all; draw the cells that are missing if none was meant")
+                       "all; fill any that is not intended")
         held, whole = recognise.held_share(body)
         if held < WHOLE * whole:
             out.append(f"contact.mesh: {side}_far holds {held:.6g} m of a face of {whole:.6g} m, {held / whole:.3g} of "
@@ -219,5 +219,5 @@ def slender(asked, mean: float) -> list:
         if piece.height > asked.length and share > BENT:
             out.append(f"the {side} piece is {piece.height / asked.length:.3g} times as tall as long and bears "
                        f"{share:.2g} of the load under which it buckles sideways (limit {BENT:g}); the lever arm that "
-                       "grows as it bends is left out")
+                       "grows with bending is neglected")
     return out

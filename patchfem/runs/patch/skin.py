@@ -46,7 +46,7 @@ def ranged(asked, pressure: float) -> list:
     if part.from_ is not None:
         half = ", those of every second sample " + _half(asked, pressure)
     return [f"contact.asperities: under the mean pressure of {short(pressure, 'Pa', 3)} the peaks have "
-            f"{mean_stiffness(asked, pressure):.3g} Pa/m{half}; by the theory of waves of all lengths (Persson) it is "
+            f"{mean_stiffness(asked, pressure):.3g} Pa/m{half}; Persson's theory of waves of all lengths gives "
             f'{soft:.3g} to {stiff:.3g} Pa/m, which law = "exponential" with decay_length = '
             f'"{sum(peaks.PERSSON) / 2 * part.rms_height * 1e6:.3g} um" has']
 

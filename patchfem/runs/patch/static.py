@@ -110,10 +110,10 @@ def not_together(asked) -> str:
     if asked.meshes is None:
         return "its mesh is its own"
     if not all(isinstance(body, TensorGrid) or body is None for level in asked.meshes.levels for body in level):
-        return "its pieces are no plain grids"
+        return "its pieces are not plain grids"
     if asked.gap.profile is not None:
-        return "what a profile is averaged over is its own"
-    return _not_of_one_stretch(asked) or ("" if len(asked.meshes.levels) > 2 else "its mesh has no coarser ones")
+        return "a profile has its own averaging length"
+    return _not_of_one_stretch(asked) or ("" if len(asked.meshes.levels) > 2 else "its mesh has no coarser levels")
 
 
 def _not_of_one_stretch(asked) -> str:

@@ -22,9 +22,9 @@ def climbing_as_one(model, patch) -> list:
         return []
     limit = model.friction.static * patch.pressure.sigma_n * patch.pieces.interface.weight
     apart = float((patch.giving @ limit).max())
-    return [f"{model.soft} over grooves: the pieces climb as one, by height and slope at the slide of the holders, "
-            f"from which a point at its limit lies up to {say(apart, 3)}, {apart / model.grooves.wavelength:.2g} of "
-            "the wavelength; the points share the normal force as they share the load"]
+    return [f"{model.soft} over grooves: the pieces climb together, by height and slope at the slide of the "
+            f"holders; a point at its limit is off by up to {say(apart, 3)}, {apart / model.grooves.wavelength:.2g} of "
+            "the wavelength; the points share the normal force like the load"]
 
 
 def warming(model, patch, response, work: float | None = None) -> list:
@@ -44,9 +44,9 @@ def unripe(law, speed: float) -> list:
     if a <= RIPE:
         return []
     least = law.ratio / (1 / (RIPE * law.length) - law.rest_growth / speed**2)  # ripening(law, speed) = RIPE with it
-    return [f"bonds ripen over {a:.2g} of their length at the peak speed {speed:.3g} m/s (limit {RIPE:g}), so friction "
-            f"as printed falls below 2.18-2.21; set friction.slip_growth = \"{0.95e6 * least:.2g} um\", or use "
-            "friction.reading = \"stretch\""]
+    return [f"bonds take {a:.2g} of their length to form at the peak speed {speed:.3g} m/s (limit {RIPE:g}), so "
+            "friction by the printed law falls below eqs. 2.18-2.21; set friction.slip_growth = "
+            f"\"{0.95e6 * least:.2g} um\", or friction.reading = \"stretch\""]
 
 
 def creeping(law, outcome, found) -> list:
@@ -56,8 +56,8 @@ def creeping(law, outcome, found) -> list:
         return []
     if law.reading != "stretch" or abs(drift.value) <= drift.error + 1e-2 * law.length:
         return []
-    return [f"the motion creeps by {drift.value / law.length:.2g} bond lengths a cycle: bonds that are damaged "
-            "by each swing do so under a biased load"]
+    return [f"the motion creeps by {drift.value / law.length:.2g} bond lengths a cycle: bonds damaged in each "
+            "cycle creep under a biased load"]
 
 
 def unbounded_bonds(law) -> list:
@@ -83,12 +83,12 @@ def of_growth(law, peak: float | None) -> list:
             "as printed the initial bonds keep the bond length eps_0, whatever the growth of all that form later"]
     out = []
     if law.order > 1:
-        out.append(f"order = {law.order:g} with growth bounds no friction: a bond that formed short pulls by the power "
-                   "of its stretch over that length and breaks the later, the longer bonds have grown since; order "
+        out.append(f"order = {law.order:g} with growth does not limit friction: a bond that formed short pulls harder "
+                   "and breaks later as the bond length grows; order "
                    "<= 1 stays near mu_s N")
     if peak is not None and peak > 1 + BOUND:
-        out.append(f"friction reaches {peak:.3g} mu_s N, as bonds that formed short hold on while the length grows; "
-                   "reading = \"report\" with order <= 0 keeps to mu_s N")
+        out.append(f"friction reaches {peak:.3g} mu_s N, because bonds that formed short keep holding while the length "
+                   "grows; reading = \"report\" with order <= 0 stays within mu_s N")
     return out
 
 

@@ -174,7 +174,7 @@ def exact_words(model: Model, engine: str) -> list:
     """The sentence of a plan on which engine takes the elements, and why."""
     count, exact, march = expected_elements(model)[0], expected_seconds(model), seconds_of_steps(model)
     return [f"{count} element{'s' * (count > 1)} by engine {engine}: about {exact:.2g} s from yield to yield, exact, "
-            f"about {march:.2g} s by steps at this tolerance"]
+            f"about {march:.2g} s by time steps at this tolerance"]
 
 
 def not_smooth(model: Model) -> str:

@@ -11,11 +11,11 @@ from .steady.balance import BalanceFinder
 
 NAME = "flutter_amplitude"
 ALONE = "a mode that gains energy moves no interface, so friction takes none of it"
-NONE = (f"no limit cycle that does not last was found between {limit_cycles.LOW:g} and {limit_cycles.HIGH:g} times the "
+NONE = (f"no unstable limit cycle was found between {limit_cycles.LOW:g} and {limit_cycles.HIGH:g} times the "
         "4 F/(pi |c| omega) of friction F and damping c")
-UNBALANCED = ("limit cycles of bonds are known for the stretch reading of order 1, a constant length, no breakaway and "
-              "pieces that do not give way alone")
-SLIDES = "no motion was found in which the interface slides from turn to turn and friction takes what the mode gives"
+UNBALANCED = ("limit cycles of bonds are known only for the stretch reading of order 1 with constant length, no "
+              "breakaway and pieces rigid in shear")
+SLIDES = "no motion was found in which the interface always slides and friction dissipates what the mode gains"
 
 
 def flutter_of(run) -> tuple:
@@ -31,18 +31,18 @@ def flutter_of(run) -> tuple:
     edge = edges[-1]
     below = [one for one in found if one.lasts and one.amplitude < edge.amplitude]
     alone = has(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1  # nothing rings in a stick
-    falls = f" to the limit cycle of {say(below[-1].amplitude, 3)}, which lasts" if below else " to rest" * alone
+    falls = f" to the limit cycle of {say(below[-1].amplitude, 3)}, which is stable" if below else " to rest" * alone
     return {NAME: Measure(edge.amplitude, unit, edge.error, floor)}, [
-        f"a mode of damping below 0 gains energy: without a drive a swing of {say(edge.amplitude, 4)} at the output "
-        f"repeats at {edge.omega / 6.283185307179586:.4g} Hz and does not last; a free swing of this mode that is "
-        f"smaller falls{falls}, a larger one grows", *far]
+        f"a mode of damping below 0 gains energy: without a drive an oscillation of {say(edge.amplitude, 4)} at the "
+        f"output repeats at {edge.omega / 6.283185307179586:.4g} Hz but is unstable; a smaller free oscillation of "
+        f"this mode decays{falls}, a larger one grows", *far]
 
 
 def _cycles(model, numerics, patch) -> tuple:
     """(list of `limit_cycles.Cycle`, the sentence where it holds none that does not last)."""
     rig, f = model.rig, model.friction
     if len(rig.interfaces) != 1 or f is None:
-        return [], "limit cycles are known beside one interface alone"
+        return [], "limit cycles are known for one interface only"
     modes, row = rig.modes, rig.modes.interfaces[0]
     if not row[limit_cycles.unstable_modes(modes)].any():
         return [], ALONE
@@ -53,9 +53,9 @@ def _cycles(model, numerics, patch) -> tuple:
     try:
         if contact.set_valued:
             if rig.bends:
-                return [], "limit cycles of rigid friction are not known beside a spring that bends"
+                return [], "limit cycles of rigid friction are not known with a nonlinear spring"
             if not modes.omega.all():
-                return [], "limit cycles of rigid friction are not known beside a mode of 0 Hz"
+                return [], "limit cycles of rigid friction are not known with a mode of 0 Hz"
             static, kinetic = contact.element.numbers[1:3]
             return limit_cycles.of_relay(modes, row, kinetic, static), SLIDES
         finder = BalanceFinder(model, numerics, patch)

@@ -257,7 +257,7 @@ def refuse_unresolved(model: Model, numerics: Numerics) -> None:
     if swing > MOST_SWING:
         wanted = ceil(pace * drive.period)
         raise Missing(f"a step of {drive.period / numerics.steps:.2g} s does not resolve the block on its bonds, which "
-                      f"swings at {pace / (2 * pi):.3g} Hz; set accuracy.steps_per_cycle = {wanted}, raise "
+                      f"oscillates at {pace / (2 * pi):.3g} Hz; set accuracy.steps_per_cycle = {wanted}, raise "
                       "structure.moving_mass or friction.bond_length, or use reading = \"stretch\" with order = 1", "")
 
 

@@ -142,7 +142,7 @@ def first_words(rig, found: dict, chain: dict) -> list:
             and link < STIFF * rig.stiffness]
     if d >= 1 and soft:
         return [f"D = {d:.3g} >= 1, but the interface gives way elastically: {soft[-1]} {chain[soft[-1]]:.4g} N/m "
-                f"beside {rig.stiffness:.4g} N/m of the mode"]
+                f"against {rig.stiffness:.4g} N/m of the mode"]
     if d >= 1:
         return [f"D = {d:.3g} >= 1: the block should stick"]
     if d > pi / 4:
@@ -184,7 +184,7 @@ def _held_words(model: Model) -> str:
     """How bonds hold the block whose list of them grows."""
     turns = "it turns back in almost every step, and the list grows by a strip with each"
     if lists.stalls(model):
-        return "the printed law holds the block from its release on: it swings on its bonds, or turns back in almost " \
+        return "the printed law holds the block from its release on: it vibrates on bonds, or turns back in almost " \
             "every step, which takes longest and is counted here"
     if lists.limp(model):
         return f"bonds of order 0 hold the block, but give it no stiffness: {turns}"

@@ -58,7 +58,7 @@ def _across(run) -> list:
     swing, share = strips.across(run.patch, run.raw.window, run.drive.period)
     return [f"the yaw moves the ends of the patch by up to {length(swing)} across x, which friction"
             f"{' and wear leave' if run.model.wear is not None else ' leaves'} out: the path of the slide in the last "
-            f"cycle is {100 * share:.2g} % longer with it, in the mean under the pressure"] if swing > 0 else []
+            f"cycle is {100 * share:.2g} % longer with it, on average under the pressure"] if swing > 0 else []
 
 
 def creeping_note(friction) -> list:
@@ -133,4 +133,4 @@ def created_warning(model, book: dict, cycles: float) -> list:
 def modes_note(model, kept: int, nodes: int) -> list:
     """The sentence on the shear modes of points whose normal force changes."""
     return [f"{model.soft}: the load changes with the motion, so no exact set of elements exists; {kept} "
-            f"tangential modes of {nodes} nodes stand for what gives way (accuracy.shear_modes)"]
+            f"tangential modes of {nodes} nodes are used instead (accuracy.shear_modes)"]

@@ -122,7 +122,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
     PatchfemError for an explicit jump beyond the critical one and for a slide in two directions.
     """
     if model.slide is not None and model.slide.across is not None:
-        text = unbuilt("beside a slide in two directions", "leave out [wear] or the lateral column")
+        text = unbuilt("with a slide in two directions", "leave out [wear] or the lateral column")
         raise PatchfemError(text, "wear")
     clock, wear, motion, stopped = perf_counter(), model.wear, _Motion(model, patch), ""
     asked = Wearing(presser(model.patch, patch.pair), motion, areas(model.patch, patch.pieces.interface),
@@ -219,8 +219,8 @@ def _before(model, patch, area):
     begun.refuse_others(patch.x, patch.gap)
     depth = frozen_array(model.wear.depth_before(patch.x, area))
     if (gone := worn_through(model, depth)) is not None:
-        raise PatchfemError(f"{begun.path}: the coating of the {gone[0]} piece was worn through there; name a run in "
-                            "which it was not", "wear.start")
+        raise PatchfemError(f"{begun.path}: the coating of the {gone[0]} piece was worn through there; choose a run "
+                            "in which it was not", "wear.start")
     return pressed(model.patch, patch.pair, depth)
 
 
@@ -297,7 +297,7 @@ def load_state(path: Path, key: str) -> tuple:
         with np.load(path, allow_pickle=False) as file:
             found = {name: file[name] for name in file.files}
         if str(found["key"]) != key:
-            raise PatchfemError(f"{path.parent.name}: what is kept there belongs to another scene or version; run "
+            raise PatchfemError(f"{path.parent.name}: the saved state belongs to another scene or version; run "
                                 "without --resume")
         whole = {name: found[f"state_{name}"] for name in STATE}
         state = Worn(**{name: float(value) if value.ndim == 0 else value for name, value in whole.items()})
@@ -305,10 +305,10 @@ def load_state(path: Path, key: str) -> tuple:
         moments = tuple(Moment(float(row[0]), *row[1:-1], float(row[-1]), values)
                         for *row, values in zip(*columns, json.loads(str(found["values"])), strict=True))
     except FileNotFoundError:
-        raise PatchfemError(f"{path.parent.name}: no interrupted run is kept there; run without --resume") from None
+        raise PatchfemError(f"{path.parent.name}: no interrupted run is saved there; run without --resume") from None
     except PatchfemError:
         raise
     except Exception as error:  # a damaged archive has many ways to fail
-        raise PatchfemError(f"{path.parent.name}: the kept state cannot be read ({error}); run without "
+        raise PatchfemError(f"{path.parent.name}: the saved state cannot be read ({error}); run without "
                             "--resume") from None
     return state, moments

@@ -72,7 +72,7 @@ def _ended(model, found, gone: dict) -> list:
     if model.patch.strips is not None:
         place += f" of the strip at y = {say(float(found.patch.strips.offsets[strip]), 3)}"
     return [f"the coating of the {name} piece, {say(thickness)}, is worn through at {place} after "
-            f"{found.state.cycle:.6g} of {model.wear.cycles:.6g} cycles; the measures are of the patch then"]
+            f"{found.state.cycle:.6g} of {model.wear.cycles:.6g} cycles; the measures are of the patch at that cycle"]
 
 
 def jumped(model, found, measures: dict) -> dict:
@@ -178,11 +178,11 @@ def _beyond_table(model, found) -> list:
     deep, out = [mean_depth(found.patch, one.depth) for one in found.moments], []
     if deep[-1] > change.depth[-1]:
         out.append(f"the mean worn depth, {say(deep[-1], 3)}, is beyond the last of wear.friction.depth, "
-                   f"{say(change.depth[-1], 3)}, from which on friction is held as it is there; add a row at "
+                   f"{say(change.depth[-1], 3)}, beyond which friction is held constant; add a row at "
                    f"{say(deep[-1], 3)}")
     past = max(sum(one < row < two for row in change.depth) for one, two in pairwise(deep)) if len(deep) > 1 else 0
     if model.wear.jumps and past > 1:
-        out.append(f"a jump passes {past} rows of wear.friction, so what lies between them is not seen; leave "
+        out.append(f"a jump passes {past} rows of wear.friction and so misses the values between them; leave "
                    "wear.jumps out")
     return out
 

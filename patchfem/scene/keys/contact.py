@@ -29,7 +29,7 @@ def material(value: object) -> object:
     if isinstance(value, Material):
         return value
     if not isinstance(value, str):
-        raise ValueError('a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is wanted')
+        raise ValueError('a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed')
     if value not in MATERIALS:
         raise ValueError(f"unknown material '{value}'; {choices(value, MATERIALS)}")
     known = MATERIALS[value]
@@ -94,7 +94,7 @@ class Holder(Table):
 def convex(value: object) -> object:
     """A radius as it is; ValueError with what to write instead for one below 0, a hollow."""
     if str(value).lstrip().startswith("-"):
-        raise ValueError("a crown is convex, its radius > 0; a hollow is told by its heights: leave [contact.crown] "
+        raise ValueError("a crown is convex, its radius > 0; a hollow is given by its heights: leave [contact.crown] "
                          'out and name a file with the columns "x [mm],z [um]" of z = x^2/(2 radius) as '
                          "contact.profile.file")
     return value

@@ -92,7 +92,7 @@ def format_si(value: float, kind: str) -> str:
 
 def wanted(kind: str) -> str:
     """Requirement of a key of this kind, with an example, as the end of a message."""
-    return f"{_article(kind)} with its unit is wanted, such as '{EXAMPLES[kind]}'"
+    return f"{_article(kind)} with its unit is needed, such as '{EXAMPLES[kind]}'"
 
 
 def _value(number: str, factor: float, words: str, kind: str) -> float:
@@ -139,7 +139,7 @@ def _malformed(words: str, kind: str) -> str:
     elif re.match(r"[+-]?(nan|inf)", words, re.IGNORECASE):
         reason = f"'{shown}' is not a finite number"
     elif (glued := _GLUED.fullmatch(words)) and _plain(glued[2]) in KINDS[kind]:
-        reason = f"'{shown}' lacks the blank between number and unit: write '{glued[1]} {glued[2]}'"
+        reason = f"'{shown}' lacks the space between number and unit: write '{glued[1]} {glued[2]}'"
     else:
         reason = f"'{shown}' is not one number and one unit ({_list(kind)})"
     return f"{reason}; {wanted(kind)}"
@@ -159,7 +159,7 @@ def _wrong_unit(number: str, unit: str, kind: str) -> str:
         belongs = f"'{unit}' is a unit of {' or '.join(others)}"
         return f"{belongs}, but this is {_article(kind)}; use one of {_list(kind)}, {example}"
     if plain.count("/") and " " in plain.split("/", 1)[1] and "(" not in plain:
-        return f"'{unit}' is ambiguous: bracket what stands below the stroke; use one of {_list(kind)}, {example}"
+        return f"'{unit}' is ambiguous: put the denominator in brackets; use one of {_list(kind)}, {example}"
     return f"unknown unit '{unit}' for {_article(kind)}; use one of {_list(kind)}, {example}"
 
 

@@ -47,8 +47,8 @@ DIVIDED_BY = {"mass", "frequency", "acceleration", "stiffness", "damping", "cubi
 
 def _within(value: float, least: float) -> float:
     if value and not least <= abs(value) <= LARGEST:
-        raise ValueError(f"{value:g} in SI is beyond what can be computed with; 0 or a size from {least:g} to "
-                         f"{LARGEST:g} is wanted")  # fmt: skip
+        raise ValueError(f"{value:g} in SI is outside the computable range; 0 or a size from {least:g} to "
+                         f"{LARGEST:g} is needed")  # fmt: skip
     return value
 
 

@@ -17,7 +17,7 @@ def _quadrature(draft: Draft, kind: str) -> None:
     alone = law.reading == "stretch" and law.order == 1
     key, shear = "accuracy.quadrature", contact.gives_way if contact is not None else ""
     if engine == "recursion" and not alone:
-        draft.say(key, "'recursion' sums reading 'stretch' with order = 1 alone; use 'auto' or 'merged'")
+        draft.say(key, "'recursion' sums only reading 'stretch' with order = 1; use 'auto' or 'merged'")
     elif engine != "recursion" and shear and alone:
         draft.say(key, f"'{engine}' beside {shear}: every point has its own path there; use 'recursion' or 'auto'")
 
@@ -53,7 +53,7 @@ def _beside_laws(knob: str, accuracy, found: Motion) -> str:
         engine = accuracy.quadrature
         if engine in ("direct", "recursion") or (engine, knob) == ("truncated", "merge"):
             return f"for quadrature '{engine}'"
-        return "" if engine != "auto" or any(map(listed, found.laws)) else "for a law that is summed by its recursion"
+        return "" if engine != "auto" or any(map(listed, found.laws)) else "for a law that is summed by recursion"
     if knob == "shear_modes":
         if not found.soft:
             return "for pieces that do not give way"

@@ -106,7 +106,7 @@ def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[st
     friction = pressed or has & {"friction", "slide", "wear"}
     if friction and "friction" not in has:
         others = ", ".join(f"[{name}]" for name in sorted(has))
-        draft.lacks_table("friction", f"{others} without it are no kind of run")
+        draft.lacks_table("friction", f"{others} without it do not make a run")
     if friction and draft.given("structure.masses") and not draft.given("structure.interface"):
         if "contact" in has:
             draft.say("structure.masses", f"masses do not rub on [contact]; {modes_instead(draft)}")

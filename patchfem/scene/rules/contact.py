@@ -19,19 +19,19 @@ def _contact(draft: Draft) -> None:
         draft.lacks("contact.load", "or [contact.approach] instead")
     outlines(draft)
     if contact.height and contact.length and contact.height > TALLEST * contact.length:
-        draft.say("contact.height", f"{contact.height:g} m is more than {TALLEST} times contact.length, and the "
-                                    f"pressure is felt over some lengths only; at most "
-                                    f"{TALLEST * contact.length:.3g} m, the rest as a spring of the structure")
+        draft.say("contact.height", f"{contact.height:g} m is more than {TALLEST} times contact.length, but the "
+                                    f"pressure reaches only a few lengths deep; use at most "
+                                    f"{TALLEST * contact.length:.3g} m, and a spring of the structure for the rest")
     flat = flat_of(contact)
     if contact.element_size and flat and contact.element_size > flat:
         name = "contact.length" if flat == contact.length else "the interface,"
         draft.say("contact.element_size", f"{contact.element_size} m is longer than {name} {flat} m")
     if contact.element_size and contact.length and contact.length > MOST_ELEMENTS * contact.element_size:
         draft.say("contact.element_size", f"{contact.element_size:g} m makes more than {MOST_ELEMENTS} elements over "
-                                          f"{contact.length:g} m; at least {contact.length / MOST_ELEMENTS:.3g} m, or "
-                                          "leave it out")
+                                          f"{contact.length:g} m; use at least {contact.length / MOST_ELEMENTS:.3g} m, "
+                                          "or leave it out")
     if contact.element_size and contact.mesh:
-        draft.remark("contact.element_size is not used beside contact.mesh, whose elements are those of the file")
+        draft.remark("contact.element_size is not used with contact.mesh, whose file gives the elements")
     pieces = [("contact.coating", contact.coating, contact.height)]
     for name in ("upper", "lower"):
         if piece := getattr(contact, name):
@@ -45,9 +45,9 @@ def _contact(draft: Draft) -> None:
             draft.say(key, f"coating of {thickness} m must be thinner than the height {height} m of its piece")
     if contact.holder and not draft.given("contact.holder.rotational_stiffness"):
         if not draft.given("contact.holder.tangential_stiffness"):
-            draft.say("contact.holder", "rotational_stiffness, tangential_stiffness or both are wanted")
+            draft.say("contact.holder", "rotational_stiffness, tangential_stiffness or both are needed")
     if contact.step and contact.step.at is not None and flat and abs(contact.step.at) >= flat / 2:
-        draft.say("contact.step.at", f"{contact.step.at} m lies outside the patch, |at| < length/2 is wanted")
+        draft.say("contact.step.at", f"{contact.step.at} m lies outside the patch, |at| < length/2 is needed")
     if contact.strips and draft.given("contact.strips.offset"):
         _free_roll(draft, contact)
     if contact.asperities:
@@ -56,7 +56,7 @@ def _contact(draft: Draft) -> None:
             _peaks(draft)
         bare = contact.asperities.law == "exponential" and contact.asperities.normal_stiffness is None
         if contact.approach and bare:
-            draft.lacks("contact.asperities.normal_stiffness", "law 'exponential' beside [contact.approach] needs it "
+            draft.lacks("contact.asperities.normal_stiffness", "law 'exponential' with [contact.approach] needs it "
                         "at first touch, where an approach starts")  # fmt: skip
 
 
@@ -66,10 +66,10 @@ def _peaks(draft: Draft) -> None:
                                                                   for one in way)]
     if len(told) > 1:
         second = next(one for one in told[1] if draft.given(f"{at}.{one}"))
-        draft.say(f"{at}.{second}", f"stands beside {', '.join(told[0])}: the peaks are told in one way; keep one")
+        draft.say(f"{at}.{second}", f"is given with {', '.join(told[0])}: the peaks are described once; keep one")
     for one in (told or PEAKS)[0]:
         if len(told) < 2 and not draft.given(f"{at}.{one}"):
-            others = "" if told else "; or from, or rms_height, rms_slope and rms_curvature"
+            others = "" if told else "; or give from, or rms_height, rms_slope and rms_curvature"
             draft.lacks(f"{at}.{one}", f"law 'hertz' needs it{others}")
 
 
@@ -77,16 +77,16 @@ def _free_roll(draft: Draft, contact) -> None:
     """A load line over the width leaves the roll free, which a load alone determines, and two strips at least."""
     at, strips = "contact.strips.offset", contact.strips
     if draft.given("contact.strips.roll"):
-        draft.say(at, "leaves the roll free: keep it or contact.strips.roll")
+        draft.say(at, "leaves the roll free: keep offset or contact.strips.roll")
     if draft.given("contact.approach"):
-        draft.say(at, "is the place of a load: name contact.load in place of [contact.approach]")
+        draft.say(at, "is where the load acts: use contact.load in place of [contact.approach]")
     if strips.count is not None and strips.count < 2:
         draft.say(at, f"{strips.count} strip does not feel a roll: raise contact.strips.count")
     elif strips.count and contact.width and strips.offset is not None:
         most = outermost(contact.width, strips.count)
         if abs(strips.offset) >= most:
             draft.say(at, f"{strips.offset} m lies beyond the middle of the outermost strip: |offset| < {most:.6g} m "
-                          "is wanted; raise contact.strips.count or lower the offset")
+                          "is needed; raise contact.strips.count or lower the offset")
 
 
 def _load_line(draft: Draft) -> None:
@@ -101,12 +101,12 @@ def _load_line(draft: Draft) -> None:
     if not offset and not moment:
         draft.lacks(f"{at}.offset", "or load_line.moment instead")
     if draft.given("contact.tilt.angle") and not draft.given("contact.holder"):
-        draft.say(at, "stands beside contact.tilt.angle without [contact.holder]: a piece free to rotate has no "
+        draft.say(at, "is given with contact.tilt.angle but without [contact.holder]: a piece free to rotate has no "
                       "prescribed angle; keep one of the two or add the holder's spring")  # fmt: skip
     flat = flat_of(contact)
     half = flat / 2 if flat else None
     if half and line.offset is not None and abs(line.offset) >= half:
-        draft.say(f"{at}.offset", f"{line.offset} m lies outside the patch: |offset| < length/2 = {half} m is wanted")
+        draft.say(f"{at}.offset", f"{line.offset} m lies outside the patch: |offset| < length/2 = {half} m is needed")
     if half and line.moment and contact.load is not None and abs(line.moment) >= half * contact.load:
         draft.say(f"{at}.moment", f"{line.moment} N m over the load {contact.load} N lies outside the patch: "
-                                  f"|moment|/load < length/2 = {half} m is wanted")  # fmt: skip
+                                  f"|moment|/load < length/2 = {half} m is needed")  # fmt: skip

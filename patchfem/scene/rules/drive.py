@@ -55,7 +55,7 @@ def _sweep(draft: Draft, drive: Any) -> None:
     elif not rate and not octaves:
         draft.lacks("drive.rate", "or drive.log_rate instead, such as '1 oct/min'")
     if drive.from_ is not None and drive.from_ == drive.to:
-        draft.say("drive.to", f"{drive.to:g} Hz is where the sweep starts; another frequency is wanted")
+        draft.say("drive.to", f"{drive.to:g} Hz is where the sweep starts; another frequency is needed")
 
 
 def _tones(draft: Draft, drive: Any) -> None:
@@ -98,7 +98,7 @@ def _size(draft: Draft, drive: Any) -> None:
         draft.lacks("drive.force", "kind 'force' needs it")
     begins = draft.given("structure.start")
     if drive.kind == "free" and not displacement and not begins:
-        draft.lacks("drive.displacement", "kind 'free' needs it: released from there; or [structure.start]")
+        draft.lacks("drive.displacement", "kind 'free' needs it as the point of release; or give [structure.start]")
     if drive.kind == "free" and displacement and begins:
         draft.say("structure.start", "[structure.start] and drive.displacement exclude each other: keep one")
     drives_mass(draft)
@@ -137,7 +137,7 @@ def check_length(draft: Draft, kind: str) -> None:
     if kind not in ("rig", "linear") or drive is None:
         return
     if drive.cycles is not None and drive.cycles < LEAST:
-        draft.say("drive.cycles", f"at least a quarter of a cycle is wanted, cycles >= {LEAST}, not {drive.cycles:g}")
+        draft.say("drive.cycles", f"at least a quarter of a cycle is needed, cycles >= {LEAST}, not {drive.cycles:g}")
     elif drive.duration is not None and drive.frequency and drive.duration * drive.frequency < LEAST:
-        draft.say("drive.duration", f"at least a quarter of a cycle is wanted, duration >= {LEAST / drive.frequency:g} "
+        draft.say("drive.duration", f"at least a quarter of a cycle is needed, duration >= {LEAST / drive.frequency:g} "
                                     f"s, not {drive.duration:g} s")  # fmt: skip

@@ -47,7 +47,7 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
     if draft.given(f"{at}.kinetic") and not takes(law.law, "kinetic"):
         draft.say(f"{at}.kinetic", f"law '{law.law}' has one coefficient only; kinetic belongs to {using('kinetic')}")
     elif law.kinetic is not None and law.static is not None and law.kinetic > law.static:
-        draft.say(f"{at}.kinetic", f"{law.kinetic} is larger than static = {law.static}; kinetic <= static is wanted")
+        draft.say(f"{at}.kinetic", f"{law.kinetic} is larger than static = {law.static}; kinetic <= static is needed")
     elif kinetic_unused(law):
         draft.remark(f"{at}.kinetic has no effect while the bond length is constant; add rest_growth and slip_growth")
     if rest_speed_unused(law):
@@ -67,10 +67,10 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
         draft.say(f"{at}.breakaway", "the law as printed (reading 'report') has none; use 'stretch' or leave it out")
     contact = draft.tables.contact
     if law.static == 0 and law.law is not None and takes(law.law, "stiffness"):
-        draft.say(f"{at}.static", f"0 beside law '{law.law}', whose stiffness needs a force to end at; static > 0 is "
-                                  "wanted")  # fmt: skip
+        draft.say(f"{at}.static", f"0 with law '{law.law}', whose springs need a limit force; static > 0 is "
+                                  "needed")  # fmt: skip
     if law.static == 0 and contact and contact.gives_way:
-        draft.say(f"{at}.static", f"0 beside {contact.gives_way}: no point carries friction; static > 0 is wanted, or "
+        draft.say(f"{at}.static", f"0 with {contact.gives_way}: no point carries friction; static > 0 is needed, or "
                                   f"leave out {contact.gives_way}")  # fmt: skip
 
 

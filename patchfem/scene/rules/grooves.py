@@ -19,13 +19,13 @@ def check_grooves(draft: Draft, kind: str) -> None:
     law = draft.tables.friction
     if kind not in ("bench", "rig"):
         if kind:
-            draft.say(at, f"[{at}] is climbed by what slides: add [friction] and [slide], or [structure] with [drive]")
+            draft.say(at, f"[{at}] needs what slides: add [friction] and [slide], or [structure] with [drive]")
         return
     if law is None or law.law is None:
         return
     _locks(draft, at, grooves, law)
     if kind == "bench" and grooves.lifted_mass:
-        draft.remark(f"{at}.lifted_mass has no meaning beside [slide], whose motion is slow, and is not used")
+        draft.remark(f"{at}.lifted_mass has no meaning with [slide], whose motion is slow, and is not used")
     if grooves.amplitude:
         _beside(draft, at, grooves, law)
 
@@ -49,7 +49,7 @@ def _locks(draft: Draft, at: str, grooves: Any, law: Any) -> None:
         most = 1 / (wave * law.static)
         draft.say(f"{at}.amplitude", f"{grooves.amplitude:.6g} m makes flanks of slope {wave * grooves.amplitude:.6g}, "
                   f"which lock with static = {law.static:g}: no force moves the load over them; an amplitude below "
-                  f"wavelength/(2 pi static) = {most:.6g} m is wanted, or a smaller static")
+                  f"wavelength/(2 pi static) = {most:.6g} m is needed, or a smaller static")
 
 
 def _under_changing_load(draft: Draft, beside: str) -> None:
@@ -58,7 +58,7 @@ def _under_changing_load(draft: Draft, beside: str) -> None:
     if cause == "normal.amplitude":
         if normal.load is not None and normal.amplitude >= normal.load:
             draft.say(cause, f"{normal.amplitude:.6g} N takes the load to zero, where nothing holds the pieces in "
-                      f"their grooves; less than normal.load = {normal.load:.6g} N is wanted {beside}")
+                      f"their grooves; less than normal.load = {normal.load:.6g} N is needed {beside}")
     elif cause:
         draft.say(cause, unbuilt(f"{beside}, whose climb would press the contact against this motion", "either"))
 

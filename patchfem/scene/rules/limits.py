@@ -67,9 +67,9 @@ def _interfaces(draft: Draft, interfaces: tuple) -> None:
     for index, one in enumerate(interfaces):
         at = f"structure.interface.{index}"
         if one.spread is not None and takes(one.law, "spread"):
-            draft.say(f"{at}.spread", unbuilt("beside masses, where an interface has no width", "out"))
+            draft.say(f"{at}.spread", unbuilt("with masses, where an interface has no width", "out"))
         if len(interfaces) > 1 and one.law is not None and not carries(one, "joints"):
-            draft.say(f"{at}.law", f"{named(one)} beside other interfaces: {refusal('joints', odd=one)}")
+            draft.say(f"{at}.law", f"{named(one)} with other interfaces: {refusal('joints', odd=one)}")
 
 
 def _quadrature(draft: Draft, kind: str, law: Friction, shear: str) -> None:
@@ -85,7 +85,7 @@ def _quadrature(draft: Draft, kind: str, law: Friction, shear: str) -> None:
     varies = normal is not None and normal.amplitude
     if kind == "bench" and engine == "merged" and (lower or law.breakaway or varies):
         draft.say("accuracy.quadrature", unbuilt("'merged' where the pressure of a point changes during the slide, or "
-                                                 "beside friction.breakaway", "use 'auto', 'direct' or 'truncated'"))
+                                                 "with friction.breakaway", "use 'auto', 'direct' or 'truncated'"))
 
 
 def sideways(tables: Tables) -> str:
@@ -95,7 +95,7 @@ def sideways(tables: Tables) -> str:
     if not carries(law, "two-directions"):
         reason = f"law '{law.law}': {refusal('two-directions').partition(';')[0]}"
     elif law.spread is not None:
-        reason = f"friction.spread, whose width turns with the path: {MEANWHILE['either']}"
+        reason = f"friction.spread, whose width would have to turn with the path: {MEANWHILE['either']}"
     elif law.breakaway:
         reason = f"friction.breakaway: {MEANWHILE['either']}"
     elif contact is not None and contact.gives_way:
@@ -116,7 +116,7 @@ def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
     if not key:
         return
     if contact is None or contact.strips is None:
-        draft.say(key, "turns the patch about its normal: name [contact.strips], which slide each by themselves")
+        draft.say(key, "turns the patch about its normal: use [contact.strips], which slide independently")
     elif not carries(law, "joints"):
         draft.say(key, f"beside strips with {named(law)}: {refusal('joints', odd=law)}")
 
@@ -125,7 +125,7 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
     """Say what a load that changes in a run cannot stand beside."""
     contact, structure, beside = draft.tables.contact, draft.tables.structure, beside_load(cause)
     if contact is None and cause != "normal.amplitude":
-        draft.say(cause, "one rigid point leaves no room for heave or pitch: name [contact] in place of [normal]")
+        draft.say(cause, "one rigid point cannot heave or pitch: use [contact] in place of [normal]")
     carried = "grooves" if climbed(draft.tables) else "varying-load"
     if not has(law.law, "bonds") and not carries(law, carried):
         draft.say("friction.law", f"'{law.law}' {beside}: {refusal(carried)}")

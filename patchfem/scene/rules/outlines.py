@@ -33,15 +33,15 @@ def outlines(draft: Draft) -> None:
             _ends(draft, contact, name, piece)
             for key in ("length", *ENDS):
                 if contact.mesh and draft.given(f"contact.{name}.{key}"):
-                    draft.say(f"contact.{name}.{key}", "stands beside contact.mesh, whose pieces have the shape that "
-                                                       "the file gives them: leave one of the two out")
+                    draft.say(f"contact.{name}.{key}", "is given with contact.mesh, whose file gives the shape of "
+                                                       "the pieces: leave one of the two out")
     lengths = [length_of(contact, name) for name in ("upper", "lower")]
     given = [name for name in ("upper", "lower") if draft.given(f"contact.{name}.length")]
     if given and None not in lengths and 0 < abs(lengths[0] - lengths[1]) < LEAST * max(lengths):
-        draft.say(f"contact.{given[-1]}.length", f"the pieces are {lengths[0]} and {lengths[1]} m long, unlike by less "
-                                                 "than 1e-5 of it: write the same length for both")
+        draft.say(f"contact.{given[-1]}.length", f"the pieces are {lengths[0]} and {lengths[1]} m long, a difference "
+                                                 "below 1e-5 of it: write the same length for both")
     if len(given) == 2 and draft.given("contact.length"):
-        draft.remark("contact.length is not used: [contact.upper] and [contact.lower] name their own")
+        draft.remark("contact.length is not used: [contact.upper] and [contact.lower] set their own")
 
 
 def _ends(draft: Draft, contact: Contact, name: str, piece) -> None:
@@ -55,7 +55,7 @@ def _ends(draft: Draft, contact: Contact, name: str, piece) -> None:
         size, at = getattr(piece, key), f"contact.{name}.{key}"
         if size and length and 2 * size >= length:
             draft.say(at, f"{size} m at both ends leaves no face of a piece {length} m long: {key} < length/2 is "
-                          "wanted")
+                          "needed")
         elif size and length and size < LEAST * length:
             draft.say(at, f"{size} m is less than 1e-5 of the length {length} m: leave it out")
         elif size and height and size + thickness >= height:

@@ -24,7 +24,7 @@ def check_structure(draft: Draft) -> None:
     if len(forms) > 1:
         draft.say(f"structure.{forms[1]}", f"{' and '.join(forms)} exclude each other: keep one description of the rig")
     if not forms:
-        draft.lacks("structure.mode", "at least one [[structure.mode]] is wanted; a mass on a spring is one with "
+        draft.lacks("structure.mode", "at least one [[structure.mode]] is needed; a mass on a spring is one with "
                                       "frequency sqrt(k/m)/(2 pi)")  # fmt: skip
     if not draft.given("structure.moving_mass") and forms in ([], ["mode"]):
         draft.lacks("structure.moving_mass", "")
@@ -41,7 +41,7 @@ def check_structure(draft: Draft) -> None:
         if "file" not in forms and draft.given(f"structure.{key}"):
             draft.say(f"structure.{key}", "names a place in a file of modes or responses; give structure.file")
     if forms in (["masses"], ["reduced"]) and draft.given("structure.moving_mass"):
-        draft.remark(f"structure.moving_mass has no meaning beside structure.{forms[0]} and is not used")
+        draft.remark(f"structure.moving_mass has no meaning with structure.{forms[0]} and is not used")
     _modes(draft)
     _masses(draft, structure)
     _file(draft, structure)
@@ -64,11 +64,11 @@ def modes_instead(draft: Draft) -> str:
     k, c = (sum(value or 0.0 for _, value in one) for one in (springs, dampers))
     pairs = [sorted(pair) if pair else None for pair, _ in springs + dampers]
     if len(masses) != 1 or not masses[0] or not k or pairs != [[0, 1]] * len(pairs):
-        return ("beside [contact], give the modes of these masses and springs: structure.moving_mass and for each a "
+        return ("with [contact], give the modes of these masses and springs: structure.moving_mass and for each a "
                 "[[structure.mode]] with its frequency, that of one mass on one spring being sqrt(k/m)/(2 pi)")
     frequency, ratio = sqrt(k / masses[0]) / (2 * pi), c / (2 * sqrt(k * masses[0]))
     damping = f"damping = {ratio:.3g} (c/(2 sqrt(k m)))" if dampers else "its damping ratio"
-    return (f"beside [contact], give structure.moving_mass = \"{masses[0]:g} kg\" and a [[structure.mode]] with "
+    return (f"with [contact], give structure.moving_mass = \"{masses[0]:g} kg\" and a [[structure.mode]] with "
             f"frequency = \"{frequency:.6g} Hz\" (sqrt(k/m)/(2 pi)), {damping} and slide = 1.0")
 
 
@@ -89,7 +89,7 @@ def _modes(draft: Draft) -> None:
     if sum(squares) > 1 + 1e-9:
         at = f"structure.mode.{squares.index(max(squares))}"
         key = f"{at}.base" if draft.given(f"{at}.base") else f"{at}.slide"
-        draft.say(key, f"the sum of base^2 over the modes is {sum(squares):.6g}; <= 1 is wanted (base is the share of "
+        draft.say(key, f"the sum of base^2 over the modes is {sum(squares):.6g}; <= 1 is needed (base is the share of "
                        "the base motion; the first mode's is its slide unless given)")  # fmt: skip
 
 
@@ -135,7 +135,7 @@ def _masses(draft: Draft, structure: Any) -> None:
     """Every spring, damper, interface and named mass must stand between masses that exist."""
     count = _numbered(structure)
     if structure.masses is not None and not structure.masses:
-        draft.say("structure.masses", "at least one mass is wanted, such as masses = [\"1 kg\"]")
+        draft.say("structure.masses", "at least one mass is needed, such as masses = [\"1 kg\"]")
         return
     for name in ("spring", "damper", "interface"):
         for index, item in enumerate(getattr(structure, name) or ()):
@@ -156,7 +156,7 @@ def _between(draft: Draft, key: str, pair: Any, count: int | None) -> None:
     what = "mass" if draft.tables.structure.reduced is None else "boundary coordinate"
     if pair[0] == pair[1]:
         draft.say(key, f"joins {'the base' if pair[0] == 0 else f'{what} {pair[0]}'} to itself; two different ones are "
-                       f"wanted, or a {what} and 0, the base")
+                       f"needed, or a {what} and 0, the base")
     for one in dict.fromkeys(pair):
         _known(draft, key, one, count)
 
@@ -175,8 +175,8 @@ def drives_mass(draft: Draft) -> None:
     if drive.mass is None or structure is None or drive.kind == "base":
         return
     if draft.given("structure.mode"):
-        draft.say("drive.mass", "names one of structure.masses; [[structure.mode]] is driven at its output: leave it "
-                                "out")  # fmt: skip
+        draft.say("drive.mass", "is for structure.masses; [[structure.mode]] is driven at its output: leave "
+                                "drive.mass out")  # fmt: skip
     else:
         _known(draft, "drive.mass", drive.mass, _numbered(structure))
 
@@ -215,11 +215,11 @@ def _reduced(draft: Draft, reduced: Any) -> None:
         draft.say("structure.reduced.boundary", f"names {twice[0]} twice; each coordinate once")
     drive = draft.tables.drive
     if reduced.moved is not None and drive is not None and drive.kind in ("force", "free"):
-        draft.remark("structure.reduced.moved is that of a base drive and is not used")
+        draft.remark("structure.reduced.moved is for a base drive and is not used")
     _between(draft, "structure.reduced.slide", reduced.slide, len(reduced.boundary) if reduced.boundary else None)
     if draft.given("structure.interface"):
         if reduced.slide is not None:
-            draft.say("structure.reduced.slide", "stands beside [friction]; an interface names its places by between")
+            draft.say("structure.reduced.slide", "is given with [friction]; an interface names its places by between")
     elif draft.given("friction") and reduced.slide is None:
         draft.lacks("structure.reduced.slide", "which two boundary coordinates rub, such as slide = [1, 0] for the "
                                                "first on the base; or write [[structure.interface]] with its own law")
@@ -229,7 +229,7 @@ def _bonded(draft: Draft, structure: Any) -> None:
     """The spring beside the contact needs to know which contact."""
     if structure.bonded is None or structure.masses is None or len(structure.interface or ()) == 1:
         return
-    draft.say("structure.bonded", f"stands beside one contact, but there are {len(structure.interface or ())} "
+    draft.say("structure.bonded", f"is for one contact, but there are {len(structure.interface or ())} "
                                   "interfaces; write a [[structure.spring]] between the same masses")  # fmt: skip
 
 
@@ -248,7 +248,7 @@ def _bolted(draft: Draft, structure: Any) -> None:
                               mode.normal or mode.pitch for mode in structure.mode or ())),
                           ("strips that yaw", any(mode.yaw for mode in structure.mode or ()))):
         if holds:
-            draft.say(key, f"'stuck' has no one stiffness to take off beside {reason}; give the modes without the "
+            draft.say(key, f"'stuck' has no single stiffness to take off with {reason}; give the modes without the "
                            "joint")
 
 
@@ -265,4 +265,4 @@ def _start(draft: Draft, structure: Any) -> None:
         values = getattr(start, key)
         if values is not None and count and len(values) != count:
             many = f"{len(values)} value{'s' if len(values) > 1 else ''}"
-            draft.say(f"structure.start.{key}", f"{many} for {count} {form}; one for each is wanted, in their order")
+            draft.say(f"structure.start.{key}", f"{many} for {count} {form}; one for each is needed, in their order")

@@ -42,17 +42,17 @@ def _friction(draft: Draft, change: WornFriction) -> None:
     if draft.tables.normal is not None:
         draft.say(at, "a point has no area over which its wear is a depth: use [contact]")
     if depth is not None and (depth[0] != 0 or any(two <= one for one, two in pairwise(depth))):
-        draft.say(f"{at}.depth", "depths that rise from 0 are wanted, such as [\"0 um\", \"1 um\", \"5 um\"]")
+        draft.say(f"{at}.depth", "depths that rise from 0 are needed, such as [\"0 um\", \"1 um\", \"5 um\"]")
     names = ("coefficient_factor", "bond_length_factor")
     if not any(draft.given(f"{at}.{name}") for name in names):
-        draft.lacks(f"{at}.coefficient_factor", "the table wants what changes: this factor, bond_length_factor or both")
+        draft.lacks(f"{at}.coefficient_factor", "the table needs what changes: this factor, bond_length_factor or both")
     for name in names:
         factors = getattr(change, name)
         if factors is not None and depth is not None and len(factors) != len(depth):
-            draft.say(f"{at}.{name}", f"{len(factors)} factors at {len(depth)} depths; one at each is wanted")
+            draft.say(f"{at}.{name}", f"{len(factors)} factors at {len(depth)} depths; one at each is needed")
         elif factors is not None and factors[0] != 1:
-            draft.say(f"{at}.{name}", f"{factors[0]:g} at depth 0, where [friction] itself tells the new contact; 1 is "
-                                      "wanted first")
+            draft.say(f"{at}.{name}", f"{factors[0]:g} at depth 0, where [friction] itself describes the new contact; "
+                                      "the first must be 1")
     if law is None:
         return
     if change.bond_length_factor is not None and not takes(law.law, "bond_length"):
@@ -72,7 +72,7 @@ def _locks(draft: Draft, change: WornFriction, static: float | None) -> None:
     if most * steepest >= 1 > static * steepest:
         draft.say("wear.friction.coefficient_factor", f"{max(change.coefficient_factor):g} makes static = {most:g}, "
                   f"which locks on the flanks of the new grooves, of slope {steepest:.6g}; factors below "
-                  f"{1 / steepest / static:.6g} are wanted")
+                  f"{1 / steepest / static:.6g} are needed")
 
 
 def _coated(contact) -> bool:

@@ -14,7 +14,7 @@ PART, SAMPLES, FILLED = 0.05, 40, 0.7  # of the length, samples, and share of un
 WORN, BROAD, LEAST = 2 * REACH, 16, 0.005  # deviations of a rubbed place, its samples at half of them, share of x
 CURVED, BOWED = 30.0, 0.75  # chi-squared of a bow in an unworn part, and its size in noises, from which it is none
 TURNS, HIGHER, VALLEYS = 8, 0.65, 0.1  # worn tops, share of unworn heights that lie lower than they, share of valleys
-HIDDEN = "mean worn depth that the tilt, to the end of its interval, may be as a wedge; even wear has no limit"
+HIDDEN = "mean worn depth if the tilt, up to the end of its interval, is a wedge of wear; even wear has no limit"
 NO_LIMIT = "no limit"
 
 
@@ -108,21 +108,21 @@ def _what(by: Carried) -> str:
 def told(by: Carried) -> str:
     """What the worn depths count from, as a sentence."""
     if by.by == "valleys":
-        return (f"Depths count from the valleys between the worn tops, {100 * by.share:.0f} % of the heights, which "
-                "agree and are taken for unworn; what they lost evenly would come on top.")
+        return (f"Depths are measured from the valleys between the worn tops, {100 * by.share:.0f} % of the heights, "
+                "which agree and are taken as unworn; any even wear of these would add to them.")
     spans = ", ".join(f"{say(a, 4)} to {say(b, 4)}" for a, b in by.parts[:4])
     more = f" and {len(by.parts) - 4} more" if len(by.parts) > 4 else ""
-    return (f"Depths count from the parts that agree, x = {spans}{more} of the trace after, which are taken for "
-            "unworn; what they lost evenly or as one wedge would come on top.")
+    return (f"Depths are measured from the parts that agree, x = {spans}{more} of the trace after, which are taken as "
+            "unworn; any even or wedge-shaped wear of these would add to them.")
 
 
 def may_hide(found: Registration, hidden: Quantity) -> str:
     """What may hide where nothing carries the registration, and what would settle it, as a sentence."""
     bow = f" A bow of {say(abs(found.bend), 3)}, taken out, may be a bent datum or wear as well." if found.bend else ""
     tilt, most = (plain(1e6 * one, 3) for one in (abs(found.slope), 2 * hidden.value / float(found.x[-1] - found.x[0])))
-    return ("Even wear of any depth would look the same, and so would a wedge that the mounting turned back; the tilt "
-            f"of {tilt} urad between the traces, up to {most} urad by its interval, may itself be up to "
-            f"{say(hidden.value, 3)} of wear in the mean, half of it times the length.{bow} Only an unworn flank "
+    return ("Even wear of any depth would look the same, and so would a wedge levelled out by the mounting. The tilt "
+            f"of {tilt} urad between the traces, up to {most} urad by its interval, may be up to "
+            f"{say(hidden.value, 3)} of mean wear: half the tilt times the length.{bow} Only an unworn flank "
             "beside the rubbed part, or a reference mark, in both traces would settle it.")
 
 

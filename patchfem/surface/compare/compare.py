@@ -22,7 +22,7 @@ from .same import Place, found_place
 from .specks import without_specks
 from .tracks import Tracks, beside_flanks, of_flanks, pieces_of, tracks_of
 
-SHIFT = "a place at x of the trace before stands at x + shift of the trace after"
+SHIFT = "a place at x of the trace before is at x + shift of the trace after"
 STRETCH = "length of the trace after over that of the trace before, from their unworn valleys"
 TILT = "slope of the trace after against the trace before"
 AMPLITUDE = "amplitude of the sine with the mean square of the waves of 60 um to 110 um, after over before"
@@ -172,13 +172,13 @@ def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Compari
     before, after, why = place.before, place.after, place.why
     notes, step = _steps(before, after)
     if place.order:
-        notes.append("taken the other way round, as wear of the trace after, the traces show a common place, at which "
-                     "nothing grew: material grew between them, or the two files are in the wrong order")
+        notes.append("with the two traces exchanged they show a common place where nothing "
+                     "grew: material grew between them, or the two files are in the wrong order")
     flanks = flanks_of(before, after)
     abbott = None if flanks is not None else worn_depth.abbott_estimate(before, after)
     sides = [[before], [after] if flanks is None else beside_flanks(after, flanks, band[1])]
     worn = worn_depth.of_flanks(flanks) if flanks is not None else worn_depth.nowhere(
-        why + ", and no unworn flanks stand beside a track; a worn depth wants one or the other")
+        why + ", and there are no unworn flanks beside a track; a worn depth needs one or the other")
     sizes = tuple(_pooled(side, step, band) for side in sides)
     freedom = [[scattered(one, step, band) for one in side] for side in sides]
     sizes = tuple(one._replace(freedom=tuple(min(a, b) for a, b in zip(one.freedom, np.sum(each, axis=0))))
@@ -278,18 +278,18 @@ def compared_files(paths: tuple, direction: str = "", units: tuple | None = None
     files, another direction, a trace beside a scan, four scans, and a shift of other than two traces.
     """
     if direction not in ("", "x", "y"):
-        raise PatchfemError(f"compare: direction {direction!r}: x or y is wanted")
+        raise PatchfemError(f"compare: direction {direction!r}: x or y is needed")
     if len(paths) not in (2, 4):
-        raise PatchfemError(f"compare: {len(paths)} files; two are wanted, or four: before and after along one "
+        raise PatchfemError(f"compare: {len(paths)} files; two are needed, or four: before and after along one "
                             "direction, then before and after along the other")
     files = [read_surface(path, units) for path in paths]
     scans = {isinstance(one, Areal) for one in files}
     if shift is not None and len(files) != 2:
         raise PatchfemError("compare: a shift is that of two traces; compare each direction by itself")
     if len(scans) > 1 or (True in scans and len(files) == 4):
-        raise PatchfemError("compare: two or four traces are wanted, or two areal scans")
+        raise PatchfemError("compare: two or four traces are needed, or two areal scans")
     if shift is not None and True in scans:
-        raise PatchfemError("compare: a shift is told for traces; areal scans are laid on each other by themselves")
+        raise PatchfemError("compare: a shift is given for traces; areal scans are laid on each other by themselves")
     if True in scans:
         return compared_scans(*files, direction or "x", keep_spikes)
     if len(files) == 2:

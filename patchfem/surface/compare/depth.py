@@ -16,7 +16,7 @@ from .flanks import Flanks
 from .largest import largest
 from .registration import REACH, Registration, together
 
-MAX, MEAN, AREA = ("largest worn depth, without what noise adds to a largest value",
+MAX, MEAN, AREA = ("largest worn depth, corrected for noise",
                    "mean worn depth over the common length",
                    "worn area of the section, that is worn volume per width")
 WITHIN = "mean worn depth from the first to the last worn place, unworn valleys between them included"

@@ -43,19 +43,19 @@ def read_pairs(path) -> list[Asked]:
             continue
         cells = cells_of(path, number, line, names)
         if empty := [name for name in HEADER.split(",") if not cells[name]]:
-            raise PatchfemError(f"{path}:{number}: {empty[0]}: the name of a file is wanted")
+            raise PatchfemError(f"{path}:{number}: {empty[0]}: the name of a file is needed")
         if cells.get("direction", "") not in ("", "x", "y"):
-            raise PatchfemError(f"{path}:{number}: direction: x, y or nothing is wanted, not "
+            raise PatchfemError(f"{path}:{number}: direction: x, y or nothing is needed, not "
                                 f"'{cells['direction'][:40]}'")
         pair = tuple(path.parent / cells[name] for name in HEADER.split(","))
         if pair in seen:
-            raise PatchfemError(f"{path}:{number}: the pair of line {seen[pair]} again; it would count twice in a mean")
+            raise PatchfemError(f"{path}:{number}: repeats line {seen[pair]}; the pair would count twice in a mean")
         seen[pair] = number
         labels = {name: cell for name, cell in cells.items() if name not in ("before", "after", "direction")}
         out.append(Asked(number, tuple(cells[name] for name in HEADER.split(",")), pair, cells.get("direction", ""),
                          labels))
     if not out:
-        raise PatchfemError(f"{path}: no pair below its header; a line such as `new.csv,worn.csv` is wanted for each")
+        raise PatchfemError(f"{path}: no pair below its header; a line such as `new.csv,worn.csv` is needed for each")
     return out
 
 

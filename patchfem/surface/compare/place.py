@@ -67,7 +67,7 @@ def prepared(before: Profile, after: Profile) -> tuple:
     samples [m]. PatchfemError for fewer than 16 samples."""
     one, other = even(before), even(after)
     if min(one.x.size, other.x.size) < 16:
-        raise PatchfemError(f"{one.source}, {other.source}: 16 samples at least are wanted to compare two traces")
+        raise PatchfemError(f"{one.source}, {other.source}: at least 16 samples are needed to compare two traces")
     step = max(max(one.length, other.length) / COARSE, *(each.length / (each.x.size - 1) for each in (one, other)))
     first, second = (_read(each, step) for each in (one, other))
     cutoff = LONGEST * min(first.size, second.size)

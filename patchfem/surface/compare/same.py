@@ -19,7 +19,7 @@ WHITE, NEIGHBOURS = 0.3, 1.5  # noise up to which white noise passes for that of
 TOLD = 0.5  # white noise up to which a shift that was told is believed
 NOTHING_GREW = 0.9  # balance of what is missing and what grew, beyond which wear alone stands in a registration
 SHARE = 0.15  # of the heights, at least, unworn
-MARK = "where both traces were measured from the same mark, tell it with --shift '0 mm'"
+MARK = "where both traces were measured from the same mark, give it with --shift '0 mm'"
 
 
 class Place(NamedTuple):
@@ -128,9 +128,9 @@ def _told(before: Profile, after: Profile, shift: float) -> Place:
     except PatchfemError:
         return Place(None, None, why + "hardly any heights of the traces agree; is it the right one?")
     if abs(found.shift - shift) > alone(first) * step:
-        return Place(None, None, why + f"the traces do not agree; the fit leaves it for {say(found.shift)}")
+        return Place(None, None, why + f"the traces do not agree; the fit moves away to {say(found.shift)}")
     if not (_quiet(found, TOLD) and found.used.mean() > SHARE):
-        return Place(None, None, why + _apart(found) + ": no more than chance brings; is it the right one?")
+        return Place(None, None, why + _apart(found) + ": no better than chance; is it the right one?")
     return Place(None, found)
 
 
@@ -180,25 +180,25 @@ def _likelier(before: Profile, after: Profile, shift: float, other: Registration
 
 
 def _apart(found: Registration) -> str:
-    return (f"the likest {100 * found.used.mean():.0f} % of the heights still differ by {say(found.noise)}, "
+    return (f"the best-matching {100 * found.used.mean():.0f} % of the heights still differ by {say(found.noise)}, "
             f"{100 * found.noise / _height(found):.0f} % of the root mean square height before")
 
 
 def _why(before: Profile, after: Profile, match: Match, valleys: Match) -> str:
     """Why no place was found, in words to act on."""
     if valleys.repeats and valleys.clear > CLEAR and match is valleys:
-        return (f"the surface repeats itself, every {say(_period(before, after))}: shifts apart from each other fit "
-                f"alike, {valleys.likeness:.3f} and {valleys.second:.3f}; {MARK}")
+        return (f"the surface repeats itself, every {say(_period(before, after))}: distant shifts fit equally "
+                f"well, {valleys.likeness:.3f} and {valleys.second:.3f}; {MARK}")
     if match.clear > CLEAR and not match.repeats:
         try:
             found = register(before, after, match.shift)
         except PatchfemError:
-            return f"at the likeliest shift, {say(match.shift)}, hardly any heights are unworn"
-        return (f"the traces show no common place that is unworn: at the likeliest shift, {say(match.shift)}, "
+            return f"at the most likely shift, {say(match.shift)}, hardly any heights are unworn"
+        return (f"the traces show no common place that is unworn: at the most likely shift, {say(match.shift)}, "
                 f"{_apart(found)}; {MARK}")
     mean, scatter = valleys.chance
-    return (f"the traces show no common place: the best likeness of their valleys is {valleys.likeness:.2f}, and only "
-            f"above {np.tanh(mean + CLEAR * scatter):.2f} it is no chance; {MARK}")
+    return (f"the traces show no common place: the best correlation of their valleys is {valleys.likeness:.2f}, and "
+            f"only above {np.tanh(mean + CLEAR * scatter):.2f} is it significant; {MARK}")
 
 
 def _period(before: Profile, after: Profile) -> float:

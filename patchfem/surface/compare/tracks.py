@@ -21,8 +21,8 @@ LONG = 3.0  # longest waves of the band, and a track is longer; so is a piece of
 MEDIAN, UNWORN = 5, 0.05  # samples of the running median that is worn in a track, share of unworn heights in it
 NEW = 10.0  # noises that a new valley is deeper than the trace before, and 3 below all of it nearby
 FORM = 2.5  # longest waves, from which the shape of the depth is the form of a track
-FROM, TO = ("where the longest track begins, in the x of the trace after",
-            "where the longest track ends, in the x of the trace after")
+FROM, TO = ("x of the trace after where the longest track begins",
+            "x of the trace after where the longest track ends")
 DEPTH, BOTTOM = ("lost area of the longest track over its width",
                  "floor of the longest track: bottom of the parabola through the deepest fifth of its width")
 WIDTH, STEP = ("width of the longest track",
@@ -172,7 +172,7 @@ def of_flanks(found: Flanks) -> Tracks:
     many = max(inside.size // FLOOR, 1)
     floor = float(np.convolve(inside, np.full(many, 1 / many), "valid").max())
     off = found.largest[2] - found.largest[0]
-    why = "what stands beside the track before is not known"
+    why = "the height beside the track before is not known"
     width = Quantity(found.width, max(found.width - 2 * part, 0.0), found.width + 2 * part, "m", WIDTH)
     return Tracks((), {"from": ends[0], "to": ends[1], "width": width,
                        "depth_mean": Quantity(*(one / found.width for one in found.area), "m", DEPTH),

@@ -52,7 +52,7 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     elif areal == ELSEWHERE or any(_elsewhere(one) for one in parts):
         headline = f"{ELSEWHERE}; {headline}"
     if any(_gain(one, "") and word != "no change shown" for one, word in zip(parts, words)):
-        headline += " by a factor of all heights, as the gain of an instrument"
+        headline += " by a factor of all heights, like the gain of an instrument"
     over = _over(parts) if parts[0].change is None else scans.over(parts[0].change)
     headline = f"{headline}; {over}" if over else headline
     out = [] if parts[0].change is None else scans.sentences(parts[0].change)
@@ -150,8 +150,8 @@ def _variant(one: Comparison, name: str) -> list:
     if one.mirrored:
         out.append(f"The trace after{name} runs the other way: it was mirrored, and its x counts from the other end.")
     if one.turned:
-        out.append(f"The heights of both traces{name} count opposite ways: those of one were turned over, so that wear "
-                   "is what is missing; tell which file counts into the material.")
+        out.append(f"The heights of both traces{name} count opposite ways: one was turned over so that wear is missing "
+                   "material; check which file counts into the material.")
     return out
 
 
@@ -169,19 +169,19 @@ def _worn(one: Comparison, name: str) -> str:
     if mean.value is None:
         text = f"Worn depth{name}: not available; {mean.reason}."
         if one.abbott is not None and one.abbott.value is not None:
-            text += (f" The valley tails of the Abbott curves suggest {_length(one.abbott)}, if the surface is alike "
-                     "everywhere and its valleys are unworn.")
+            text += (f" The valley tails of the Abbott curves suggest {_length(one.abbott)}, if the surface is "
+                     "uniform and its valleys are unworn.")
         return text
     if not _sure(mean):
-        return f"Worn depth{name}: none shown; at most {say(mean.high)} in the mean.{above}"
+        return f"Worn depth{name}: none shown; at most {say(mean.high)} on average.{above}"
     what = "over the track below its unworn flanks" if one.reference == "flanks" else "over the common length"
-    text = (f"Worn{name}: {_track(one)}{_length(mean)} in the mean {what}, {_length(one.worn.largest)} at the deepest "
+    text = (f"Worn{name}: {_track(one)}{_length(mean)} on average {what}, {_length(one.worn.largest)} at the deepest "
             f"place.{above}")
     if one.worn.extent is not None and not one.tracks.sizes:
         before, after = (_span(*(end.value for end in ends)) for ends in one.worn.extent)
         text += f" Worn from x = {before} of the trace before, that is from {after} of the trace after"
         mean = one.worn.within
-        text += "." if mean is None else f", and between these places {_length(mean)} in the mean."
+        text += "." if mean is None else f", and between these places {_length(mean)} on average."
     return text
 
 
@@ -204,7 +204,7 @@ def _track(one: Comparison) -> str:
     if not found:
         return ""
     return (f"a track from x = {_span(found['from'].value, found['to'].value)} of the trace after, "
-            f"{_length(found['depth_mean'])} deep in the mean, its floor {_length(found['depth_floor'])}; ")
+            f"{_length(found['depth_mean'])} deep on average, its floor {_length(found['depth_floor'])}; ")
 
 
 def _apart(one: Comparison) -> list:
@@ -214,7 +214,7 @@ def _apart(one: Comparison) -> list:
     if one.tracks.valley is not None:
         place, depth = one.tracks.valley
         out.append(f"A valley {say(depth, 3)} deep at x = {say(place, 4)} is in the trace after only: a scratch or a "
-                   "pit; the worn depths hold it too.")
+                   "pit; the worn depths include it too.")
     return out
 
 

@@ -37,8 +37,8 @@ def npy(raw: Raw, units: tuple | None) -> Profile | Areal:
     if table.ndim == 2 and table.shape[0] in (2, 3) and table.shape[1] > 3:
         table = table.T
     if table.ndim != 2 or table.shape[1] not in (2, 3):
-        raise PatchfemError(f"{path}: an array of shape {table.shape}; columns x, z or x, y, z are wanted: {TABLE}; of "
-                            f"a matrix of heights {PIXEL}")
+        raise PatchfemError(f"{path}: an array of shape {table.shape}; columns x, z or x, y, z are needed: {TABLE}; "
+                            f"for a matrix of heights {PIXEL}")
     return _table(path, table, factors)
 
 
@@ -56,7 +56,7 @@ def mat(raw: Raw, units: tuple | None) -> Profile | Areal:
     if len(tables) != 1:
         listed = ", ".join(f"{shown(name)} {one.shape}" for name, one in list(found.items())[:8]) or "no array"
         raise PatchfemError(f"{path}: holds {listed}; variables x, z or x, y, z, or one matrix of these columns, are "
-                            "wanted")
+                            "needed")
     return _table(path, found[tables[0]].values(), factors)
 
 
@@ -74,7 +74,7 @@ def lengths(raw: Raw, units: tuple | None) -> tuple:
 def _table(path, table, factors: tuple) -> Profile | Areal:
     columns = [np.ascontiguousarray(column, dtype=float) for column in table.T]
     if len(columns[0]) < 2:
-        raise PatchfemError(f"{path}: {len(columns[0])} rows; a trace wants two at least")
+        raise PatchfemError(f"{path}: {len(columns[0])} rows; a trace needs at least two")
     if len(columns) == 2:
         return checked(path, *columns, None, factors, GIVEN)
     return raster(path, columns, None, (factors[0], *factors), GIVEN)
@@ -90,10 +90,10 @@ def _named(path, places: list, z, factors: tuple) -> Profile | Areal:
         return areal(path, flat[0] * factors[0], flat[1] * factors[0], z * factors[1], GIVEN)
     else:
         shapes = ", ".join(str(one.shape) for one in (*places, z))
-        raise PatchfemError(f"{path}: x, y and z of shapes {shapes} do not fit; z wants a row for each y and a column "
+        raise PatchfemError(f"{path}: x, y and z of shapes {shapes} do not fit; z needs a row for each y and a column "
                             "for each x")
     if not z.size > 1:
-        raise PatchfemError(f"{path}: {z.size} heights; a trace wants two at least")
+        raise PatchfemError(f"{path}: {z.size} heights; a trace needs at least two")
     return _table(path, np.column_stack(columns), factors)
 
 
@@ -110,8 +110,8 @@ def _npy(raw: Raw):
     except PatchfemError:
         raise
     except Exception:  # NumPy lets through whatever Python says of a damaged header
-        raise PatchfemError(f"{path}: the header of the .npy file is damaged or holds no plain array; save it anew: "
-                            f"{TABLE}") from None
+        raise PatchfemError(f"{path}: the header of the .npy file is damaged or holds an unsupported array; save it "
+                            f"anew: {TABLE}") from None
     if kind.kind not in "fiu" or kind.itemsize > 8:
         what = "Python objects, which are never loaded" if kind.hasobject else f"'{shown(kind.str)}'"
         raise PatchfemError(f"{path}: holds {what}; save numbers: {TABLE}")
@@ -119,6 +119,6 @@ def _npy(raw: Raw):
     if count > POINTS * 3:
         raise PatchfemError(f"{path}: {count} numbers by its header, more than {POINTS:.0e} points; save a part of it")
     if count * kind.itemsize != left:
-        raise PatchfemError(f"{path}: {left} bytes where {count} numbers of {kind.name} are wanted; the file is cut "
+        raise PatchfemError(f"{path}: {left} bytes where {count} numbers of {kind.name} are needed; the file is cut "
                             "off or damaged")
     return np.frombuffer(raw.data, kind, count, file.tell()).reshape(shape, order="F" if fortran else "C")

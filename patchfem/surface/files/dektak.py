@@ -101,4 +101,4 @@ def _stepped(path, x, length: float | None, factor: float) -> tuple:
                 f"{path}: x is printed to {say(digit * factor)}; the step is {say(length)}/{count} = "
                 f"{say(step * factor)} by the header",)
     return x, (f"{path}: the length of {say(length)} in the header does not fit {x.size} samples that end at "
-               f"{say(x[-1] * factor)}: the printed x are taken",)
+               f"{say(x[-1] * factor)}: the printed x are used",)

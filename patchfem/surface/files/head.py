@@ -109,7 +109,7 @@ def head_of(path, text: str) -> Head:
         comment = line.startswith(COMMENT)
         if len(line) > WIDEST and not comment:
             if not _NUMERIC.fullmatch(line):
-                raise PatchfemError(f"{path}:{number}: a line of {len(line)} characters; two columns are wanted, "
+                raise PatchfemError(f"{path}:{number}: a line of {len(line)} characters; two columns are needed, "
                                     f"{EXAMPLE}")
         plain = line[:WIDEST].lstrip("#%/").strip() if comment else line
         names, cells, delimiter = ([], [], None) if len(plain) > WIDEST else names_of(plain, comment)

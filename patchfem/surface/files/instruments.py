@@ -64,10 +64,10 @@ def _read(path, file) -> tuple:
         if ended == 0:  # it had just ended, idle
             found, arrays, ended = _asked(path, file)
     if ended == 3:
-        raise Missing(f"{path}: a file of an instrument; SurfaceTopography reads many of them: {REMEDY}, or export "
+        raise Missing(f"{path}: an instrument's own format; SurfaceTopography reads many of them: {REMEDY}, or export "
                       "the surface as text with the header `x [um],z [um]`")
     if ended == "late":
-        raise PatchfemError(f"{path}: SurfaceTopography did not end with it in {WAIT:g} s; {ELSE}")
+        raise PatchfemError(f"{path}: SurfaceTopography did not finish reading it in {WAIT:g} s; {ELSE}")
     if ended == -24:  # SIGXCPU
         raise PatchfemError(f"{path}: SurfaceTopography did not read it in {SECONDS:g} s of CPU time; {ELSE}")
     if ended is not None:

@@ -14,7 +14,7 @@ from .raw import shown
 from .units import GIVE, PIXEL, factor_of, pixel_of
 
 SIZE = "`# Width: 1.2 mm` and `# Height: 0.8 mm`"
-ABOVE = f"write {SIZE}, those of the scan, and `# Value units: um` above its rows, or {PIXEL}"
+ABOVE = f"write the scan's {SIZE} and `# Value units: um` above its rows, or {PIXEL}"
 
 
 def is_matrix(count: int, names: list, facts: dict) -> bool:
@@ -35,11 +35,11 @@ def matrix(path, head: Head, facts: dict, given: tuple | None, body: str) -> Pro
     for name, axis, count in (("rows", "rows", table.shape[0]), ("columns", "numbers a row", table.shape[1])):
         stated = facts.get(name, (None,))[0]
         if stated is not None and stated != count:
-            raise PatchfemError(f"{path}: {count} {axis} where its head says {stated:g}; the file is cut off or was "
-                                "put together: export the scan anew")
+            raise PatchfemError(f"{path}: {count} {axis} where its header says {stated:g}; the file is cut off or "
+                                "joined from parts: export the scan anew")
     if min(table.shape) > 3 and _even(table[0, 1:]) and _even(table[1:, 0]) and not _even(table[1, 1:]):
-        raise PatchfemError(f"{path}: the first row and the first column of its matrix grow evenly, as places and no "
-                            "heights do; leave them out")
+        raise PatchfemError(f"{path}: the first row and the first column of its matrix grow evenly, like coordinates "
+                            "and not heights; leave them out")
     steps, notes = [], ()
     for axis, count in zip(("x", "y"), table.shape[::-1]):
         if axis == "y" and count == 1:
@@ -72,12 +72,12 @@ def _height(path, facts: dict, given: tuple | None) -> tuple:
         told, scale = "nm", facts["bit2nm"][0]
     scale = 1.0 if scale is None else scale
     if not 0 < abs(scale) < np.inf:
-        raise PatchfemError(f"{path}: a factor of the heights of {scale:g}; export the scan anew")
+        raise PatchfemError(f"{path}: its heights have the factor {scale:g}; export the scan anew")
     if told is not None and factor_of(told) is None and given is None:
-        raise PatchfemError(f"{path}: its values are in '{shown(told)}', which is no length; export the channel of the "
-                            f"heights, or {GIVE}")
+        raise PatchfemError(f"{path}: its values are in '{shown(told)}', which is not a length; export the channel of "
+                            f"the heights, or {GIVE}")
     if told is None and given is None:
-        raise PatchfemError(f"{path}: a matrix of heights whose unit is not told; write `# Value units: um` above its "
+        raise PatchfemError(f"{path}: a matrix of heights whose unit is not given; write `# Value units: um` above its "
                             f"rows, or {GIVE}")
     unit, notes = _overruled(path, "the heights", told, given and given[1])
     return scale * factor_of(unit), notes
@@ -87,14 +87,14 @@ def _step(path, axis: str, count: int, facts: dict, given: tuple | None) -> tupl
     """Step along x or y [m]; notes."""
     size, step = ("width", "step_x") if axis == "x" else ("height", "step_y")
     if given is not None and (pixel := pixel_of(given[0])) is not None:
-        told = f"{path}: its head tells its size along {axis}; the pixel that was given, {given[0]}, is taken"
+        told = f"{path}: its header gives its size along {axis}; the given pixel, {given[0]}, is used"
         return pixel, () if {size, step}.isdisjoint(facts) else (told,)
     if axis == "y" and step not in facts and size not in facts:
         step = "step_x"  # square pixels by a size of one number
     number, unit = facts.get(step, facts.get(size, (None, "")))
     if number is None or not 0 < number < np.inf:
         raise PatchfemError(f"{path}: rows of more than three numbers, or those of a map, are a matrix of heights, and "
-                            f"its {'width' if axis == 'x' else 'height'} is not told; {ABOVE}")
+                            f"its {'width' if axis == 'x' else 'height'} is not given; {ABOVE}")
     unit = unit or next((facts[name][1] for name in ("unit_y", "lateral") if axis == "y" or name == "lateral"
                          if name in facts), None)
     if not unit and facts.get("format", ("", ""))[1].lower() == "ascii":
@@ -110,7 +110,7 @@ def _overruled(path, what: str, told: str | None, asked: str | None) -> tuple:
     """The unit that counts, and a note where the one given overrules the one of the file."""
     if asked is None or told is None or factor_of(asked) == factor_of(told):
         return asked or told, ()
-    return asked, (f"{path}: its head gives {what} in {shown(told)}; {asked} is taken, as the units given say",)
+    return asked, (f"{path}: its header gives {what} in {shown(told)}; {asked} is used, as the given units say",)
 
 
 def _table(path, head: Head, body: str) -> np.ndarray:
@@ -144,7 +144,7 @@ def _row(at: str, line: str, delimiter: str | None, count: int) -> list:
     cells = cells if len(cells) == count else trimmed(cells)
     if len(cells) != count:
         raise PatchfemError(f"{at}: {len(cells)} numbers where the first row of the matrix has {count}; write nan for "
-                            "a missing height, and one row of the scan in a line")
+                            "a missing height, and one row of the scan per line")
     bad = next((cell for cell in cells if not is_number(cell, delimiter)), None)
     if bad is not None:
         raise PatchfemError(f"{at}: '{shown(bad)}' is not a height; a missing one is empty, nan, bad or ***")

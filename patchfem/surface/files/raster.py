@@ -25,8 +25,8 @@ def raster(path, columns: list, at, factors: tuple, stated: str = "") -> Profile
         return checked(path, y if xs.size == 1 else x, z, at, (factors[xs.size == 1], factors[2]), stated)
     cells = xs.size * ys.size
     if cells > max(SPARSE * z.size, 16) or cells > POINTS:
-        raise PatchfemError(f"{path}: {z.size} points with {xs.size} x and {ys.size} y lie on no raster; export the "
-                            "scan as a grid, or one trace of two columns")
+        raise PatchfemError(f"{path}: {z.size} points with {xs.size} x and {ys.size} y do not lie on a grid; export "
+                            "the scan as a grid, or one trace of two columns")
     place = row * xs.size + column
     if np.unique(place).size < place.size:
         first = np.setdiff1d(np.arange(place.size), np.unique(place, return_index=True)[1])[0]
@@ -50,19 +50,19 @@ def areal(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal
     axes = []
     for axis, (name, values) in enumerate((("y", y), ("x", x))):
         if len(values) < 2:
-            raise PatchfemError(f"{path}: {len(values)} places along {name}; a scan wants two at least")
+            raise PatchfemError(f"{path}: {len(values)} places along {name}; a scan needs at least two")
         bounded(path, (values,), (name,), None, (1.0,))
         if values[-1] < values[0]:
             values, z = values[::-1], np.flip(z, axis)
         values, more = evened(path, values, 1.0, name)
         if not (np.diff(values) > 0).all():
-            raise PatchfemError(f"{path}: {name} turns back; a scan runs one way along either side")
+            raise PatchfemError(f"{path}: {name} turns back; each coordinate of a scan must run one way")
         axes.append(values)
         notes += more
     bounded(path, (z.ravel(),), ("z",), None, (1.0,))
     there = np.isfinite(z)
     if there.sum() < 3:
-        raise PatchfemError(f"{path}: {there.sum()} heights; a scan wants three at least")
+        raise PatchfemError(f"{path}: {there.sum()} heights; a scan needs at least three")
     notes += plausible(path, max(axes, key=np.ptp), z[there], stated)
     return Areal(frozen_array(axes[1]), frozen_array(axes[0]), frozen_array(z), str(path), tuple(notes))
 

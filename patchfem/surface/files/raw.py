@@ -88,7 +88,7 @@ def _most(kind: str) -> int:
 
 def _limited(path, kind: str, size: int) -> None:
     if size > _most(kind):
-        what = f"{TEXT >> 20} MiB of text; keep every few samples of the profile"
+        what = f"{TEXT >> 20} MiB of text; thin out the samples of the profile"
         raise PatchfemError(f"{path}: more than " + (what if kind == "text" else f"{LARGEST >> 20} MiB"))
 
 
@@ -161,7 +161,7 @@ def member(raw: Raw, archive: zipfile.ZipFile, name: str, most: int = LARGEST) -
         info = archive.getinfo(name)
         _ratio(raw, info)
         if info.file_size > most:
-            raise PatchfemError(f"{raw.path}: {name} inside it has {info.file_size} bytes; {most} at most are wanted")
+            raise PatchfemError(f"{raw.path}: {name} inside it has {info.file_size} bytes; at most {most} are allowed")
         with archive.open(info) as file:
             out = file.read(info.file_size + 1)
     except KeyError:

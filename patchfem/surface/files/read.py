@@ -28,7 +28,7 @@ def read_surface(path, units: tuple | None = None) -> Profile | Areal:
     of the file. PatchfemError names file and line of a fault, Missing what is not there.
     """
     if units is not None and (isinstance(units, str) or not hasattr(units, "__len__") or len(units) != 2):
-        raise PatchfemError(f'{path}: units are two, of x and of z, such as ("mm", "um"), not {units!r}')
+        raise PatchfemError(f'{path}: give two units, of x and of z, such as ("mm", "um"), not {units!r}')
     raw = fetch(path)
     begins = raw.data[:80].replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \r\n\t") if raw.kind == "text" else b""
     kind = "dektak" if begins.startswith(MARK) else raw.kind
@@ -45,7 +45,7 @@ def read_profile(path, units: tuple | None = None) -> Profile:
     found = read_surface(path, units)
     if isinstance(found, Areal):
         raise PatchfemError(f"{path}: an areal scan of {found.z.shape[0]} x {found.z.shape[1]} heights where one trace "
-                            "is wanted; write one of its rows to a file with the header `x [um],z [um]`")
+                            "is needed; write one of its rows to a file with the header `x [um],z [um]`")
     return found
 
 

@@ -42,7 +42,7 @@ def _checked(raw: Raw, header: dict) -> dict:
             raise PatchfemError(f"{path}: the header lacks {name}; export the scan anew")
     for name in ("NumPoints", "NumProfiles"):
         if not 1 <= header[name] <= POINTS or header[name] != int(header[name]):
-            raise PatchfemError(f"{path}: {name} = {header[name]:g}; a whole number from 1 on is wanted")
+            raise PatchfemError(f"{path}: {name} = {header[name]:g}; a whole number >= 1 is needed")
         header[name] = int(header[name])
     if header["NumPoints"] * header["NumProfiles"] > POINTS:
         raise PatchfemError(f"{path}: {header['NumPoints']} x {header['NumProfiles']} heights, more than {POINTS:.0e}; "
@@ -50,7 +50,7 @@ def _checked(raw: Raw, header: dict) -> dict:
     for name in ("Xscale", "Yscale", "Zscale"):
         one_row = name == "Yscale" and header["NumProfiles"] == 1  # means nothing there
         if not 0 < header[name] < np.inf and not one_row:
-            raise PatchfemError(f"{path}: {name} = {header[name]:g}; a length > 0 m is wanted")
+            raise PatchfemError(f"{path}: {name} = {header[name]:g}; a length > 0 m is needed")
     if header.get("Compression"):
         raise PatchfemError(f"{path}: compressed; export the scan uncompressed")
     return header
@@ -66,7 +66,7 @@ def _binary(raw: Raw) -> tuple:
     count = header["NumPoints"] * header["NumProfiles"]
     if len(raw.data) - _BINARY.size < count * kind.itemsize:
         raise PatchfemError(f"{raw.path}: {len(raw.data) - _BINARY.size} bytes of heights where {count} of {kind.name} "
-                            "are wanted; export the scan anew")
+                            "are needed; export the scan anew")
     data = np.frombuffer(raw.data, kind, count, _BINARY.size)
     z = data.astype(float)
     if kind.kind in "iu" and kind.itemsize > 1:
@@ -87,7 +87,7 @@ def _ascii(raw: Raw) -> tuple:
         name, _, value = (part.strip() for part in line.partition("="))
         known = next((one for one in _NAMES if one.lower() == name.lower()), None)
         if known and not NUMBER.fullmatch(value):
-            raise PatchfemError(f"{raw.path}:{number}: {known} = '{shown(value)}': a number is wanted")
+            raise PatchfemError(f"{raw.path}:{number}: {known} = '{shown(value)}': a number is needed")
         if known:
             header[known] = float(value)
     header = _checked(raw, header)
@@ -95,7 +95,7 @@ def _ascii(raw: Raw) -> tuple:
     words = rest.partition(b"*")[0].replace(b",", b" ").split(None, count)
     if len(words) != count:
         raise PatchfemError(f"{raw.path}: {'more' if len(words) > count else len(words)} heights "
-                            f"{'than' if len(words) > count else 'where'} {count} are wanted; export the scan anew")
+                            f"{'than' if len(words) > count else 'where'} {count} are needed; export the scan anew")
     try:
         z = np.array([np.nan if word.upper() == b"BAD" else float(word) for word in words])
     except ValueError as error:

@@ -51,7 +51,7 @@ def columns(raw: Raw, given: tuple | None = None) -> Profile | Areal:
         raise PatchfemError(f"{path}: '{shown(given[0])}' is the pixel of a matrix of heights, and this file has "
                             "columns; give their unit")
     if len(head.named or head.row) < 2:
-        raise PatchfemError(f"{path}:{head.number + 1}: one column, '{shown(head.row[0])}', where x and z are wanted; "
+        raise PatchfemError(f"{path}:{head.number + 1}: one column, '{shown(head.row[0])}', where x and z are needed; "
                             f"{EXAMPLE}")
     if not (names or given or units or "lateral" in facts):
         raise PatchfemError(f"{path}:{at}: no header, and units are never guessed; {EXAMPLE} above the first sample, "
@@ -110,7 +110,7 @@ def _roles(at: str, cells: list, given: bool) -> tuple:
     data = {k: role for k, role in roles.items() if role not in ("valid", "index")}
     if not 1 < len(data) < 4:
         what = f"{len(cells)} columns" if len(data) == len(cells) else f"{', '.join(map(shown, cells))}"
-        raise PatchfemError(f"{at}: {what} where x and z, or x, y and z, are wanted; keep one trace of two columns and "
+        raise PatchfemError(f"{at}: {what} where x and z, or x, y and z, are needed; keep one trace of two columns and "
                             f"{EXAMPLE}")
     known, notes = ("x", "z") if len(data) == 2 else ("x", "y", "z"), ()
     if sorted(data.values()) == ["x", "y"]:
@@ -119,7 +119,7 @@ def _roles(at: str, cells: list, given: bool) -> tuple:
     if strange is not None and not given:
         listed = " and ".join(filter(None, (", ".join(known[:-1]), known[-1])))
         raise PatchfemError(f"{at}: column '{shown(strange.partition('[')[0].strip())}' is not known, {listed} are "
-                            f"wanted; {EXAMPLE}")
+                            f"needed; {EXAMPLE}")
     if strange is not None:
         names = ", ".join(f"'{shown(cells[k])}'" for k in data)
         data = dict(zip(data, known))
@@ -152,7 +152,7 @@ def _factors(at: str, place: dict, cells: tuple, facts: dict, given: tuple | Non
         if factor_of(unit) is None:
             raise PatchfemError(f"{at}: unknown unit '{shown(unit)}' of {name}; use one of {LISTED}")
         if told is not None and factor_of(told) != factor_of(unit):
-            notes += (f"{at}: the header gives {name} in {shown(told)}; {unit} is taken, as the units given say",)
+            notes += (f"{at}: the header gives {name} in {shown(told)}; {unit} is used, as the given units say",)
         factors.append(factor_of(unit))
     return tuple(factors), notes
 
@@ -228,18 +228,18 @@ def _row(at: str, line: str, columns: tuple, delimiter, comma: bool) -> list | N
         return None
     words = _COUNTS[width]
     if len(line) > WIDEST:
-        raise PatchfemError(f"{at}: a line of {len(line)} characters; {words} numbers are wanted")
+        raise PatchfemError(f"{at}: a line of {len(line)} characters; {words} numbers are needed")
     cells = [cell.strip() for cell in line.split(delimiter)]
     while len(cells) > width and not cells[-1]:
         cells.pop()
     if delimiter == "," and len(cells) == 2 * width:
-        raise PatchfemError(f"{at}: '{shown(line)}': {words} numbers are wanted; with a decimal comma the columns "
-                            "stand apart by semicolons or tabs")
+        raise PatchfemError(f"{at}: '{shown(line)}': {words} numbers are needed; with a decimal comma, separate "
+                            "the columns by semicolons or tabs")
     if len(cells) != width:
-        raise PatchfemError(f"{at}: '{shown(line)}': {words} numbers are wanted; write nan for a missing height")
+        raise PatchfemError(f"{at}: '{shown(line)}': {words} numbers are needed; write nan for a missing height")
     if comma and "." in line:
         raise PatchfemError(f"{at}: '{shown(line)}': the decimal sign is a comma elsewhere in the file and a point "
-                            "here; write it in one way")
+                            "here; use only one")
     if comma:
         cells = [cell.replace(",", ".") if COMMA.fullmatch(cell) else cell for cell in cells]
     return [_value(at, name, cells[k]) for name, k in place.items()]

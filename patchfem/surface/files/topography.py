@@ -77,7 +77,7 @@ def _read(reader, most: int) -> tuple:
         return {"error": f"{count} heights, more than {most:.0e}; export a part of the scan"}, []
     sizes = channel.physical_sizes
     if sizes is None:
-        return {"error": "the file does not tell how large the scan is; export it as text with x, y and z"}, []
+        return {"error": "the file does not give the size of the scan; export it as text with x, y and z"}, []
     topography = channel.topography()
     unit = topography.unit
     if unit is not None:

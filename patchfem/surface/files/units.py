@@ -13,7 +13,7 @@ LISTED = ", ".join(UNITS)
 GIVE = 'give profile or compare the units, --units "mm,um" (in Python units=("mm", "um"))'
 PIXEL = 'give its pixel in place of the unit of x, --units "0.8 um,um"'
 
-ASIDE = "the file itself tells its units; those that were given are left aside"
+ASIDE = "the file has its own units; the given ones are ignored"
 
 
 def factor_of(word: str) -> float | None:

@@ -32,7 +32,7 @@ def x3p(raw: Raw) -> Profile | Areal:
     path, archive = raw.path, opened(raw)
     main = [one.filename for one in archive.infolist() if posixpath.basename(one.filename) == "main.xml"]
     if len(main) != 1:
-        raise PatchfemError(f"{path}: {len(main)} main.xml inside it where one is wanted")
+        raise PatchfemError(f"{path}: {len(main)} main.xml inside it where one is needed")
     text = member(raw, archive, main[0], XML)
     root = _parsed(path, text)
     axes = [_axis(path, root, name) for name in _AXES]
@@ -58,7 +58,7 @@ def _surface(path, columns: list, axes: list, shape: tuple, listed: bool, notes:
         places = [np.arange(n) * axis[2] + axis[3] for n, axis in zip((count, rows), axes)]
         for name, axis, n in zip(_AXES, axes, (count, rows)):
             if n > 1 and not axis[2] > 0:
-                raise PatchfemError(f"{path}: Increment of {name} is {axis[2]:g}; a length > 0 m is wanted")
+                raise PatchfemError(f"{path}: Increment of {name} is {axis[2]:g}; a length > 0 m is needed")
         return areal(path, *places, columns[-1].reshape(rows, count), METRES, notes)
     number = np.arange(rows * count)
     places, own = [], iter(columns)
@@ -66,7 +66,7 @@ def _surface(path, columns: list, axes: list, shape: tuple, listed: bool, notes:
         places.append(next(own) if axis[0] == "A" else index * axis[2] + axis[3])
     there = np.isfinite(places[0]) & np.isfinite(places[1])
     if there.sum() < 2:
-        raise PatchfemError(f"{path}: {there.sum()} points with a place; a trace wants two at least")
+        raise PatchfemError(f"{path}: {there.sum()} points with a place; a trace needs at least two")
     return raster(path, [one[there] for one in (*places, columns[-1])], None, (1.0, 1.0, 1.0), METRES)
 
 
@@ -77,10 +77,10 @@ def _axis(path, root: Element, name: str) -> tuple:
         raise PatchfemError(f"{path}: main.xml lacks Record1/Axes/{name}; export the surface anew")
     kind = "I" if node is None else _text(node, "AxisType", "I" if name != "CZ" else "A")
     if kind not in ("I", "A"):
-        raise PatchfemError(f"{path}: AxisType of {name} is '{shown(kind)}'; I or A is wanted")
+        raise PatchfemError(f"{path}: AxisType of {name} is '{shown(kind)}'; I or A is needed")
     data = "D" if node is None else _text(node, "DataType", "D")
     if data not in TYPES:
-        raise PatchfemError(f"{path}: DataType of {name} is '{shown(data)}'; one of {', '.join(TYPES)} is wanted")
+        raise PatchfemError(f"{path}: DataType of {name} is '{shown(data)}'; one of {', '.join(TYPES)} is needed")
     numbers = [_number(path, f"{key} of {name}", "" if node is None else _text(node, key), default)
                for key, default in (("Increment", 1.0), ("Offset", 0.0))]
     if kind == "A" and not abs(numbers[0]) > 0:
@@ -94,7 +94,7 @@ def _number(path, name: str, text: str, default: float) -> float:
     except ValueError:
         value = np.nan
     if "_" in text or not np.isfinite(value):
-        raise PatchfemError(f"{path}: {name} is '{shown(text)}'; a number is wanted")
+        raise PatchfemError(f"{path}: {name} is '{shown(text)}'; a number is needed")
     return value
 
 
@@ -107,7 +107,7 @@ def _shape(path, root: Element) -> tuple:
     for name in names:
         text = _text(where, name, "1" if name != "SizeX" else "") if where is not None else ""
         if not re.fullmatch(r"[0-9]{1,18}", text) or not 1 <= int(text) <= POINTS:
-            raise PatchfemError(f"{path}: {name} is '{shown(text)}'; a whole number from 1 to {POINTS:.0e} is wanted")
+            raise PatchfemError(f"{path}: {name} is '{shown(text)}'; a whole number from 1 to {POINTS:.0e} is needed")
         sizes.append(int(text))
     if len(sizes) == 1:
         return (1, sizes[0]), True
@@ -126,7 +126,7 @@ def _linked(raw: Raw, archive, link: tuple, axes: list, shape: tuple) -> list:
     record = np.dtype([(name, TYPES[axis[1]]) for name, axis in zip(_AXES, axes) if axis[0] == "A"])
     data = _file(raw, archive, node, folder, ("PointDataLink", "MD5ChecksumPointData", count * record.itemsize))
     if len(data) != count * record.itemsize:
-        raise PatchfemError(f"{path}: {len(data)} bytes of heights where {count} of type {axes[2][1]} are wanted; "
+        raise PatchfemError(f"{path}: {len(data)} bytes of heights where {count} of type {axes[2][1]} are needed; "
                             "export the surface anew")
     points = np.frombuffer(data, record)
     columns = [points[name].astype(float) for name in record.names]
@@ -135,7 +135,7 @@ def _linked(raw: Raw, archive, link: tuple, axes: list, shape: tuple) -> list:
     if _text(node, "ValidPointsLink"):
         valid = _file(raw, archive, node, folder, ("ValidPointsLink", "MD5ChecksumValidPoints", count + 8))
         if len(valid) < (count + 7) // 8:
-            raise PatchfemError(f"{path}: {len(valid)} bytes of valid points where {(count + 7) // 8} are wanted")
+            raise PatchfemError(f"{path}: {len(valid)} bytes of valid points where {(count + 7) // 8} are needed")
         bits = np.unpackbits(np.frombuffer(valid, np.uint8), bitorder="little")[:count]
         columns[-1][bits == 0] = np.nan
     return columns
@@ -165,7 +165,7 @@ def _main_checksum(raw: Raw, archive, root: Element, folder: str, text: bytes) -
         return ()
     if hashlib.md5(text, usedforsecurity=False).hexdigest() == said[0].lower():
         return ()
-    return (f"{raw.path}: main.xml does not have the checksum that {shown(name)} gives it: it was changed after it was "
+    return (f"{raw.path}: main.xml does not match its checksum in {shown(name)}: it was changed after it was "
             "written",)
 
 
@@ -175,7 +175,7 @@ def _listed(path, root: Element, axes: list, shape: tuple) -> list:
     datums = [] if listed is None else [(one.text or "").strip() for one in listed.findall("Datum")]
     count, wide = shape[0] * shape[1], sum(axis[0] == "A" for axis in axes)
     if len(datums) != count:
-        raise PatchfemError(f"{path}: {len(datums)} heights in main.xml where {count} are wanted; export it anew")
+        raise PatchfemError(f"{path}: {len(datums)} heights in main.xml where {count} are needed; export it anew")
     table = np.full((count, wide), np.nan)
     for k, text in enumerate(datums):
         cells = [cell.strip() for cell in text.split(";")]
@@ -184,7 +184,7 @@ def _listed(path, root: Element, axes: list, shape: tuple) -> list:
             try:
                 table[k] = [float(cell) if cell else np.nan for cell in cells]
             except ValueError:
-                raise PatchfemError(f"{path}: datum {k + 1} is '{shown(text)}'; {wide} numbers are wanted") from None
+                raise PatchfemError(f"{path}: datum {k + 1} is '{shown(text)}'; {wide} numbers are needed") from None
     table[np.isinf(table)] = np.nan
     return list(table.T)
 

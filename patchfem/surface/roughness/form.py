@@ -66,7 +66,7 @@ def _less_cylinder(surface: Profile | Areal) -> tuple:
     down, right = np.nonzero(~np.isnan(z[::every, ::every]))
     points = x[::every][right], y[::every][down], z[::every, ::every][down, right]
     if points[2].size < 10:
-        raise PatchfemError(f"{surface.source}: {points[2].size} heights; a {CYLINDER} wants ten at least")
+        raise PatchfemError(f"{surface.source}: {points[2].size} heights; a {CYLINDER} needs at least ten")
     found = _fitted(*points, scan)
     points = [one[::max(1, one.size // LEFT)] for one in points]
     across = -np.sin(found[4]) * points[0] + np.cos(found[4]) * points[1] if scan else points[0]

@@ -59,7 +59,7 @@ def moments_of(trace: Profile, every: int = 1) -> Moments:
     trace = level(tilted)
     z, step = trace.z[::every], every * trace.length / (trace.z.size - 1)
     if z.size < FEWEST:
-        raise PatchfemError(f"{trace.source}: {z.size} samples tell no curvature; {FEWEST} at least are wanted")
+        raise PatchfemError(f"{trace.source}: {z.size} samples give no curvature; at least {FEWEST} are needed")
     if not np.ptp(z) > ROUND * np.ptp(tilted.z):
         raise PatchfemError(f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out")
     return Moments(*(float(np.sqrt(np.mean(np.diff(z, order)**2)) / step**order) for order in range(3)))
@@ -70,8 +70,8 @@ def peaks_of(moments: Moments) -> Peaks:
     them."""
     if not moments.alpha >= NARROWEST * (1 - 1e-9):
         raise PatchfemError(f"rms_height x rms_curvature/rms_slope^2 is {np.sqrt(moments.alpha):.3g}, and at least "
-                            f"{np.sqrt(NARROWEST):.3g} on a surface of Gaussian heights that is alike in all "
-                            "directions; take all three from one trace across the lay, or give radius, density and "
+                            f"{np.sqrt(NARROWEST):.3g} on an isotropic surface of Gaussian "
+                            "heights; take all three from one trace across the lay, or give radius, density and "
                             "height_deviation of the peaks")
     m0, m2, m4 = (one**2 for one in moments)
     return Peaks(3 / 8 * float(np.sqrt(np.pi / m4)), float(m4 / (6 * np.pi * np.sqrt(3) * m2)),

@@ -21,12 +21,12 @@ from .spectrum import BAND, amplitude_of, refuse_band, spectrum_of
 from .tip import Tip, tip_check
 
 FEWEST = 16  # samples of a trace with a report
-UNTOLD = "one trace does not tell its interval"
-UNEVEN = "the heights are not Gaussian, which intervals of one trace count on; the scatter of several traces tells"
+UNTOLD = "one trace does not give its interval"
+UNEVEN = "the heights are not Gaussian, which intervals of one trace assume; use the scatter of several traces"
 CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)  # [m] of ISO 21920-3, and one more at each end
 SECTIONS = 6  # cut-offs in a trace: five that count and one that the filter takes
 ROUND = 1e-14  # of the largest height: what levelling leaves of a straight line
-LONG = "fewer than four of the strongest waves fit the trace, so that a longer one would tell another value"
+LONG = "fewer than four of the strongest waves fit the trace, so a longer one would give another value"
 PRINTED = {"Ra": "Pa", "Rq": "Pq", "Skew": "Psk", "RzDin": "RzDin", "MaxDev": "MaxDev", "ASH": "ASH",
            "Wa": "Pa", "Wq": "Pq", "WMaxDev": "MaxDev"}  # names of a Dektak, which filters nothing unless asked
 
@@ -146,7 +146,7 @@ def windowed(surface: Profile | Areal, *ends: float) -> Profile | Areal:
     scan = isinstance(surface, Areal)
     if len(ends) != (4 if scan else 2):
         raise PatchfemError(f"{surface.source}: a window of " + (
-            "an areal scan is four places, from and to in x, from and to in y" if scan else "a trace is two places"))
+            "an areal scan needs four places, from and to in x, from and to in y" if scan else "a trace is two places"))
     parts = [_between(surface.source, axis, *ends[2 * k:2 * k + 2], "xy"[k] if scan else "")
              for k, axis in enumerate((surface.x, surface.y) if scan else (surface.x,))]
     axes = {name: getattr(surface, name)[one] for name, one in zip("xy", parts)}
@@ -168,13 +168,13 @@ def interval_of(name: str, profile: Profile, cutoff: float | None = None, band: 
     row = rows.TABLE.get(name)
     if row is None or row in rows.AREAL or row in rows.WINDOW or row in rows.TWO_STAGE:
         known = ", ".join(each.name for each in (*rows.PRIMARY, *rows.WAVES, *rows.ROUGH))
-        raise PatchfemError(f"'{name}' is no parameter of a trace; known are {known}")
+        raise PatchfemError(f"'{name}' is not a parameter of a trace; use one of {known}")
     trace = _enough(even(_enough(profile)))
     if row not in rows.ROUGH:
         found = _primary(trace, band)[2]
         return _waves(row, trace.source, found) if row in rows.WAVES else _value(row, row.of(found.heights), found)
     if cutoff is None:
-        raise PatchfemError(f"{profile.source}: {name} is of the roughness profile and wants a cut-off")
+        raise PatchfemError(f"{profile.source}: {name} belongs to the roughness profile and needs a cut-off")
     heights = Heights(filtered(_primary(trace, band)[0], cutoff)[1].z, trace.length / (trace.x.size - 1), cutoff)
     return _value(row, row.of(heights), Intervals(heights, None))
 
@@ -204,7 +204,7 @@ def reread(profile: Profile) -> tuple:
 
 def _enough(trace: Profile) -> Profile:
     if trace.x.size < FEWEST:
-        raise PatchfemError(f"{trace.source}: {trace.x.size} samples; parameters want {FEWEST} at least")
+        raise PatchfemError(f"{trace.source}: {trace.x.size} samples; parameters need at least {FEWEST}")
     return trace
 
 

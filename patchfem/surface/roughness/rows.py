@@ -140,8 +140,8 @@ AREAL = (
               "its two pairs of triangles", developed, ""),
     Parameter("Sal", "m", "autocorrelation length: shortest distance at which the autocorrelation falls to 0.2",
               shortest, ""),
-    Parameter("Str", "1", "texture aspect ratio: Sal over the longest distance of the same kind, 1 for alike in every "
-              "direction", aspect, ""),
+    Parameter("Str", "1", "texture aspect ratio: Sal over the longest distance of the same kind, 1 if "
+              "isotropic", aspect, ""),
     Parameter("Std", "rad", "texture direction: angle from x, anticlockwise, of the waves with the most power; the lay "
               "runs at right angles to it", direction, ""),
     Parameter("Sk", "m", "core height: fall of the least-squares line through the flattest 40 % of the Abbott curve, "

@@ -25,7 +25,7 @@ GREW = "material grew, or the files are in the wrong order"
 ELSEWHERE = "not comparable place by place"
 HIDDEN = "mean depth that even wear or a wedge may hide"
 OPEN = "changed: worn on one part or grown on another"
-EITHER = "two parts of the scans agree each up to a plane of its own, and either may be the unworn one"
+EITHER = "two parts of the scans each agree up to a plane, and either may be unworn"
 UNSURE = "the scans agree up to a plane: even wear and a wedge would look the same"
 GROWN = "but for what grew, the scans agree up to a plane: even wear and a wedge would look the same"
 
@@ -89,8 +89,8 @@ def _laid(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
     least = ALIKE if found.guess.clear > CLEAR else LIKELY
     if found.like <= least:
         raise PatchfemError("the scans show no common place: the heights that agree up to a plane have a correlation "
-                            f"of {found.like:.3f}, and only above {least:g} it is no chance; scan the same place, with "
-                            "unworn parts beside the rubbed one")
+                            f"of {found.like:.3f}, and only above {least:g} is it significant; scan the same place, "
+                            "with unworn parts beside the rubbed one")
     found, specks = (found, 0) if keep_spikes else without_specks(found)
     return found, measured(found, before.x, before.y), specks
 
@@ -166,11 +166,11 @@ def sentences(one: Change) -> list:
     worn, grown = values["worn_volume"], values["grown_volume"]
     if worn.low > 0:
         out.append(f"Worn: {_volume(worn)} over {100 * values['worn_share'].value:.3g} % of the region that both scans "
-                   f"show, {_length(values['worn_depth_mean'])} in the mean over that region, "
+                   f"show, {_length(values['worn_depth_mean'])} on average over that region, "
                    f"{_length(values['worn_depth_max'])} at the deepest place.")
         out += _unseen(one)
     elif one.volumes.open:
-        out.append(f"Which part is unworn stays open: {EITHER}. If it is one of them, up to {_most(worn)} wore off the "
+        out.append(f"It is open which part is unworn: {EITHER}. If it is one of them, up to {_most(worn)} wore off the "
                    f"other; if it is the other, up to {_most(grown)} grew on the first. A scan that reaches farther "
                    "beyond the rubbed part would settle it.")
     else:
@@ -181,11 +181,11 @@ def sentences(one: Change) -> list:
         out.append(f"{_volume(grown)} stand above the scan before: pile-up or deposits"
                    + (", or the two files are in the wrong order." if headline(one) == GREW else "."))
     share = 100 * float(one.found.used.sum()) / max(float(np.isfinite(one.found.depth).sum()), 1.0)
-    out.append(f"Depths count from the {share:.0f} % of the heights that agree up to a plane within "
-               f"{say(REACH * one.found.noise, 3)}; what they lost evenly or as one wedge would come on top.")
+    out.append(f"Depths are measured from the {share:.0f} % of the heights that agree up to a plane within "
+               f"{say(REACH * one.found.noise, 3)}; any even or wedge-shaped wear of these would add to them.")
     if one.found.other is not None and not one.volumes.open:
-        out.append("Another part of the scans may be the unworn one as well, as where two planes meet in an edge; the "
-                   "intervals hold what either gives.")
+        out.append("Another part of the scans may be unworn instead, as where two planes meet in an edge; the "
+                   "intervals cover both.")
     return out
 
 
@@ -193,7 +193,7 @@ def _unseen(one: Change) -> list:
     """How much of the worn part has no heights, as a sentence."""
     worn = one.volumes.worn
     share = float((worn & ~np.isfinite(one.found.depth)).sum()) / max(float(worn.sum()), 1.0)
-    return [f"{100 * share:.0f} % of the worn part has no heights in one scan or stands beside a hole of it: its depth "
+    return [f"{100 * share:.0f} % of the worn part has no heights in one scan or lies next to a hole: its depth "
             "there is that of the nearest ones, and a deeper place may be among them."] if share > SEEN else []
 
 
@@ -201,7 +201,7 @@ def _track(one: ScanTrack) -> str:
     """The wear track as a sentence."""
     found = one.values
     text = (f"A track at {np.degrees(found['direction'].value):.1f} degrees from x: over {one.sections} sections "
-            f"across it in the mean {_length(found['width'])} wide, {_length(found['depth_mean'])} deep, its floor "
+            f"across it on average {_length(found['width'])} wide, {_length(found['depth_mean'])} deep, its floor "
             f"{_length(found['depth_floor'])}; ")
     if found["volume"].value is None:
         return text + f"its volume is not known: {found['volume'].reason}."
@@ -215,8 +215,8 @@ def _ways(one: Change) -> list:
     if abs(abs(one.registration["rotation"].value) - np.pi) < 0.2:
         out.append("The scan after is turned half round.")
     if guess.turned:
-        out.append("The heights of both scans count opposite ways: those of one were turned over, so that more wears "
-                   "than grows; tell which file counts into the material.")
+        out.append("The heights of both scans count opposite ways: one was turned over so that more wears than "
+                   "grows; check which file counts into the material.")
     return out
 
 

@@ -24,7 +24,7 @@ ENDS = 0.5  # of the median lost area, where a track ends along its direction
 TEXTS = {  # name: (unit, definition)
     "direction": ("rad", "of the track, against x anticlockwise, from the gradients of the depths"),
     "from": ("m", "where the track begins across its direction, from the middle of the scan before to larger x or y"),
-    "to": ("m", "where it ends across its direction"),
+    "to": ("m", "where the track ends across its direction"),
     "width": ("m", "width of the track"),
     "depth_mean": ("m", "lost area of a section over its width"),
     "depth_floor": ("m", "floor: bottom of the parabola through the deepest fifth of a section"),
@@ -100,7 +100,7 @@ def track_of(found: Laid, depth, worn, axes: tuple, error: float) -> ScanTrack:
     measured = [_measured(turned, one, span, found.noise) for one in groups if one.size]
     measured = [one for one in measured if one is not None]
     if len(measured) < LEAST:
-        return _none(f"{len(measured)} groups of whole sections lie across what wore; {LEAST} are wanted")
+        return _none(f"{len(measured)} groups of whole sections lie across what wore; {LEAST} are needed")
     middles = measured, [float(turned.along[one].mean()) for one in groups if one.size]
     values, scatter = _values(measured, error, turned.step)
     inner, section = turned.depth[rows], _mean(turned.depth[rows], KNOWN)

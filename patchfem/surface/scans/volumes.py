@@ -22,7 +22,7 @@ WALL = 0.5  # of the depth of a worn part beside it, how well a missing height a
 UNDER = 0.7  # of the slow errors of the scans beside a worn part, what they are in its mean
 TOGETHER = 3.0  # the noise of a volume over that of independent heights
 FEW = 0.25  # of a square, at least, is known
-WORN = {"worn_volume": "volume that went, over the region that both scans show",
+WORN = {"worn_volume": "volume lost, over the region that both scans show",
         "grown_volume": "volume that stands above the scan before: pile-up, deposits",
         "worn_share": "share of the common region that wore",
         "worn_depth_mean": "worn volume over the common region",

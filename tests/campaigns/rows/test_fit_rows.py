@@ -347,11 +347,11 @@ def test_placebos_are_whole_fits_of_their_own(tmp_path):
 
 
 @pytest.mark.parametrize("words, said", [
-    (["--offset", "force"], "belongs to a loop"), (["--starts", "0"], "one at least"),
+    (["--offset", "force"], "belongs to a loop"), (["--starts", "0"], "at least one"),
     (["--placebo", "friction.static"], "table.key=value,value"), (["--leave-out", "displacement"], "no column"),
     (["--placebo", "structure.mode.axial.damping=0.01,0.2"], "the key is free"),
     (["--placebo", "drive.frequency=140 Hz"], "the rows give the drive"),
-    (["--placebo", "structure.mode.axial.slide=1,x"], "a plain number is wanted"),
+    (["--placebo", "structure.mode.axial.slide=1,x"], "a plain number is needed"),
     (["--leave-out", "input"], "nothing would be left"), (["--unstable", "maybe"], "unstable")])
 def test_refuses_options_that_rows_do_not_have(tmp_path, words, said):
     given = ["fit", str(scene_of(tmp_path, LINEAR).path), "--to", str(table(tmp_path, linear_rows())), "--free",

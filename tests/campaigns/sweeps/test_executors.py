@@ -193,7 +193,7 @@ def test_exact_a_cluster_answers_as_this_process_does():
 
 
 def test_refuses_executors_that_are_not_there(monkeypatch):
-    with pytest.raises(PatchfemError, match="--executor slurm: unknown; dask or dask:ADDRESS"):
+    with pytest.raises(PatchfemError, match="--executor slurm: unknown; use dask or dask:ADDRESS"):
         executors.of("slurm")
     with pytest.raises(PatchfemError, match="-j 0: at least one"):
         executors.of("", 0)

@@ -23,11 +23,11 @@ def test_exact_units_stand_in_the_header_or_in_the_cells(tmp_path):
 
 @pytest.mark.parametrize("text, says", [
     ("contact.load [lb]\n1\n2\n", ["cases.csv:2: contact.load: 'lb' is ambiguous", "cases.csv:3: contact.load"]),
-    ("contact.load [N],friction.static\n1 N,0.3\n2,a\n", ["cases.csv:2: contact.load: '1 N' is no number",
+    ("contact.load [N],friction.static\n1 N,0.3\n2,a\n", ["cases.csv:2: contact.load: '1 N' is not a number",
                                                         "cases.csv:3: friction.static: a plain number"]),
     ("contact.lod [N]\n1\n2\n", ["cases.csv:1: contact.lod: not a key of a scene; did you mean 'load'"]),
     ("contact.load [N],contact.load\n1,2 N\n", ["cases.csv:1: contact.load: stands twice"]),
-    ("contact.load [N]\n1,2\n", ["cases.csv:2: 1 cells are wanted, not 2"]),
+    ("contact.load [N]\n1,2\n", ["cases.csv:2: 1 cells are needed, not 2"]),
     ("contact.load [N]\n", ["a header like"]),
 ])
 def test_refuses_each_mistake_with_its_line(tmp_path, text, says):

@@ -71,5 +71,5 @@ def test_exact_two_modes_hold_at_the_least_energy():
 def test_refuses_friction_that_follows_the_speed():
     friction = SimpleNamespace(static=0.3, reference_speed=1e-3)
     group = Group(ONE, OfSpeed(tanh.from_keys(friction, 1.0).element(9.0)))
-    with pytest.raises(PatchfemError, match="speed of the slide"):
+    with pytest.raises(PatchfemError, match="sliding speed"):
         quasi_static.along(ONE, group, [1e-4], (700.0, np.ones(1)))

@@ -105,7 +105,7 @@ def test_exact_keys_that_drive_have_no_limit():
 
 def test_exact_nothing_that_moves_changes():
     assert sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]})) == \
-        "Tilt may reach 1 mrad (13 um over the patch): nothing that moves changes by 5 %."
+        "Tilt may reach 1 mrad (13 um over the patch): no measure of the motion changes by 5 %."
     assert sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]}, trusted=[1, 1, 1, 1, 0])) == (
         "Tilt may reach at least 0.5 mrad (6.4 um over the patch) before anything that moves changes by 5 %: the cases "
         "after it are open.")

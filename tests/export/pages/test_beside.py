@@ -76,14 +76,14 @@ def test_always_runs_of_the_same_name_are_told_apart(tmp_path):
 
 
 def test_refuses_a_folder_without_results(tmp_path):
-    with pytest.raises(PatchfemError, match=r"no results folder: it has no summary\.json"):
+    with pytest.raises(PatchfemError, match=r"not a results folder: it has no summary\.json"):
         read(tmp_path)
     (tmp_path / "summary.json").write_text("{")
     with pytest.raises(PatchfemError, match="cannot be read"):
         read(tmp_path)
     folder = made(tmp_path / "good", 1.0, 1e-6, 0.0)
     (folder / "scene.resolved.toml").write_text("drive = 3")
-    with pytest.raises(PatchfemError, match=r"scene\.resolved\.toml: drive is no table"):
+    with pytest.raises(PatchfemError, match=r"scene\.resolved\.toml: drive is not a table"):
         read(folder)
     (folder / "scene.resolved.toml").write_text(SCENE.format(load=1.0))
     (folder / "result.nc").write_bytes(b"nothing")
@@ -101,7 +101,7 @@ def test_refuses_a_folder_without_results(tmp_path):
 def test_refuses_a_summary_of_another_shape(tmp_path, text, why):
     """Each of them once ended `report` with an internal fault."""
     (tmp_path / "summary.json").write_text(text)
-    with pytest.raises(PatchfemError, match=f"cannot be read: summary.json is no summary of a run: .*{why}"):
+    with pytest.raises(PatchfemError, match=f"cannot be read: summary.json is not a summary of a run: .*{why}"):
         read(tmp_path)
 
 

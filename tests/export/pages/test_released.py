@@ -72,6 +72,6 @@ def test_exact_the_picture_of_the_whole_run_shows_every_turn():
     found = _histories(data)
     early, last = histories(*found.values)[0]["marks"]
     assert {early["kind"], last["kind"]} == {"line"} and early["x"].size == 7 and early["x"][-1] == last["x"][0]
-    assert np.allclose(early["y"][:6], 1e6 * swing) and "turns and stops were kept" in found.caption
+    assert np.allclose(early["y"][:6], 1e6 * swing) and "turning points and stops were kept" in found.caption
     whole = draw.figure(found.charts(*found.values)).axes[0].lines[0].get_ydata()
     assert np.allclose(whole[:6], 1e6 * swing)

@@ -95,7 +95,7 @@ def test_always_many_cases_are_thinned_to_a_page_below_three_megabytes_with_all_
               "messages": {}, "grid": False, "folders": [f"cases/{case}" for case in range(many)]}
     text = page(table)
     data = data_of(text)
-    assert len(text.encode()) < 3e6 and f"Drawn are {len(data['outcome'])} of {many} cases" in text
+    assert len(text.encode()) < 3e6 and f"{len(data['outcome'])} of {many} cases are drawn" in text
     cases = [int(one.removeprefix("cases/")) for one in data["links"]]
     assert len(cases) > 1000 and len(set(cases)) == len(cases) and (cases[0], cases[-1]) == (0, many - 1)
     assert data["outcome"] == [table["outcome"][case] for case in cases] and not data["whole"]

@@ -73,7 +73,7 @@ def test_always_tighter_tolerances_tighten_the_engine():
 
 def test_refuses_a_recursion_of_any_other_law():
     for reading, order in (("report", 1.0), ("stretch", 2.0)):
-        with pytest.raises(ValueError, match="order = 1 alone"):
+        with pytest.raises(ValueError, match="order = 1"):
             choose(Bonds(1.0, 1.0, order, reading), 1e-3, 1.0, 100, "recursion")
         assert impossible("recursion", reading, order) and not impossible("merged", reading, order)
     assert get_args(Accuracy.model_fields["quadrature"].annotation) == ("auto", *ENGINES)  # what a scene may name
@@ -178,7 +178,7 @@ def test_exact_engine_of_a_scene(tmp_path):
 
 
 def test_refuses_engines_that_cannot_sum_the_law(tmp_path):
-    with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature.*order = 1 alone"):
+    with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature.*order = 1"):
         rig(tmp_path, "recursion")
     with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature: 'exponential' is gone.*use 'merged'"):
         rig(tmp_path, "exponential")

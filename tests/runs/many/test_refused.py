@@ -52,7 +52,7 @@ KINDS = {
     "few cycles": changed(("cycles = 20", "cycles = 12")),
     "no load": changed(("26 lbf", "0 N")),
     "no friction": changed(("static = 0.3", "static = 0")),
-    "no push": changed(("slide = 1.0", "slide = 1.0\nbase = 0")),
+    "no drive": changed(("slide = 1.0", "slide = 1.0\nbase = 0")),
     "no output": changed(("slide = 1.0", "slide = 1.0\noutput = 0")),
     "a gauge of its own": changed(("slide = 1.0", "slide = 1.0\ngauge = 0.5")),
     "a mass": MASS,

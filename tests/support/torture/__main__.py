@@ -25,7 +25,7 @@ def main(words=None) -> int:
     if unknown := [name for name in names if name not in driver.CAMPAIGNS]:
         parser.error(f"--campaign {unknown[0]}: one of {', '.join(driver.CAMPAIGNS)}")
     if not 0 < given.share <= 1:
-        parser.error(f"--share {given.share}: above 0 and up to 1 is wanted")
+        parser.error(f"--share {given.share}: above 0 and up to 1 is needed")
     if given.only is not None and (len(names) != 1 or given.only < 0):
         parser.error("--only N: the place of one trial in one --campaign, from 0 on")
     if sys.platform == "win32":

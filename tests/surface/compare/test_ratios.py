@@ -71,7 +71,7 @@ def test_always_wear_of_peaks_is_called_reduced():
     p = pair(30077, share=0.5)
     headline, sentences = verdicts([compared(p.before, p.after, "x")])
     assert headline == "worn, waves reduced" and sentences[0].startswith("Worn along x: ")
-    assert sentences[1].startswith("Depths count from the ")
+    assert sentences[1].startswith("Depths are measured from the ")
     assert "along x" in sentences[2] and "confidence" in sentences[2]
 
 

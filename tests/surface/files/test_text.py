@@ -94,7 +94,7 @@ def test_exact_samples_at_one_place_become_their_mean(tmp_path):
     assert profile.x == pytest.approx(np.array([0, 1, 4, 9]) * UM) and profile.z == pytest.approx(
         np.array([1, 1.5, 3, 3]) * UM)
     path = tmp_path / "before.csv"
-    assert profile.notes == (f"{path}: 3 samples lie where another one does (the first in line 5): mean taken",)
+    assert profile.notes == (f"{path}: 3 samples share a place with another (the first in line 5): mean used",)
 
 
 @pytest.mark.parametrize("step", [0.15625, 0.052, 0.0999, 0.1003, 0.37137, 7.3])
@@ -121,44 +121,44 @@ REFUSED = {
                    f"{GIVE}",
     "\nx [um],z []\n0,1\n": "{path}:2: unknown unit '' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
     "x [um],z [furlong]\n0,1\n": "{path}:1: unknown unit 'furlong' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
-    "x [um]\n0\n": "{path}:2: one column, '0', where x and z are wanted; write the header as `x [um],z [um]`",
-    "x [um],y [um],z [um],w [um]\n0,0,1,1\n": "{path}:1: 4 columns where x and z, or x, y and z, are wanted; keep one "
+    "x [um]\n0\n": "{path}:2: one column, '0', where x and z are needed; write the header as `x [um],z [um]`",
+    "x [um],y [um],z [um],w [um]\n0,0,1,1\n": "{path}:1: 4 columns where x and z, or x, y and z, are needed; keep one "
                                                "trace of two columns and write the header as `x [um],z [um]`",
     "x [um],x [um]\n0,1\n": "{path}:1: two columns are named x; write the header as `x [um],z [um]`",
-    "t [s],z [um]\n0,1\n": "{path}:1: column 't' is not known, x and z are wanted; write the header as `x [um],z [um]`",
-    "x [um],z [um]\n": "{path}: 0 heights; a trace wants two at least",
-    "x [um],z [um]\n0,1\n1,\n2,nan\n": "{path}: 1 heights; a trace wants two at least",
-    "x [um],z [um]\n0,1\n1,2\n1.5\n": "{path}:4: '1.5': two numbers are wanted; write nan for a missing height",
-    "x [um],z [um]\n0,1\n1,2,3\n": "{path}:3: '1,2,3': two numbers are wanted; write nan for a missing height",
-    "x [um] z [um]\n0 1\n# c\n1\n": "{path}:4: '1': two numbers are wanted; write nan for a missing height",
+    "t [s],z [um]\n0,1\n": "{path}:1: column 't' is not known, x and z are needed; write the header as `x [um],z [um]`",
+    "x [um],z [um]\n": "{path}: 0 heights; a trace needs at least two",
+    "x [um],z [um]\n0,1\n1,\n2,nan\n": "{path}: 1 heights; a trace needs at least two",
+    "x [um],z [um]\n0,1\n1,2\n1.5\n": "{path}:4: '1.5': two numbers are needed; write nan for a missing height",
+    "x [um],z [um]\n0,1\n1,2,3\n": "{path}:3: '1,2,3': two numbers are needed; write nan for a missing height",
+    "x [um] z [um]\n0 1\n# c\n1\n": "{path}:4: '1': two numbers are needed; write nan for a missing height",
     "x [um];z [um]\n0;1\n1;2,5\n1.5;3\n": "{path}:4: '1.5;3': the decimal sign is a comma elsewhere in the file and a "
-                                            "point here; write it in one way",
+                                            "point here; use only one",
     "x [um];z [um]\n0;1\n1;1.234,5\n": "{path}:3: '1;1.234,5': the decimal sign is a comma elsewhere in the file and "
-                                         "a point here; write it in one way",
+                                         "a point here; use only one",
     "x [um];z [um]\n999,5;1\n1,000;2\n1500,5;2\n": "{path}:3: x turns back, 999.5 um and then 1 um; a trace runs one "
                                                   "way: keep one trace per file",
-    "x [um],z [um]\n0,0,1,5\n": "{path}:2: '0,0,1,5': two numbers are wanted; with a decimal comma the columns stand "
-                                 "apart by semicolons or tabs",
+    "x [um],z [um]\n0,0,1,5\n": "{path}:2: '0,0,1,5': two numbers are needed; with a decimal comma, separate the "
+                                 "columns by semicolons or tabs",
     "x [um],z [um]\n0,1\n,2\n": "{path}:3: '' is not a number for x; correct the line or leave it out",
     "x [um],z [um]\n0,1\n1,bad\n": "{path}:3: 'bad' is not a height; a missing one is empty, nan or ***",
     "x [um],z [um]\n0,1\n1,1_0\n": "{path}:3: '1_0' is not a height; a missing one is empty, nan or ***",
     "x [um],z [um]\n0,1\n1,\u0663\n": "{path}:3: '\u0663' is not a height; a missing one is empty, nan or ***",
-    "x [um],z [um]\n0,1\nnan,2\n3,1\n": "{path}:3: x is nan; finite numbers are wanted",
-    "x [um],z [um]\n0,1\n1,2\n2,-inf\n": "{path}:4: z is -inf; finite numbers are wanted",
-    "x [um],z [um]\n0,1\n1,2\n2,1e999\n": "{path}:4: z is inf; finite numbers are wanted",
-    "x [m],z [um]\n0,1\n12700,2\n": "{path}:3: x is 1.27e+04 m; is its unit right? a missing height is written nan",
-    "x [mm],z [mm]\n0,1\n1,2\n2,99999\n": "{path}:4: z is 100 m; is its unit right? a missing height is written nan",
-    "x [um],z [mm]\n0,1\n5,2\n10,1\n": "{path}: heights span 1 mm over a length of 10 um; is the unit of z right? a "
-                                       "missing height is written nan; profile and compare take --units over "
-                                       "those of a header",
+    "x [um],z [um]\n0,1\nnan,2\n3,1\n": "{path}:3: x is nan; finite numbers are needed",
+    "x [um],z [um]\n0,1\n1,2\n2,-inf\n": "{path}:4: z is -inf; finite numbers are needed",
+    "x [um],z [um]\n0,1\n1,2\n2,1e999\n": "{path}:4: z is inf; finite numbers are needed",
+    "x [m],z [um]\n0,1\n12700,2\n": "{path}:3: x is 1.27e+04 m; is its unit right? write a missing height as nan",
+    "x [mm],z [mm]\n0,1\n1,2\n2,99999\n": "{path}:4: z is 100 m; is its unit right? write a missing height as nan",
+    "x [um],z [mm]\n0,1\n5,2\n10,1\n": "{path}: heights span 1 mm over a length of 10 um; is the unit of z right? "
+                                       "write a missing height as nan; --units of profile and compare overrides the "
+                                       "header",
     "x [nm],z [nm]\n0,0\n0.1,0\n": "{path}: the profile is 0.1 nm long; is the unit of x right?",
     "x [um],z [um]\n0,1\n1,2\n3,1\n2,2\n4,1\n": "{path}:5: x turns back, 3 um and then 2 um; a trace runs one way: "
                                                   "keep one trace per file",
     "x [um],z [um]\n4,1\n1,2\n2,1\n0,2\n": "{path}:4: x turns back, 1 um and then 2 um; a trace runs one way: keep one "
                                            "trace per file",
-    "x [um],z [um]\n5,1\n5,2\n": "{path}: every sample lies at x = 5 um; a trace wants two places at least",
-    "x [um],z [um]\n" + "1" * 2000: "{path}:2: a line of 2000 characters; two numbers are wanted",
-    "a" * 2000: "{path}:1: a line of 2000 characters; two columns are wanted, write the header as `x [um],z [um]`",
+    "x [um],z [um]\n5,1\n5,2\n": "{path}: every sample lies at x = 5 um; a trace needs at least two places",
+    "x [um],z [um]\n" + "1" * 2000: "{path}:2: a line of 2000 characters; two numbers are needed",
+    "a" * 2000: "{path}:1: a line of 2000 characters; two columns are needed, write the header as `x [um],z [um]`",
     "x [um],z [um]\n0,\x00\n": "{path}: not a text file; export the profile as text with two columns and write the "
                                "header as `x [um],z [um]`",
 }  # fmt: skip
@@ -184,7 +184,7 @@ def test_refuses_what_is_no_file_and_what_is_too_much(tmp_path, monkeypatch):
     monkeypatch.setattr(raw, "TEXT", 1 << 20)
     bomb = gzip.compress(b"0" * (1 << 22))
     for content in (bomb, b" " * (1 << 21)):
-        with pytest.raises(PatchfemError, match="more than 1 MiB of text; keep every few samples"):
+        with pytest.raises(PatchfemError, match="more than 1 MiB of text; thin out the samples"):
             read(tmp_path, content)
 
 

@@ -86,9 +86,9 @@ def test_exact_uneven_and_missing_samples_of_a_straight_flank():
     found = even(Profile(x, z, "flank.csv"))
     assert np.ptp(np.diff(found.x)) < 1e-12 and found.x[[0, -1]] == pytest.approx([0, 12 * UM])
     assert found.z == pytest.approx(0.1 * found.x, abs=1e-18)
-    assert found.notes == ("flank.csv: 1 of 10 heights are missing; straight lines stand in their place, the longest "
-                           "over 3 um", "flank.csv: samples lie 1 um to 2 um apart; the trace is read off every 1 um "
-                           "along its straight lines")
+    assert found.notes == ("flank.csv: 1 of 10 heights are missing; straight lines replace them, the longest "
+                           "over 3 um", "flank.csv: samples lie 1 um to 2 um apart; the trace is resampled every 1 um "
+                           "by straight lines")
 
 
 def test_always_a_finer_reading_of_an_uneven_sine_gives_its_roughness():

@@ -104,7 +104,7 @@ def test_refuses_a_form(text):
 def test_refuses_too_few_heights():
     with pytest.raises(PatchfemError, match="do not determine a polynomial of degree 5"):
         without_form(trace(np.where(np.arange(40) < 6, 1.0, np.nan)), 5)
-    with pytest.raises(PatchfemError, match="a cylinder wants ten at least"):
+    with pytest.raises(PatchfemError, match="a cylinder needs at least ten"):
         without_form(trace(np.where(np.arange(40) < 6, 1.0, np.nan)), "cylinder")
     line = np.full((20, 20), np.nan)
     line[4] = 1.0

@@ -154,7 +154,7 @@ def test_exact_the_other_theory_is_the_exponential_law():
 
 
 @pytest.mark.parametrize("keys, said", [
-    ("", "or from, or rms_height, rms_slope and rms_curvature"),
+    ("", "or give from, or rms_height, rms_slope and rms_curvature"),
     ('radius = "1 um"\n', "contact.asperities.density: missing"),
     ('rms_height = "1 um"\nrms_slope = 0.1\n', "contact.asperities.rms_curvature: missing"),
     (RMS + 'radius = "1 um"\n', "keep one"), (RMS.replace("0.05", "0.5"), "at least 1.22"),

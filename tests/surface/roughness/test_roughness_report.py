@@ -77,7 +77,7 @@ def test_exact_spikes_are_told_and_count():
     assert report.notes[0] == ("made.csv: 1 of 4001 heights is a spike (at x = 1 mm); it counts in every parameter")
     z[1000] += 950 * UM  # its interval was 4 nm to 68 um on a step of 1 um
     wave = report_of(Profile(trace.x, z, "made.csv"))["dominant_wavelength"]
-    assert wave.value > 0 and wave.low is wave.high is None and "does not tell" in wave.reason
+    assert wave.value > 0 and wave.low is wave.high is None and "does not give" in wave.reason
     assert report["Pt"].value > 50 * UM
 
 
@@ -145,11 +145,11 @@ def test_exact_areal_parameters_of_white_noise(lost):
 
 
 @pytest.mark.parametrize("surface, more, says", [
-    (made(10), {}, "made.csv: 10 samples; parameters want 16 at least"),
+    (made(10), {}, "made.csv: 10 samples; parameters need at least 16"),
     (made(), {"window": (20 * UM, 10 * UM)}, "a window from 20 um to 10 um; the trace runs from 0 um to 4 mm"),
     (made(), {"window": (20 * UM, 5e-3)}, "a window from 20 um to 5 mm"),
     (made(), {"cutoff": 5e-3}, "the trace is 4 mm long; half a cut-off of 5 mm goes off at each end"),
-    (scan(), {"window": (0.0, 1e-4)}, "a window of an areal scan is four places"),
+    (scan(), {"window": (0.0, 1e-4)}, "a window of an areal scan needs four places"),
     (scan(), {"window": (0.0, 1e-5, 2e-5, 1e-3)}, "the scan runs in y from 0 um to 79 um"),
     (made(), {"window": (0.0, 1e-5, 2e-5, 1e-3)}, "a window of a trace is two places"),
     (scan(), {"cutoff": 1e-4}, "scan.txt: the shorter side is 79 um long; half a cut-off of 100 um goes off"),
@@ -159,8 +159,8 @@ def test_refuses(surface, more, says):
         report_of(surface, **more)
 
 
-@pytest.mark.parametrize("name, says", [("Rx", "'Rx' is no parameter of a trace; known are Pa, "),
-                                        ("Rq", "Rq is of the roughness profile and wants a cut-off")])
+@pytest.mark.parametrize("name, says", [("Rx", "'Rx' is not a parameter of a trace; use one of Pa, "),
+                                        ("Rq", "Rq belongs to the roughness profile and needs a cut-off")])
 def test_refuses_a_parameter(name, says):
     with pytest.raises(PatchfemError, match=says):
         interval_of(name, made())

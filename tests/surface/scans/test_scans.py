@@ -141,7 +141,7 @@ def test_always_a_part_as_large_as_the_rest_leaves_open_whether_it_wore_or_the_r
         return 0.8e-6 * (np.abs(x - SIDE / 2) < half * SIDE)
     found = change.changed(*scans(wide)[::sign])
     assert change.headline(found) == change.OPEN
-    assert all(one.value is None and "either may be the unworn" in one.reason for one in found.values.values())
+    assert all(one.value is None and "either may be unworn" in one.reason for one in found.values.values())
     volume = found.volumes.values["worn_volume" if sign > 0 else "grown_volume"]
     assert volume.low <= common(0.03, (12e-6, -18e-6), wide) <= volume.high
 
@@ -210,9 +210,9 @@ def test_exact_a_scan_beside_itself_shows_no_change(grooved, tmp_path):
     assert "Another part" not in answer.out and "<title>scan.x3p and scan.x3p" in \
         (tmp_path / "out" / "report.html").read_text()
     assert {one.name for one in (tmp_path / "out").iterdir()} <= set(FILES)
-    assert "a shift is told for traces" in cli("compare", file, file, "--shift", "0 mm").err
+    assert "a shift is given for traces" in cli("compare", file, file, "--shift", "0 mm").err
     (tmp_path / "trace.csv").write_text("x [um],z [um]\n" + "".join(f"{k},{k % 7}\n" for k in range(400)))
-    assert "two or four traces are wanted, or two areal scans" in cli("compare", file, tmp_path / "trace.csv").err
+    assert "two or four traces are needed, or two areal scans" in cli("compare", file, tmp_path / "trace.csv").err
 
 
 @pytest.mark.parametrize("clear, least", [(3.0, change.LIKELY), (30.0, change.ALIKE)])

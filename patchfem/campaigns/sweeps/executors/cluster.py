@@ -31,7 +31,7 @@ class Cluster:
             import distributed
         except ImportError:
             raise Missing('--executor dask: the package dask.distributed is not installed; pip install '
-                          '"patchfem[cluster]", or take -j N') from None
+                          '"patchfem[cluster]", or use -j N') from None
         self.own = None
         if not address:
             import dask
@@ -48,7 +48,7 @@ class Cluster:
             one.setLevel(CRITICAL)  # what they have to say is said here
         tls = distributed.Security().get_connection_args("client")["ssl_context"] is not None
         if address.startswith("tls:") and not tls:
-            raise PatchfemError(f"{self.name}: TLS wants certificates; name their files in {CERTIFICATES}")
+            raise PatchfemError(f"{self.name}: TLS needs certificates; give their files in {CERTIFICATES}")
         try:
             self.client = distributed.Client(self.own or address, timeout=PATIENCE, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
@@ -100,9 +100,9 @@ class Cluster:
         names = [name for name in want if found[name] != want[name] and name != "files"]
         there, here = (", ".join(f"{name} {one[name]}" for name in names) for one in (found, want))
         if names:
-            return Missing(f"{self.name}: a worker has {there}; here it is {here}: install the same there")
-        return Missing(f"{self.name}: a worker finds other files than those that the scene names here; put them where "
-                       "both look")
+            return Missing(f"{self.name}: a worker has {there}; here it is {here}: install the same version there")
+        return Missing(f"{self.name}: a worker finds different files under the names in the scene; put them where "
+                       "both read them")
 
     def _died(self, future) -> tuple:
         """(0 s, Died) of a chunk whose worker died or failed; Missing where the scheduler did."""

@@ -142,5 +142,5 @@ def _started(work: Work, silent: bool) -> Worker:
 
 def _how(status: int) -> str:
     if status == -9:
-        return "killed, by hand or for want of memory"
+        return "killed, by hand or for lack of memory"
     return f"signal {-status}" if status < 0 else f"exit code {status}"

@@ -73,7 +73,7 @@ RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a 
 
 def refuses(model: Model) -> str:
     """Why lanes do not take a model; "" where they do."""
-    return no_lanes(model) or ("" if steps_of([model])[0] else "it rings too fast beside its drive")
+    return no_lanes(model) or ("" if steps_of([model])[0] else "it rings too fast for its drive")
 
 
 def no_lanes(model: Model) -> str:

@@ -35,7 +35,7 @@ def not_one_point(model: Model) -> str:
 def not_one_sine(rig) -> str:
     """Why a rig is not one mode under one sine, seen by one accelerometer; "" where it is."""
     if rig.modes.gauge is not None:
-        return "its gauge and its accelerometer do not move alike"
+        return "its gauge and its accelerometer move differently"
     if rig.richer is not None:
         return "its structure is reduced"
     if rig.modes.omega.size != 1 or not isinstance(rig.drive, BaseSine) or rig.levels:
@@ -43,7 +43,7 @@ def not_one_sine(rig) -> str:
     if np.isfinite(rig.travel):
         return "its travel ends, at a stop or because it may gain energy"
     if rig.cycles != int(rig.cycles) or not rig.modes.base[0] or not rig.modes.slide[0] or not rig.modes.output[0]:
-        return "it has no whole cycles, or no push, slide or output"
+        return "its cycles are not whole, or it has no drive, slide or output"
     return ""
 
 

@@ -48,7 +48,7 @@ class Pressed(NamedTuple):
 def refuses(model: Model) -> str:
     """Why the batch does not take a model; "" where it does."""
     if model.patch is None or not model.soft or model.patch.strips is not None or model.grooves is not None:
-        return "it is no patch that slips part by part"
+        return "it is not a patch that slips part by part"
     if model.wear is not None or model.measured is not None or model.heat is not None:
         return "it wears, warms or is held against a measurement"
     if why := not_one_sine(model.rig):

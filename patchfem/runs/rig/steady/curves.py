@@ -50,7 +50,7 @@ def exact_errors(values: dict, left: float) -> dict:
 def unlasting(multipliers) -> str:
     """The sentence on a steady motion that does not last; multipliers: Floquet's (m,)."""
     size = np.abs(multipliers).max()
-    return f"the steady motion that was found does not last: a disturbance of it grows {size:.3g} times in a cycle; " \
+    return f"the steady motion that was found is unstable: a disturbance grows {size:.3g} times in a cycle; " \
         'use accuracy.method = "march"'
 
 
