@@ -359,7 +359,7 @@ def test_exact_pages_of_cases_that_are_there_are_drawn(scene, tmp_path):
 def test_refuses_a_mode_by_its_name_and_by_its_number(scene, tmp_path):
     over = ("--over", "structure.mode.axial.frequency=100 Hz,110 Hz", "--over", "structure.mode.0.frequency=120 Hz")
     answer = cli("sweep", scene, *over, "-o", tmp_path / "a")
-    assert answer.code == 2 and "structure.mode.0.frequency: stands twice, as structure.mode.axial.frequency too" \
+    assert answer.code == 2 and "structure.mode.0.frequency: is given twice, also as structure.mode.axial.frequency" \
         in answer.err and not (tmp_path / "a").exists()
 
 
@@ -392,7 +392,7 @@ def test_refuses_a_key_of_the_file_and_of_the_line(scene, tmp_path):
     table = tmp_path / "cases.csv"
     table.write_text("normal.load [N],friction.static\n10,0.3\n", encoding="utf-8")
     answer = cli("sweep", scene, "--cases", table, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a")
-    assert answer.code == 2 and answer.err == f"--over friction.static: stands in {table} too\n"
+    assert answer.code == 2 and answer.err == f"--over friction.static: is also in {table}\n"
 
 
 @pytest.mark.parametrize("words, says", [
