@@ -123,8 +123,8 @@ def fit(scene: Path, /, *, to: word(
         amplitudes: word('with --from-patch: half peak-to-peak of the slide, such as "0.1 um..10 um:25"; from where '
                          "the patch begins to slip unless given") = "",
         hold: texts('rows that are only predicted, such as "frequency=135 Hz,150 Hz"') = (),
-        offset: texts("for a loop, offsets to fit as well: force (constant over the record), displacement (of its "
-                      "first row from the unstressed place)") = (),
+        offset: texts("for a loop, offsets to fit as well, such as force (constant over the record), displacement (of "
+                      "its first row from the unstressed place)") = (),
         warm_up: flag("for a loop: drive its whole cycles once before it, unscored") = False,
         rows: Annotated[Rows, Parameter(name="*")] = Rows(),
         out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):

@@ -64,7 +64,7 @@ class By:
                    "--executor") = ""
     shard: word("one part only, such as 3/40, into a folder that all parts share", "--shard") = ""
     collect: flag("only write the tables of a sweep whose cases are all done", "--collect") = False
-    device: word("what the lanes of a sweep run on: only cpu so far", "--device") = "cpu"
+    device: word("what the lanes of a sweep run on, such as cpu (only that so far)", "--device") = "cpu"
 
     def __post_init__(self):
         if self.device != "cpu":

@@ -136,7 +136,7 @@ def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
     (["-o", "a.toml", "--band", "20 Hz"], "two rising frequencies"),
     (["-o", "a.toml", "--segment", "9 s"], "a segment"),
     (["-o", "a.toml", "--map", "acceleration=tip"], "one input, force or base_acceleration"),
-    (["-o", "a.toml", "--map", "slide=12:+x"], "--map slide: not known")])
+    (["-o", "a.toml", "--map", "slide=12:+x"], "--map slide: unknown; use")])
 def test_refuses_by_name(shaken, tmp_path, monkeypatch, words, says):
     monkeypatch.chdir(tmp_path)
     answer = cli("import", shaken, *words)

@@ -147,4 +147,4 @@ def test_always_help_says_what_each_option_does_by_an_example(verb):
 
 def test_refuses_words_too_many_by_what_they_are():
     answer = cli("new", "misalignment", "tilts.toml")
-    assert answer.code == 2 and answer.err == "patchfem: no place for 'tilts.toml'; see `patchfem new --help`\n"
+    assert answer.code == 2 and answer.err == "patchfem: unexpected 'tilts.toml'; see `patchfem new --help`\n"

@@ -102,14 +102,14 @@ def test_exact_a_release_has_no_excitation(tmp_path):
 
 @pytest.mark.parametrize("text, ending, says", [
     (POINT + friction_of("coulomb") + STRUCTURE, ".mat", "law 'coulomb'"),
-    (POINT + friction_of("bouc-wen") + STRUCTURE, ".npz", "law 'bouc-wen' is no set of elements"),
+    (POINT + friction_of("bouc-wen") + STRUCTURE, ".npz", "law 'bouc-wen' is not a set of elements"),
     (POINT + friction_of("tanh") + STRUCTURE.replace("[drive]", CUBIC + "[drive]"),
-     ".mat", "no form beside [structure.stiffening]"),
-    (STRUCTURE.replace("[drive]", CUBIC + "[drive]"), ".npz", "no form beside [structure.stiffening]; leave that out"),
-    (POINT + WAVE + friction_of("tanh") + STRUCTURE, ".npz", "no form under a load that changes; leave that out"),
-    (POINT + WAVE + PLASTIC + STRUCTURE, ".npz", "no form under a load that changes; leave that out"),
+     ".mat", "cannot be written beside [structure.stiffening]"),
+    (STRUCTURE.replace("[drive]", CUBIC + "[drive]"), ".npz", "cannot be written beside [structure.stiffening]"),
+    (POINT + WAVE + friction_of("tanh") + STRUCTURE, ".npz", "cannot be written under a load that changes"),
+    (POINT + WAVE + PLASTIC + STRUCTURE, ".npz", "cannot be written under a load that changes; leave that out"),
     (POINT + "[normal.grooves]\nwavelength = \"80 um\"\namplitude = \"1 um\"\n" + friction_of("tanh") + STRUCTURE,
-     ".npz", "no form beside [normal.grooves]"),
+     ".npz", "cannot be written beside [normal.grooves]"),
     (RUB, ".csv", "a structure is exported as .mat or .npz"),
     (POINT + PLASTIC + '[slide]\nkind = "triangle"\namplitude = "8 um"\nspeed = "1 mm/s"\n', ".mat", "which it lacks"),
 ])

@@ -88,9 +88,9 @@ def test_always_steps_that_are_left_out_cure_what_few_steps_do_not_show():
 @pytest.mark.parametrize("wide, first", [
     ({"slip_start_phase": 0.5, "relative_displacement_amplitude": 0.08, "loop_area": 0.1},
      "relative_displacement_amplitude is known to 0.08 of its value, loop_area to 0.1 of its value, the tolerance is "
-     "0.01 (1 other measure beside them); set accuracy.steps_per_cycle = 64"),
+     "0.01 (1 other measure besides them); set accuracy.steps_per_cycle = 64"),
     ({"slip_start_phase": 0.5, "stick_fraction": 0.1},
-     "slip_start_phase is known to 0.5 of its value, the tolerance is 0.01 (1 other measure beside it); set "
+     "slip_start_phase is known to 0.5 of its value, the tolerance is 0.01 (1 other measure besides it); set "
      "accuracy.steps_per_cycle = 128")])
 def test_exact_what_a_run_answers_first_is_named_first(wide, first):
     """Errors of 16 steps; that of second order falls by 16 at 64 steps, by 64 at 128."""

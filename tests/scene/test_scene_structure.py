@@ -189,7 +189,7 @@ def test_refuses_at_the_line_of_the_file():
     (STRUCTURE + '[structure.start]\nvelocity = ["1 m/s", "2 m/s"]\n', "structure.start.velocity",
      "2 values for 1 mode; one for each"),
     (STRUCTURE.replace("cycles", "mass = 1\ncycles").replace('"base"', '"force"').replace(
-        "acceleration", 'force = "1 N"\nacceleration'), "drive.mass", "leave it out"),
+        "acceleration", 'force = "1 N"\nacceleration'), "drive.mass", "leave drive.mass out"),
     (STRUCTURE[:STRUCTURE.index("[[")].replace("moving", 'file = "rig.csv"\nmoving') +
      STRUCTURE[STRUCTURE.index("[drive]"):], "structure.file", "the name ends in '.csv'"),
 ])  # fmt: skip

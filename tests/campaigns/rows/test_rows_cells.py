@@ -62,7 +62,7 @@ def test_held_rows_are_named_by_frequency_input_flag_or_run(tmp_path):
 
 
 @pytest.mark.parametrize("text, wanted", [
-    ("frequency=150", "unit"), ("frequency=151 Hz", "there are 143 Hz"), ("frequency", "column=value"),
+    ("frequency=150", "unit"), ("frequency=151 Hz", "it has 143 Hz"), ("frequency", "column=value"),
     ("displacement=1 mil", "no column displacement"), ("input=4 Hz", "--hold input=4 Hz")])
 def test_refuses_rows_to_hold_that_are_not_there(tmp_path, text, wanted):
     with pytest.raises(PatchfemError, match=wanted):
