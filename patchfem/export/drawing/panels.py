@@ -38,7 +38,7 @@ class Panel:
         unit, scale = axis_unit([self.top], "Pa")
         text += f", top colour {self.top * scale:.3g} {unit} and more" if self.over and scaled else ""
         if self.aside != 1:
-            return text + f"\nthe slide of {self.slide * 1e3:.3g} um drawn {self.aside:g} times as large"
+            return text + f"\nthe slide of {self.slide * 1e3:.3g} um {self.aside:g} times as large"
         return text + (f"\nthe slide of {self.slide * 1e3:.3g} um as it is" if self.slide and self.factor > 1 else "")
 
 
