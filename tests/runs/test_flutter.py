@@ -45,7 +45,7 @@ def test_a_release_below_the_flutter_amplitude_comes_to_rest_and_one_above_it_gr
     if outcome != "stuck":
         swing = found.measures["relative_displacement_amplitude"].value
         assert (swing < edge.value) == (share < 1)
-    assert "10.08" not in "".join(found.notes) and "falls to rest" in found.notes[-1]
+    assert "10.08" not in "".join(found.notes) and "decays to rest" in found.notes[-1]
 
 
 def test_a_spring_before_the_slip_keeps_a_small_swing_up():

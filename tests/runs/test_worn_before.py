@@ -68,7 +68,7 @@ def test_exact_volumes_add_where_the_path_and_the_friction_stay(place):
     volume = sum(each.measures["worn_volume"].value for each in (one, two))
     assert found.measures["worn_volume"].value == pytest.approx(volume, rel=1e-12, abs=0)
     assert volume == pytest.approx(ALPHA * LOAD * 1.5 * PATH * 1e6, rel=1e-8, abs=0)
-    assert "goes on from archard/result.nc, up to " in found.extra["notes"][-1]
+    assert "continues from archard/result.nc, up to " in found.extra["notes"][-1]
 
 
 def test_exact_a_run_goes_on_on_another_mesh(place):
