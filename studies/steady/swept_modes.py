@@ -1,5 +1,11 @@
 """Does a backbone of several modes tell where a marched steady motion resonates, and what it loses there?
 
+Up to the square of its damping ratio zeta. Of seven rigs of seed 59, 21 amplitudes: where zeta is above .003, the
+marched frequency differs from the backbone's by .1 to 1.1 zeta^2 where the base drives all modes, by .032 zeta^2 at
+most where it drives the first alone; the damping ratio by 5.6 and 2.6 zeta^2 at most. Below .003, frequencies differ by
+1.2e-6 and ratios by 6.4e-6 at most: the resonance is found to some 1e-6. A point of a backbone costs some .1 CPU
+seconds, a marched resonance 11.
+
 The recipe: the joints of `three_ways.py` in rigs of two or three modes, each 1.4 to 3.5 times as high as the one
 before, with random slides, outputs and shares of the base motion. At LEVELS of the amplitudes of a balanced backbone
 the base is driven as hard as the first mode would need; the frequency is moved until the base feeds no reactive power
@@ -111,7 +117,7 @@ def beside(curve, text: str, numbers, k: int):
     return here[1], off, np.abs(off) / np.array([bars[0] / here[0], (bars[1] + ratio_bar) / here[1]])
 
 
-def main(count: int = 12, seed: int = 59) -> list:
+def main(count: int = 7, seed: int = 59) -> list:
     """(law, level, which modes the base drives, damping ratio, differences of `beside`) of each, printed."""
     rng, rows = np.random.default_rng(seed), []
     for number in range(count):
