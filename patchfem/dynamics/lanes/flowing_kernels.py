@@ -24,6 +24,8 @@ from .names_kernels import (
     OWN,
     PASSED,
     PLACE,
+    SLIP_HIGH,
+    SLIP_LOW,
     TURNED,
     WAY,
     D,
@@ -41,6 +43,7 @@ RESTS = TURNS_HELD = False  # it never holds
 FELT, SQUARE, WORK, READS = range(OWN, OWN + 4)
 OWN_STATE = 4
 PARTS = 4  # of a step: a reversal and a kink on either side of it
+CORRECTED = 2  # times, by Newton, is the place of an event, which a cubic over a kink misses by the second order
 FINEST = 64  # parts of a step through a layer
 SHARE, HALVINGS = 0.5, 24  # irreversible share of the slide from which it slips; of the part of a step where it begins
 
@@ -246,11 +249,13 @@ def advance(room, i, s0, c0, s1, c1, h):
     """(x, v, way, place at the end of a step h; share u of the step up to a turn; x, v and place there; x where the
     slide turns, that of the end without a turn; kink: 0, as no acceleration jumps).
 
-    The step ends and begins anew where the slide turns, and where the law has a kink at no stretch.
+    The step ends and begins anew where the slide turns, and where the law has a kink at no stretch. There the
+    irreversible part of the slide turns, so its range is told here.
     """
     if friction.LAYERS:
         return through(room, i, s0, c0, s1, c1, h)
     state, way, at, work, u = begun(room, i), room[WAY * LANES + i], 0.0, 0.0, 1.0
+    k, push, damp, square = numbers(room, i), room[P * LANES + i], room[D * LANES + i], room[W * LANES + i]
     xe = ve = ze = 0.0
     for part in range(PARTS):
         rest = h - at
@@ -261,12 +266,20 @@ def advance(room, i, s0, c0, s1, c1, h):
         if part == PARTS - 1 or not (turns or share < 1.0):
             break
         if share > 0.0:
-            end, middle = at + share * rest, at + share * rest / 2
-            drive = (sine, s0 * cos(middle) + c0 * sin(middle), s0 * cos(end) + c0 * sin(end))
-            (x, v, _, z, q), done = run(room, i, state, way, drive, share * rest)
+            for _ in range(1 + CORRECTED):
+                end, middle = at + share * rest, at + share * rest / 2
+                drive = (sine, s0 * cos(middle) + c0 * sin(middle), s0 * cos(end) + c0 * sin(end))
+                (x, v, f, z, q), done = run(room, i, state, way, drive, share * rest)
+                gain = friction.flowing(k, z, v, way)[1] * v
+                miss, pace = (v, push * drive[2] - damp * v - square * x - f) if turns else (z, gain)
+                if abs(miss) < rest * abs(pace):
+                    share = min(max(share - miss / (rest * pace), 0.0), 1.0)
             work, at = work + done, end
             v, z = 0.0 if turns else v, z if turns else 0.0
-            state = x, v, friction.flowing(numbers(room, i), z, v, way)[0], z, q
+            state = x, v, friction.flowing(k, z, v, way)[0], z, q
+            if not turns and room[READS * LANES + i] > 0.0:
+                room[SLIP_HIGH * LANES + i] = max(room[SLIP_HIGH * LANES + i], x)
+                room[SLIP_LOW * LANES + i] = min(room[SLIP_LOW * LANES + i], x)
         if turns:
             way, u, xe, ve, ze = -way, at / h, state[0], state[1], state[3]
     x1, v1, f1, z1, q1 = after
@@ -292,11 +305,11 @@ def held(begin, end, way, room, i, h):
     irreversible part of the slide where that turns inside it, that of its end without).
 
     begin, end: x, x', x'' and place at the ends of the part, of an angle h; in between they are cubics. The
-    irreversible part turns where there is no stretch.
+    irreversible part turns where there is no stretch; at a kink `advance` tells where.
     """
     k, (x, v, _, z), (x1, v1, _, z1) = numbers(room, i), begin, end
     furthest, low, high = slid(x1, z1, room, i), 0.0, 1.0
-    if z * z1 < 0.0:
+    if not friction.BENDS and z * z1 < 0.0:
         u = zero(z, z1, h * v * friction.flowing(k, z, v, way)[1], h * v1 * friction.flowing(k, z1, v1, way)[1])
         furthest = cubic(x, x1, h * v, h * v1, u)
     first = sticks(begin, end, way, k, h, 0.0)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from patchfem.compiled.plain import INNER, plain, retold
 from patchfem.dynamics.lanes import names_kernels as at
@@ -87,6 +88,40 @@ def test_exact_bonds_of_lanes_follow_a_slide_in_closed_form(way):
     for found, rate in ((stretch, 1 - way * stretch / k[1]), (spread, 2 * stretch - way * spread / k[1]),
                         (work, k[0] * stretch)):
         np.testing.assert_allclose(np.gradient(found, x)[1:-1], rate[1:-1], rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0])
+def test_exact_a_kink_is_found_inside_a_step(exponent, monkeypatch):
+    """A step in which the stretch of Bouc-Wen passes 0, anywhere: its end and the slide where the irreversible
+    part turns, against SciPy to either side of the kink. A cubic alone missed the stretch by up to 3e-6."""
+    flowing = plain("patchfem.dynamics.lanes.flowing_kernels")
+    monkeypatch.setattr(flowing, "friction", plain("patchfem.friction.laws.bouc_wen_kernels"))
+    limit, length, shape, h = 0.5, 0.4, 0.9, 0.02
+
+    def rates(angle, state):
+        x, v, z = state
+        y = z / length
+        gain = 1 - (1 if y > 0 else 1 - 2 * shape) * abs(y)**exponent
+        return v, np.sin(angle) - 0.1 * v - 1.3 * x - limit * y, gain * v
+
+    def passes(angle, state):
+        return state[2]
+
+    passes.terminal = True
+    for far in np.linspace(0.001, 0.019, 10):
+        begin, room = (0.2, 1.0, -far), np.zeros(at.LANES * (at.OWN + flowing.OWN_STATE))
+        for place, value in ((at.X, begin[0]), (at.V, begin[1]), (at.PLACE, begin[2]), (at.WAY, 1), (at.P, 1),
+                             (at.D, 0.1), (at.W, 1.3), (at.SLIP_HIGH, -9), (flowing.READS, 1),
+                             *enumerate((limit, length, exponent, shape), at.FIRST_OF_LAW)):
+            room[place * at.LANES] = value
+        flowing.begin(room, 0)
+        found = flowing.advance(room, 0, 0.0, 1.0, np.sin(h), np.cos(h), h)
+        tight = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-14}
+        first = solve_ivp(rates, (0, h), begin, events=passes, **tight)
+        bend = first.y[:, -1] * [1, 1, 0]
+        end = solve_ivp(rates, (first.t[-1], h), bend, **tight).y[:, -1] if first.t[-1] < h else first.y[:, -1]
+        np.testing.assert_allclose([found[0], found[1], found[3]], end, rtol=0, atol=3e-9)
+        assert first.t[-1] == h or abs(room[at.SLIP_HIGH * at.LANES] - bend[0]) < 3e-9
 
 
 @pytest.mark.share(0)
