@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import cholesky, eigh
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..core import ModalBasis, NotConverged, PatchfemError, frozen_array
@@ -25,6 +25,7 @@ MORE = 4  # modes beyond twice as many in the run for the error
 ROUND = 64 * np.finfo(float).eps  # times the terms that a stiffness is a sum of: what it comes out as for none
 SHIFT = 1e-9  # of the largest stiffness over mass, that a loose structure is held by where its modes are found
 STRAINLESS = 1e-12  # of a diagonal stiffness, a pivot below which nothing holds
+LOOSE = 1e-12  # of the largest square of a frequency and coordinate, below which a motion takes no strain
 RESIDUAL = 1e-8  # of the flexibility at the boundary, below which the modes hold all of it
 CRAIG_BAMPTON = "craig-bampton"
 
@@ -34,7 +35,8 @@ class Reduction(NamedTuple):
 
     stiffness, mass, damping (p, p), damping None without; boundary (b, p): motion of each boundary coordinate per
     shape; pushed (p,): V^T M r, the mass that the base moves, None where it stands still; omega (m,) [rad/s] of the
-    modes; left (m, a): what a mode that is left out leaves to each attached shape; whole: whether all modes are here.
+    modes; left (m, a): what a mode that is left out leaves to each attached shape; whole: whether all modes are here;
+    lowest (n,): shape of the lowest mode of the structure that takes strain, of unit modal mass.
     """
 
     stiffness: np.ndarray
@@ -45,10 +47,11 @@ class Reduction(NamedTuple):
     omega: np.ndarray
     left: np.ndarray
     whole: bool
+    lowest: np.ndarray
 
     def kept(self, modes: int) -> np.ndarray:
-        """Combinations (p, c) of the shapes with the first `modes` modes alone, whose first b coordinates are the
-        motions of the boundary: the attached shapes take over statically what the other modes yield.
+        """Combinations (p, c) of the shapes with the first `modes` modes alone: the attached shapes take over
+        statically what the other modes yield.
 
         PatchfemError where the attached shapes of the boundary hold nothing beside the modes.
         """
@@ -57,16 +60,13 @@ class Reduction(NamedTuple):
         out[:modes, :modes] = np.eye(modes)
         out[count:, modes:] = np.eye(beside)
         out[modes:count, modes:] = self.left[modes:]
-        moved = self.boundary @ out
-        own = moved[:, modes:modes + b]
+        own = self.boundary @ out[:, modes:modes + b]
         scale = np.sqrt(np.abs(np.diag(own)))
         if not scale.all() or np.linalg.cond(own / np.outer(scale, scale)) > 1 / RESIDUAL:
             raise PatchfemError("the modes leave nothing of the flexibility at the boundary to its attachment modes; "
                                 "lower structure.reduced.modes, or use method = 'craig-bampton'",
                                 "structure.reduced.modes")
-        first = out[:, modes:modes + b] @ np.linalg.inv(own)
-        others = np.r_[0:modes, modes + b:modes + beside]
-        return np.hstack([first, out[:, others] - first @ moved[:, others]])
+        return out
 
 
 def reduction(K, M, C, boundary, modes: int, method: str, moved=None) -> Reduction:
@@ -88,11 +88,14 @@ def reduction(K, M, C, boundary, modes: int, method: str, moved=None) -> Reducti
 def _projected(K, M, C, boundary, load, shapes, omega, left, whole: bool) -> Reduction:
     """K, M, C, boundary and load in shapes (n, p)."""
     size = np.abs(shapes)
-    mass = shapes.T @ (M @ shapes)
+    mass = matrices.trimmed(shapes.T @ (M @ shapes), size.T @ (abs(M) @ size) * ROUND / 1e-12)
     damping = None if C is None else matrices.trimmed(shapes.T @ (C @ shapes), size.T @ (abs(C) @ size))
     stiffness = matrices.trimmed(shapes.T @ (K @ shapes), size.T @ (abs(K) @ size) * ROUND / 1e-12)
-    return Reduction(stiffness, (mass + mass.T) / 2, damping, shapes[boundary],
-                     None if load is None else shapes.T @ load, omega, left, whole)
+    stiffness[:omega.size] = stiffness[:, :omega.size] = 0.0  # no mode strains with a shape beside it
+    np.fill_diagonal(stiffness[:omega.size, :omega.size], omega**2)
+    strained, turn = _strained(stiffness, mass)
+    return Reduction(stiffness, mass, damping, shapes[boundary], None if load is None else shapes.T @ load, omega, left,
+                     whole, shapes @ turn[:, 0] if strained.size else np.zeros(len(shapes)))
 
 
 def _refuse_indefinite(matrix, name: str) -> None:
@@ -216,29 +219,50 @@ def basis(found: Reduction, modes: int, pairs=(), output: int = 1, pushed: int |
     coordinates that `shapes` leads to are these, then the modes. PatchfemError for a mass or stiffness that is not
     positive.
     """
-    turn = found.kept(min(modes, found.omega.size))
-    mass, b = turn.T @ found.mass @ turn, len(found.boundary)
+    count, b = min(modes, found.omega.size), len(found.boundary)
+    turn = found.kept(count)
+    mass, moved = turn.T @ found.mass @ turn, found.boundary @ turn
+    mass = (mass + mass.T) / 2
     stiffness = _rows_of(turn.T @ found.stiffness @ turn, mass)
     C = None if found.damping is None else turn.T @ found.damping @ turn
-    unit = np.eye(turn.shape[1])
-    rows = masses.rows(pairs, b) @ unit[:b] if pairs else None
-    force = -turn.T @ found.pushed if pushed is None else unit[pushed - 1]
-    names = [*(names or [str(k + 1) for k in range(b)]), *(f"mode {k + 1}" for k in range(len(unit) - b))]
-    out = matrices.basis(mass, None, C, faces=rows, output=unit[output - 1], force=force, names=names,
+    rows = masses.rows(pairs, b) @ moved if pairs else None
+    force = -turn.T @ found.pushed if pushed is None else moved[pushed - 1]
+    names = [*(names or [str(k + 1) for k in range(b)]), *(f"mode {k + 1}" for k in range(len(mass) - b))]
+    out = matrices.basis(mass, None, C, faces=rows, output=moved[output - 1], force=force, names=names,
                          stretch=stiffness)
+    shapes = np.vstack([moved @ out.shapes, np.delete(out.shapes, np.s_[count:count + b], axis=0)])
+    out = replace(out, shapes=frozen_array(shapes))
     return out if not ratio else replace(out, zeta=frozen_array(ratio * (out.omega > 0)))
 
 
 def _rows_of(stiffness, mass) -> np.ndarray:
-    """Rows (s, c) with stiffness = rows^T rows, motions without strain left out exactly."""
+    """Rows (s, c) with stiffness = rows^T rows, motions without strain left out exactly.
+
+    A triangle where every motion takes strain: eigenvalues of both matrices would be right to round-off of the largest,
+    which of the lowest leaves few digits.
+    """
+    square, shapes = _strained(stiffness, mass)
+    own = np.sqrt(np.diag(stiffness))
+    if square.size == own.size:
+        try:
+            root = cholesky(stiffness / np.outer(own, own))
+        except np.linalg.LinAlgError:
+            root = np.zeros((1, 1))
+        if np.diag(root).min()**2 > LOOSE * own.size:
+            return root * own
+    return (np.sqrt(square)[:, None] * shapes.T) @ mass
+
+
+def _strained(stiffness, mass) -> tuple:
+    """(Squares (k,) [1/s^2] of the frequencies of motions that take strain, ascending; their shapes (c, k) of unit
+    modal mass); PatchfemError for a mass or stiffness that is not positive."""
     try:
-        square, shapes = eigh((stiffness + stiffness.T) / 2, (mass + mass.T) / 2)
+        square, shapes = eigh((stiffness + stiffness.T) / 2, mass)
     except np.linalg.LinAlgError:
         raise PatchfemError("the mass is not positive: a motion of the boundary or a mode moves none; give every "
                             "coordinate of the boundary its mass", "structure.reduced.mass") from None
-    least = 1e-12 * square[-1] * len(square)
+    least = LOOSE * square[-1] * len(square)
     if square[0] < -least:
         raise PatchfemError(f"the stiffness is not positive: one shape has {square[0]:.3g} 1/s^2 per mass, "
                             f"{square[0] / square[-1]:.2g} of the largest", "structure.reduced.stiffness")
-    held = square > least
-    return (np.sqrt(square[held])[:, None] * shapes[:, held].T) @ mass
+    return square[square > least], shapes[:, square > least]

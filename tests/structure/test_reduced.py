@@ -1,5 +1,6 @@
 """Reduced structures: exact where no mode is left out, statics and rigid motions always, orders of the rest."""
 
+import mpmath
 import numpy as np
 import pytest
 from scipy import sparse
@@ -80,6 +81,22 @@ def test_always_fewer_modes_are_the_reduction_to_fewer(method):
     omegas = np.array([reduced.basis(many, modes).omega[:3] for modes in (2, 4, 8, 16)])
     full = matrices.basis(M, K).omega[:3]
     assert (np.diff(omegas, axis=0) <= 1e-9 * full).all() and (omegas >= full * (1 - 1e-9)).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("links", [40, 12])
+def test_exact_frequencies_of_a_slender_beam_keep_their_digits(method, links):
+    """A beam of rigid links and equal hinges, by 40 digits; its frequencies span a factor of 260 or 3000. Eigenvalues
+    of both reduced matrices erred by 5e-10 behind free modes."""
+    n = links
+    D = np.eye(n) - 2 * np.eye(n, k=-1) + np.eye(n, k=-2)
+    K, M = D.T @ D, np.diag(np.random.default_rng(4).integers(1, 9, n) / 4.0)
+    with mpmath.workdps(40):
+        root = mpmath.diag([1 / mpmath.sqrt(one) for one in np.diag(M)])
+        square = mpmath.eigsy(root * mpmath.matrix(K.tolist()) * root, eigvals_only=True)
+        true = np.array([float(mpmath.sqrt(one)) for one in square])
+    small = reduced.basis(made(K, M, None, n, method, np.array([n - 1, 4])), n, pushed=1)
+    np.testing.assert_allclose(small.omega, true, rtol=2e-16 * (true[-1] / true[0])**1.5)
 
 
 def test_order_of_a_free_interface_reduction_is_that_of_its_residuals():
