@@ -91,7 +91,7 @@ SCREEN = {
               "cite": (start, "BibTeX of a scene's sources", "joint.toml")}}
 VERBS = {verb: row[0] for verbs in SCREEN.values() for verb, row in verbs.items()}
 
-OUT_OF_MEMORY = "out of memory; `patchfem plan` names what takes most of it and the key that drives it"
+OUT_OF_MEMORY = "out of memory; `patchfem plan` names what needs most memory and the key that sets its size"
 
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
           help="friction, vibration and wear of two rubbing surfaces.")
@@ -172,7 +172,7 @@ def _guarded(words: list, before=lambda: None) -> int:
     if there := sys.modules.get(f"{__package__}.disk.whole"):
         there.begun()
     if words[:1] == ["help"]:
-        say("patchfem: no verb help; `patchfem --help` lists the verbs, `patchfem run --help` explains one")
+        say("patchfem: there is no verb help; `patchfem --help` lists the verbs, `patchfem run --help` explains one")
         return 2
     try:
         before()
@@ -209,7 +209,7 @@ def _guarded(words: list, before=lambda: None) -> int:
         return 0
     except OSError as error:
         gone = isinstance(error, FileNotFoundError) and not error.filename  # of what asks where it is
-        say(plain("patchfem: the working folder is gone; change to one that is there" if gone else
+        say(plain("patchfem: the working folder no longer exists; change to an existing one" if gone else
                   f"{error.filename or 'patchfem'}: {error.strerror or error}"
                   f"{'; use a shorter name' * (error.errno == ENAMETOOLONG)}"))
         return 4

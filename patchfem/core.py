@@ -47,11 +47,11 @@ class Outcome(StrEnum):
 _SENTENCES = {
     Outcome.DONE: "Finished as asked.",
     Outcome.STEADY: "The motion repeats from window to window within the tolerance.",
-    Outcome.STUCK: "The interface holds as a whole in the last cycles.",
-    Outcome.TRANSIENT: "The run ended before the motion settled; more cycles may help where the drive no longer "
-                       "changes.",
-    Outcome.GROWS: "The motion still rises and no bounded steady motion was found; friction does not limit it.",
-    Outcome.EXCEEDS_TRAVEL: "The motion passed the stop of the flexure; the run ended there.",
+    Outcome.STUCK: "The whole interface sticks in the last cycles.",
+    Outcome.TRANSIENT: "The run ended before the motion settled; more cycles may help if the drive repeats "
+                       "itself.",
+    Outcome.GROWS: "The motion still grows, and no bounded steady motion was found: friction does not limit it.",
+    Outcome.EXCEEDS_TRAVEL: "The motion exceeded the travel of the flexure, so the run ended there.",
     Outcome.LEAVES_CONTACT: "The slide passed the end of the piece, where the pieces no longer overlap; lower the "
                             "drive, shorten the slide or lengthen the piece.",
     Outcome.LEAVES_GROOVES: "The inertia of the lifted mass took all of the load, so it left its grooves and the run "
@@ -59,7 +59,7 @@ _SENTENCES = {
     Outcome.WORN_THROUGH: "Wear went through a coating at its deepest place, so the run ended; ask for fewer "
                           "cycles or make the coating thicker.",
     Outcome.NO_CONTACT: "The pieces do not touch; raise the load or close the gap.",
-    Outcome.NOT_CONVERGED: "A solve did not reach its residual; the result is marked and must not be used.",
+    Outcome.NOT_CONVERGED: "A numerical method did not converge, so the result is marked; do not use it.",
 }
 
 

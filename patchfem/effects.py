@@ -230,7 +230,7 @@ def using(key: str) -> str:
 
 
 def refusal(word: str, least: str = "", odd=None) -> str:
-    """Alternative to a law that is not carried: "use law 'coulomb' or 'tanh'; not yet built".
+    """Alternative to a law that is not carried: "use law 'coulomb' or 'tanh'".
 
     least: what the law must carry besides; odd: the table of the law, of which the reading or the order may be all that
     is not carried.
@@ -240,7 +240,7 @@ def refusal(word: str, least: str = "", odd=None) -> str:
     own = odd.law if odd is not None and listed(odd) and odd.law in laws else ""
     instead = 'reading = "stretch" with order = 1, or ' if own else ""
     others = in_words((f"'{name}'" for name in laws if name != own), "or")
-    return f"use {instead}law {others}; not yet built"
+    return f"use {instead}law {others}"
 
 
 MEANWHILE = {  # what serves where two effects cannot stand together yet
@@ -260,7 +260,9 @@ MEANWHILE = {  # what serves where two effects cannot stand together yet
 
 def unbuilt(what: str, meanwhile: str) -> str:
     """The sentence for what cannot stand together yet: `what`, and a word of MEANWHILE or what to do in words."""
-    return f"{what}: {MEANWHILE.get(meanwhile, meanwhile)}; not yet built"
+    bare = what.startswith(("beside ", "with ", "in "))
+    said = f"not supported yet {what}" if bare else f"{what} is not supported yet"
+    return f"{said}; {MEANWHILE.get(meanwhile, meanwhile)}"
 
 
 def in_words(names, last: str) -> str:

@@ -7,7 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from ..core import NotConverged, Outcome, PatchfemError
-from ..effects import has, unbuilt
+from ..effects import has
 from ..identify.least_squares import Fit, fit
 from ..identify.words import remarks
 from ..inputs.loops import Loop, read_loop
@@ -65,8 +65,8 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None, options: LoopOptio
     """
     begin = perf_counter()
     if scene.kind != "bench":
-        raise SceneError([unbuilt(f"{scene.path}: fit: a {scene.kind} scene; only loops of [slide] scenes are fitted",
-                                  "prescribe the motion by [slide]")])
+        raise SceneError([f"{scene.path}: fit: a loop needs a scene with [slide], but this is a {scene.kind} scene; "
+                          "prescribe the motion with [slide]"])
     wanted, wrong = ranges(free)
     if wrong:
         raise SceneError(wrong)

@@ -9,7 +9,6 @@ from cyclopts import Parameter
 
 from ..campaigns import backbone as backbones
 from ..campaigns import cost as cost_curves
-from ..effects import unbuilt
 from ..export import backbone as backbone_files
 from ..export import cost as cost_files
 from ..export import fits, results
@@ -42,8 +41,7 @@ def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle,
     """
     found = model_of(scene, set_)
     if over and over not in cost_curves.KNOBS:
-        raise Refused(unbuilt(f"cost --over {over}: no knob of this name",
-                              f"the knobs are {', '.join(cost_curves.KNOBS)}"))
+        raise Refused(f"cost --over {over}: unknown key; use one of {', '.join(cost_curves.KNOBS)}")
     knobs = [over] if over else cost_curves.knobs_of(found)
     if not knobs:
         raise Refused(f"{scene}: no knob changes what this scene computes")

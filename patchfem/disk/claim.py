@@ -69,8 +69,8 @@ class Claim:
                 owner = os.read(file, 200).decode("utf-8", "replace").split()
                 if self._works(owner):
                     there = "" if len(owner) < 3 or owner[2] == HOST else " of another machine"
-                    raise Missing(f"{self.shown}: another {self.kind} (process {owner[0]}{there}) is writing it; name "
-                                  "another -o or wait; if that process is not patchfem, remove "
+                    raise Missing(f"{self.shown}: another {self.kind} (process {owner[0]}{there}) is writing it; "
+                                  "wait, or name another folder with -o; if that process is not patchfem, remove "
                                   f"{self.path.parent.name}/{self.path.name}")
                 os.ftruncate(file, 0)
                 if os.pwrite(file, self.me.encode(), 0) < len(self.me):  # part of a name would be nobody's

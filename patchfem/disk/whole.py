@@ -136,7 +136,7 @@ def fault(error: OSError, path: Path, partial: Path, need: int | None = None) ->
         limited = where.endswith(")")  # what is written so far counts against a limit, and no longer for the free room
         left = there - written if limited else there
         if error.errno in FULL and not _places(path):
-            return Unwritten(f"{shown(path)}: no room: the table of files of its disk (inodes) is full; remove files")
+            return Unwritten(f"{shown(path)}: no room: its disk has no free inodes; remove files")
         if error.errno in FULL or (error.errno is None and left < NARROW):
             wanted = f"{size_of(need)} needed" if need is not None else f"more than {size_of(written)} needed"
             why = f" ({os.strerror(error.errno)})" if error.errno else ""

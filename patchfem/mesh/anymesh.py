@@ -11,7 +11,6 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..core import PatchfemError, frozen_array
-from ..effects import unbuilt
 
 CLOSE = 1e-9  # lengths below this share of the interface are nothing
 STEEP = 0.1  # slope of a rounded edge from which normal and vertical differ by half a percent
@@ -144,8 +143,8 @@ def pieces(raw: Tagged, where) -> PairMesh:
     apart = np.abs(lower.x[[0, -1]] - upper.x[[0, -1]]).max()
     if apart > CLOSE * lower.length:
         fault = f"lengths {lower.length:.9g} and {upper.length:.9g} m, ends up to {apart:.6g} m apart"
-        raise PatchfemError(f"{where}: lower_interface and upper_interface do not match ({fault})"
-                            + unbuilt(", pieces overhang", "give both the same ends (the nodes between may differ)"))
+        raise PatchfemError(f"{where}: lower_interface and upper_interface do not match ({fault}); "
+                            "give both the same ends (the nodes between may differ)")
     return PairMesh(_centred(lower, lower.x), _centred(upper, lower.x))
 
 
@@ -286,8 +285,8 @@ def _joined(mesh: PieceMesh, side: str, where) -> None:
     gone = ~np.isin(wanted[:, 0] * count + wanted[:, 1], key[~inner])
     if gone.any():
         x = mesh.x[np.argmax(gone)]
-        what = f"{where}: {side}_interface has a hole or leaves out nodes after x = {x:.6g} m"
-        raise PatchfemError(unbuilt(what, "make it one stretch"))
+        raise PatchfemError(f"{where}: {side}_interface has a hole or leaves out nodes after x = {x:.6g} m; make it "
+                            "one continuous edge")
 
 
 def cell_edges(mesh: PieceMesh) -> tuple:

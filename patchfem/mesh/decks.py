@@ -27,11 +27,12 @@ def read_inp(text: str) -> Tagged:
     nodes, elements, sets = {}, {}, {"NSET": {}, "ELSET": {}}
     for keyword, given, lines in _inp_blocks(text):
         if keyword in ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY"):
-            raise PatchfemError(f"*{keyword} is not yet built; write a flat deck")
+            raise PatchfemError(f"*{keyword} is not supported yet; write a flat deck")
         if keyword == "NODE":
             new = {int(line[0]): [float(v) for v in line[1:] if v] for line in lines}
             if new.keys() & nodes.keys():
-                raise PatchfemError("a node number is given twice (several parts are not yet built: write a flat deck)")
+                raise PatchfemError("a node number is given twice (several parts are not supported yet: write a "
+                                    "flat deck)")
             nodes |= new
             _gather(sets["NSET"], given.get("NSET"), list(new))
         elif keyword == "ELEMENT":

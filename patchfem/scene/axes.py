@@ -65,7 +65,7 @@ def read(texts: Iterable[str], sampled: bool = False) -> tuple[list[Axis | Span]
     for text in texts:
         key, equals, values = (part.strip() for part in text.partition("="))
         if not equals or not key:
-            wrong.append(f"--over {text}: table.key=v1,v2,... or table.key=low..high:n is needed, such as "
+            wrong.append(f"--over {text}: write table.key=v1,v2,... or table.key=low..high:n, such as "
                          "contact.tilt.angle=1e-6 rad..1e-2 rad:9")
             continue
         _add(found, wrong, key, values, sampled)
@@ -247,7 +247,7 @@ def _ends(key: str, low: str, high: str) -> tuple:
     kind = kind_of(model, name)
     if kind is None:
         if any(re.fullmatch(quantities.NUMBER, end) is None for end in (low, high)):
-            raise ValueError(f"{low}..{high}: both ends of the range are plain numbers here")
+            raise ValueError(f"{low}..{high}: both ends of this range must be plain numbers")
         return Fraction(low), Fraction(high), ""
     for end in (low, high):
         quantities.parse(end, kind)
@@ -278,9 +278,9 @@ def _steps(key: str, low: str, high: str, count: str | None, how: str | None) ->
 def _span(key: str, low: str, high: str, count: str | None, how: str | None) -> Span:
     first, last, unit = _ends(key, low, high)
     if float not in _types(key):
-        raise ValueError(f"{low}..{high}: list the values of a whole number, such as 1,2,3")
+        raise ValueError(f"{low}..{high}: a whole number takes no range; list its values, such as 1,2,3")
     if count:
-        raise ValueError(f"{low}..{high}:{count}: values are drawn between the ends; leave :{count} out")
+        raise ValueError(f"{low}..{high}:{count}: random values are drawn between the ends; leave out :{count}")
     if first == last:
         raise ValueError(f"{low}..{high}: both ends are the same value")
     return Span(key, float(first), float(last), unit, _is_log(first, last, how))

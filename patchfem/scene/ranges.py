@@ -67,7 +67,7 @@ def _numeric(key: str) -> tuple:
     annotation = model.model_fields[name].annotation
     types = (annotation, *parts(annotation))
     if model_of(model, name) is not None or tuple in types or float not in types:
-        raise ValueError("holds no number that can vary; quantities and plain numbers can be free")
+        raise ValueError("is not a number that can vary; only quantities and plain numbers can be free")
     return model, name
 
 

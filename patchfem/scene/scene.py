@@ -117,8 +117,8 @@ def text_of(path: str | Path) -> str:
         reason = getattr(error, "strerror", None) or str(error)
         raise SceneError([f"{path}: cannot be read: {reason}"]) from None
     if len(content) > LARGEST:
-        raise SceneError([f"{path}: more than {LARGEST >> 20} MiB, which no scene needs; put matrices into a file and "
-                          "name it as structure.file"])
+        raise SceneError([f"{path}: more than {LARGEST >> 20} MiB, too large for a scene; put matrices into a file "
+                          "and name it in structure.file"])
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -244,9 +244,9 @@ def _refuse_crowds(raw: dict, text: str, path: str | Path) -> None:
         if count > MOST_COORDINATES:
             found = re.search(rf"^[ \t]*{form}", text, re.MULTILINE)
             line = f":{text.count(chr(10), 0, found.start()) + 1}" if found else ""
-            raise SceneError([f"{path}{line}: structure.{key}: {count} are more than {MOST_COORDINATES}, whose modes "
+            raise SceneError([f"{path}{line}: structure.{key}: {count} are more than {MOST_COORDINATES}; their modes "
                               f"are solved as one full matrix: {8e-9 * 3 * count**2:.2g} GB and some "
-                              f"{1.5e-9 * count**3:.2g} s; give fewer, or the modes that the drive reaches as "
+                              f"{1.5e-9 * count**3:.2g} s; give fewer, or give the modes themselves in "
                               "structure.file"])
 
 
@@ -279,11 +279,11 @@ def _unquoted(text: str, line: int) -> str:
     if point and (point[2] or point[3]):
         return f"; put a digit on both sides of the point: {key} = {point[1]}{point[2] or 0}.{point[3] or 0}{point[4]}"
     if re.fullmatch(r"[-+]?\d+,\d+", value):
-        return f"; a decimal is written with a point: {key} = {value.replace(',', '.')}"
+        return f"; write the decimal comma as a point: {key} = {value.replace(',', '.')}"
     if value.lower() in ("true", "false"):
         return f"; {key} = {value.lower()}"
     if percent := re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*%", value):
-        return f"; a share is a plain number: {key} = {float(percent[1]) / 100:.12g}"
+        return f"; write a percentage as a plain number: {key} = {float(percent[1]) / 100:.12g}"
     quoted = re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE]$)[a-zA-Z%\u00b5\u03bc][a-zA-Z\u00b5\u03bc/^0-9 -]*|"
                           r"[a-zA-Z][\w./ -]*", value)
     return f'; put a quantity or a word in quotes: {key} = "{value}"' if quoted and len(value) < 60 else ""

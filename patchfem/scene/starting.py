@@ -11,12 +11,12 @@ from .keys.types import choices
 
 HERE = Path(__file__).parent / "templates"
 KINDS = {
-    "patch": "two coated pieces pressed together: where they touch, how hard, how stiff",
-    "joint": "a bolted lap joint shaken to and fro: its friction loop, stiffness and damping",
-    "bench": "a law of friction on one contact point, along a prescribed slide",
+    "patch": "two coated pieces pressed together: contact area, pressure and stiffness",
+    "joint": "a bolted lap joint moved to and fro: friction loop, stiffness and damping",
+    "bench": "a friction law at one contact point, along a prescribed slide",
     "rig": "a rubbing block on flexures, shaken at one frequency",
     "beam": "a beam with a bolted lap joint: frequency and damping over its amplitude",
-    "damper": "a sweep: the under-platform damper that takes most out of a blade's resonance",
+    "damper": "a sweep: the under-platform damper that lowers a blade's resonance most",
     "shroud": "a sweep: resonances of blades that rub at their shrouds, by nodal diameter",
     "linear": "a mass on flexures without friction",
     "misalignment": "a sweep: how much tilt the rig of the report allows",
@@ -37,4 +37,4 @@ def shipped() -> Path:
     for folder in (HERE / "shipped", HERE.parents[2] / "studies" / "rig"):
         if (folder / "rig.toml").is_file():
             return folder / "rig.toml"
-    raise Missing("the scene of the rig is not in this installation; install patchfem anew")
+    raise Missing("the example scene is missing from this installation; install patchfem again")

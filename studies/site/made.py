@@ -237,7 +237,7 @@ def beside(name: str, other: str) -> list:
     try:
         pf.load(both)
     except pf.SceneError as fault:
-        return [re.sub(r"^[^:]*(?::\d+)?: ", "", line) for line in fault.mistakes if "not yet built" in line]
+        return [re.sub(r"^[^:]*(?::\d+)?: ", "", line) for line in fault.mistakes if "not supported yet" in line]
     return []
 
 

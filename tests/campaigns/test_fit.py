@@ -389,10 +389,13 @@ def test_always_a_fit_cut_short_ends_with_3(asked, monkeypatch, tmp_path):
 @pytest.mark.parametrize("free, says", [
     ("friction.static=0.6..0.1", "friction.static: the low bound 0.6 must lie below the high bound 0.1"),
     ("friction.static=0.1..0.1", "must lie below"), ("friction.static=0.1..nan", "a plain number is needed, not nan"),
-    ("friction.static=-0.1..1", "friction.static: must be >= 0, not -0.1"), ("friction.law=1..2", "holds no number"),
+    ("friction.static=-0.1..1", "friction.static: must be >= 0, not -0.1"), ("friction.law=1..2", "is not a number "
+                                                                                                  "that can vary"),
     ("friction.bond_length=1..2", "a bare number without a unit"), ("friction.statc=0..1", "did you mean 'static'?"),
     ("friction.bond_length=1 N..2 N", "'N' is a unit of force"), ("friction.static", "table.key=low..high is needed"),
-    ("friction=0..1", "holds no number"), ("contact.pairs=1..3", "holds no number"), ("x=1..2", "not a key of a scene"),
+    ("friction=0..1", "is not a number that can vary"), ("contact.pairs=1..3", "is not a number that can "
+                                                                               "vary"), ("x=1..2", "not a key of a "
+                                                                                                   "scene"),
     ("friction.static=0..1,friction.static=0..2", "friction.static: stands twice"),
     ("friction.bond_length=1 um..1e999 um", "too large"), ("contact.load=1 N..2 N", "[contact] and [normal] exclude"),
 ])  # fmt: skip

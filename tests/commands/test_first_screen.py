@@ -225,8 +225,9 @@ def test_always_a_ratio_written_as_per_cent_is_remarked(tmp_path):
     path.write_text(text_of("rig"), "utf-8")
     said = [cli("check", path, "--set", f"structure.mode.axial.damping={value}") for value in ("0.49", "0.5", "1")]
     assert [one.code for one in said] == [0, 0, 0] and said[0].err == ""
-    assert said[1].err.endswith("structure.mode.axial.damping = 0.5 is a ratio: 1 is critical, 1 % is 0.01\n")
-    assert "damping = 1 is a ratio: 1 is critical" in said[2].err
+    assert said[1].err.endswith("structure.mode.axial.damping = 0.5 is a damping ratio: 1 is critical, and 1 % is "
+                                "written 0.01\n")
+    assert "damping = 1 is a damping ratio: 1 is critical" in said[2].err
 
 
 def test_refuses_with_the_key_that_was_meant(tmp_path):

@@ -220,4 +220,4 @@ def test_always_a_working_folder_that_is_gone_is_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "gone")
     (tmp_path / "gone").rmdir()
     answer = cli("run", tmp_path / "bench.toml")
-    assert answer.code == 4 and "the working folder is gone; change to one that is there" in answer.err
+    assert answer.code == 4 and "the working folder no longer exists; change to an existing one" in answer.err

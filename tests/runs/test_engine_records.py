@@ -55,7 +55,7 @@ def test_always_the_functions_of_a_record_exist(name):
 def motions():
     """Motions of every law with everything that may stand beside it."""
     for law, soft, varies, yaws, spring, waveform in product(
-            LAWS, ("", "[contact.shear]"), ("", "beside normal.amplitude"), (False, True),
+            LAWS, ("", "[contact.shear]"), ("", "with normal.amplitude"), (False, True),
             ("", "[structure.stiffening]", "[normal.grooves]"), ("sine", "levels")):
         for count in (1, 2):
             yield Motion([Friction(law=law, static=0.3)] * count, soft, varies, yaws, spring, waveform)
@@ -78,7 +78,7 @@ def test_exact_what_has_no_solution_between_events_is_named():
     for laws, soft in (([], ""), ([coulomb], ""), ([coulomb], "[contact.shear]"), ([ep], ""), ([ep], "a holder")):
         assert "" in reasons(Motion(laws, soft, "", False, "", "sine"))
     for m, said in ((Motion([tanh], "", "", False, "", "sine"), "for law 'tanh'"),
-                    (Motion([ep], "", "", True, "", "sine"), "beside strips that yaw"),
-                    (Motion([coulomb], "", "", True, "", "levels"), "beside strips that yaw, level by level"),
-                    (Motion([coulomb], "", "", False, "[normal.grooves]", "sine"), "beside [normal.grooves]")):
+                    (Motion([ep], "", "", True, "", "sine"), "with strips that yaw"),
+                    (Motion([coulomb], "", "", True, "", "levels"), "with strips that yaw and waveform 'levels'"),
+                    (Motion([coulomb], "", "", False, "[normal.grooves]", "sine"), "with [normal.grooves]")):
         assert all(reasons(m)) and said in reasons(m)

@@ -276,7 +276,7 @@ def test_always_books_close_under_a_load_that_swings(law):
 def test_refuses_heave_over_grooves():
     text = RIG.replace("[normal]", PIECES).replace('load = "115 N"\ngrooves', "grooves").replace(
         "slide = 1.0}", "slide = 1.0, normal = 0.1}")
-    with pytest.raises(SceneError, match=r"structure\.mode\.\S+: beside \[contact\.grooves\], whose climb would press"):
+    with pytest.raises(SceneError, match=r"structure\.mode\.\S+: not supported yet with \[contact\.grooves\]"):
         loads(text)
 
 
@@ -292,19 +292,19 @@ def test_exact_the_plan_prints_stiffness_and_capacity():
 @pytest.mark.parametrize(("text", "sets", "key", "words"), [
     (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "which lock with static = 2"),
     (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "= 6.3662e-06 m is needed"),
-    (RIG, ["accuracy.method=exact"], "accuracy.method", "no exact solution exists beside [normal.grooves]"),
-    (RIG, ["accuracy.method=newmark"], "accuracy.method", "beside [normal.grooves]"),
+    (RIG, ["accuracy.method=exact"], "accuracy.method", "no exact solution exists with [normal.grooves]"),
+    (RIG, ["accuracy.method=newmark"], "accuracy.method", "with [normal.grooves]"),
     (RIG, ["friction.law=convolution", "friction.bond_length=1 um"], "friction.law",
-     "beside [normal.grooves]: use law 'coulomb'"),
+     "with [normal.grooves] is not supported yet; use law 'coulomb'"),
     (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.order=2"], "friction.order",
-     "beside [normal.grooves]"),
+     "with [normal.grooves]"),
     (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "accuracy.quadrature=direct"], "accuracy.quadrature",
-     "'direct' beside [normal.grooves]"),
-    (RIG, ["normal.amplitude=115 N", "normal.frequency=50 Hz"], "normal.amplitude", "less than normal.load = 115 N"),
+     "'direct' with [normal.grooves]"),
+    (RIG, ["normal.amplitude=115 N", "normal.frequency=50 Hz"], "normal.amplitude", "below normal.load = 115 N"),
     (RIG, ["structure.bonded.stiffness=1e5 N/m", "structure.bonded.wavelength=80 um"], "structure.bonded.wavelength",
-     "beside [normal.grooves]"),
+     "with [normal.grooves]"),
     (BENCH, ["wear.coefficient=1e-14 m^2/N", "wear.cycles=1000"], "wear",
-     "beside [normal.grooves]: a point has no area"),
+     "with [normal.grooves]; a [normal] contact has no area"),
     (BENCH, ["normal.grooves.amplitude=-1 um"], "normal.grooves.amplitude", ""),
 ])
 def test_refuses_what_grooves_cannot_stand_beside(text, sets, key, words):
@@ -315,13 +315,14 @@ def test_refuses_what_grooves_cannot_stand_beside(text, sets, key, words):
 
 def test_refuses_grooves_under_a_static_patch_and_soft_pieces():
     patch = BLOCK + GROOVES
-    with pytest.raises(SceneError, match=r"contact\.grooves: .*needs what slides"):
+    with pytest.raises(SceneError, match=r"contact\.grooves: .*needs a sliding motion"):
         loads(patch)
     soft = BENCH.replace(f'[normal]\nload = "115 N"\n{GROOVES}', patch + "\n[contact.shear]")
-    with pytest.raises(SceneError, match=r"friction\.law: 'tanh' beside \[contact\.shear\]"):
+    with pytest.raises(SceneError, match=r"friction\.law: 'tanh' with \[contact\.shear\]"):
         loads(soft.replace('law = "coulomb"', 'law = "tanh"\nreference_speed = "1 mm/s"'))
     soft = soft.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"')
-    with pytest.raises(SceneError, match=r"contact\.holder\.tangential_stiffness: beside \[contact\.grooves\]"):
+    with pytest.raises(SceneError, match=r"contact\.holder\.tangential_stiffness: not supported yet with "
+                                         r"\[contact\.grooves\]"):
         loads(soft + '\n[contact.holder]\ntangential_stiffness = "1e7 N/m"')
 
 

@@ -413,7 +413,7 @@ def test_refuses_bad_requests(words):
 def test_refuses_keys_not_yet_built(written, tmp_path, sets):
     words = [word for one in sets for word in ("--set", one)]
     answer = cli("run", written(SMALL_PATCH + NONLOCAL + STRUCTURE), "-o", tmp_path / "out", *words)
-    assert answer.code == 2 and "not yet built" in answer.err
+    assert answer.code == 2 and "not supported yet" in answer.err
     assert not (tmp_path / "out").exists()
 
 

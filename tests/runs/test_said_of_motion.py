@@ -65,7 +65,7 @@ cycles = 6
 
 
 def test_exact_transient_names_no_estimate_that_a_run_may_lack():
-    assert "_steady" not in Outcome.TRANSIENT.sentence and "where the drive no longer changes" in \
+    assert "_steady" not in Outcome.TRANSIENT.sentence and "if the drive repeats itself" in \
         Outcome.TRANSIENT.sentence
 
 

@@ -108,10 +108,11 @@ def test_exact_a_resumed_run_has_the_same_bits():
 
 @pytest.mark.parametrize("sets, told", [
     (['wear.friction.depth=["1 um","2 um"]'], "wear.friction.depth: depths that rise from 0 are needed"),
-    (['wear.friction.depth=["0 um","1 um","3 um"]'], "2 factors at 3 depths; one at each is needed"),
+    (['wear.friction.depth=["0 um","1 um","3 um"]'], "2 factors at 3 depths; give one at each"),
     (['wear.friction.depth=["0 um"]'], "wear.friction.depth: at least 2 values are needed, not 1"),
-    (["wear.friction.coefficient_factor=[1.1,2]"], "1.1 at depth 0, where [friction] itself describes the new contact"),
-    (["friction.law=coulomb", "wear.friction.bond_length_factor=[1,2]"], "law 'coulomb' has no bond length"),
+    (["wear.friction.coefficient_factor=[1.1,2]"], "1.1 at depth 0, where [friction] itself describes the unworn "
+                                                   "contact"),
+    (["friction.law=coulomb", "wear.friction.bond_length_factor=[1,2]"], "law 'coulomb' has no bond_length"),
     (["contact.grooves.wavelength=80 um", "contact.grooves.amplitude=20 um", "wear.friction.coefficient_factor=[1,2]"],
      "locks on the flanks of the new grooves, of slope 1.5708; factors below 1.59155 are needed"),
 ])

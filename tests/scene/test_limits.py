@@ -17,35 +17,36 @@ PATCH_BENCH = PATCH + BENCH[BENCH.index("[friction]") :]
 POINT_RIG = BENCH[: BENCH.index("[slide]")] + LINEAR
 REPORT = ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.reading=report"]
 STEADY = "accuracy.method=harmonic"
-NOT_BUILT = "not yet built"
+UNBUILT = "not supported yet"
 
 # (text, sets, key, what the message says)
 REFUSED = [
-    (RIG, [SHEAR, "contact.strips.count=8"], "contact.strips", "beside [contact.shear]: leave one of them out"),
+    (RIG, [SHEAR, "contact.strips.count=8"], "contact.strips", "with [contact.shear]; leave one of them out"),
     (PATCH_BENCH, [SHEAR, *REPORT[:2], "friction.order=2", "friction.breakaway=0.1"], "friction.breakaway",
-     "beside order = 2 and [contact.shear]: use order = 1; not yet built"),
-    (PATCH_BENCH, [SHEAR, "friction.kinetic=0.2"], "friction.kinetic", "leave kinetic out; not yet built"),
-    (RIG, [SHEAR, COULOMB, "friction.kinetic=0.2"], "friction.kinetic", "0.2 below static = 0.3 beside"),
-    (PATCH_BENCH, ["contact.crown.radius=1 m", LOWER], "contact.tilt.on", "put all shapes on one piece; not yet"),
-    (RIG, ["contact.crown.radius=1 m", "contact.crown.on=lower"], "contact.crown.on", "on one piece; not yet built"),
-    (RIG, ["contact.crown.radius=1 m", LOWER, SHEAR], "contact.tilt.on", "put all shapes on one piece; not yet built"),
-    (RIG, [SHEAR, COULOMB, LOWER], "contact.tilt.on", "'lower' beside [contact.shear] with law 'coulomb': put the"),
-    (RIG, [SHEAR, "friction.breakaway=0.1", LOWER], "contact.tilt.on", "'lower' beside friction.breakaway and"),
-    (PATCH_BENCH, [SHEAR, LOWER], "contact.tilt.on", "'lower' beside [contact.shear]"),
-    (RIG, [COULOMB, LOWER], "contact.tilt.on", "'lower' in a rig with law 'coulomb': put the shapes on the upper"),
+     "not supported yet with order = 2 and [contact.shear]; use order = 1"),
+    (PATCH_BENCH, [SHEAR, "friction.kinetic=0.2"], "friction.kinetic", "is not supported yet; leave kinetic out"),
+    (RIG, [SHEAR, COULOMB, "friction.kinetic=0.2"], "friction.kinetic", "0.2 below static = 0.3 with"),
+    (PATCH_BENCH, ["contact.crown.radius=1 m", LOWER], "contact.tilt.on", "put all shapes on one piece"),
+    (RIG, ["contact.crown.radius=1 m", "contact.crown.on=lower"], "contact.crown.on", "supported yet; put all "
+                                                                                      "shapes on one piece"),
+    (RIG, ["contact.crown.radius=1 m", LOWER, SHEAR], "contact.tilt.on", "put all shapes on one piece"),
+    (RIG, [SHEAR, COULOMB, LOWER], "contact.tilt.on", "'lower' with [contact.shear] and law 'coulomb' is not"),
+    (RIG, [SHEAR, "friction.breakaway=0.1", LOWER], "contact.tilt.on", "'lower' with friction.breakaway and"),
+    (PATCH_BENCH, [SHEAR, LOWER], "contact.tilt.on", "'lower' with [contact.shear]"),
+    (RIG, [COULOMB, LOWER], "contact.tilt.on", "'lower' in a rig with law 'coulomb' is not supported yet; put the"),
     (RIG, [PLASTIC, LOWER], "contact.tilt.on", "'lower' in a rig with law 'elastic-plastic'"),
     (POINT_RIG, [COULOMB, STEADY, "structure.stiffening.cubic=1e9 N/m^3"], "accuracy.method", "use 'march', or law"),
     (POINT_RIG, [COULOMB, STEADY, "structure.bonded.stiffness=1e6 N/m", "structure.bonded.wavelength=80 um"],
-     "accuracy.method", "'harmonic' with a law that jumps beside structure.bonded.wavelength"),
+     "accuracy.method", "'harmonic' with law 'coulomb', which jumps, and structure.bonded.wavelength"),
 ]
 PLAIN = [
     (RIG, [SHEAR, "friction.static=0"], "friction.static", "no point carries friction; static > 0 is needed"),
     (PATCH_BENCH, [SHEAR, "friction.static=0"], "friction.static", "or leave out [contact.shear]"),
     (RIG, ["accuracy.method=exact"], "accuracy.method", "no exact solution exists for law 'nonlocal'; use 'march'"),
     (RIG, ["accuracy.method=exact", PLASTIC, "structure.stiffening.cubic=1e12 N/m^3"], "accuracy.method",
-     "no exact solution exists beside [structure.stiffening]; use 'march' or leave"),
+     "no exact solution exists with [structure.stiffening]; use 'march' or leave"),
     (RIG, ["accuracy.method=exact", PLASTIC, SHEAR, "structure.mode.second.pitch=1 rad/m"], "accuracy.method",
-     "no exact solution exists beside a mode's pitch"),
+     "no exact solution exists with a mode's pitch"),
     (LINEAR, ["drive.cycles=0.2"], "drive.cycles", "at least a quarter of a cycle is needed, cycles >= 0.25, not 0.2"),
     (LINEAR, [STEADY, "drive.kind=free", "drive.displacement=1 mm"], "accuracy.method", "steady motion under a sine"),
     (LINEAR, [STEADY, "drive.waveform=step"], "accuracy.method", "use 'march' or leave method out"),
@@ -57,7 +58,7 @@ PLAIN = [
 def test_refuses_what_no_run_can_do(text, sets, key, says):
     message = only(text, *sets)
     assert message.startswith(f"--set: {key}: ") and says in message
-    assert message.endswith(NOT_BUILT) == ((text, sets, key, says) in REFUSED)
+    assert (UNBUILT in message) == ((text, sets, key, says) in REFUSED)
 
 
 def test_refuses_at_the_line_of_the_file():
@@ -65,9 +66,9 @@ def test_refuses_at_the_line_of_the_file():
     text = text.replace('angle = "0.1 mrad"', 'angle = "0.1 mrad"\non = "lower"')
     text += '[accuracy]\nmethod = "exact"\n'
     assert mistakes(text) == [
-        f"a.toml:{line_of(text, 'on =')}: contact.tilt.on: 'lower' beside friction.breakaway and [contact.shear]: put "
-        "the shapes on the upper piece; not yet built",
-        f"a.toml:{line_of(text, 'method')}: accuracy.method: no exact solution exists for law 'nonlocal' beside "
+        f"a.toml:{line_of(text, 'on =')}: contact.tilt.on: 'lower' with friction.breakaway and [contact.shear] "
+        "is not supported yet; put the shapes on the upper piece",
+        f"a.toml:{line_of(text, 'method')}: accuracy.method: no exact solution exists for law 'nonlocal' with "
         "[contact.shear]; use 'march' or leave method out",
     ]
 
@@ -80,7 +81,7 @@ def test_refuses_combinations_beside_the_list_of_keys():
 def test_refuses_a_rig_in_which_nothing_slides():
     text = RIG.replace("slide = 0.8", "slide = 0.0").replace("slide = 0.1", "slide = 0.0")
     message = only(text)
-    assert message.startswith(f"a.toml:{line_of(text, 'slide')}: structure.mode.axial.slide: 0 in every mode")
+    assert message.startswith(f"a.toml:{line_of(text, 'slide')}: structure.mode.axial.slide: slide is 0 in every mode")
     assert loads(RIG, sets=["structure.mode.axial.slide=0"]).structure.mode[1].slide == 0.1
     assert loads(text[text.index("[structure]") :]).kind == "linear"
 

@@ -121,7 +121,7 @@ def _written(folder, text):
 
 REFUSED = {
     ("boundary", "[40, 25]", "[40, 41]"): "there is no coordinate 41: the matrices have 40, counted from 1",
-    ("boundary", "[40, 25]", "[40, 40]"): "names 40 twice; each coordinate once",
+    ("boundary", "[40, 25]", "[40, 40]"): "names 40 twice; name each coordinate once",
     ("boundary", "[40, 25]", '["40:x", 2]'): "'40:x' names a node, but the files name none",
     ("boundary", "[40, 25]", "[]"): "whole numbers are needed, such as [1, 2]",
     ("mass", '"both.npz"', '"k.mtx"'): "holds the same numbers as the stiffness; name the file of the mass",

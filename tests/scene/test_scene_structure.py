@@ -164,7 +164,8 @@ def test_exact_starts_of_a_scene():
     (["structure.masses=[]"], "structure.masses", "at least one mass is needed"),
     (["structure.masses=['1 kg', '0 kg']"], "structure.masses[2]", "must be > 0"),
     (["structure.spring.0.stiffness=-1 N/m"], "structure.spring[1].stiffness", "must be >= 0"),
-    (["structure.start.displacement=['1 mm']"], "structure.start.displacement", "1 value for 2 masses; one for each"),
+    (["structure.start.displacement=['1 mm']"], "structure.start.displacement", "1 value for 2 masses; give one for "
+                                                                                "each"),
     (["structure.start={}"], "structure.start.displacement", "or structure.start.velocity"),
     (["structure.slide_at=12:+x"], "structure.slide_at", "names a place in a file"),
     (["drive={kind = 'force', mass = 3, force = '1 N', frequency = '1 Hz', cycles = 9}"], "drive.mass", "no mass 3"),
@@ -187,7 +188,7 @@ def test_refuses_at_the_line_of_the_file():
     (MASSES + '[structure.bonded]\nstiffness = "1 N/m"\n', "structure.bonded", "there are 0 interfaces"),
     (RUB + RUB + MASSES + '[structure.bonded]\nstiffness = "1 N/m"\n', "structure.bonded", "there are 2 interfaces"),
     (STRUCTURE + '[structure.start]\nvelocity = ["1 m/s", "2 m/s"]\n', "structure.start.velocity",
-     "2 values for 1 mode; one for each"),
+     "2 values for 1 mode; give one for each"),
     (STRUCTURE.replace("cycles", "mass = 1\ncycles").replace('"base"', '"force"').replace(
         "acceleration", 'force = "1 N"\nacceleration'), "drive.mass", "leave drive.mass out"),
     (STRUCTURE[:STRUCTURE.index("[[")].replace("moving", 'file = "rig.csv"\nmoving') +
@@ -305,7 +306,7 @@ def test_exact_items_count_from_one_where_people_read_and_write(key, message, te
 def test_exact_a_remark_counts_a_mode_whose_name_is_a_number_from_one():
     """It once named structure.mode[4] where the name is "3"."""
     assert loads(POINT + MODES, sets=["structure.mode[2].damping=0.7"]).remarks == [
-        "structure.mode[2].damping = 0.7 is a ratio: 1 is critical, 1 % is 0.01"]
+        "structure.mode[2].damping = 0.7 is a damping ratio: 1 is critical, and 1 % is written 0.01"]
 
 
 def test_exact_an_item_by_its_number_from_one_is_the_one_that_python_counts_from_zero():

@@ -42,7 +42,7 @@ def test_always_an_effect_is_told_from_its_records(files):
     assert EFFECTS["contact.tilt"].equations in page and '[contact.tilt]\nangle = "0.1 mrad"' in page
     with_it, without = re.search(r"`contact_fraction` \| ([\d.]+) ± [\d.]+ \| ([\d.]+)", page).groups()
     assert float(with_it) < 0.25 and float(without) == 1
-    assert "not yet built" in " ".join(made.limits("friction.law=iwan"))
+    assert "not supported yet" in " ".join(made.limits("friction.law=iwan"))
     assert made.source("friction.law=iwan")[1].startswith("Segalman, D. J.: A four-parameter Iwan model")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ...core import BaseSine, PatchfemError
-from ...effects import unbuilt
 from ...model.model import Model, build
 from ...runs import joint
 from ...scene.changed import Base
@@ -59,7 +58,7 @@ class Asked:
             raise PatchfemError(f"{where}the rows give the input as an acceleration; replace drive.displacement by "
                                 "drive.acceleration")
         if scene.wear is not None:
-            raise PatchfemError(unbuilt(f"{where}beside [wear]", "leave [wear] out"))
+            raise PatchfemError(f"{where}[wear] cannot be fitted; leave [wear] out")
         for one in self.wanted:
             if one.key.startswith("drive.") or one.key == "measured.reading_cutoff":
                 raise PatchfemError(f"--free {one.key}: it is not a value of the rig; the rows give the drive")

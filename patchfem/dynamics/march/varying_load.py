@@ -64,7 +64,7 @@ def plastic(static: float, length: float) -> Rubbing:
 def bonds(law) -> Rubbing:
     """The stretch reading with p = 1 of friction.bonds.parameters.Bonds at every point. PatchfemError for others."""
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
-        raise PatchfemError(unbuilt("friction: such bonds with a load that changes", "recursion"))
+        raise PatchfemError(unbuilt("friction: a load that changes with such bonds", "recursion"))
 
     return Rubbing(POINTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
                    law.length)
@@ -74,7 +74,7 @@ def lists(law, reach: float, merge: float) -> Rubbing:
     """The printed reading of friction.bonds.parameters.Bonds, a list of bonds at every point: bonds keep the pressure
     that they formed under. PatchfemError for the other, of which bonds are let go as the load falls."""
     if law.reading != "report":
-        raise PatchfemError(unbuilt("friction: such bonds with a load that changes", "recursion"))
+        raise PatchfemError(unbuilt("friction: a load that changes with such bonds", "recursion"))
     return Rubbing(LISTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
                    law.length, (law, reach, merge))
 
@@ -85,9 +85,10 @@ def sets_of(patch, spring: float = 0.0) -> ContactSets:
     PatchfemError for a smooth skin, strips, or a patch that carries no load.
     """
     if patch.skin is not None:
-        raise PatchfemError(unbuilt("contact.asperities.law: a smooth skin with a load that changes", "linear"))
+        raise PatchfemError(unbuilt("contact.asperities.law: a law that is not linear, with a load that "
+                                    "changes,", "linear"))
     if patch.strips is not None:
-        raise PatchfemError(unbuilt("contact.strips: with a load that changes", "either"))
+        raise PatchfemError(unbuilt("[contact.strips] with a load that changes", "either"))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     c, x = patch.pieces.normal, patch.x
     if spring > 0:
@@ -231,7 +232,7 @@ def model_of(modes: ModalBasis, law: Rubbing, sets: ContactSets | None, load=Non
     """The model of a basis on contact sets, or under a prescribed load on one point, which no heave or pitch can move.
     shear: ShearModes of an elastic-plastic law or of bonds; PatchfemError beside any other."""
     if shear is not None and law.kind not in (PLASTIC, POINTS, LISTS):
-        raise PatchfemError(unbuilt("friction.law: this one with a load that changes and [contact.shear]", "stiff"))
+        raise PatchfemError(unbuilt("friction.law: this law with a load that changes and [contact.shear]", "stiff"))
     if shear is not None and shear.points.size != sets.x.size:
         raise PatchfemError("contact.shear: under a load that changes the shear modes must span every node")
     if load is not None and any(part is not None and np.any(part) for part in (modes.normal, modes.pitch)):

@@ -34,9 +34,8 @@ def limit_share(model, patch) -> float:
     forward, back = _law().limits(patch.x, sigma, weight, f.bond_length, f.order)
     if abs(forward - back) > ALIKE * max(forward, back):
         raise PatchfemError(unbuilt(
-            f"'{f.law}' on a pressure that is not symmetric",
-            f"the limit is {forward * f.static:.6g} N forward and {back * f.static:.6g} N back; make the patch "
-            "symmetric or use a bench, [slide]"), "friction.law")
+            f"'{f.law}' on a pressure that is not symmetric (slip force {forward * f.static:.6g} N forward, "
+            f"{back * f.static:.6g} N back)", "make the patch symmetric or use a bench, [slide]"), "friction.law")
     return (forward + back) / 2 / patch.pressure.load
 
 

@@ -42,60 +42,60 @@ Substance = Annotated[Material, BeforeValidator(material)]
 class Coating(Table):
     """A hard layer on a piece: what it is made of and how thick it is, part of the piece's height."""
 
-    material: key(Substance, "what the layer is made of, written as a substrate is")
-    thickness: key(Length, "thickness of the layer, part of the height of its piece")
+    material: key(Substance, "material of the coating, given in the same way as substrate")
+    thickness: key(Length, "thickness of the coating, included in the height of its piece")
 
 
 class OnePiece(Table):
     """What one of the two pieces has otherwise than the other; `coating = "none"` leaves it bare."""
 
     height: key(Length | None, "height of this piece; contact.height unless given") = None
-    length: key(Length | None, "length of this piece, its middle at x = 0; contact.length unless given; the interface "
-                "is as long as the shorter one") = None
-    substrate: key(Substance | None, "what this piece is made of; contact.substrate unless given") = None
-    coating: key(Coating | Literal["none"] | None, 'layer of this piece, {material = ..., thickness = ...}, or "none"; '
-                 'contact.coating unless given') = None
-    chamfer: key(Length | None, "length along x, and depth, that is cut off both ends at 45 degrees; the interface "
-                 "stops there") = None
-    end_radius: key(Length | None, "radius that rounds both ends off; the interface stops where the slope "
-                    "exceeds 0.097") = None
+    length: key(Length | None, "length of this piece, centred at x = 0; contact.length unless given; the interface "
+                "has the length of the shorter piece") = None
+    substrate: key(Substance | None, "material of this piece; contact.substrate unless given") = None
+    coating: key(Coating | Literal["none"] | None, 'coating of this piece, {material = ..., thickness = ...}, or '
+                 '"none"; contact.coating unless given') = None
+    chamfer: key(Length | None, "size of the 45 degree chamfer at both ends; the interface stops where the chamfer "
+                 "starts") = None
+    end_radius: key(Length | None, "radius of the rounded ends; the interface stops where the slope of "
+                    "the rounding exceeds 0.097") = None
 
 
 class Tilt(Table):
     """A prescribed angle between the pieces; `on` is the piece that carries the shape."""
 
     angle: key(quantity("angle"), "angle between the pieces; > 0 opens the gap at +x")
-    on: key(Piece, "the piece that carries the shape, and with it the pressure as it slides") = "upper"
+    on: key(Piece, "the piece that carries the shape; the pressure moves with this piece as it slides") = "upper"
 
 
 class LoadLine(Table):
     """The line of the load beside the middle of a piece that is free to rotate, by offset or by moment."""
 
-    offset: key(Place | None, "distance of the line of the load from the middle of the patch; > 0 moves the pressure "
-                "to +x", "unless moment") = None
-    moment: key(quantity("moment") | None, "moment about the middle of the patch in place of the offset") = None
+    offset: key(Place | None, "distance of the load line from the middle of the patch; > 0 moves the pressure to "
+                "+x", "unless moment") = None
+    moment: key(quantity("moment") | None, "moment about the middle of the patch, in place of the offset") = None
 
 
 class Approach(Table):
     """A prescribed closing of the holders in place of the load."""
 
-    distance: key(quantity("length", ge=0), "how far the holders close from first touch, in place of a load")
+    distance: key(quantity("length", ge=0), "approach of the holders from first touch, in place of a load")
 
 
 class Holder(Table):
     """The springs between the far face and what holds it."""
 
-    rotational_stiffness: key(quantity("rotational stiffness", gt=0) | None, "stiffness against rotation between the "
-                              "far face and what holds it", "unless tangential_stiffness") = None
-    tangential_stiffness: key(quantity("stiffness", gt=0) | None, "stiffness along x between the far face and what "
-                              "holds it; rigid unless given") = None
+    rotational_stiffness: key(quantity("rotational stiffness", gt=0) | None, "rotational stiffness between the far "
+                              "face and its holder", "unless tangential_stiffness") = None
+    tangential_stiffness: key(quantity("stiffness", gt=0) | None, "stiffness along x between the far face and its "
+                              "holder; rigid unless given") = None
 
 
 def convex(value: object) -> object:
     """A radius as it is; ValueError with what to write instead for one below 0, a hollow."""
     if str(value).lstrip().startswith("-"):
-        raise ValueError("a crown is convex, its radius > 0; a hollow is given by its heights: leave [contact.crown] "
-                         'out and name a file with the columns "x [mm],z [um]" of z = x^2/(2 radius) as '
+        raise ValueError("a crown is convex, so its radius must be > 0; for a hollow leave out [contact.crown] and "
+                         'give a file with the columns "x [mm],z [um]" of z = x^2/(2 radius) as '
                          "contact.profile.file")
     return value
 
@@ -103,49 +103,49 @@ def convex(value: object) -> object:
 class Crown(Table):
     """A rounding of this radius over the patch."""
 
-    radius: key(Annotated[Length, BeforeValidator(convex)], "radius of the rounding: the gap grows as x^2/(2 radius)")
+    radius: key(Annotated[Length, BeforeValidator(convex)], "radius of the crown: the gap grows as x^2/(2 radius)")
     on: key(Piece, "the piece that carries the shape") = "upper"
 
 
 class Step(Table):
     """A step of this height at this place."""
 
-    height: key(Place, "how much wider the gap is beyond the step")
-    at: key(Place, "place of the step from the middle of the patch")
+    height: key(Place, "height of the step: the gap is wider by it where x > at")
+    at: key(Place, "position x of the step, 0 at the middle of the patch")
     on: key(Piece, "the piece that carries the shape") = "upper"
 
 
 class ProfileFile(Table):
     """Measured heights, added to the gap."""
 
-    file: key(Text, "one trace of heights along x: text with units in its header, or a file of an instrument")
-    heights: key(Literal["gap", "surface"], "gap: a larger height is an opening; surface: a stylus trace, whose peaks "
-                 "are material of the piece that carries the shape") = "gap"
+    file: key(Text, "file of one height trace along x: text with units in its header, or an instrument's file")
+    heights: key(Literal["gap", "surface"], "'gap': larger heights open the gap; 'surface': a stylus trace, whose "
+                 "peaks are material of the piece that carries the shape") = "gap"
     on: key(Piece, "the piece that carries the shape") = "upper"
 
 
 class Asperities(Table):
     """A compliant rough layer; the law decides which of the other keys are used."""
 
-    law: key(Literal["linear", "exponential", "hertz"], "how the rough layer gives way: pressure linear or exponential "
-             "in its closing, or of spherical peaks with Gaussian heights")
-    normal_stiffness: key(quantity("foundation stiffness", gt=0) | None, "pressure per closing; with the exponential "
-                          "law that at first touch") = None
-    decay_length: key(Length | None, "closing over which the pressure of the exponential law grows by a factor "
-                      "e") = None
+    law: key(Literal["linear", "exponential", "hertz"], "law of the rough layer: pressure linear or exponential in its "
+             "compression, or from spherical peaks of Gaussian heights")
+    normal_stiffness: key(quantity("foundation stiffness", gt=0) | None, "pressure per compression of the layer; for "
+                          "law 'exponential' its value at first touch") = None
+    decay_length: key(Length | None, "compression over which the pressure of law 'exponential' grows by a "
+                      "factor e") = None
     radius: key(Length | None, "radius of the tips of the peaks", "law `hertz`, unless from or rms_height") = None
     density: key(quantity("areal density", gt=0) | None, "number of peaks per area", "as radius") = None
-    height_deviation: key(Length | None, "standard deviation of the heights of the peaks", "as radius") = None
-    from_: key(Text | None, "file of a trace whose peaks these are: of one rough piece on a smooth one",
+    height_deviation: key(Length | None, "standard deviation of the peak heights", "as radius") = None
+    from_: key(Text | None, "file of a height trace from which the peaks are taken: one rough piece on a smooth one",
                "law `hertz`, unless radius or rms_height") = Field(None, alias="from")
-    rms_height: key(Length | None, "root mean square of the heights of a trace that the peaks are made from; of two "
-                    "rough pieces the root of the sum of both squares, as of slope and curvature",
+    rms_height: key(Length | None, "root mean square height of the rough trace; for two rough pieces the root of "
+                    "the sum of both squares, as for slope and curvature",
                     "law `hertz`, unless radius or from") = None
     rms_slope: key(Positive | None, "root mean square of the slope of that trace", "as rms_height") = None
     rms_curvature: key(quantity("curvature", gt=0) | None, "root mean square of the curvature of that trace",
                        "as rms_height") = None
-    tangential_ratio: key(Positive | None, "tangential over normal stiffness of the layer; rigid along x "
-                          "unless given") = None
+    tangential_ratio: key(Positive | None, "tangential over normal stiffness of the rough layer; the "
+                          "layer is rigid along x unless given") = None
 
 
 class Shear(Table):
@@ -155,12 +155,13 @@ class Shear(Table):
 class Grooves(Table):
     """Matched grooves whose flanks the load climbs."""
 
-    wavelength: key(Length, "distance of the grooves along x")
-    amplitude: key(quantity("length", ge=0), "half the height of their flanks, peak to peak; 0 is the law of friction "
-                   "itself")
-    phase: key(quantity("angle"), "place of the bottom of a groove, 2 pi x/wavelength, from where the run begins") = 0.0
-    lifted_mass: key(quantity("mass", ge=0), "mass that rises with the load as it climbs; its inertia counts, its "
-                     "weight is part of the load") = 0.0
+    wavelength: key(Length, "wavelength of the grooves along x")
+    amplitude: key(quantity("length", ge=0), "half the height of the grooves from valley to peak; with 0 the friction "
+                   "law acts alone")
+    phase: key(quantity("angle"), "phase 2 pi x/wavelength of a groove's bottom, x counted from the start of the "
+                                  "run") = 0.0
+    lifted_mass: key(quantity("mass", ge=0), "mass that rises as the load climbs the grooves; it adds inertia "
+                     "only, because its weight is part of the load") = 0.0
 
 
 def outermost(width: float, count: int) -> float:
@@ -173,7 +174,7 @@ class Strips(Table):
 
     count: key(whole(1, 10_000), "number of equal strips side by side over the width")
     roll: key(quantity("angle"), "rotation of the holder about x, which shifts the pressure sideways") = 0.0
-    offset: key(Place | None, "lateral place of the load line; the upper piece is then free to roll") = None
+    offset: key(Place | None, "lateral position of the load line; if given, the upper piece is free to roll") = None
 
 
 class Contact(Table):
@@ -185,14 +186,14 @@ class Contact(Table):
     load: key(Force | None, "total normal force on the interface, weight included; [contact.approach] may stand in its "
               "place", "unless [contact.approach]") = None
     pairs: key(whole(1, 1_000_000), "number of equal patches that share the load; forces and stiffnesses are reported "
-               "for all of them") = 1
+               "for all of them together") = 1
     plane: key(Literal["strain", "stress"], "plane strain or plane stress in the pieces") = "strain"
-    element_size: key(Length | None, "length of the elements along an even interface; without it the tolerance grades "
-                      "the mesh") = None
-    substrate: key(Substance, "what the pieces are made of: a name of the material table, or a table of young, "
+    element_size: key(Length | None, "element length of a uniform mesh along the interface; unless given, the mesh is "
+                      "graded to meet the tolerance") = None
+    substrate: key(Substance, "material of the pieces: a name of the material table, or a table of young, "
                    "poisson, density")
-    mesh: key(Text | None, "a mesh file of both pieces, tagged as GUIDE.md says; made from the dimensions "
-              "unless given") = None
+    mesh: key(Text | None, "a mesh file of both pieces, tagged as GUIDE.md says; unless given, the mesh "
+              "is made from the dimensions") = None
     coating: Coating | None = None
     upper: OnePiece | None = None
     lower: OnePiece | None = None

@@ -17,7 +17,8 @@ class Elastic(NamedTuple):
 MATERIALS: dict[str, Elastic] = {
     "Ti-8Al-1Mo-1V": Elastic(121e9, 0.32, 4370.0, "Handbook values of the mill-annealed near-alpha alloy at 20 degC."),
     "WC-Co": Elastic(
-        250e9, 0.24, 14500.0, "Assumed: sprayed coating; pores and splats leave 200-350 GPa of the sintered 600 GPa."
+        250e9, 0.24, 14500.0, "Assumed for a sprayed coating: pores and splat boundaries lower the 600 GPa of "
+                              "sintered material to 200-350 GPa."
     ),
     "WC-Co sintered": Elastic(600e9, 0.22, 14900.0, "Handbook values of the dense cermet with about 6 % cobalt."),
     "steel": Elastic(210e9, 0.30, 7850.0, "Handbook values of plain carbon steel at 20 degC."),

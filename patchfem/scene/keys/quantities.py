@@ -131,7 +131,7 @@ def _malformed(words: str, kind: str) -> str:
     if _BARE.fullmatch(words):
         reason = f"'{shown}' is a bare number without a unit"
     elif "±" in words or "+/-" in words or "+-" in words:
-        reason = f"'{shown}' carries a tolerance: give the nominal value alone"
+        reason = f"'{shown}' has a tolerance: give only the nominal value"
     elif _COMMA.match(words):
         reason = f"'{shown}' has a comma: write the decimal separator as a point"
     elif "#" in words:
@@ -149,7 +149,7 @@ def _wrong_unit(number: str, unit: str, kind: str) -> str:
     plain = _plain(unit)
     example = f"such as '{EXAMPLES[kind]}'"
     if "±" in unit or "+/-" in unit:
-        return f"'{number} {unit}' carries a tolerance: give the nominal value alone; {wanted(kind)}"
+        return f"'{number} {unit}' has a tolerance: give only the nominal value; {wanted(kind)}"
     if kind == "force" and plain in ("lb", "lbs", "#"):
         return f"'{unit}' is ambiguous for a force; did you mean 'lbf'? use one of {_list(kind)}, {example}"
     if kind == "temperature" and plain.lstrip("°").removeprefix("deg") in ("C", "F"):

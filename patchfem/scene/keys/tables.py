@@ -44,13 +44,13 @@ LawName, WaveName = Literal[tuple(LAWS)], Literal[tuple(WAVEFORMS)]
 class Normal(Table):
     """A normal load on a single point, with an optional oscillation."""
 
-    load: key(Force, "normal force on the point, its mean where it oscillates")
+    load: key(Force, "normal force on the point; for an oscillating load its mean")
     amplitude: key(Force | None, "amplitude of an oscillating load, load + amplitude cos(2 pi frequency t + phase), "
-                   "never below 0", "beside frequency") = None
-    frequency: key(Frequency | None, "frequency of the oscillating load", "beside amplitude") = None
+                   "never below 0", "with frequency") = None
+    frequency: key(Frequency | None, "frequency of the oscillating load", "with amplitude") = None
     phase: key(quantity("angle") | None, "phase of the oscillating load at t = 0") = None
     width: key(Length | None, "width of the contact across the path, for "
-               "friction.spread", "beside friction.spread") = None
+               "friction.spread", "with friction.spread") = None
     grooves: Grooves | None = None
 
 
@@ -73,44 +73,46 @@ class Friction(Table):
     kinetic: key(NotNegative | None, "coefficient of kinetic friction mu_k, at most static; static unless given") = None
     reference_speed: key(Speed | None, "speed v_0 over which the friction of the law tanh saturates") = None
     bond_length: key(Length | None, "length eps_0 over which a bond forms and breaks, at rest") = None
-    stiffness: key(quantity("stiffness", gt=0) | None, "slope of the force at first loading, of the whole contact; a "
-                   "patch shares it as the normal force") = None
-    chi: key(number(gt=-1, le=0) | None, "exponent of the sliders' density: a small cycle loses energy as its "
-             "amplitude to the power chi + 3") = None
-    beta: key(NotNegative | None, "share of the last slider: its stiffness over that of all the others") = None
-    exponent: key(Positive, "sharpness n of the knee") = 1.0
-    shape: key(number(gt=0, le=1), "share s of the unloading, which rests on the elastic line at 1/2; no energy is "
-               "created from there on") = 0.5
+    stiffness: key(quantity("stiffness", gt=0) | None, "initial slope of force over slide, for the whole contact; a "
+                   "patch shares it in proportion to the normal force") = None
+    chi: key(number(gt=-1, le=0) | None, "exponent of the distribution of sliders: in micro-slip the energy "
+             "dissipated per cycle grows as force amplitude to the power chi + 3") = None
+    beta: key(NotNegative | None, "stiffness of the last slider over that of all other sliders together") = None
+    exponent: key(Positive, "exponent n, which sets how sharp the transition from stick to slip is") = 1.0
+    shape: key(number(gt=0, le=1), "shape s of the unloading: at 1/2 it follows the elastic line; from 1/2 on, the "
+               "law creates no energy") = 0.5
     stribeck_speed: key(Speed | None, "speed v_s over which friction falls from static to kinetic") = None
-    micro_damping: key(quantity("damping", ge=0), "force per rate of the bristles' stretch, of the whole contact") = 0.0
-    viscous: key(quantity("damping", ge=0), "force per speed of the slide, of the whole contact") = 0.0
-    reading: key(Literal["stretch", "report"], "eq. 2.17 with the stretch of a bond kept apart from its damage, which "
-                 "never creates energy, or as the report prints it") = "stretch"
+    micro_damping: key(quantity("damping", ge=0), "force per rate of the bristle deflection, for the whole "
+                                                  "contact") = 0.0
+    viscous: key(quantity("damping", ge=0), "viscous force per sliding speed, for the whole contact") = 0.0
+    reading: key(Literal["stretch", "report"], "'stretch': eq. 2.17 with the stretch of a bond kept apart from its "
+                 "damage, which never creates energy; 'report': eq. 2.17 as printed") = "stretch"
     order: key(number(le=100), "power p with which a bond grows stronger along its path; > -1, and >= 0 for the "
                "reading stretch") = 1.0
-    rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (2.10); constant bond length without "
-                     "it and slip_growth", "beside slip_growth") = None
+    rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (2.10); without it and slip_growth "
+                     "the bond length is constant", "with slip_growth") = None
     slip_growth: key(Length | None, "length l_k by which the bond length grows with slip "
-                     "(2.10)", "beside rest_growth") = None
-    rest_speed: key(Speed | None, "speed v_h that floors |v| in a_s/|v|; 1e-3 of the peak speed unless given") = None
-    initial_bonds: key(Share, "share m_0 of the bonds that stand when the run begins") = 1.0
+                     "(2.10)", "with rest_growth") = None
+    rest_speed: key(Speed | None, "least speed v_h taken for |v| in a_s/|v|; 1e-3 of the peak speed unless "
+                                  "given") = None
+    initial_bonds: key(Share, "share m_0 of the bonds that exist when the run begins") = 1.0
     breakaway: key(number(ge=0, le=1), "share of the bond length over which a bond stretches without damage") = 0.0
-    spread: key(Length | None, "width rho of the bonds across the path (2.15); not counted unless given") = None
+    spread: key(Length | None, "width rho of the bonds across the path (2.15); ignored unless given") = None
     temperature: Temperature | None = None
 
 
 class Slide(Table):
     """A prescribed motion; which keys it needs depends on `kind`."""
 
-    kind: key(Literal["constant", "sine", "triangle", "dwell", "file"], "the motion: at constant speed, a sine, a "
-              "triangle, a slide with a rest, or a table of places")
-    amplitude: key(Length | None, "half peak-to-peak of the motion, which starts in its middle upwards") = None
-    frequency: key(Frequency | None, "cycles per time of a sine") = None
+    kind: key(Literal["constant", "sine", "triangle", "dwell", "file"], "prescribed motion: constant speed, sine, "
+              "triangle, slide with a rest, or a table of positions")
+    amplitude: key(Length | None, "half the peak-to-peak motion, which starts in the middle and rises") = None
+    frequency: key(Frequency | None, "frequency of the sine") = None
     speed: key(Speed | None, "speed of the slide") = None
-    distance: key(quantity("length", ge=0) | None, "way to slide, up to the rest of a dwell; of a triangle the way "
-                  "slid before its cycles, 0 unless given") = None
+    distance: key(quantity("length", ge=0) | None, "sliding distance; for a dwell, up to its rest; for a triangle, "
+                  "before its cycles (0 unless given)") = None
     hold: key(quantity("time", ge=0) | None, "time at rest") = None
-    distance_after: key(quantity("length", ge=0) | None, "way to slide on after the rest; 0 unless given") = None
+    distance_after: key(quantity("length", ge=0) | None, "sliding distance after the rest; 0 unless given") = None
     cycles: key(Positive | None, "number of cycles, fractions allowed; 1 unless given") = None
     file: key(Text | None, "table with columns time and displacement, and lateral for a slide in two directions") = None
 
@@ -120,12 +122,12 @@ class Mode(Table):
 
     name: key(Text, "name of the mode, unique")
     frequency: key(quantity("frequency", ge=0), "natural frequency; 0 Hz for a rigid mode")
-    damping: key(number(gt=-1), "damping ratio; below 0, energy that friction has to take (flutter)")
+    damping: key(number(gt=-1), "damping ratio; below 0 the mode gains energy, which friction must dissipate (flutter)")
     slide: key(Number, "motion of the patch along x per unit of the modal coordinate")
     normal: key(Number, "motion of the patch away from the contact per unit of the modal coordinate") = 0.0
     pitch: key(PerMetre, "rotation of the patch in the plane of the model per unit of the modal coordinate") = 0.0
     lateral: key(Number, "motion of the patch across x per unit of the modal coordinate") = 0.0
-    yaw: key(PerMetre, "rotation of the patch about its normal per unit of the modal coordinate; beside "
+    yaw: key(PerMetre, "rotation of the patch about its normal per unit of the modal coordinate; needs "
              "[contact.strips]") = 0.0
     base: key(Number | None, "share of the base motion that drives the mode; slide for the first mode, 0 for the "
               "others unless given; the squares sum to at most 1") = None
@@ -146,7 +148,7 @@ class Stiffening(Table):
 class Bonded(Table):
     """A second load path beside the contact."""
 
-    stiffness: key(quantity("stiffness", ge=0), "stiffness of the spring beside the contact")
+    stiffness: key(quantity("stiffness", ge=0), "stiffness of the spring in parallel with the contact")
     damping: key(quantity("damping", ge=0), "damping of that spring") = 0.0
     wavelength: key(Length | None, "period of an interlocking spring, k wavelength/(2 pi) sin(2 pi x/wavelength); "
                     "linear unless given") = None
@@ -173,8 +175,8 @@ class Damper(Table):
 class Interface(Friction):
     """A friction interface between two masses, with its own law and load."""
 
-    between: key(Between, "the two masses that rub, counted from 1, 0 for the base; the slide is the first less the "
-                 "second")
+    between: key(Between, "the two masses that rub, counted from 1, 0 for the base; the slide is the motion of the "
+                 "first minus that of the second")
     load: key(Force, "normal force on the interface")
 
 
@@ -190,17 +192,17 @@ class Reduced(Table):
     mass: key(Text, "file of the mass matrix; may be the file of the stiffness")
     damping: key(number(ge=0, lt=1) | Text | None, "damping ratio of every mode, or a file of the damping matrix; none "
                  "unless given") = None
-    boundary: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)], "coordinates that are kept, which "
-                  "interfaces, drive.mass and structure.output_mass count from 1: rows of the matrices, or "
-                  "node:direction such as 1201:x where the files name nodes")
-    modes: key(whole(0, 1000), "modes that are kept beside the boundary") = 12
-    method: key(Literal["craig-bampton", "free-interface"], "'craig-bampton' modes with the boundary held, "
-                "'free-interface' modes of the whole with residual attachment modes") = "craig-bampton"
+    boundary: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)], "boundary coordinates to keep: "
+                  "rows of the matrices, or node:direction such as 1201:x if the files name nodes; interfaces, "
+                  "drive.mass and structure.output_mass count them from 1")
+    modes: key(whole(0, 1000), "number of modes kept in addition to the boundary coordinates") = 12
+    method: key(Literal["craig-bampton", "free-interface"], "'craig-bampton': modes with the boundary "
+                "held; 'free-interface': modes of the whole structure with residual attachment modes") = "craig-bampton"
     moved: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)] | None, "coordinates that a base drive moves "
-               "along x, by row, range a..b:n of rows, node or direction; all of direction x, or all where the files "
-               "name none, unless given") = None
+               "along x, by row, range a..b:n of rows, node or direction; unless given, all in direction x, or all "
+               "if the files name no directions") = None
     slide: key(Between | None, "two boundary coordinates between which [contact] or [normal] slides, 0 for the base",
-               "beside friction") = None
+               "with [friction]") = None
     unit: key(Length, "unit of length of the files, whose forces are in N; \"1 mm\" for N, mm and tonne") = 1.0
 
 
@@ -216,11 +218,12 @@ class Start(Table):
 class Structure(Table):
     """The rig: modes, or masses with springs, or a file; `..._at` name places in a file of measured modes."""
 
-    moving_mass: key(Mass | None, "modal mass of every mode", "beside modes") = None
+    moving_mass: key(Mass | None, "modal mass of every mode", "with modes") = None
     travel: key(Length | None, "stop of the flexure: a motion beyond it ends the run; none unless given") = None
     mode: tuple[Mode, ...] = ()
-    measured: key(Literal["free", "stuck"], "'free': the modes are those without the joint; 'stuck': they were "
-                  "measured with it bolted, as are their dampings, and its stiffness is taken off them") = "free"
+    measured: key(Literal["free", "stuck"], "'free': the modes are those without the joint; 'stuck': "
+                  "frequencies and damping were measured with the joint bolted, and its stiffness is "
+                  "subtracted") = "free"
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
     masses: key(tuple[Mass, ...] | None, "masses of a rig of springs, in place of modes") = None
@@ -231,27 +234,27 @@ class Structure(Table):
     interface: tuple[Interface, ...] = ()
     file: key(Text | None, "file of matrices, modes or measured responses (.npz, .mat, .uff), in place of modes") = None
     reduced: Reduced | None = None
-    slide_at: key(Text | None, "place in the file that moves the patch along x, such as 12:+x") = None
-    output_at: key(Text | None, "place in the file that carries the accelerometer") = None
-    base_at: key(Text | None, "place in the file that is driven as the base") = None
-    force_at: key(Text | None, "place in the file at which the force drives") = None
-    normal_at: key(Text | None, "place in the file that moves the patch away from the contact") = None
-    pitch_at: key(Text | None, "place in the file that rotates the patch") = None
+    slide_at: key(Text | None, "node and direction in the file that moves the patch along x, such as 12:+x") = None
+    output_at: key(Text | None, "node and direction in the file that carries the accelerometer") = None
+    base_at: key(Text | None, "node and direction in the file that is driven as the base") = None
+    force_at: key(Text | None, "node and direction in the file at which the force acts") = None
+    normal_at: key(Text | None, "node and direction in the file that moves the patch away from the contact") = None
+    pitch_at: key(Text | None, "node and direction in the file that rotates the patch") = None
     start: Start | None = None
 
 
 class Drive(Table):
     """What sets the rig in motion; which keys it needs depends on `kind` and `waveform`."""
 
-    kind: key(Literal["base", "force", "free"], "what drives: the accelerated base, a force, or nothing after a "
-              "release")
-    waveform: key(WaveName, "course of the drive in time") = "sine"
+    kind: key(Literal["base", "force", "free"], "what drives the motion: 'base', an accelerated base; 'force'; "
+              "or 'free', a release without a drive")
+    waveform: key(WaveName, "waveform of the drive over time") = "sine"
     frequency: key(Frequency | None, "frequency of a sine or of levels") = None
     from_: key(Frequency | None, "frequency at which a sweep begins, or the lowest one of a random "
                "drive") = Field(None, alias="from")
     to: key(Frequency | None, "frequency at which a sweep ends, or the highest one of a random drive") = None
-    spectrum: key(quantity("acceleration spectrum", gt=0) | None, "one-sided spectral density of a random acceleration "
-                  "of the base, the same from `from` to `to`", "waveform `random` unless a file") = None
+    spectrum: key(quantity("acceleration spectrum", gt=0) | None, "one-sided spectral density of a random base "
+                  "acceleration, constant between `from` and `to`", "waveform `random` unless a file") = None
     seed: key(whole(0, 2**32 - 1) | None, "number of the random record; 0 unless given") = None
     rate: key(quantity("sweep rate", gt=0) | None,
               "change of frequency per time of a linear sweep", "waveform `sweep` unless log_rate") = None
@@ -260,29 +263,31 @@ class Drive(Table):
                       "acceleration of the base, zero to "
                       "peak", "kind `base` unless displacement, levels or a file") = None
     displacement: key(quantity("length", ge=0) | None, "displacement of the base, zero to peak, in place of an "
-                      "acceleration; where a release starts", "kind `free` unless [structure.start]") = None
+                      "acceleration; for kind `free` the displacement at release", "kind `free` unless "
+                                                                                   "[structure.start]") = None
     levels: key(Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)] | None,
-                "accelerations of the base, or forces, one after the other, the state carried over") = None
+                "accelerations of the base, or forces, run one after the other; each level starts from the state "
+                "that the one before it reached") = None
     frequencies: key(Annotated[tuple[Frequency, ...], Field(min_length=2, max_length=100)] | None, "frequencies of "
-                     "tones that drive together") = None
+                     "tones that act at the same time") = None
     accelerations: key(Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=2)] | None,
                        "acceleration of the base of each tone, zero to peak") = None
     phases: key(Annotated[tuple[quantity("angle"), ...], Field(min_length=2)] | None, "phase of each tone at the "
                 "start; 0 unless given") = None
-    onset: key(Literal["slip", "distortion", "gauge"], "what onset_level means: 'slip' the first irreversible motion "
-               "(of what gives way elastically, beyond a thousandth of the slide over which it does), 'distortion' a "
-               "third harmonic of the acceleration above 3 % of the first, 'gauge' half peak-to-peak at the output "
-               "above onset_length") = "distortion"
-    onset_length: key(Length | None, "half peak-to-peak at the output from which a gauge sees "
-                      "motion", "onset `gauge`") = None
+    onset: key(Literal["slip", "distortion", "gauge"], "what counts as the onset of slip in onset_level; 'slip': the "
+               "first irreversible motion (for an elastic interface, more than a thousandth of its elastic range); "
+               "'distortion': a third harmonic of the acceleration above 3 % of the first; 'gauge': half the "
+               "peak-to-peak motion at the output above onset_length") = "distortion"
+    onset_length: key(Length | None, "smallest motion that the gauge shows, as half "
+                      "peak-to-peak at the output", "onset `gauge`") = None
     force: key(Force | None, "force, zero to peak", "kind `force` unless a file") = None
     mass: key(whole(1, MOST_MASSES) | None, "number of the mass on which the force acts; the output unless "
               "given") = None
-    cycles: key(Positive | None, "length of the run, of each level, in cycles of the drive or of the first mode that "
-                "is not rigid", "unless duration, a sweep or a file") = None
-    duration: key(Seconds | None, "length of the run, of each level, in place of cycles") = None
-    file: key(Text | None, "record of the drive, a table with units or UFF; of a random drive a table of its "
-              "spectrum") = None
+    cycles: key(Positive | None, "length of the run, or of each level, in cycles of the drive; for a release in "
+                "cycles of the first mode that is not rigid", "unless duration, a sweep or a file") = None
+    duration: key(Seconds | None, "length of the run, or of each level, as a time in place of cycles") = None
+    file: key(Text | None, "record of the drive, a table with units or UFF; for a random drive a table of "
+              "its spectrum") = None
 
     @field_validator("levels", mode="before")
     @classmethod
@@ -307,18 +312,18 @@ class WornFriction(Table):
 class Wear(Table):
     """Material removed over many cycles."""
 
-    coefficient: key(quantity("wear coefficient", ge=0), "volume worn per load and slip path, of both pieces together; "
-                     "form 'energy': per friction work")
-    upper_share: key(Share, "share of the worn depth that the upper piece bears") = 0.5
+    coefficient: key(quantity("wear coefficient", ge=0), "volume worn off both pieces per load and slip path; for form "
+                     "'energy' per friction work")
+    upper_share: key(Share, "share of the worn depth that is worn off the upper piece") = 0.5
     cycles: key(Positive, "number of cycles over which material is removed, each like the converged last cycle")
-    jumps: key(Literal["auto"] | whole(1, 1_000_000), "number of equal steps in which the cycles are taken; by the "
-               "tolerance unless given") = "auto"
-    form: key(Literal["archard", "energy"], "'archard': depth by pressure and slip path; 'energy': by friction work "
-              "per area") = "archard"
-    scheme: key(Literal["implicit", "explicit"], "'explicit' takes the pressure from the start of a step and is "
-                "refused beyond its critical length") = "implicit"
+    jumps: key(Literal["auto"] | whole(1, 1_000_000), "number of equal steps into which these cycles are divided; "
+               "set by the tolerance unless given") = "auto"
+    form: key(Literal["archard", "energy"], "'archard': depth proportional to pressure and slip path; 'energy': to "
+              "friction work per area") = "archard"
+    scheme: key(Literal["implicit", "explicit"], "'explicit' uses the pressure at the start of each step; steps "
+                "too long for it to be stable are refused") = "implicit"
     start: key(Text | None, "result.nc of a run with [wear], such as out/before/result.nc, whose worn depth this run "
-               "goes on from; new pieces unless given") = None
+               "starts from; unless given, the pieces are new") = None
     friction: WornFriction | None = None
 
 
@@ -328,16 +333,16 @@ class Measured(Table):
     file: key(Text, "table of measured rows: frequency, input, acceleration, displacement, flag")
     acceleration_gain: key(Positive, "factor by which the reading exceeds the true acceleration") = 1.0
     displacement_gain: key(Positive, "factor by which the reading of the gauge exceeds the true displacement") = 1.0
-    reading: key(Literal["peak", "fundamental", "rms", "lowpass"], "what the accelerometer shows: 'peak' the largest "
-                 "acceleration, 'fundamental' its part at the drive's frequency, 'rms' its effective value, 'lowpass' "
-                 "the largest behind a low pass of second order") = "peak"
-    reading_cutoff: key(Frequency | None, "cut-off frequency of that low pass", "reading `lowpass`") = None
+    reading: key(Literal["peak", "fundamental", "rms", "lowpass"], "what the accelerometer shows: 'peak': the "
+                 "largest acceleration; 'fundamental': its part at the drive frequency; 'rms': its root mean "
+                 "square; 'lowpass': its largest value after a second-order low-pass filter") = "peak"
+    reading_cutoff: key(Frequency | None, "cut-off frequency of the low-pass filter", "reading `lowpass`") = None
 
 
 class Tables(Table):
     """The whole scene as tables, in the order in which effects are named."""
 
-    title: key(Title, "a line of text that stands over the results") = ""
+    title: key(Title, "title of the results, one line of text") = ""
     contact: Contact | None = None
     normal: Normal | None = None
     friction: Friction | None = None

@@ -47,7 +47,7 @@ DIVIDED_BY = {"mass", "frequency", "acceleration", "stiffness", "damping", "cubi
 
 def _within(value: float, least: float) -> float:
     if value and not least <= abs(value) <= LARGEST:
-        raise ValueError(f"{value:g} in SI is outside the computable range; 0 or a size from {least:g} to "
+        raise ValueError(f"{value:g} in SI is outside the computable range; 0 or a magnitude from {least:g} to "
                          f"{LARGEST:g} is needed")  # fmt: skip
     return value
 
@@ -75,7 +75,7 @@ def _printable(value: str) -> str:
     """A text without signs that no file of results can hold: control characters and halves of a pair."""
     wrong = next((sign for sign in value if category(sign) in ("Cc", "Cs") and sign not in "\n\t"), None)
     if wrong is not None:
-        raise ValueError(f"holds the sign U+{ord(wrong):04X}, which no text can show; leave it out")
+        raise ValueError(f"holds the sign U+{ord(wrong):04X}, which cannot be displayed; remove it")
     return value
 
 

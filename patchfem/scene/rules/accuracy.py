@@ -19,7 +19,8 @@ def _quadrature(draft: Draft, kind: str) -> None:
     if engine == "recursion" and not alone:
         draft.say(key, "'recursion' sums only reading 'stretch' with order = 1; use 'auto' or 'merged'")
     elif engine != "recursion" and shear and alone:
-        draft.say(key, f"'{engine}' beside {shear}: every point has its own path there; use 'recursion' or 'auto'")
+        draft.say(key, f"'{engine}' cannot be used with {shear}, where every point has its own path; use "
+                       "'recursion' or 'auto'")
 
 
 def _knobs(draft: Draft, kind: str) -> None:
@@ -56,7 +57,7 @@ def _beside_laws(knob: str, accuracy, found: Motion) -> str:
         return "" if engine != "auto" or any(map(listed, found.laws)) else "for a law that is summed by recursion"
     if knob == "shear_modes":
         if not found.soft:
-            return "for pieces that do not give way"
+            return "for pieces that are rigid in shear"
         changes = found.varies or found.spring.endswith("grooves]") or any(has(one.law, "bonds") for one in found.laws)
         return "" if changes else f"for law '{found.laws[0].law}' under a constant load, whose elements are exact"
     return ""

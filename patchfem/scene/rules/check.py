@@ -32,7 +32,7 @@ def _normal(draft: Draft) -> None:
     if draft.tables.normal is None:
         return
     if draft.given("normal.amplitude") and not draft.given("normal.frequency"):
-        draft.lacks("normal.frequency", "an amplitude needs it")
+        draft.lacks("normal.frequency", "normal.amplitude needs it")
     for key in ("frequency", "phase"):
         if draft.given(f"normal.{key}") and not draft.given("normal.amplitude"):
             draft.lacks("normal.amplitude", f"{key} needs it")
@@ -48,7 +48,7 @@ def _measured(draft: Draft) -> None:
         draft.lacks("measured.reading_cutoff", "reading 'lowpass' needs it, such as '600 Hz'")
     drive = draft.tables.drive
     if draft.tables.measured.reading != "peak" and (drive is None or drive.kind == "free" or drive.waveform != "sine"):
-        draft.remark("measured.reading is that of a motion under one sine and is not used")
+        draft.remark("measured.reading has a meaning only under one sine drive and is not used")
     if cut and not low:
         draft.remark(f"measured.reading_cutoff has no meaning for reading '{draft.tables.measured.reading}' and is not "
                      "used")
@@ -63,8 +63,8 @@ def _slide(draft: Draft) -> None:
         draft.say("slide.distance", f"must be > 0 m for kind '{slide.kind}'")
     law = draft.tables.friction
     if slide.kind == "dwell" and slide.hold and law is not None and _ageless(law):
-        draft.remark("slide.hold has no effect while nothing ages at rest; add friction.rest_growth and slip_growth to "
-                     "law 'nonlocal'")  # fmt: skip
+        draft.remark("slide.hold has no effect, because no bond grows at rest; add friction.rest_growth and "
+                     "slip_growth to law 'nonlocal'")  # fmt: skip
 
 
 def _ageless(law: Friction) -> bool:
@@ -78,7 +78,8 @@ def _kind(draft: Draft) -> str:
     if draft.given("structure.interface"):
         instead = modes_instead(draft) if "contact" in has else ""
         for name in sorted(has & {"friction", "normal", "contact"}):
-            draft.say(name, f"[{name}] and [[structure.interface]] exclude each other: an interface carries its own" +
+            draft.say(name, f"[{name}] and [[structure.interface]] exclude each other: each interface has its own "
+                            "law and load" +
                       (f"; {instead}" if instead and name == "contact" else ""))
         has = has - {"contact"} | {"friction", "normal"}  # an interface's load is no [normal] that someone wrote
     if {"contact", "normal"} <= has:
@@ -86,7 +87,8 @@ def _kind(draft: Draft) -> str:
         has.discard("normal")
     moves, pressed = has & {"structure", "drive"}, has & {"contact", "normal"}
     if "slide" in has and moves:
-        draft.say("slide", "[slide] prescribes the motion, [structure] with [drive] computes it: keep one")
+        draft.say("slide", "[slide] prescribes the motion, [structure] with [drive] computes it: keep only one of "
+                           "the two")
         return ""
     if has == {"contact"}:
         return "patch"
@@ -109,9 +111,9 @@ def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[st
         draft.lacks_table("friction", f"{others} without it do not make a run")
     if friction and draft.given("structure.masses") and not draft.given("structure.interface"):
         if "contact" in has:
-            draft.say("structure.masses", f"masses do not rub on [contact]; {modes_instead(draft)}")
+            draft.say("structure.masses", f"structure.masses cannot be used with [contact]; {modes_instead(draft)}")
         else:
-            draft.lacks("structure.interface", "masses rub at interfaces between two of them: write "
+            draft.lacks("structure.interface", "friction between masses needs an interface: write "
                                                "[[structure.interface]] with its law and load instead of [friction]")
     if friction and not pressed:
         draft.lacks_table("contact", "friction needs a normal load, [contact] or [normal]")
@@ -139,5 +141,5 @@ def _sliding(draft: Draft, kind: str) -> None:
     structure = draft.tables.structure
     modes = structure.mode if kind == "rig" and structure is not None else ()
     if modes and all(mode.slide == 0 for mode in modes):
-        draft.say("structure.mode.0.slide", "0 in every mode, so nothing slides at the patch; give the slide of a mode "
-                                            "that moves it, or leave out [friction] and its load")  # fmt: skip
+        draft.say("structure.mode.0.slide", "slide is 0 in every mode, so nothing slides at the patch; give slide for "
+                                            "the mode that moves it, or leave out [friction] and its load")  # fmt: skip

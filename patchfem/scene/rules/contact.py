@@ -20,7 +20,7 @@ def _contact(draft: Draft) -> None:
     outlines(draft)
     if contact.height and contact.length and contact.height > TALLEST * contact.length:
         draft.say("contact.height", f"{contact.height:g} m is more than {TALLEST} times contact.length, but the "
-                                    f"pressure reaches only a few lengths deep; use at most "
+                                    f"stress reaches only a few lengths deep; use at most "
                                     f"{TALLEST * contact.length:.3g} m, and a spring of the structure for the rest")
     flat = flat_of(contact)
     if contact.element_size and flat and contact.element_size > flat:
@@ -56,8 +56,8 @@ def _contact(draft: Draft) -> None:
             _peaks(draft)
         bare = contact.asperities.law == "exponential" and contact.asperities.normal_stiffness is None
         if contact.approach and bare:
-            draft.lacks("contact.asperities.normal_stiffness", "law 'exponential' with [contact.approach] needs it "
-                        "at first touch, where an approach starts")  # fmt: skip
+            draft.lacks("contact.asperities.normal_stiffness", "law 'exponential' with [contact.approach] needs "
+                        "the stiffness at first touch, where the approach starts")  # fmt: skip
 
 
 def _peaks(draft: Draft) -> None:
@@ -66,7 +66,7 @@ def _peaks(draft: Draft) -> None:
                                                                   for one in way)]
     if len(told) > 1:
         second = next(one for one in told[1] if draft.given(f"{at}.{one}"))
-        draft.say(f"{at}.{second}", f"is given with {', '.join(told[0])}: the peaks are described once; keep one")
+        draft.say(f"{at}.{second}", f"is given with {', '.join(told[0])}, which describes the same peaks; keep one")
     for one in (told or PEAKS)[0]:
         if len(told) < 2 and not draft.given(f"{at}.{one}"):
             others = "" if told else "; or give from, or rms_height, rms_slope and rms_curvature"
@@ -77,9 +77,9 @@ def _free_roll(draft: Draft, contact) -> None:
     """A load line over the width leaves the roll free, which a load alone determines, and two strips at least."""
     at, strips = "contact.strips.offset", contact.strips
     if draft.given("contact.strips.roll"):
-        draft.say(at, "leaves the roll free: keep offset or contact.strips.roll")
+        draft.say(at, "offset frees the roll that contact.strips.roll prescribes: keep one of the two")
     if draft.given("contact.approach"):
-        draft.say(at, "is where the load acts: use contact.load in place of [contact.approach]")
+        draft.say(at, "a load line needs a load: use contact.load in place of [contact.approach]")
     if strips.count is not None and strips.count < 2:
         draft.say(at, f"{strips.count} strip does not feel a roll: raise contact.strips.count")
     elif strips.count and contact.width and strips.offset is not None:

@@ -55,35 +55,36 @@ def _sweep(draft: Draft, drive: Any) -> None:
     elif not rate and not octaves:
         draft.lacks("drive.rate", "or drive.log_rate instead, such as '1 oct/min'")
     if drive.from_ is not None and drive.from_ == drive.to:
-        draft.say("drive.to", f"{drive.to:g} Hz is where the sweep starts; another frequency is needed")
+        draft.say("drive.to", f"{drive.to:g} Hz is also where the sweep starts; give another frequency")
 
 
 def _tones(draft: Draft, drive: Any) -> None:
     if drive.kind == "force":
-        draft.say("drive.kind", "tones shake the base; give kind 'base', or a record of the force as waveform 'file'")
+        draft.say("drive.kind", "tones can only shake the base; set drive.kind = 'base', or give a record of the "
+                                "force with drive.waveform = 'file'")
     for key in ("accelerations", "phases"):
         given = getattr(drive, key)
         if given is not None and drive.frequencies is not None and len(given) != len(drive.frequencies):
-            draft.say(f"drive.{key}", f"{len(given)} stand beside {len(drive.frequencies)} frequencies; one each is "
-                                      "wanted")
+            draft.say(f"drive.{key}", f"{len(given)} values for {len(drive.frequencies)} frequencies; give one "
+                                      "for each")
     if drive.accelerations is not None and not any(drive.accelerations):
-        draft.say("drive.accelerations", "all are 0, so nothing moves")
+        draft.say("drive.accelerations", "all accelerations are 0, so nothing moves")
 
 
 def _random(draft: Draft, drive: Any) -> None:
     level, table = draft.given("drive.spectrum"), draft.given("drive.file")
     if drive.kind == "force":
-        draft.say("drive.kind", "a random drive shakes the base; give kind 'base', or a record of the force as "
-                                "waveform 'file'")
+        draft.say("drive.kind", "a random drive can only shake the base; set drive.kind = 'base', or give a "
+                                "record of the force with drive.waveform = 'file'")
     if level and table:
         draft.say("drive.file", "spectrum and file exclude each other: keep one")
     elif not level and not table:
         draft.lacks("drive.spectrum", "or drive.file, a table with the header frequency [Hz],level [g^2/Hz]")
     for key in ("from", "to") if level else ():
         if not draft.given(f"drive.{key}"):
-            draft.lacks(f"drive.{key}", "a spectrum has two ends")
+            draft.lacks(f"drive.{key}", "a spectrum needs a lowest and a highest frequency")
     if drive.from_ is not None and drive.to is not None and drive.to <= drive.from_:
-        draft.say("drive.to", f"{drive.to:g} Hz does not lie above drive.from, {drive.from_:g} Hz")
+        draft.say("drive.to", f"{drive.to:g} Hz is not above drive.from, {drive.from_:g} Hz")
 
 
 def _size(draft: Draft, drive: Any) -> None:

@@ -12,7 +12,7 @@ def check_spread(draft: Draft, at: str, law: Friction) -> None:
     if law.spread is None:
         return
     if not takes(law.law, "spread"):
-        draft.say(f"{at}.spread", f"law '{law.law}' has no bonds to spread; spread belongs to {using('spread')}")
+        draft.say(f"{at}.spread", f"law '{law.law}' has no spread; only these have one: {using('spread')}")
     elif at == "friction" and draft.tables.normal is not None and not draft.given("normal.width"):
         draft.lacks("normal.width", "friction.spread needs it")
 
@@ -45,7 +45,8 @@ def _frictions(draft: Draft) -> None:
 def _friction(draft: Draft, at: str, law: Friction) -> None:
     _needs(draft, at, law, "law", LAWS)
     if draft.given(f"{at}.kinetic") and not takes(law.law, "kinetic"):
-        draft.say(f"{at}.kinetic", f"law '{law.law}' has one coefficient only; kinetic belongs to {using('kinetic')}")
+        draft.say(f"{at}.kinetic", f"law '{law.law}' has only one coefficient; a kinetic one exists for "
+                                   f"{using('kinetic')}")
     elif law.kinetic is not None and law.static is not None and law.kinetic > law.static:
         draft.say(f"{at}.kinetic", f"{law.kinetic} is larger than static = {law.static}; kinetic <= static is needed")
     elif kinetic_unused(law):
@@ -64,10 +65,11 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
         wanted = "> -1" if has(law.law, "averaged") else wanted
         draft.say(f"{at}.order", f"must be {wanted}, not {law.order}")
     if law.breakaway and law.reading == "report":
-        draft.say(f"{at}.breakaway", "the law as printed (reading 'report') has none; use 'stretch' or leave it out")
+        draft.say(f"{at}.breakaway", "reading 'report' has no breakaway; use reading = 'stretch' or leave breakaway "
+                                     "out")
     contact = draft.tables.contact
     if law.static == 0 and law.law is not None and takes(law.law, "stiffness"):
-        draft.say(f"{at}.static", f"0 with law '{law.law}', whose springs need a limit force; static > 0 is "
+        draft.say(f"{at}.static", f"0 with law '{law.law}', whose springs need a slip force; static > 0 is "
                                   "needed")  # fmt: skip
     if law.static == 0 and contact and contact.gives_way:
         draft.say(f"{at}.static", f"0 with {contact.gives_way}: no point carries friction; static > 0 is needed, or "

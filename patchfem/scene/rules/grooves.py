@@ -19,13 +19,13 @@ def check_grooves(draft: Draft, kind: str) -> None:
     law = draft.tables.friction
     if kind not in ("bench", "rig"):
         if kind:
-            draft.say(at, f"[{at}] needs what slides: add [friction] and [slide], or [structure] with [drive]")
+            draft.say(at, f"[{at}] needs a sliding motion: add [friction] and [slide], or [structure] with [drive]")
         return
     if law is None or law.law is None:
         return
     _locks(draft, at, grooves, law)
     if kind == "bench" and grooves.lifted_mass:
-        draft.remark(f"{at}.lifted_mass has no meaning with [slide], whose motion is slow, and is not used")
+        draft.remark(f"{at}.lifted_mass has no meaning with [slide], which has no inertia, and is not used")
     if grooves.amplitude:
         _beside(draft, at, grooves, law)
 
@@ -57,21 +57,22 @@ def _under_changing_load(draft: Draft, beside: str) -> None:
     cause, normal = changing_load(draft.tables), draft.tables.normal
     if cause == "normal.amplitude":
         if normal.load is not None and normal.amplitude >= normal.load:
-            draft.say(cause, f"{normal.amplitude:.6g} N takes the load to zero, where nothing holds the pieces in "
-                      f"their grooves; less than normal.load = {normal.load:.6g} N is needed {beside}")
+            draft.say(cause, f"{normal.amplitude:.6g} N lets the load fall to zero, where nothing holds the "
+                      f"pieces in their grooves; an amplitude below normal.load = {normal.load:.6g} N is needed "
+                      f"{beside}")
     elif cause:
-        draft.say(cause, unbuilt(f"{beside}, whose climb would press the contact against this motion", "either"))
+        draft.say(cause, unbuilt(beside, "either"))
 
 
 def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
     """Grooves are climbed as a whole by one interface, whose load heave and pitch do not change."""
     contact, structure = draft.tables.contact, draft.tables.structure
-    beside = f"beside [{at}]"
+    beside = f"with [{at}]"
     if has(law.law, "bonds") and (listed(law) or law.breakaway):
         key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
         draft.say(f"friction.{key}", unbuilt(beside, "recursion"))
     elif not carries(law, "grooves"):
-        draft.say("friction.law", f"{named(law)} {beside}: {refusal('grooves', odd=law)}")
+        draft.say("friction.law", unbuilt(f"{named(law)} {beside}", refusal("grooves", odd=law)))
     accuracy = draft.tables.accuracy  # None where [accuracy] could not be read
     if has(law.law, "bonds") and accuracy is not None and accuracy.quadrature not in (None, "auto", "recursion"):
         draft.say("accuracy.quadrature", unbuilt(f"'{accuracy.quadrature}' {beside}",
@@ -80,7 +81,7 @@ def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
         if contact.holder is not None and contact.holder.tangential_stiffness is not None:
             draft.say("contact.holder.tangential_stiffness", unbuilt(beside, "out"))
     if contact is not None and contact.strips is not None and (turning(draft.tables) or contact.gives_way):
-        draft.say(at, unbuilt("beside strips that yaw or give way", "either"))
+        draft.say(at, unbuilt("with strips that yaw or give way", "either"))
     _under_changing_load(draft, beside)
     lower = [f"contact.{name}.on" for name, one in (contact.shapes if contact is not None else {}).items()
              if one.on == "lower"]

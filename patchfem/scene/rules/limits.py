@@ -1,6 +1,6 @@
 """What a scene may say but no run can do yet: a key without an implementation, and combinations.
 
-Each message says what serves meanwhile and ends in "not yet built". Building one means deleting its rule.
+Each message has the words "not supported yet" and what to do meanwhile. Building one means deleting its rule.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def not_yet_built(tables: Tables) -> Iterator[tuple[str, str]]:
     """Key and message of every mode that has the key without an implementation; a zero names nothing."""
     for index, mode in enumerate(tables.structure.mode if tables.structure else ()):
         if mode.lateral:
-            yield f"structure.mode.{index}.lateral", "not yet built"
+            yield f"structure.mode.{index}.lateral", "not supported yet"
 
 
 def combinations(draft: Draft, kind: str) -> None:
@@ -37,10 +37,10 @@ def combinations(draft: Draft, kind: str) -> None:
         _under_changing_load(draft, law, shear, cause)
     still = _still(law) and not climbed(draft.tables)  # along flanks every law has a normal force that changes
     if kind == "bench" and still and draft.tables.normal is not None and draft.tables.normal.amplitude:
-        draft.say("normal.amplitude", f"beside law '{law.law}': {refusal('varying-load')}")
+        draft.say("normal.amplitude", unbuilt(f"with law '{law.law}'", refusal("varying-load")))
     if (kind == "rig" or shear) and has(law.law, "bonds") and law.breakaway and law.order != 1:
         where = "in a rig" if kind == "rig" else f"and {shear}"
-        draft.say("friction.breakaway", unbuilt(f"beside order = {law.order:g} {where}", "order"))
+        draft.say("friction.breakaway", unbuilt(f"with order = {law.order:g} {where}", "order"))
     if kind == "rig":
         _yawing(draft, law, contact)
     if shear:
@@ -48,9 +48,9 @@ def combinations(draft: Draft, kind: str) -> None:
     if contact is not None:
         _on_pieces(draft, contact, _only_on_upper(kind, law, shear))
         if contact.strips is not None and shear and not _slips_in_strips(kind, contact, law):
-            draft.say("contact.strips", unbuilt(f"beside {shear}", "either"))
+            draft.say("contact.strips", unbuilt(f"with {shear}", "either"))
         elif contact.strips is not None and has(law.law, "averaged"):
-            draft.say("contact.strips", unbuilt(f"beside law '{law.law}'", "out"))
+            draft.say("contact.strips", unbuilt(f"with law '{law.law}'", "out"))
 
 
 def _slips_in_strips(kind: str, contact: Contact, law: Friction) -> bool:
@@ -69,7 +69,7 @@ def _interfaces(draft: Draft, interfaces: tuple) -> None:
         if one.spread is not None and takes(one.law, "spread"):
             draft.say(f"{at}.spread", unbuilt("with masses, where an interface has no width", "out"))
         if len(interfaces) > 1 and one.law is not None and not carries(one, "joints"):
-            draft.say(f"{at}.law", f"{named(one)} with other interfaces: {refusal('joints', odd=one)}")
+            draft.say(f"{at}.law", unbuilt(f"{named(one)} with other interfaces", refusal("joints", odd=one)))
 
 
 def _quadrature(draft: Draft, kind: str, law: Friction, shear: str) -> None:
@@ -81,7 +81,7 @@ def _quadrature(draft: Draft, kind: str, law: Friction, shear: str) -> None:
     lower = contact is not None and any(shape.on == "lower" for shape in contact.shapes.values())
     if kind == "rig" and (lower or law.breakaway) and not listed(law):
         beside = "the pressure on the lower piece" if lower else "friction.breakaway"
-        draft.say("accuracy.quadrature", unbuilt(f"'{engine}' beside {beside} in a rig", "use 'recursion' or 'auto'"))
+        draft.say("accuracy.quadrature", unbuilt(f"'{engine}' with {beside} in a rig", "use 'recursion' or 'auto'"))
     varies = normal is not None and normal.amplitude
     if kind == "bench" and engine == "merged" and (lower or law.breakaway or varies):
         draft.say("accuracy.quadrature", unbuilt("'merged' where the pressure of a point changes during the slide, or "
@@ -93,9 +93,9 @@ def sideways(tables: Tables) -> str:
     law, contact, normal = tables.friction, tables.contact, tables.normal
     lower = contact is not None and any(shape.on == "lower" for shape in contact.shapes.values())
     if not carries(law, "two-directions"):
-        reason = f"law '{law.law}': {refusal('two-directions').partition(';')[0]}"
+        reason = f"law '{law.law}': {refusal('two-directions')}"
     elif law.spread is not None:
-        reason = f"friction.spread, whose width would have to turn with the path: {MEANWHILE['either']}"
+        reason = f"friction.spread: {MEANWHILE['either']}"
     elif law.breakaway:
         reason = f"friction.breakaway: {MEANWHILE['either']}"
     elif contact is not None and contact.gives_way:
@@ -107,7 +107,7 @@ def sideways(tables: Tables) -> str:
     else:
         return ""
     what, _, remedy = reason.partition(": ")
-    return unbuilt(f"a lateral column beside {what}", f"{remedy}, or leave the column out")
+    return unbuilt(f"a lateral column with {what}", f"{remedy}, or leave the column out")
 
 
 def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
@@ -116,9 +116,9 @@ def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
     if not key:
         return
     if contact is None or contact.strips is None:
-        draft.say(key, "turns the patch about its normal: use [contact.strips], which slide independently")
+        draft.say(key, "yaw turns the patch about its normal; add [contact.strips], whose strips slide independently")
     elif not carries(law, "joints"):
-        draft.say(key, f"beside strips with {named(law)}: {refusal('joints', odd=law)}")
+        draft.say(key, unbuilt(f"in strips with {named(law)}", refusal("joints", odd=law)))
 
 
 def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) -> None:
@@ -128,7 +128,7 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
         draft.say(cause, "one rigid point cannot heave or pitch: use [contact] in place of [normal]")
     carried = "grooves" if climbed(draft.tables) else "varying-load"
     if not has(law.law, "bonds") and not carries(law, carried):
-        draft.say("friction.law", f"'{law.law}' {beside}: {refusal(carried)}")
+        draft.say("friction.law", unbuilt(f"'{law.law}' {beside}", refusal(carried)))
     elif has(law.law, "bonds") and (law.breakaway or (listed(law) and (climbed(draft.tables) or
                                                                       law.reading != "report"))):
         key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
@@ -152,23 +152,23 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
 
 def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:
     if has(law.law, "bonds") and law.reading == "report" and _inside(law.order, -1, 0) and law.initial_bonds:
-        draft.say("friction.initial_bonds", f"{law.initial_bonds:g} with order = {law.order:g} beside {shear}: as "
-                                            "printed (R/eps)^order of bonds at rest has no bound, and no force moves "
-                                            "their point; set initial_bonds = 0 or use order >= 0")
+        draft.say("friction.initial_bonds", f"{law.initial_bonds:g} with order = {law.order:g} and {shear}: in "
+                                            "the law as printed, bonds at rest have an unbounded (R/eps)^order, so "
+                                            "that no force moves their point; set initial_bonds = 0 or use order >= 0")
     if not has(law.law, "bonds") and not carries(law, "shear"):
-        draft.say("friction.law", f"'{law.law}' beside {shear}: leave it out, or {refusal('shear')}")
+        draft.say("friction.law", unbuilt(f"'{law.law}' with {shear}", f"leave out {shear}, or {refusal('shear')}"))
     weakens = law.static is not None and _inside(law.kinetic, -1, law.static)
     if has(law.law, "set-valued") and carries(law, "shear") and weakens:
-        draft.say("friction.kinetic", unbuilt(f"{law.kinetic:g} below static = {law.static:g} beside {shear}",
+        draft.say("friction.kinetic", unbuilt(f"{law.kinetic:g} below static = {law.static:g} with {shear}",
                                               "kinetic"))
 
 
 def _only_on_upper(kind: str, law: Friction, shear: str) -> str:
     """What keeps the pressure of such a run on the upper piece; empty where it may lie on the lower one as well."""
     if has(law.law, "bonds"):
-        return "beside friction.breakaway and " + shear if shear and law.breakaway else ""
+        return "with friction.breakaway and " + shear if shear and law.breakaway else ""
     if shear:
-        return f"beside {shear} with law '{law.law}'"
+        return f"with {shear} and law '{law.law}'"
     if kind == "bench":
         return f"with law '{law.law}'" if _still(law) else ""
     return f"in a rig with law '{law.law}'"
@@ -186,7 +186,7 @@ def _on_pieces(draft: Draft, contact: Contact, only_upper: str) -> None:
         key = next((key for key in reversed(sides) if draft.given(key)), next(iter(sides)))
         piece = "the upper piece" if only_upper else "one piece"
         names = " and ".join(key.removesuffix(".on") for key in sides)
-        draft.say(key, unbuilt(f"{names} lie on different pieces", f"put all shapes on {piece}"))
+        draft.say(key, unbuilt(f"{names} on different pieces", f"put all shapes on {piece}"))
     elif lower and only_upper:
         draft.say(lower[0], unbuilt(f"'lower' {only_upper}", "shapes"))
 

@@ -38,13 +38,13 @@ class Takes(NamedTuple):
 BESIDE = {  # word -> what a Motion has of it, as words behind an engine; "" where it has none
     "no-law": lambda m: "" if m.laws else "for law 'none'",
     "load": lambda m: m.varies,
-    "yaw": lambda m: "beside strips that yaw" if m.yaws else "",
-    "yaw-levels": lambda m: "beside strips that yaw, level by level" if m.yaws and m.waveform == "levels" else "",
-    "parts": lambda m: f"beside {m.soft}" if m.laws and m.soft else "",
-    "grooves": lambda m: f"beside {m.spring}" if m.spring.endswith("grooves]") else "",
-    "spring": lambda m: f"beside {m.spring}" if m.spring and not m.spring.endswith("grooves]") else "",
-    "faces": lambda m: "beside several interfaces" if len(m.laws) > 1 else "",
-    "levels": lambda m: "level by level" if m.waveform == "levels" else ""}
+    "yaw": lambda m: "with strips that yaw" if m.yaws else "",
+    "yaw-levels": lambda m: "with strips that yaw and waveform 'levels'" if m.yaws and m.waveform == "levels" else "",
+    "parts": lambda m: f"with {m.soft}" if m.laws and m.soft else "",
+    "grooves": lambda m: f"with {m.spring}" if m.spring.endswith("grooves]") else "",
+    "spring": lambda m: f"with {m.spring}" if m.spring and not m.spring.endswith("grooves]") else "",
+    "faces": lambda m: "with several interfaces" if len(m.laws) > 1 else "",
+    "levels": lambda m: "with waveform 'levels'" if m.waveform == "levels" else ""}
 TAKES = {  # engine -> what it takes; the records of `runs.rig.engines` refer to it by name
     "exact": Takes("exact", "no-law yaw faces levels"),
     "piecewise": Takes("pieces", "parts faces levels"),
@@ -60,7 +60,7 @@ def lacking(engine: str, m: Motion) -> str:
     takes = TAKES[engine]
     odd = _odd(takes.law, m)
     if odd is not None:
-        return f"for law '{odd.law}'" + (f" beside {m.soft}" if m.soft else "")
+        return f"for law '{odd.law}'" + (f" with {m.soft}" if m.soft else "")
     beside = takes.beside.split()
     return next((words for word, of in BESIDE.items() if word not in beside and (words := of(m))), "")
 
@@ -149,10 +149,10 @@ def changing_load(tables: Tables) -> str:
 
 
 def beside_load(cause: str) -> str:
-    """The key that changes the load as the words behind another effect: "beside a mode's pitch"."""
+    """The key that changes the load as the words behind another effect: "with a mode's pitch"."""
     if cause in ("", "normal.amplitude"):
-        return cause and f"beside {cause}"
-    return f"beside a mode's {cause.rpartition('.')[2]}"
+        return cause and f"with {cause}"
+    return f"with a mode's {cause.rpartition('.')[2]}"
 
 
 def balances_over_grooves(law) -> bool:
@@ -176,22 +176,23 @@ def _harmonic(m: Motion, method: str) -> str:
         return ("'harmonic' finds the steady motion under a sine, or its curve over a sweep or over levels; use "
                 "'march' or leave method out")
     if drive is not None and drive.kind == "base" and drive.waveform == "sweep" and drive.displacement is not None:
-        return "'harmonic' keeps the acceleration over a sweep; give drive.acceleration"
+        return ("'harmonic' needs a constant acceleration over a sweep; give drive.acceleration in place of "
+                "drive.displacement")
     if why := lacking(method, m):
         return unbuilt(f"'{method}' {why}", "march")
     if not m.laws or not all(lacking(engine, m) for engine in METHODS["exact"]) or m.spring.endswith("grooves]"):
         return ""  # over grooves by a balance, or a march that is brought to repeat
     law = m.laws[0]
     if len(m.laws) > 1:
-        return unbuilt("'harmonic' beside several interfaces where a law has no exact solution or a spring bends",
+        return unbuilt("'harmonic' with several interfaces where a law has no exact solution or a spring bends",
                        "march")
     if has(law.law, "set-valued") and not m.soft:
-        return unbuilt(f"'harmonic' with a law that jumps beside {m.spring}", "march or stiff")
+        return unbuilt(f"'harmonic' with law '{law.law}', which jumps, and {m.spring}", "march or stiff")
     if not has(law.law, "set-valued") and not carries(law, "harmonic"):
-        return f"'harmonic' with {named(law)}: use 'march', or {refusal('harmonic', odd=law)}"
+        return unbuilt(f"'harmonic' with {named(law)}", f"use 'march', or {refusal('harmonic', odd=law)}")
     beside = next((key for key in ("rest_growth", "breakaway") if getattr(law, key)), "")
     beside = f"friction.{beside}" if beside else m.soft or m.lower
-    return unbuilt(f"'harmonic' with law '{law.law}' beside {beside}", "march") if has(law.law, "bonds") and beside \
+    return unbuilt(f"'harmonic' with law '{law.law}' and {beside}", "march") if has(law.law, "bonds") and beside \
         else ""
 
 
@@ -199,6 +200,6 @@ def _compared(m: Motion, method: str) -> str:
     """The comparison methods take one force per interface and linear modes."""
     odd = _odd("comparison", m)
     if odd is not None:
-        return f"'{method}' with {named(odd)}: use 'march', or {refusal('comparison', odd=odd)}"
+        return unbuilt(f"'{method}' with {named(odd)}", f"use 'march', or {refusal('comparison', odd=odd)}")
     why = lacking(method, m)
     return unbuilt(f"'{method}' {why}", "march") if why else ""

@@ -38,8 +38,8 @@ def outlines(draft: Draft) -> None:
     lengths = [length_of(contact, name) for name in ("upper", "lower")]
     given = [name for name in ("upper", "lower") if draft.given(f"contact.{name}.length")]
     if given and None not in lengths and 0 < abs(lengths[0] - lengths[1]) < LEAST * max(lengths):
-        draft.say(f"contact.{given[-1]}.length", f"the pieces are {lengths[0]} and {lengths[1]} m long, a difference "
-                                                 "below 1e-5 of it: write the same length for both")
+        draft.say(f"contact.{given[-1]}.length", f"the pieces are {lengths[0]} and {lengths[1]} m long, which differ "
+                                                 "by less than 1e-5 of that length: write the same length for both")
     if len(given) == 2 and draft.given("contact.length"):
         draft.remark("contact.length is not used: [contact.upper] and [contact.lower] set their own")
 

@@ -32,7 +32,8 @@ def check_structure(draft: Draft) -> None:
         if not {"masses", *(["reduced"] if key == "output_mass" else [])} & set(forms) and \
                 draft.given(f"structure.{key}"):
             if draft.given("contact") and key != "output_mass":
-                draft.say(f"structure.{key}", f"joins masses, which do not rub on [contact]; {modes_instead(draft)}")
+                draft.say(f"structure.{key}", f"joins masses, which cannot be used with [contact]; "
+                                              f"{modes_instead(draft)}")
             else:
                 draft.lacks("structure.masses", f"structure.{key} needs them")
     if not {"masses", "file", "reduced"} & set(forms) and draft.given("structure.interface"):
@@ -77,11 +78,11 @@ def _modes(draft: Draft) -> None:
     names: set[str] = set()
     for index, mode in enumerate(modes):
         if mode.name is not None and mode.name in names:
-            draft.say(f"structure.mode.{index}.name", f"'{mode.name}' names two modes; each name once")
+            draft.say(f"structure.mode.{index}.name", f"two modes are named '{mode.name}'; give each its own name")
         names.add(mode.name)
         if mode.damping is not None and mode.damping >= HEAVY:
             key = draft.shown(f"structure.mode.{index}.damping")
-            draft.remark(f"{key} = {mode.damping:g} is a ratio: 1 is critical, 1 % is 0.01")
+            draft.remark(f"{key} = {mode.damping:g} is a damping ratio: 1 is critical, and 1 % is written 0.01")
     _instruments(draft, modes)
     bases = [mode.base if draft.given(f"structure.mode.{index}.base") else 0.0 if index else mode.slide
              for index, mode in enumerate(modes)]  # fmt: skip
@@ -98,8 +99,9 @@ def check_gains(draft: Draft, kind: str) -> None:
     structure = draft.tables.structure
     for index, mode in enumerate((structure.mode or ()) if structure is not None and kind == "linear" else ()):
         if mode.damping is not None and mode.damping < 0:
-            draft.say(f"structure.mode.{index}.damping", f"{mode.damping:g} gives the mode energy that nothing takes, "
-                      "so the motion would grow for ever; give [friction], or a damping >= 0")
+            draft.say(f"structure.mode.{index}.damping", f"{mode.damping:g} is negative damping and nothing "
+                      "dissipates the energy that it adds, so the motion would grow for ever; add [friction], or "
+                      "set damping >= 0")
 
 
 def unseen(structure, driven: bool) -> list:
@@ -128,7 +130,7 @@ def _instruments(draft: Draft, modes: tuple) -> None:
         beside = "drive.kind = 'free'" if drive.kind == "free" else \
             f"drive.waveform = '{drive.waveform}'" if drive.waveform in ("sweep", "levels") and not steady else ""
     if beside:
-        draft.say(written[0], unbuilt(f"beside {beside}", "output alone"))
+        draft.say(written[0], unbuilt(f"with {beside}", "give the accelerometer and the gauge the value of output"))
 
 
 def _masses(draft: Draft, structure: Any) -> None:
@@ -194,7 +196,7 @@ def _file(draft: Draft, structure: Any) -> None:
             draft.say(f"structure.{key}", f"names a place in a universal file; a {ending} file holds the array "
                                           f"{key.removesuffix('_at')}")  # fmt: skip
     if measured and not draft.given("structure.moving_mass"):
-        draft.lacks("structure.moving_mass", "the modes of a universal file are scaled to it")
+        draft.lacks("structure.moving_mass", "the modes of a universal file are scaled to this mass")
     if measured and not draft.given("structure.slide_at"):
         draft.lacks("structure.slide_at", "the place and direction that slide, such as slide_at = \"12:+x\"")
     if measured and draft.given("structure.interface"):
@@ -212,14 +214,15 @@ def _reduced(draft: Draft, reduced: Any) -> None:
             draft.say(f"structure.reduced.{key}", f"the name ends in '{ending}'; {choices(ending, REDUCED)}")
     twice = [one for k, one in enumerate(reduced.boundary or ()) if one in reduced.boundary[:k]]
     if twice:
-        draft.say("structure.reduced.boundary", f"names {twice[0]} twice; each coordinate once")
+        draft.say("structure.reduced.boundary", f"names {twice[0]} twice; name each coordinate once")
     drive = draft.tables.drive
     if reduced.moved is not None and drive is not None and drive.kind in ("force", "free"):
-        draft.remark("structure.reduced.moved is for a base drive and is not used")
+        draft.remark("structure.reduced.moved has a meaning only with a base drive and is not used")
     _between(draft, "structure.reduced.slide", reduced.slide, len(reduced.boundary) if reduced.boundary else None)
     if draft.given("structure.interface"):
         if reduced.slide is not None:
-            draft.say("structure.reduced.slide", "is given with [friction]; an interface names its places by between")
+            draft.say("structure.reduced.slide", "is given with [friction]; an interface names its two sides with "
+                                                 "the key between")
     elif draft.given("friction") and reduced.slide is None:
         draft.lacks("structure.reduced.slide", "which two boundary coordinates rub, such as slide = [1, 0] for the "
                                                "first on the base; or write [[structure.interface]] with its own law")
@@ -238,9 +241,10 @@ def _bolted(draft: Draft, structure: Any) -> None:
     tables, key = draft.tables, "structure.measured"
     under = tables.contact if tables.contact is not None else tables.normal
     if tables.friction is None and not structure.interface:
-        draft.say(key, "'stuck' takes the stiffness of the joint off the modes, and this scene has no [friction]")
-    for reason, holds in (("structure.masses: masses and springs are not measured", structure.masses is not None),
-                          ("structure.reduced: matrices are not measured", structure.reduced is not None),
+        draft.say(key, "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; "
+                       "add [friction] and its load, or leave measured out")
+    for reason, holds in (("structure.masses, which are not measured", structure.masses is not None),
+                          ("structure.reduced, which is not measured", structure.reduced is not None),
                           ("a spring of structure.bonded.wavelength", structure.bonded is not None
                            and structure.bonded.wavelength is not None),
                           ("grooves", under is not None and under.grooves is not None),
@@ -248,8 +252,8 @@ def _bolted(draft: Draft, structure: Any) -> None:
                               mode.normal or mode.pitch for mode in structure.mode or ())),
                           ("strips that yaw", any(mode.yaw for mode in structure.mode or ()))):
         if holds:
-            draft.say(key, f"'stuck' has no single stiffness to take off with {reason}; give the modes without the "
-                           "joint")
+            draft.say(key, f"'stuck' cannot be used with {reason}: there is no single joint stiffness to subtract; "
+                           "give the modes without the joint")
 
 
 def _start(draft: Draft, structure: Any) -> None:
@@ -265,4 +269,4 @@ def _start(draft: Draft, structure: Any) -> None:
         values = getattr(start, key)
         if values is not None and count and len(values) != count:
             many = f"{len(values)} value{'s' if len(values) > 1 else ''}"
-            draft.say(f"structure.start.{key}", f"{many} for {count} {form}; one for each is needed, in their order")
+            draft.say(f"structure.start.{key}", f"{many} for {count} {form}; give one for each, in their order")

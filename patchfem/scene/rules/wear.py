@@ -17,17 +17,17 @@ def check_wear(draft: Draft, kind: str) -> None:
     if tables.wear is None:
         return
     if kind == "patch":
-        draft.say("wear", "nothing slides: wear needs [friction] with [slide], or with [structure] and [drive]")
+        draft.say("wear", "wear needs a slide: add [friction] with [slide], or with [structure] and [drive]")
     for key, words in _beside(draft, tables, kind):
-        draft.say("wear", unbuilt(f"beside {key}", words))
+        draft.say("wear", unbuilt(f"with {key}", words))
     if draft.given("wear.scheme") and tables.wear.scheme == "explicit" and not draft.given("wear.jumps"):
-        draft.lacks("wear.jumps", "scheme 'explicit' needs the number of its jumps")
+        draft.lacks("wear.jumps", "scheme 'explicit' needs a number of steps")
     if tables.wear.friction is not None:
         _friction(draft, tables.wear.friction)
     if tables.normal is not None:
         if draft.given("wear.start"):
-            draft.say("wear.start", "a point has no worn depth to go on from: use [contact], or add the volumes "
-                                    "of both runs")
+            draft.say("wear.start", "[normal] is a point and has no worn depth to start from: use [contact], or "
+                                    "leave wear.start out and add the worn volumes of both runs")
         for key in ("jumps", "upper_share", "scheme"):
             if draft.given(f"wear.{key}"):
                 draft.remark(f"wear.{key} has no meaning without [contact] and is not used")
@@ -40,23 +40,24 @@ def _friction(draft: Draft, change: WornFriction) -> None:
     """Say every mistake of the table of friction over the worn depth."""
     at, law, depth = "wear.friction", draft.tables.friction, change.depth
     if draft.tables.normal is not None:
-        draft.say(at, "a point has no area over which its wear is a depth: use [contact]")
+        draft.say(at, "a [normal] contact has no area, so its wear has no depth: use [contact]")
     if depth is not None and (depth[0] != 0 or any(two <= one for one, two in pairwise(depth))):
         draft.say(f"{at}.depth", "depths that rise from 0 are needed, such as [\"0 um\", \"1 um\", \"5 um\"]")
     names = ("coefficient_factor", "bond_length_factor")
     if not any(draft.given(f"{at}.{name}") for name in names):
-        draft.lacks(f"{at}.coefficient_factor", "the table needs what changes: this factor, bond_length_factor or both")
+        draft.lacks(f"{at}.coefficient_factor", "the table needs a factor: coefficient_factor, bond_length_factor "
+                                                "or both")
     for name in names:
         factors = getattr(change, name)
         if factors is not None and depth is not None and len(factors) != len(depth):
-            draft.say(f"{at}.{name}", f"{len(factors)} factors at {len(depth)} depths; one at each is needed")
+            draft.say(f"{at}.{name}", f"{len(factors)} factors at {len(depth)} depths; give one at each")
         elif factors is not None and factors[0] != 1:
-            draft.say(f"{at}.{name}", f"{factors[0]:g} at depth 0, where [friction] itself describes the new contact; "
-                                      "the first must be 1")
+            draft.say(f"{at}.{name}", f"{factors[0]:g} at depth 0, where [friction] itself describes the unworn "
+                                      "contact; the first factor must be 1")
     if law is None:
         return
     if change.bond_length_factor is not None and not takes(law.law, "bond_length"):
-        draft.say(f"{at}.bond_length_factor", f"law '{law.law}' has no bond length, which belongs to "
+        draft.say(f"{at}.bond_length_factor", f"law '{law.law}' has no bond_length; leave it out, or use "
                                               f"{using('bond_length')}; leave it out")
     if change.coefficient_factor is not None and law.static == 0:
         draft.remark(f"{at}.coefficient_factor has no effect on static = 0")
@@ -99,7 +100,7 @@ def _beside(draft: Draft, tables, kind: str):
     method = tables.accuracy and tables.accuracy.method  # None where [accuracy] could not be read
     grooves = grooves_of(tables)
     if grooves is not None and tables.normal is not None and grooves[1].amplitude:
-        yield f"[{grooves[0]}]", "a point has no area from which the wear lowers the grooves: use [contact]"
+        yield f"[{grooves[0]}]", "a [normal] contact has no area, so its wear has no depth: use [contact]"
     if contact is not None and contact.strips is not None:
         yield from _beside_strips(draft, contact)
     if tables.normal is not None and tables.normal.amplitude and kind == "rig":

@@ -91,7 +91,7 @@ def test_refuses_spread_without_a_width_and_for_laws_without_bonds():
     with pytest.raises(SceneError, match=r"normal.width: missing.*friction.spread needs it"):
         loads(POINT + LONGER + TRIANGLE, sets=SPREAD)
     for law in ("coulomb", "tanh", "elastic-plastic"):
-        with pytest.raises(SceneError, match=f"friction.spread: law '{law}' has no bonds to spread") as caught:
+        with pytest.raises(SceneError, match=f"friction.spread: law '{law}' has no spread") as caught:
             loads(SMALL_PATCH + LONGER + TRIANGLE, sets=[*SPREAD, f"friction.law={law}",
                                                      "friction.reference_speed=1 mm/s"])
         assert len(caught.value.mistakes) == 1

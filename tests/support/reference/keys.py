@@ -81,7 +81,7 @@ def _row(model: type, key: str, at: str) -> tuple:
     elif default:
         default = f"`{default}`"
     required = "yes" if field.is_required() else _needed(model, key, path.rpartition(".")[0])
-    said = meaning(model, key) + ("; not yet built" if path == NOT_YET_BUILT else "")
+    said = meaning(model, key) + ("; not supported yet" if path == NOT_YET_BUILT else "")
     return f"`{key}`", _kind(model, name), default, required, said
 
 
