@@ -124,7 +124,7 @@ def test_refuses_a_table_that_makes_no_sense(sets, told):
 
 def test_refuses_friction_over_the_wear_of_a_point():
     text = '[normal]\nload = "100 N"\n' + SCENE[SCENE.index("[friction]"):]
-    with pytest.raises(SceneError, match=r"wear.friction: a point has no area .*: use \[contact\]"):
+    with pytest.raises(SceneError, match=r"wear.friction: a \[normal\] contact has no area.*: use \[contact\]"):
         loads(text, "a.toml")
 
 
