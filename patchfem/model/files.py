@@ -65,7 +65,6 @@ def _profile(path: Path, tables, whole: bool) -> tuple:
     """A trace that covers the interface and is no finer than the patch can show; what is done to it."""
     import numpy as np
 
-
     profile.trace_of(path)
     contact = tables.contact
     if not whole or contact.mesh is not None:
@@ -75,7 +74,7 @@ def _profile(path: Path, tables, whole: bool) -> tuple:
     size = contact.element_size or length / patch.AUTOMATIC_CELLS
     x = np.linspace(-length / 2, length / 2, max(1, round(length / size)) + 1)
     return profile.profile_gap(path, x, patch.profile_lengths(contact, pieces), contact.asperities is not None,
-                       contact.profile.heights == "surface")[1]
+                                contact.profile.heights == "surface")[1]
 
 
 def _slide(path: Path, tables, whole: bool) -> None:
@@ -117,7 +116,8 @@ def _worn(path: Path, tables, whole: bool) -> tuple:
 
 def _rough(path: Path, tables, whole: bool) -> None:
     """A trace whose peaks those of a surface can be."""
-    peaks.of_trace(path)
+    contact = tables.contact
+    peaks.of_trace(path, patch.split_at(contact, patch.interface_of(patch.pieces_asked(contact))) if whole else None)
 
 
 READERS = {"contact.mesh": _mesh, "contact.asperities.from": _rough, "contact.profile.file": _profile,

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 from ..mesh.ends import SHARP, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material
-from . import peaks
+from . import peaks, profile
 from .gap import Gap, gap_asked
 
 CHOSEN_POINTS = 160  # about what a patch takes at the default tolerance
-AUTOMATIC_CELLS = 200  # along the interface, of an even mesh; beside asperities a profile is averaged over one of them
+AUTOMATIC_CELLS = 200  # along the interface, of an even mesh; a profile beside asperities keeps waves of two of them
 CLOSE = 1e-9  # lengths below this share of another one are nothing
 
 
@@ -130,8 +130,10 @@ class PatchModel:
 
     @property
     def size(self) -> float:
-        """Element size [m] of an even interface: that of the scene, or the automatic one."""
-        return self.element_size or self.length / AUTOMATIC_CELLS
+        """Element size [m] of an even interface: that of the scene, or the automatic one, which shows the waves that a
+        cut-off leaves to the mesh."""
+        least = self.gap.average if self.gap.rough and self.gap.average else self.length
+        return self.element_size or min(self.length / AUTOMATIC_CELLS, least)
 
     @property
     def nominal_load(self) -> float:
@@ -169,7 +171,7 @@ def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
         (holder.rotational_stiffness or 0.0) if holder is not None else 0.0,
         (holder.tangential_stiffness or None) if holder is not None else None,
         contact.asperities if contact.asperities is None or contact.asperities.law != "hertz" else
-        peaks.skin_asked(contact.asperities, beside),
+        peaks.skin_asked(contact.asperities, beside, split_at(contact, length)),
         (strips.count, strips.roll, strips.offset) if strips is not None else None,
         contact.shear is not None, contact.gives_way)
 
@@ -188,11 +190,20 @@ def profile_lengths(contact: Contact, pieces) -> tuple:
     length = interface_of(pieces)
     automatic = length / AUTOMATIC_CELLS
     if contact.asperities is not None:
-        return automatic, None
+        split = split_at(contact, length)
+        return split and split / profile.ELEMENTS, None
     if contact.mesh is not None or contact.element_size:
         return (None, 0.0) if contact.mesh is not None else (contact.element_size, contact.element_size)
     apart = contact.strips is None and all(piece.length <= length * (1 + CLOSE) for piece in pieces)
     return None, None if apart else automatic
+
+
+def split_at(contact: Contact, length: float) -> float | None:
+    """Wavelength [m] between the waves of a profile and those of [contact.asperities] over an interface of this length
+    [m]; None where all waves are of the asperities."""
+    if contact.asperities.cutoff is not None or contact.profile is None:
+        return contact.asperities.cutoff
+    return profile.ELEMENTS * length / AUTOMATIC_CELLS
 
 
 def interface_of(pieces) -> float:

@@ -6,19 +6,20 @@ from pathlib import Path
 from ..core import PatchfemError
 from ..scene.keys.contact import Asperities
 from ..surface.files.read import read_profile
-from ..surface.roughness.peaks import Moments, moments_of, peaks_of
+from ..surface.roughness.peaks import Moments, Told, peaks_of, told_by
 
 AT = "contact.asperities."
 
 
-def skin_asked(table: Asperities, beside) -> Asperities:
+def skin_asked(table: Asperities, beside, cutoff: float | None = None) -> Asperities:
     """The table with the radius, density and height_deviation that its law asks for, of its trace the root mean squares
-    too; beside(name) -> path of a file that the scene names. PatchfemError with the key where no surface has them."""
+    too; beside(name) -> path of a file that the scene names; cutoff [m]: of the waves of a trace that count, None: all.
+    PatchfemError with the key where no surface has them."""
     if table.radius is not None:
         return table
     if table.from_ is not None:
-        found = of_trace(Path(beside(table.from_)))[0]
-        table = table.model_copy(update={"from_": str(beside(table.from_)), **{
+        found = of_trace(Path(beside(table.from_)), cutoff).fine
+        table = table.model_copy(update={"from_": str(beside(table.from_)), "cutoff": cutoff, **{
             f"rms_{name}": one for name, one in found._asdict().items()}})
     try:
         one = peaks_of(Moments(table.rms_height, table.rms_slope, table.rms_curvature))
@@ -27,21 +28,18 @@ def skin_asked(table: Asperities, beside) -> Asperities:
     return table.model_copy(update={"radius": one.radius, "density": one.density, "height_deviation": one.deviation})
 
 
-def of_trace(path: Path) -> tuple:
-    """Moments of the trace in a file, and the Peaks that every second sample tells, None where it tells none; a file is
-    read once. PatchfemError with the key for one that has no peaks of a surface."""
+def of_trace(path: Path, cutoff: float | None = None) -> Told:
+    """What the waves below a cut-off [m] of the trace in a file tell, None: all waves; a file is read once.
+    PatchfemError with the key for one that has no peaks of a surface."""
     try:
-        return _read(path, path.stat().st_mtime_ns if path.exists() else 0)
+        return _read(path, path.stat().st_mtime_ns if path.exists() else 0, cutoff)
     except PatchfemError as error:
-        raise type(error)(str(error), f"{AT}from") from None
+        cure = f"; {AT}cutoff moves it" if "cut-off" in str(error) else ""
+        raise type(error)(f"{error}{cure}", f"{AT}from") from None
 
 
 @lru_cache(maxsize=4)
-def _read(path: Path, stamp: int) -> tuple:
-    trace = read_profile(path)
-    found = moments_of(trace)
-    peaks_of(found)
-    try:
-        return found, peaks_of(moments_of(trace, 2))
-    except PatchfemError:
-        return found, None
+def _read(path: Path, stamp: int, cutoff: float | None) -> Told:
+    found = told_by(read_profile(path), cutoff)
+    peaks_of(found.fine)
+    return found

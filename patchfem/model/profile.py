@@ -10,11 +10,13 @@ from ..core import PatchfemError, frozen_array, say
 from ..surface.files.read import read_profile
 from ..surface.fine import ELEMENTS, fine_share, too_fine
 from ..surface.nodes import on_nodes, placed
-from ..surface.profile import Profile, cleaned, level
+from ..surface.profile import Profile, cleaned, even, level
+from ..surface.roughness.filter import mean_line
 
 SPLIT = 16  # straight pieces of a cell of a smooth profile
 NOISE = 1e-10  # m: heights below it are digits
 CELLS = 200  # of an even mesh over the interface
+DENSE = 16  # samples of a cut-off at least, on which a trace is filtered
 
 
 def profile_gap(path: Path, x, lengths: tuple, rough: bool, material: bool = False) -> tuple:
@@ -24,25 +26,43 @@ def profile_gap(path: Path, x, lengths: tuple, rough: bool, material: bool = Fal
     smooth curve goes through the means, or, where that is None, through the samples of the file; every node sees the
     mean of the curve over its own cells. limit: cells that too much of the heights may not be finer than, 0: those of
     the nodes, None: all may. The gap counts from its least, where flat pieces touch first. rough: asperities stand for
-    what is finer; material: heights of a surface, on either piece measured outwards, so that a peak closes the gap.
-    PatchfemError where too much of the profile is finer than `limit`.
+    the waves shorter than ELEMENTS times `average`, and the curve is the waviness of this cut-off; material: heights of
+    a surface, on either piece measured outwards, so that a peak closes the gap. PatchfemError where too much of the
+    profile is finer than `limit`, or the cut-off longer than the interface.
     """
     average, limit = lengths
-    trace, notes, straight = _levelled(path, x, average or float(x[-1] - x[0]) / CELLS, material)
+    cell = float(x[-1] - x[0]) / CELLS
+    trace, notes, straight = _levelled(path, x, min(average, cell) if rough else average or cell, material)
     if limit is not None and not straight and \
             (said := too_fine(trace, limit or float(np.diff(x).max()))) is not None:
         raise PatchfemError(said, "contact.profile.file")
-    if rough and not straight and (share := fine_share(trace, ELEMENTS * average)) > 0:
-        notes = (*notes, f"{trace.source}: averaged over {say(average)}; the finer heights, {100 * share:.2g} % of the "
-                         "rms, are left to the law of the asperities")
+    if rough:
+        shape, said = _waviness(trace, ELEMENTS * average)
+        return on_nodes(shape, x) - shape.z.min(), notes if straight else (*notes, *said)
     if average is None:
         heights = on_nodes(trace, x, _curve(trace).antiderivative())
         return heights - heights.min(), notes
-    even, shape = x, trace
+    places, shape = x, trace
     if not _even(x, average):
-        even = np.linspace(x[0], x[-1], max(2, round(float(x[-1] - x[0]) / average) + 1))
-        shape = _smooth(trace, even)
-    return on_nodes(shape, x) - on_nodes(trace, even).min(), notes
+        places = np.linspace(x[0], x[-1], max(2, round(float(x[-1] - x[0]) / average) + 1))
+        shape = _smooth(trace, places)
+    return on_nodes(shape, x) - on_nodes(trace, places).min(), notes
+
+
+def _waviness(trace: Profile, cutoff: float) -> tuple:
+    """The waves of a trace longer than a cut-off [m], whole to its ends, and a sentence, as a tuple, where it has
+    shorter ones."""
+    if cutoff >= trace.length:
+        raise PatchfemError(f"{say(cutoff)} is longer than the patch, {say(trace.length)}, so that no wave is left to "
+                            "the profile; take a shorter one, or leave [contact.profile] out",
+                            "contact.asperities.cutoff")
+    same = even(trace)
+    x = np.linspace(same.x[0], same.x[-1], max(same.x.size, int(np.ceil(DENSE * same.length / cutoff)) + 1))
+    line = mean_line(np.interp(x, same.x, same.z), cutoff * (x.size - 1) / same.length, tilted=True)
+    share = fine_share(trace, cutoff)
+    said = (f"{trace.source}: waves longer than {say(cutoff)} shape the gap; the shorter ones, {100 * share:.2g} % of "
+            "the rms, are left to [contact.asperities], whose cutoff moves the limit",) if share > 0 else ()
+    return replace(trace, x=frozen_array(x), z=frozen_array(line), notes=()), said
 
 
 def _levelled(path: Path, x, cell: float, material: bool) -> tuple:

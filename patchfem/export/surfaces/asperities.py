@@ -3,50 +3,64 @@
 import numpy as np
 
 from ...contact.skin_laws import HertzSkin
-from ...core import PatchfemError
+from ...core import PatchfemError, say
 from ...scales import short
-from ...surface.roughness.peaks import PERSSON, Moments, peaks_of
+from ...surface.roughness.peaks import PERSSON, Told, peaks_of
 
 LIGHT = 1e-5  # of the combined modulus, the pressure at which stiffnesses are told: 1.2 MPa on steel
 
 
-def data_of(fine: Moments | None, coarse: Moments | None) -> dict | None:
-    """Root mean squares of a trace and its peaks in SI, with the stiffness over the pressure [1/m] at LIGHT; of every
-    second sample, `coarse`, that alone. A reason where no surface has such peaks, None of a flat trace."""
-    if fine is None:
+def data_of(told: Told | None, cutoff: float | None) -> dict | None:
+    """Root mean squares of the waves of a trace below a cut-off [m] (None: of all) and their peaks in SI, with the
+    stiffness over the pressure [1/m] at LIGHT; of every second sample that alone. A reason where no surface has such
+    peaks, None of a flat trace."""
+    if told is None:
         return None
-    out = {f"rms_{name}": one for name, one in fine._asdict().items()}
+    out = {"cutoff": cutoff, **{f"rms_{name}": one for name, one in told.fine._asdict().items()}}
     try:
-        one = peaks_of(fine)
+        one = peaks_of(told.fine)
     except PatchfemError as error:
         return out | {"reason": str(error)}
-    out |= {"radius": one.radius, "density": one.density, "height_deviation": one.deviation, "stiffness": _steep(one)}
+    out |= {"radius": one.radius, "density": one.density, "height_deviation": one.deviation, "stiffness": _steep(one),
+            "notes": [told.doubt] * bool(told.doubt)}
     try:
-        return out | {"stiffness_half_sampled": None if coarse is None else _steep(peaks_of(coarse))}
+        return out | {"stiffness_half_sampled": None if told.coarse is None else _steep(peaks_of(told.coarse))}
     except PatchfemError:
         return out | {"stiffness_half_sampled": None}
 
 
-def lines_of(fine: Moments | None, coarse: Moments | None) -> list:
+def lines_of(told: Told | None, cutoff: float | None) -> list:
     """`data_of` as lines of text, ready to paste."""
-    one = data_of(fine, coarse)
+    one = data_of(told, cutoff)
     if one is None:
         return []
     if "reason" in one:
         return [f"  no [contact.asperities] of it: {one['reason']}"]
+    fine = told.fine
     soft, stiff = (1 / (share * fine.height) for share in reversed(PERSSON))
     decay = sum(PERSSON) / 2 * fine.height
     half = one["stiffness_half_sampled"]
-    told = "every second sample describes no such surface" if half is None else \
+    sampled = "every second sample describes no such surface" if half is None else \
         f"every second sample of the trace gives {_per(half)}, {100 * (half / one['stiffness'] - 1):+.2g} %"
     return ["  to paste into a scene, if the other face is smooth (peaks of Greenwood and Williamson, radius "
             f"{short(one['radius'], 'm', 3)}, {one['density']:.3g} 1/m^2):",
             "    [contact.asperities]", '    law = "hertz"', f'    rms_height = "{fine.height * 1e6:.5g} um"',
             f"    rms_slope = {fine.slope:.5g}", f'    rms_curvature = "{fine.curvature:.5g} 1/m"',
+            *([f'    cutoff = "{say(cutoff)}"'] if cutoff else []),
             f"  Under {LIGHT:g} of the modulus of the pair their stiffness over the pressure is "
-            f"{_per(one['stiffness'])}; {told}. Waves shorter than the sampling are missing.",
+            f"{_per(one['stiffness'])}; {sampled}. Waves shorter than the sampling are missing.",
             f"  Persson's theory of waves of all lengths gives {_per(soft)} to {_per(stiff)}, as does "
-            f'law = "exponential" with decay_length = "{decay * 1e6:.3g} um".']
+            f'law = "exponential" with decay_length = "{decay * 1e6:.3g} um".', f"  {_split(cutoff)}",
+            *([f"  Not Gaussian: {told.doubt}."] if told.doubt else [])]
+
+
+def _split(cutoff: float | None) -> str:
+    """Which waves of a trace its peaks are, and which are left to the profile."""
+    if cutoff is None:
+        return ("All waves of the trace are in it. If [contact.profile] takes the same trace, split it by --cutoff, or "
+                "the long waves count twice.")
+    return (f"Only waves below the cut-off of {say(cutoff)} are in it; beside [contact.profile] of the same trace the "
+            "longer ones shape the gap, so that none counts twice.")
 
 
 def _steep(one) -> float:

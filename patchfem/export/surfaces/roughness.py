@@ -91,7 +91,7 @@ def lines_of(report: RoughnessReport, verbose: bool = False) -> list:
         if verbose:
             out.append(f"  {'':<20}   {one.text}")
     out += [f"  no interval of {', '.join(names)}: {reason}" for reason, names in _untold(report).items()]
-    out += asperities.lines_of(*_moments(report)) if report.kind == "profile" else []
+    out += asperities.lines_of(_told(report), report.cutoff) if report.kind == "profile" else []
     for one in report.printed:
         out.append(f"  the instrument printed {_pair(one)}")
     if report.tip is not None:
@@ -99,24 +99,21 @@ def lines_of(report: RoughnessReport, verbose: bool = False) -> list:
     return out
 
 
-def _moments(report: RoughnessReport) -> tuple:
-    """Moments of the primary profile from its samples and from every second one, None where it tells none."""
-    def told(every: int) -> peaks.Moments | None:
-        try:
-            return peaks.moments_of(report.primary, every)
-        except PatchfemError:
-            return None
-
-    return told(1), told(2)
+def _told(report: RoughnessReport) -> peaks.Told | None:
+    """What the primary profile below the cut-off tells of its peaks, None where it tells none."""
+    try:
+        return peaks.told_by(report.primary, report.cutoff)
+    except PatchfemError:
+        return None
 
 
 def means_lines(reports: list) -> list:
     """The means over several files as lines, of two traces also as the faces of one contact; () without any."""
     out = []
     if len(reports) == 2 and all(one.kind == "profile" for one in reports):
-        both = zip(*map(_moments, reports))
+        one, other = map(_told, reports)
         out = ["", "Both as the two faces of one contact:",
-               *asperities.lines_of(*(one.beside(other) if one and other else None for one, other in both))]
+               *asperities.lines_of(one and other and one.beside(other), reports[0].cutoff)]
     for each in means.means_of(reports):
         out += ["", _of_many(each), f"  {'':<20} {'mean':>10}  {'95 %: from .. to':<20} {'scatter':<10} unit"]
         out += [f"  {name:<20} {value:>10}  {interval:<20} {scatter:<10} {unit}".rstrip()
@@ -203,7 +200,7 @@ def data_of(report: RoughnessReport) -> dict:
            "notes": list(report.notes)}
     if report.kind == "profile":
         out["band"] = list(report.band)
-        out["asperities"] = asperities.data_of(*_moments(report))
+        out["asperities"] = asperities.data_of(_told(report), report.cutoff)
     if report.tip is not None:
         out["tip"] = {"radius": report.tip.radius, "valley_radius": report.tip.valleys,
                       "narrow_share": report.tip.share, "text": report.tip.sentence}
@@ -241,7 +238,7 @@ def _section(number: int, report: RoughnessReport) -> Section:
     parts += [figure(f"{number}{place}", *one) for place, one in enumerate(figures(report))]
     parts += [_table(report), _printed(report), _definitions(report)]
     if report.kind == "profile":
-        parts.append(f"<pre>{escape(chr(10).join(asperities.lines_of(*_moments(report))))}</pre>")
+        parts.append(f"<pre>{escape(chr(10).join(asperities.lines_of(_told(report), report.cutoff)))}</pre>")
     return Section(f"surface{number}", report.source, "\n".join(parts))
 
 

@@ -37,7 +37,7 @@ def geometry_of(asked) -> tuple:
     mesh = asked.mesh and (asked.mesh, asked.mesh.stat().st_mtime_ns if asked.mesh.exists() else 0)
     return (asked.length, asked.width, asked.height, asked.pairs, asked.plane, asked.lower, asked.upper,
             asked.element_size, asked.still, asked.sweeps, mesh, asked.mesh_tolerance, asked.gap.jumps,
-            asked.gap.profile)
+            asked.gap.profile, asked.gap.average)
 
 
 def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None:

@@ -8,7 +8,7 @@ import numpy as np
 from ...contact import skin_laws
 from ...contact.edges import BEARING
 from ...contact.strips import press_strips
-from ...core import Compliance, Pressure, frozen_array
+from ...core import Compliance, PatchfemError, Pressure, frozen_array, say
 from ...model import peaks as traces
 from ...scales import short
 from ...surface.roughness import peaks
@@ -42,18 +42,28 @@ def ranged(asked, pressure: float) -> list:
     if part is None or part.law != "hertz" or part.rms_height is None or not pressure > 0:
         return []
     soft, stiff = peaks.persson_stiffness(pressure, part.rms_height)
-    half = ""
+    half, told = "", []
+    waves = f" of the waves below {short(part.cutoff, 'm', 3)}" if part.cutoff else ""
     if part.from_ is not None:
-        half = ", those of every second sample " + _half(asked, pressure)
-    return [f"contact.asperities: under the mean pressure of {short(pressure, 'Pa', 3)} the peaks have "
+        found = traces.of_trace(Path(part.from_), part.cutoff)
+        half = ", those of every second sample " + _half(asked, found.coarse, pressure)
+        told = [f"contact.asperities: {found.doubt}"] if found.doubt else []
+    elif asked.gap.profile is not None and part.cutoff is None:
+        told = [f"contact.asperities.rms_height: the profile has the waves longer than {say(2 * asked.gap.average)}; "
+                "where it is the same trace, take the rms of the shorter ones (patchfem profile --cutoff, whose table "
+                "has a cutoff)"]
+    return [f"contact.asperities: under the mean pressure of {short(pressure, 'Pa', 3)} the peaks{waves} have "
             f"{mean_stiffness(asked, pressure):.3g} Pa/m{half}; Persson's theory of waves of all lengths gives "
             f'{soft:.3g} to {stiff:.3g} Pa/m, which law = "exponential" with decay_length = '
-            f'"{sum(peaks.PERSSON) / 2 * part.rms_height * 1e6:.3g} um" has']
+            f'"{sum(peaks.PERSSON) / 2 * part.rms_height * 1e6:.3g} um" has', *told]
 
 
-def _half(asked, pressure: float) -> str:
-    """The stiffness of the peaks that every second sample of the trace tells, as words."""
-    one = traces.of_trace(Path(asked.skin.from_))[1]
+def _half(asked, coarse, pressure: float) -> str:
+    """The stiffness of the peaks that the Moments of every second sample of the trace tell, as words."""
+    try:
+        one = peaks.peaks_of(coarse) if coarse else None
+    except PatchfemError:
+        one = None
     if one is None:
         return "are those of no such surface"
     new = {"radius": one.radius, "density": one.density, "height_deviation": one.deviation}

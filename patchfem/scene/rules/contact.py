@@ -54,6 +54,10 @@ def _contact(draft: Draft) -> None:
         _needs(draft, "contact.asperities", contact.asperities, "law", ASPERITIES)
         if contact.asperities.law == "hertz":
             _peaks(draft)
+        if draft.given("contact.asperities.cutoff") and not any(
+                draft.given(f"contact.{one}") for one in ("profile", "asperities.from", "asperities.rms_height")):
+            draft.say("contact.asperities.cutoff", "splits the waves of a trace, and none stands here: add "
+                      "[contact.profile] or from, or leave the key out")
         bare = contact.asperities.law == "exponential" and contact.asperities.normal_stiffness is None
         if contact.approach and bare:
             draft.lacks("contact.asperities.normal_stiffness", "law 'exponential' with [contact.approach] needs "

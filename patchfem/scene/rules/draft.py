@@ -20,9 +20,9 @@ SLIDES: dict[str, tuple[str, str]] = {
     "file": ("file", ""),
 }
 ASPERITIES: dict[str, tuple[str, str]] = {
-    "linear": ("normal_stiffness", "tangential_ratio"),
-    "exponential": ("decay_length", "normal_stiffness tangential_ratio"),
-    "hertz": ("", "radius density height_deviation from rms_height rms_slope rms_curvature tangential_ratio"),
+    "linear": ("normal_stiffness", "cutoff tangential_ratio"),
+    "exponential": ("decay_length", "normal_stiffness cutoff tangential_ratio"),
+    "hertz": ("", "radius density height_deviation from rms_height rms_slope rms_curvature cutoff tangential_ratio"),
 }
 PEAKS = (("radius", "density", "height_deviation"), ("from",), ("rms_height", "rms_slope", "rms_curvature"))
 

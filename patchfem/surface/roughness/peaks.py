@@ -4,7 +4,8 @@ A surface of Gaussian heights, alike in all directions, whose traces have the me
 slope and curvature has m_4/(6 pi 3^(1/2) m_2) summits per area of mean curvature (8/3) (m_4/pi)^(1/2) (Nayak, J. Lubr.
 Technol. 93, 398, 1971). Their heights have the variance m_0 (1 - 0.8968/alpha) with alpha = m_0 m_4/m_2^2 (Bush, Gibson
 and Keogh, Mech. Res. Commun. 3, 169, 1976); McCool (Wear 107, 37, 1986) makes the contact of peaks of them. No such
-surface has alpha < 3/2. The shortest waves decide on m_4: the peaks are those of a sampling step, not of a surface.
+surface has alpha < 3/2. The shortest waves decide on m_4: the peaks are those of a sampling step, not of a surface. The
+longest decide on m_0, so that a cut-off keeps those away which the mesh holds already.
 """
 
 from typing import NamedTuple
@@ -13,6 +14,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ..profile import Profile, despiked, even, level
+from .filter import filtered
 
 SUMMITS = 0.8968  # of m_0/alpha, that the heights of summits scatter less than all heights
 NARROWEST = 1.5  # alpha of waves of one length in all directions
@@ -20,6 +22,8 @@ PERSSON = 0.4, 0.5  # u_0 over the rms height: Persson 2007, and Pastewka et al.
 FEWEST = 16  # samples of a trace
 SPIKY = 0.1  # share of the samples from which they are a surface and no spikes
 ROUND = 1e-12  # of its heights, what levelling leaves of a straight line
+SKEWED, PEAKED = 0.5, 1.0  # skewness and excess kurtosis from which heights are told not to be Gaussian
+SURE = 3  # standard deviations of either over traces of that many waves, which it must exceed too
 
 
 class Moments(NamedTuple):
@@ -48,21 +52,73 @@ class Peaks(NamedTuple):
     deviation: float
 
 
-def moments_of(trace: Profile, every: int = 1) -> Moments:
+class Told(NamedTuple):
+    """What a trace tells of its peaks: Moments of its samples; Moments of every second one, None where these tell
+    none; how far its heights are from Gaussian ones, a clause or ""."""
+
+    fine: Moments
+    coarse: Moments | None
+    doubt: str
+
+    def beside(self, other: "Told") -> "Told":
+        """What two rough faces tell of the gap between them."""
+        coarse = self.coarse.beside(other.coarse) if self.coarse and other.coarse else None
+        return Told(self.fine.beside(other.fine), coarse, self.doubt or other.doubt)
+
+
+def told_by(trace: Profile, cutoff: float | None = None) -> Told:
+    """What the waves of a trace below a cut-off [m] tell (`moments_of`), None: all of its waves."""
+    short = _short_waves(trace, cutoff)
+    fine = _moments(short, 1)
+    try:
+        coarse = _moments(short, 2)
+    except PatchfemError:
+        coarse = None
+    return Told(fine, coarse, _uneven(short.z, fine, short.length))
+
+
+def moments_of(trace: Profile, every: int = 1, cutoff: float | None = None) -> Moments:
     """Moments of a trace, levelled and without spikes, from neighbouring samples or every second (third, ...) of them.
 
-    Slope and curvature are first and second differences, which see a wave of length L as sinc(step/L) and sinc^2 of its
-    own. PatchfemError for a trace of less than FEWEST such samples and for one without heights.
+    cutoff [m]: only the roughness below it counts (ISO 16610-21, half a cut-off trimmed at each end); a trace no longer
+    than that holds no longer waves. Slope and curvature are first and second differences, which see a wave of length L
+    as sinc(step/L) and sinc^2 of its own. PatchfemError for a trace of less than FEWEST such samples, for one without
+    heights and for a cut-off of fewer than four steps.
     """
+    return _moments(_short_waves(trace, cutoff), every)
+
+
+def _short_waves(trace: Profile, cutoff: float | None) -> Profile:
+    """The trace without spikes, levelled, and without waves longer than the cut-off."""
     clean = despiked(trace)
     tilted = even(clean if (clean.missing & ~trace.missing).mean() <= SPIKY else trace)
-    trace = level(tilted)
+    flat = level(tilted)
+    if flat.z.size >= FEWEST and not np.ptp(flat.z) > ROUND * np.ptp(tilted.z):
+        raise PatchfemError(f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out")
+    return flat if cutoff is None or cutoff >= flat.length else filtered(flat, cutoff)[1]
+
+
+def _moments(trace: Profile, every: int) -> Moments:
     z, step = trace.z[::every], every * trace.length / (trace.z.size - 1)
     if z.size < FEWEST:
         raise PatchfemError(f"{trace.source}: {z.size} samples give no curvature; at least {FEWEST} are needed")
-    if not np.ptp(z) > ROUND * np.ptp(tilted.z):
-        raise PatchfemError(f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out")
     return Moments(*(float(np.sqrt(np.mean(np.diff(z, order)**2)) / step**order) for order in range(3)))
+
+
+def _uneven(z, moments: Moments, length: float) -> str:
+    """The skewness and kurtosis of heights z (n,) [m] that Gaussian ones would not have, in words; "" of Gaussian ones.
+
+    A Gaussian trace has slope length/(pi height) crossings of its mean line, each taken as one independent height.
+    """
+    unit = (z - z.mean()) / z.std()
+    skew, excess = float(np.mean(unit**3)), float(np.mean(unit**4)) - 3
+    count = max(moments.slope * length / (np.pi * moments.height), 1.0)
+    if abs(skew) <= max(SKEWED, SURE * np.sqrt(6 / count)) and abs(excess) <= max(PEAKED, SURE * np.sqrt(24 / count)):
+        return ""
+    return (f"the heights have skewness {skew:.2g} and kurtosis {excess + 3:.2g}, those of the theory are Gaussian "
+            "(0 and 3): " + ("tops cut by wear are stiffer than it says" if skew < -SKEWED else
+                          "single high peaks are softer than it says" if skew > SKEWED else
+                          "its stiffness is a guess"))
 
 
 def peaks_of(moments: Moments) -> Peaks:

@@ -10,8 +10,10 @@ from scipy.integrate import quad
 
 import patchfem as pf
 from patchfem.core import PatchfemError
+from patchfem.model.model import build
+from patchfem.scene.scene import loads
 from patchfem.surface.profile import Profile
-from patchfem.surface.roughness.peaks import Moments, moments_of, peaks_of, persson_stiffness
+from patchfem.surface.roughness.peaks import Moments, moments_of, peaks_of, persson_stiffness, told_by
 
 PATCH = PIECE + 'load = "26 lbf"\nelement_size = "1 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n' \
     '[contact.asperities]\nlaw = "hertz"\n'
@@ -181,3 +183,88 @@ def test_profile_tells_two_faces_together(tmp_path):
     both = cli("profile", *files).out.partition("two faces")[2]
     height = np.hypot(*(one["asperities"]["rms_height"] for one in told))
     assert f'rms_height = "{height * 1e6:.5g} um"' in both
+
+
+CUT = 0.4e-3
+
+
+def passed(wave) -> float:
+    """Share of a wave [m] that the Gaussian filter of ISO 16610-21 leaves in the waviness: half of the cut-off's."""
+    return 0.5 ** (CUT / wave)**2
+
+
+def split(folder, waves) -> tuple:
+    """Places [m] of nodes, the gap there [m] and the skin of a patch that takes one trace of cosines [(amplitude,
+    wavelength) in m] for its profile and for its asperities, split at CUT; and the folder's scene."""
+    x = np.linspace(-6.35e-3, 6.35e-3, 25401)
+    z = sum(a * np.cos(2 * np.pi * x / wave + k) for k, (a, wave) in enumerate(waves))
+    (folder / "trace.csv").write_text("x [m],z [m]\n" + "".join(f"{a!r},{b!r}\n" for a, b in zip(
+        x.tolist(), z.tolist())))
+    text = PATCH.replace('element_size = "1 mm"\n', 'element_size = "25.4 um"\n') + \
+        'from = "trace.csv"\ncutoff = "0.4 mm"\n[contact.profile]\nfile = "trace.csv"\n'
+    found = build(loads(text, folder / "scene.toml")).patch
+    nodes = np.linspace(-6.35e-3, 6.35e-3, 501)
+    return nodes, found.gap.at(nodes)[0], found.skin, text
+
+
+def test_exact_one_cutoff_splits_a_trace_between_the_gap_and_its_asperities(tmp_path):
+    """Each wave of a known spectrum counts once: the gap has what the filter passes, the peaks what it stops."""
+    waves = [(1e-6, 2.54e-3), (0.3e-6, 0.508e-3), (0.2e-6, 12.7e-3 / 40), (0.1e-6, 63.5e-6), (2e-8, 25.4e-6)]
+    x, gap, skin, _ = split(tmp_path, waves)
+    inner = np.abs(x) < 4e-3  # the mean line bends near the ends
+    columns = [part(2 * np.pi * x / wave) for _, wave in waves[:4] for part in (np.cos, np.sin)]
+    fit = np.linalg.lstsq(np.stack([*columns, np.ones(x.size), x], 1)[inner], gap[inner], rcond=None)[0]
+    for (size, wave), found in zip(waves, np.hypot(fit[0:8:2], fit[1:8:2])):
+        seen = np.sinc(25.4e-6 / wave)  # by the mean over a node's own length
+        assert found == pytest.approx(size * passed(wave) * seen, abs=3e-4 * size), wave
+    left = [(size * (1 - passed(wave)), 2 * np.pi / wave) for size, wave in waves]
+    for name, order in (("height", 0), ("slope", 1), ("curvature", 2)):
+        truth = np.sqrt(sum((a * k**order)**2 / 2 for a, k in left))
+        assert getattr(skin, f"rms_{name}") == pytest.approx(truth, rel=5e-3), name
+    whole = moments_of(Profile(np.arange(25401) * 0.5e-6, sum(
+        a * np.cos(2 * np.pi * np.arange(25401) * 0.5e-6 / wave) for a, wave in waves), "whole"))
+    assert whole.height > 4 * skin.rms_height  # what counted twice
+
+
+def test_profile_prints_the_peaks_below_its_cutoff_and_they_paste_to_the_same_patch(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(11)
+    waves = [(2e-8 * n**-0.8, 12.7e-3 / n) for n in (5, *rng.integers(10, 900, 60).tolist())]
+    *_, skin, text = split(tmp_path, waves)
+    said = cli("profile", "trace.csv", "--cutoff", "0.4 mm")
+    told = pf.profile("trace.csv", cutoff="0.4 mm")["profiles"][0]
+    assert told["asperities"]["rms_height"] == pytest.approx(told["measures"]["Rq"]["value"], rel=1e-9)
+    assert told["asperities"]["cutoff"] == 0.4e-3 and "Only waves below the cut-off of 400 um" in said.out
+    assert told["asperities"]["rms_height"] == pytest.approx(skin.rms_height, rel=1e-9)
+    bare = cli("profile", "trace.csv").out
+    assert "cutoff =" not in bare and "or the long waves count twice" in bare
+    block = said.out[said.out.index("[contact.asperities]"):].split("  Under")[0]
+    pasted = text.replace('from = "trace.csv"\ncutoff = "0.4 mm"\n', "".join(
+        f"{line.strip()}\n" for line in block.splitlines()[2:]))
+    again = build(loads(pasted, tmp_path / "scene.toml")).patch.skin
+    for name in ("radius", "density", "height_deviation"):
+        assert getattr(again, name) == pytest.approx(getattr(skin, name), rel=1e-4), name
+    lacking = pf.plan(loads(pasted.replace('cutoff = "400 um"\n', ""), tmp_path / "scene.toml"))
+    assert any("waves longer than 127 um" in one for one in lacking.verdict)
+    assert not any("longer than" in one for one in pf.plan(loads(pasted, tmp_path / "scene.toml")).verdict)
+
+
+def test_heights_that_are_not_gaussian_are_told():
+    """None of 40 Gaussian traces is doubted; tops cut off and single peaks are, each with its sign."""
+    step = 1e-6
+    for seed in range(40):
+        row = gaussian(256, step, (8e-6, 6e-5), seed)[seed]
+        assert told_by(trace_of(row, step)).doubt == "", seed
+    rows = gaussian(512, step, (8e-6, 6e-5), 3)[::128].ravel() * 1e-7
+    rows /= rows.std() / 1e-7
+    for z, word in ((np.minimum(rows, 0.3e-7), "stiffer"), (np.maximum(rows, -0.3e-7), "softer")):
+        doubt = told_by(trace_of(z, step)).doubt
+        assert word in doubt and "(0 and 3)" in doubt
+
+
+@pytest.mark.parametrize("cutoff, said", [("13 mm", "no wave is left to the profile"), ("1 um", "shortest here")])
+def test_refuses_a_cutoff_that_does_not_split(tmp_path, cutoff, said):
+    *_, text = split(tmp_path, [(1e-6, 1e-3), (1e-7, 1e-4), (1e-8, 2e-5)])
+    with pytest.raises(PatchfemError, match=said) as wrong:
+        pf.run(loads(text.replace("0.4 mm", cutoff), tmp_path / "scene.toml"))
+    assert "contact.asperities.cutoff" in str(wrong.value)
