@@ -26,8 +26,8 @@ MOST_COORDINATES = 2000  # masses or modes of a rig, whose matrices are full; he
 
 class Effect(NamedTuple):
     """module: "" where the scene's own values suffice; needs, gives: what earlier effects hand on; of a law of friction
-    or a waveform the keys that it must have and those that it may have besides; of a law what carries it; of both their
-    traits."""
+    or a waveform the keys that it must have, "a|b" for one of two, and those that it may have besides; of a law what
+    carries it; of both their traits."""
 
     module: str
     equations: str
@@ -81,8 +81,8 @@ EFFECTS = {
                                  "set-valued timeless memoryless"),
     "friction.law=tanh": _law("laws.tanh", "F = mu N tanh(v/v_0) (2.4)", ("reference_speed", ""),
                               "joints varying-load harmonic comparison grooves", "memoryless creeps"),
-    "friction.law=elastic-plastic": _law("laws.elastic_plastic", "F' = mu N v/eps, |F| <= mu N (3.12 with its "
-                                         "reversal)", ("bond_length", ""),
+    "friction.law=elastic-plastic": _law("laws.elastic_plastic", "F' = k v, |F| <= mu N (3.12 with its reversal), k "
+                                         "the stiffness or mu N/bond_length", ("bond_length|stiffness", ""),
                                          "shear joints varying-load harmonic comparison pieces grooves", "timeless"),
     "friction.law=nonlocal": _law("bonds.quadrature", "tau = -mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
                                   ("bond_length", "kinetic reading order rest_growth slip_growth rest_speed "
@@ -216,7 +216,12 @@ def named(friction) -> str:
 
 def takes(law: str | None, key: str) -> bool:
     """Whether a law has a key; any may have it where the law is not known."""
-    return law not in LAWS or key in " ".join(LAWS[law].keys).split()
+    return law not in LAWS or key in " ".join(LAWS[law].keys).replace("|", " ").split()
+
+
+def either(law: str | None) -> bool:
+    """Whether a law is given its stiffness or the bond length over which its limit makes one."""
+    return law in LAWS and "bond_length|stiffness" in LAWS[law].keys[0].split()
 
 
 def shown_absent(names, engine: str | None) -> list:

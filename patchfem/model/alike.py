@@ -12,10 +12,13 @@ import numpy as np
 from ..core import frozen_array
 from . import load as of_load
 from . import rig as of_rig
+from .law import load_of, stretching
 from .model import Model, resolved
 
 if TYPE_CHECKING:
     from ..scene.changed import Numbered
+
+LOADS = ("normal", None, "load"), ("contact", None, "load")  # of the contact of [friction], as `Numbered` has them
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -75,8 +78,9 @@ def renumbered(model: Model, like: Numbered, values: Sequence, sets: tuple = ())
         new["point"] = replace(model.point, load=numbers["normal", None, "load"])
     if "contact" in tables:
         new["patch"] = _pressed(model.patch, numbers)
-    if "friction" in tables:
-        new["friction"] = like.table("friction", numbers)
+    if model.friction is not None and tables & {"friction", "normal", "contact"}:
+        law = like.table("friction", numbers) if "friction" in tables else scene.friction
+        new["friction"] = stretching(law, next((numbers[key] for key in LOADS if key in numbers), load_of(scene)))
         rig["interfaces"] = tuple(replace(one, numbers=new["friction"]) for one in model.rig.interfaces)
     if "drive" in tables:
         rig |= _driven(model.rig.drive, scene.drive, numbers)
@@ -127,8 +131,8 @@ def _shaken(rig, structure, numbers: dict) -> dict:
 def _again(model: Model, like: Numbered, values: Sequence, sets: tuple) -> Model:
     """The model where a bonded spring makes other modes of those of the scene."""
     scene = like.scene(values, sets)
-    found = replace(model, source=None, rig=of_rig.rig_asked(scene), point=of_load.point_asked(scene),
-                    friction=scene.friction)
+    rig = of_rig.rig_asked(scene)
+    found = replace(model, source=None, rig=rig, point=of_load.point_asked(scene), friction=rig.interfaces[0].numbers)
     return replace(found, source=replace(model.source, write=partial(resolved, scene, found), sets=scene.sets))
 
 

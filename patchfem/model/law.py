@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..core import PatchfemError
-from ..effects import module_of
+from ..effects import either, module_of
 from ..friction.bonds import parameters, spread
 
 
@@ -31,15 +33,16 @@ def limits_of(f, load: float) -> tuple:
     return f.static * load, (f.kinetic if f.kinetic is not None else f.static) * load
 
 
-def acting(f, width: float | None, where):
+def acting(f, width: float | None, where, load: float | None = None):
     """The keys of a law after the effects that only change its numbers.
 
     rest_growth and slip_growth are those at friction.temperature; static and kinetic are multiplied by the pad's share
-    of friction.spread. width [m]: of the contact across the path; where(key) -> place of a key. PatchfemError where a
-    rate leaves the range of numbers.
+    of friction.spread; of a stiffness follows the bond length, as `stretching` has it. width [m]: of the contact across
+    the path; where(key) -> place of a key; load [N] of the contact. PatchfemError where a rate leaves the range of
+    numbers.
     """
     if f is None or (f.temperature is None and f.spread is None):
-        return f
+        return stretching(f, load)
     new = {"temperature": None, "spread": None}
     if f.temperature is not None and f.rest_growth is not None:
         t, growth_at = f.temperature, module_of("friction.temperature").growth_at
@@ -51,7 +54,15 @@ def acting(f, width: float | None, where):
     if f.spread is not None:
         share = spread.pad_factor(width, f.spread)
         new |= {"static": f.static * share, "kinetic": None if f.kinetic is None else f.kinetic * share}
-    return f.model_copy(update=new)
+    return stretching(f.model_copy(update=new), load)
+
+
+def stretching(f, load):
+    """The keys of a law with the bond length [m] that makes its stiffness under a load [N], of which 0 counts as 1 N,
+    where the law is given one in place of the other; numbers or columns of them."""
+    if f is None or f.stiffness is None or not either(f.law):
+        return f
+    return f.model_copy(update={"bond_length": f.static * (load if np.ndim(load) else load or 1.0) / f.stiffness})
 
 
 def bonds_of(f, speed: float, least: float = 0.0):
@@ -70,11 +81,16 @@ def interface_laws_of(scene) -> tuple:
     None, as an empty tuple, without either. PatchfemError where a rate of growth leaves the range of numbers.
     """
     if scene.structure.interface:
-        return tuple(InterfaceLaw(f"structure.interface.{k}", acting(one, None, scene.where), one.load)
+        return tuple(InterfaceLaw(f"structure.interface.{k}", acting(one, None, scene.where, one.load), one.load)
                      for k, one in enumerate(scene.structure.interface))
     if scene.friction is None:
         return ()
-    return (InterfaceLaw("friction", acting(scene.friction, pad_width(scene), scene.where), None),)
+    return (InterfaceLaw("friction", acting(scene.friction, pad_width(scene), scene.where, load_of(scene)), None),)
+
+
+def load_of(scene) -> float | None:
+    """Load [N] that a scene gives for the contact of [friction], its mean where it changes; None of an approach."""
+    return scene.contact.load if scene.contact is not None else scene.normal.load if scene.normal is not None else None
 
 
 def pad_width(scene) -> float | None:

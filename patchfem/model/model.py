@@ -17,7 +17,7 @@ from . import patch as patch_model
 from . import rig as of_rig
 from . import slide as of_slide
 from . import wear as of_wear
-from .law import acting, bonds_of, pad_width
+from .law import acting, bonds_of, load_of, pad_width
 from .source import Source, placed
 
 if TYPE_CHECKING:
@@ -140,12 +140,13 @@ def _absent(named: tuple) -> tuple:
 
 def _law(scene: Scene) -> tuple:
     """Law of the first interface: (keys as they act, surface temperature table, spread [m], width of the pad [m])."""
-    given = scene.structure.interface[0] if scene.structure is not None and scene.structure.interface else \
-        scene.friction
+    given, load = scene.friction, load_of(scene)
+    if scene.structure is not None and scene.structure.interface:
+        given, load = scene.structure.interface[0], scene.structure.interface[0].load
     if given is None:
         return None, None, None, None
     pad = pad_width(scene)
-    return acting(given, pad, scene.where), given.temperature, given.spread, pad
+    return acting(given, pad, scene.where, load), given.temperature, given.spread, pad
 
 
 def resolved(scene: Scene, model: Model) -> str:

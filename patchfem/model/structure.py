@@ -15,7 +15,7 @@ from ..scene.keys.same import once
 from ..structure import masses, starts
 from ..structure.modes import basis
 from . import structure_files, structure_reduced
-from .law import interface_laws_of
+from .law import interface_laws_of, load_of
 
 
 def modes_of(scene, own: ModalBasis | None = None) -> ModalBasis:
@@ -84,8 +84,7 @@ def of_a_patch(scene) -> bool:
 
 def joints(scene) -> list:
     """Stiffness [N/m] of every interface while nothing slips, of its law alone; PatchfemError of one that has none."""
-    load = scene.contact.load if scene.contact is not None else scene.normal.load if scene.normal is not None else 0.0
-    out = []
+    load, out = load_of(scene), []
     for one in interface_laws_of(scene):
         try:
             out.append(stiffness_of(one, load if one.load is None else one.load))

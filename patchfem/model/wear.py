@@ -25,7 +25,8 @@ class WornFriction:
 
     def after(self, law: Friction, depth: float) -> Friction:
         """The keys of a law after a mean worn depth [m]."""
-        factors = (("static", self.coefficient), ("kinetic", self.coefficient), ("bond_length", self.bond_length))
+        length = self.bond_length if law.stiffness is None else self.coefficient  # at a constant stiffness
+        factors = (("static", self.coefficient), ("kinetic", self.coefficient), ("bond_length", length))
         return law.model_copy(update={
             name: getattr(law, name) * float(np.interp(depth, self.depth, factor))
             for name, factor in factors if factor is not None and getattr(law, name) is not None})

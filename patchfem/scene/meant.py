@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from pydantic import ValidationError
 
 from .keys.types import Table, keys, model_of, record
-from .rules.draft import SELECTORS
+from .rules.draft import SELECTORS, each
 
 NEAR = 0.6  # of difflib, from which two names are alike
 
@@ -68,6 +68,6 @@ def _lacking(model: type[Table], at: str, written: dict) -> Collection:
     """Keys that the table needs and has not: always, by the value of its selector, or under a condition."""
     need = [key for key, name in keys(model).items() if model.model_fields[name].is_required()]
     _, selector, by = SELECTORS.get(at, (None, "", {}))
-    need += by.get(written.get(selector), ("", ""))[0].split() if isinstance(written.get(selector), str) else []
+    need += each(by.get(written.get(selector), ("", ""))[0]) if isinstance(written.get(selector), str) else []
     need += [key for key in keys(model) if (found := record(model, key)) and found.needed]
     return [key for key in need if key not in written]

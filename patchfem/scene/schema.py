@@ -10,7 +10,7 @@ from .keys.materials import MATERIALS
 from .keys.quantities import KINDS, NUMBER
 from .keys.tables import Tables
 from .keys.types import Table, keys, kind_of, meaning, model_of, whole_tables
-from .rules.draft import SELECTORS
+from .rules.draft import SELECTORS, each
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 SPELLED = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ": "[ ·]"}
@@ -69,8 +69,9 @@ def _selected(model: type[Table], key: str) -> str:
     """Which keys each value of a selector wants, or which values of its selector want or use a key; "" for others."""
     selector, values = next((each for table, *each in SELECTORS.values() if issubclass(model, table)), ("", {}))
     if key == selector:
-        return "; ".join(f"'{value}' needs {', '.join(needs.split())}" for value, (needs, _) in values.items() if needs)
-    wanted, used = ([f"'{value}'" for value, words in values.items() if key in words[place].split()]
+        return "; ".join(f"'{value}' needs {', '.join(needs.split()).replace('|', ' or ')}"
+                         for value, (needs, _) in values.items() if needs)
+    wanted, used = ([f"'{value}'" for value, words in values.items() if key in each(words[place])]
                     for place in (0, 1))  # fmt: skip
     return "; ".join(f"{verb} {selector} {', '.join(found)}" for verb, found in (("needed by", wanted),
                                                                                 ("used by", used)) if found)

@@ -27,6 +27,7 @@ SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "100 Hz"\ncycle
 LAWS = {
     "coulomb": '[friction]\nlaw = "coulomb"\nstatic = 0.5\n',
     "elastic-plastic": '[friction]\nlaw = "elastic-plastic"\nstatic = 0.5\nbond_length = "5 um"\n',
+    "springs": '[friction]\nlaw = "elastic-plastic"\nstatic = 0.5\nstiffness = "10 N/um"\n',
     "tanh": '[friction]\nlaw = "tanh"\nstatic = 0.5\nreference_speed = "5 mm/s"\n',
     "bonds": '[friction]\nlaw = "nonlocal"\nstatic = 0.5\nbond_length = "5 um"\n',
     "growth": '[friction]\nlaw = "nonlocal"\nstatic = 0.35\nkinetic = 0.2\nbond_length = "3 um"\nrest_growth = '
@@ -35,6 +36,7 @@ LAWS = {
 TRUTH = {
     "coulomb": {"friction.static": 0.31},
     "elastic-plastic": {"friction.static": 0.31, "friction.bond_length": 2.3e-6},
+    "springs": {"friction.static": 0.31, "friction.stiffness": 1.3e7},
     "tanh": {"friction.static": 0.31, "friction.reference_speed": 1.7e-3},
     "bonds": {"friction.static": 0.31, "friction.bond_length": 2.3e-6},
     "growth": {"friction.static": 0.31, "friction.kinetic": 0.22, "friction.bond_length": 2.3e-6,
@@ -42,6 +44,7 @@ TRUTH = {
 }
 FREE = {
     "friction.static": "0.1..0.7", "friction.kinetic": "0.1..0.3", "friction.bond_length": "0.3 um..20 um",
+    "friction.stiffness": "2e6 N/m..1e8 N/m",
     "friction.reference_speed": "0.1 mm/s..100 mm/s", "friction.rest_growth": "1 m/s^2..50 m/s^2",
     "friction.slip_growth": "0.2 um..10 um", "normal.load": "50 N..200 N",
 }  # fmt: skip
@@ -90,6 +93,8 @@ def forces(law, time, slide, truth):
     values = list(truth.values())
     if law == "elastic-plastic":
         return play(slide, *values)
+    if law == "springs":
+        return play(slide, values[0], values[0] * LOAD / values[1])
     if law == "bonds":
         return dahl(slide, *values)
     if law == "growth":
@@ -122,7 +127,7 @@ def free_of(*names):
 
 # ---- every law from a loop of known numbers
 
-@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic", "tanh", "bonds"])
+@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic", "springs", "tanh", "bonds"])
 def test_exact_known_values_are_found_again(tmp_path, law):
     time, slide = rows()
     loop = table(tmp_path / "loop.csv", time, slide, forces(law, time, slide, TRUTH[law]))

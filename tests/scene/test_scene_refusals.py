@@ -169,7 +169,7 @@ def test_refuses_a_missing_key_at_its_table(text, pattern, header, key, says):
     "sets, key, says",
     [
         (["friction.law=tanh"], "friction.reference_speed", "law 'tanh' needs it"),
-        (["friction.law=elastic-plastic"], "friction.bond_length", "needs it"),
+        (["friction.law=elastic-plastic"], "friction.bond_length", "needs it or stiffness"),
         (["friction.law=convolution"], "friction.bond_length", "needs it"),
         (["slide.kind=sine"], "slide.frequency", "kind 'sine' needs it"),
         (["slide.kind=constant"], "slide.distance", "kind 'constant' needs it"),

@@ -72,7 +72,8 @@ class Friction(Table):
     static: key(NotNegative, "coefficient of static friction mu_s")
     kinetic: key(NotNegative | None, "coefficient of kinetic friction mu_k, at most static; static unless given") = None
     reference_speed: key(Speed | None, "speed v_0 over which the friction of the law tanh saturates") = None
-    bond_length: key(Length | None, "length eps_0 over which a bond forms and breaks, at rest") = None
+    bond_length: key(Length | None, "length eps_0 over which a bond forms and breaks, at rest; law elastic-plastic "
+                     "takes stiffness in its place") = None
     stiffness: key(quantity("stiffness", gt=0) | None, "initial slope of force over slide, for the whole contact; a "
                    "patch shares it in proportion to the normal force") = None
     chi: key(number(gt=-1, le=0) | None, "exponent of the distribution of sliders: in micro-slip the energy "

@@ -10,7 +10,7 @@ from ..keys.contact import Asperities
 from ..keys.tables import Friction, Slide, Tables
 from ..keys.types import keys
 
-# selector value -> keys it needs, keys it can use; a key of the table that stands in neither list is not used
+# selector value -> keys it needs, "a|b" for one of two, keys it can use; what stands in neither list is not used
 LAWS: dict[str, tuple[str, str]] = {name: law.keys for name, law in effects.LAWS.items()}
 SLIDES: dict[str, tuple[str, str]] = {
     "constant": ("speed distance", ""),
@@ -75,6 +75,11 @@ class Draft(Protocol):
     def lacks_table(self, name: str, reason: str) -> None: ...
 
 
+def each(words: str) -> list[str]:
+    """The keys of a record, each of several that stand for one another."""
+    return words.replace("|", " ").split()
+
+
 def unused(table: BaseModel, selector: str, used: dict[str, tuple[str, str]]) -> frozenset[str]:
     """Keys of a table that the value of its selector gives no meaning, among those that depend on it."""
     return _unused(type(table), getattr(table, selector), tuple(used.items()))
@@ -83,8 +88,8 @@ def unused(table: BaseModel, selector: str, used: dict[str, tuple[str, str]]) ->
 @cache
 def _unused(model: type[BaseModel], value: str, used: tuple) -> frozenset[str]:
     needs, can = dict(used)[value]
-    dependent = {key for _, pair in used for words in pair for key in words.split()}
-    return frozenset((dependent - set(needs.split()) - set(can.split())) & keys(model).keys())
+    dependent = {key for _, pair in used for words in pair for key in each(words)}
+    return frozenset((dependent - set(each(needs)) - set(each(can))) & keys(model).keys())
 
 
 def _needs(draft: Draft, at: str, table: Any, selector: str, used: dict[str, tuple[str, str]]) -> None:
@@ -92,9 +97,13 @@ def _needs(draft: Draft, at: str, table: Any, selector: str, used: dict[str, tup
     value = getattr(table, selector, None)
     if value not in used:
         return
-    for key in used[value][0].split():
-        if not draft.given(f"{at}.{key}"):
-            draft.lacks(f"{at}.{key}", f"{selector} '{value}' needs it")
+    for word in used[value][0].split():
+        key, *others = word.split("|")
+        given = [one for one in (key, *others) if draft.given(f"{at}.{one}")]
+        if not given:
+            draft.lacks(f"{at}.{key}", " or ".join((f"{selector} '{value}' needs it", *others)))
+        elif len(given) > 1:
+            draft.say(f"{at}.{given[-1]}", f"{selector} '{value}' takes it in place of {key}; leave one of them out")
     for key in sorted(unused(table, selector, used)):
         if draft.given(f"{at}.{key}") and key not in ("kinetic", "spread"):
             draft.remark(f"{at}.{key} has no meaning for {selector} '{value}' and is not used")

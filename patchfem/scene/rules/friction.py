@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from ...effects import has, takes, using
+from ...effects import either, has, takes, using
 from ..keys.tables import Friction
 from .draft import LAWS, Draft, _needs
+from .methods import changing_load, climbed
 
 
 def check_spread(draft: Draft, at: str, law: Friction) -> None:
@@ -68,12 +69,25 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
         draft.say(f"{at}.breakaway", "reading 'report' has no breakaway; use reading = 'stretch' or leave breakaway "
                                      "out")
     contact = draft.tables.contact
-    if law.static == 0 and law.law is not None and takes(law.law, "stiffness"):
+    if either(law.law) and law.stiffness is not None:
+        _stretches(draft, at, law)
+    if law.static == 0 and law.stiffness is not None and takes(law.law, "stiffness"):
         draft.say(f"{at}.static", f"0 with law '{law.law}', whose springs need a slip force; static > 0 is "
                                   "needed")  # fmt: skip
     if law.static == 0 and contact and contact.gives_way:
         draft.say(f"{at}.static", f"0 with {contact.gives_way}: no point carries friction; static > 0 is needed, or "
                                   f"leave out {contact.gives_way}")  # fmt: skip
+
+
+def _stretches(draft: Draft, at: str, law: Friction) -> None:
+    """Say a stiffness beside a load that changes or is not given."""
+    contact, cause = draft.tables.contact, changing_load(draft.tables) or climbed(draft.tables)
+    if cause:
+        draft.say(f"{at}.stiffness", f"{cause} changes the load, and springs come and go with it; give bond_length in "
+                                     "its place")
+    elif contact is not None and contact.load is None and contact.approach is not None:
+        draft.say(f"{at}.stiffness", "[contact.approach] leaves the load open; give bond_length, or contact.load in "
+                                     "place of the approach")
 
 
 def kinetic_unused(law: Friction) -> bool:

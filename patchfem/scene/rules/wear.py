@@ -59,6 +59,8 @@ def _friction(draft: Draft, change: WornFriction) -> None:
     if change.bond_length_factor is not None and not takes(law.law, "bond_length"):
         draft.say(f"{at}.bond_length_factor", f"law '{law.law}' has no bond_length; leave it out, or use "
                                               f"{using('bond_length')}; leave it out")
+    elif change.bond_length_factor is not None and law.stiffness is not None:
+        draft.say(f"{at}.bond_length_factor", "has no meaning beside friction.stiffness; give friction.bond_length")
     if change.coefficient_factor is not None and law.static == 0:
         draft.remark(f"{at}.coefficient_factor has no effect on static = 0")
     _locks(draft, change, law.static)

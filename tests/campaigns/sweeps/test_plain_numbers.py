@@ -15,6 +15,7 @@ from patchfem.runs.many.lumped import columns, lanes
 from patchfem.scene.changed import PLAIN
 
 PLASTIC = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"\n'
+SPRINGS = PLASTIC.replace('bond_length = "10 um"', 'stiffness = "2e6 N/m"')
 UNITS = {"load": "N", "bond_length": "m", "acceleration": "m/s^2", "frequency": "Hz", "moving_mass": "kg"}
 UNITS |= {"angle": "rad", "reference_speed": "m/s", "stiffness": "N/m", "stribeck_speed": "m/s"}
 KEYS = [key.replace("mode.", f"mode.{mode}.") for key in PLAIN if not key.startswith("contact.")
@@ -22,6 +23,7 @@ KEYS = [key.replace("mode.", f"mode.{mode}.") for key in PLAIN if not key.starts
 RIG = MODE + SECOND + DRIVE
 TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
 SCENES = {"coulomb": POINT + COULOMB + RIG, "elastic-plastic": POINT + PLASTIC + RIG,
+          "springs": POINT + SPRINGS + RIG,
           "tanh": POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "5 mm/s"\n' + RIG,
           "lugre": POINT + '[friction]\nlaw = "lugre"\nstatic = 0.3\nkinetic = 0.2\nstiffness = "1e7 N/m"\n'
           'stribeck_speed = "1 mm/s"\n' + RIG,
@@ -32,7 +34,8 @@ SCENES = {"coulomb": POINT + COULOMB + RIG, "elastic-plastic": POINT + PLASTIC +
           "start": POINT + COULOMB + RIG + '[structure.start]\nvelocity = ["0.1 m/s", "0 m/s"]\n'}
 PATCHES = {"static": TILTED, "lower": TILTED + 'on = "lower"\n[contact.asperities]\nlaw = "linear"\n'
            'normal_stiffness = "1e14 Pa/m"\n', "sheared": TILTED + SHEAR + PLASTIC + RIG,
-           "bonds": TILTED + SHEAR + NONLOCAL + RIG, "rigid": TILTED + COULOMB + RIG}
+           "springs": TILTED + SHEAR + SPRINGS + RIG, "bonds": TILTED + SHEAR + NONLOCAL + RIG,
+           "rigid": TILTED + COULOMB + RIG}
 HELD = TILTED + '[contact.holder]\nrotational_stiffness = "100 N m/rad"\n'
 
 
@@ -103,8 +106,8 @@ def test_exact_patches_made_from_the_first_are_those_built_from_text(name):
 
 ONE = POINT + "{}" + MODE + DRIVE
 OF_LAW = {"bond_length": ("elastic-plastic", "nonlocal"), "reference_speed": ("tanh",),
-          "stiffness": ("bouc-wen", "lugre"), "stribeck_speed": ("lugre",)}
-LUMPED = {"coulomb": ONE.format(COULOMB), "elastic-plastic": ONE.format(PLASTIC),
+          "stiffness": ("bouc-wen", "lugre", "springs"), "stribeck_speed": ("lugre",)}
+LUMPED = {"coulomb": ONE.format(COULOMB), "elastic-plastic": ONE.format(PLASTIC), "springs": ONE.format(SPRINGS),
           **{law: ONE.format(friction_of(law)) for law in ("tanh", "nonlocal", "bouc-wen", "lugre")},
           "start": ONE.format(COULOMB) + '[structure.start]\nvelocity = ["0.1 m/s"]\n'}
 

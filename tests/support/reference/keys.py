@@ -10,7 +10,7 @@ from patchfem.scene.keys.quantities import EXAMPLES, KINDS
 from patchfem.scene.keys.tables import Tables
 from patchfem.scene.keys.types import keys, kind_of, meaning, model_of, parts, record
 from patchfem.scene.reader import is_value
-from patchfem.scene.rules.draft import SELECTORS
+from patchfem.scene.rules.draft import SELECTORS, each
 from patchfem.scene.rules.limits import NOT_YET_BUILT
 
 FOLDER = Path(__file__).parents[3] / "patchfem" / "scene"
@@ -90,7 +90,7 @@ def _needed(model: type, key: str, table: str) -> str:
     found = record(model, key)
     said = [found.needed] if found and found.needed else []
     for selector, used in NEEDS.items():
-        values = [f"`{value}`" for value, (needs, _) in used.items() if key in needs.split()]
+        values = [f"`{value}`" for value, (needs, _) in used.items() if key in each(needs)]
         if values and selector.rpartition(".")[0] == table:
             said.append(f"{selector.rpartition('.')[2]} {', '.join(values)}")
     return "; ".join(said)
@@ -137,7 +137,7 @@ def _effects() -> str:
     rows = []
     for name, effect in EFFECTS.items():
         selector, _, value = name.partition("=")
-        used = [words.replace(" ", ", ") for words in NEEDS.get(selector, {}).get(value, ("", ""))]
+        used = [words.replace(" ", ", ").replace("|", " or ") for words in NEEDS.get(selector, {}).get(value, ("", ""))]
         rows += [(f"`{name}`", *used, effect.equations)] if not name.startswith("structure.interface.") else []
     return grid(("effect", "needs", "may have", "equations"), rows)
 

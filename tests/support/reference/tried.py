@@ -98,7 +98,8 @@ def laws() -> dict:
     """Name of a form of a law -> the keys that a table of it holds."""
     out = {}
     for law, effect in LAWS.items():
-        needed = "".join(f"{key} = {VALUES[key]}\n" for key in effect.keys[0].split() if key in VALUES)
+        needs = effect.keys[0].replace("|stiffness", "").split()
+        needed = "".join(f"{key} = {VALUES[key]}\n" for key in needs if key in VALUES)
         for name, more in FORMS.get(law, {law: ""}).items():
             out[name] = f'law = "{law}"\nstatic = 0.3\n{needed}{more}'
     return out

@@ -111,7 +111,7 @@ def point(trial: Trial) -> dict:
 def friction(trial: Trial, spread: bool = False, law: str = "") -> dict:
     """[friction] or the same keys of an interface: a law, what it needs and some of what it may have."""
     law = law or trial.draw(*LAWS)
-    needs, may = (words.split() for words in LAWS[law].keys)
+    needs, may = (words.replace("|stiffness", "").split() for words in LAWS[law].keys)
     out = {"law": law, "static": round(float(trial.r.uniform(0.3, 0.8)), 3)}
     grows = trial.chance(0.3)
     for key in (*needs, *(key for key in may if trial.chance(0.25))):
