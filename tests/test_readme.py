@@ -6,9 +6,9 @@ import json
 import os
 import re
 import shlex
+import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
 from command_line import cli
 
@@ -106,18 +106,15 @@ def test_always_the_python_of_the_guide_runs(tmp_path, monkeypatch):
 
 @pytest.fixture
 def recipes(tmp_path, monkeypatch):
-    """question -> what its recipe prints as it stands, in an empty folder that holds a trace before and one after."""
+    """question -> what its recipe prints as it stands, in a folder with the files of a bare clone that it names."""
     monkeypatch.chdir(tmp_path)
-    x = np.arange(0, 4e-3, 2e-6)
-    before = 2e-6 * np.sin(2 * np.pi * x / 80e-6) + 1e-7 * np.random.default_rng(1).standard_normal(x.size)
-    after = np.where(abs(x - 2e-3) < 1e-3, np.minimum(before, 0.5e-6), before)
-    for name, heights in (("before", before), ("after", after)):
-        rows = "\n".join(f"{1e3 * place},{1e6 * height}" for place, height in zip(x, heights))
-        (tmp_path / f"{name}.csv").write_text(f"x [mm],z [um]\n{rows}\n")
     lines = re.search(r"## Three recipes\n\n```bash\n(.*?)```", text("README.md"), re.S)[1].splitlines()
     commands = {question.strip().partition("?")[0]: command for command, _, question in
                 (line.partition("#") for line in lines)}
     assert len(commands) == 3
+    for name in re.findall(r"studies/\S+", " ".join(commands.values())):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
 
     def said(question: str) -> str:
         for words in commands[question].split("&&"):
@@ -143,7 +140,11 @@ def test_always_the_recipe_of_tilts_runs_and_every_page_allows_what_it_says(reci
 def test_always_the_recipes_of_a_joint_and_of_a_pad_run(recipes):
     joint = recipes("how stiff is my joint, what does it damp")
     assert "secant_stiffness" in joint and "loop_area" in joint and "dissipated per cycle" in joint
-    assert "worn" in recipes("is my pad worn")
+    depth, low, high = map(float, re.search(r"Worn along x: (\S+) nm \((\S+) nm to (\S+) nm\) on average",
+                                            recipes("is my pad worn")).groups())
+    before, after = ([float(row["z [um]"]) for row in csv.DictReader(text(f"studies/wear/{name}.csv").splitlines())]
+                     for name in ("before", "after"))
+    assert low < 1e3 * (sum(before) - sum(after)) / len(before) < high and high - low < 0.02 * depth
 
 
 def allowed_everywhere(limit: str, peak: str) -> None:

@@ -43,16 +43,17 @@ def small(path: Path) -> None:
     found.quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
-def traces(folder: Path) -> None:
-    """A ground surface before and after its crests wore off over the middle half."""
-    draw, x = np.random.default_rng(4), np.arange(0, 4e-3, 2e-6)
+def traces(folder: Path = ROOT / "studies/wear") -> None:
+    """Write the made-up pair of the README's recipe: a ground surface before and after its crests wore off over the
+    middle half, to 0.4 um over its mean line."""
+    draw, x = np.random.default_rng(4), np.arange(0, 4e-3, 4e-6)
     waves = [(2e-6, 190e-6, 0.3), (1.2e-6, 83e-6, 1.1), (0.6e-6, 31e-6, 2.0)]
     height = sum(a * np.sin(2 * np.pi * x / length + 9e2 * x * phase) for a, length, phase in waves)
     height = height + np.convolve(draw.standard_normal(x.size), np.ones(8) / 8, "same") * 1e-6
     worn = np.where(abs(x - 2e-3) < 1e-3, np.minimum(height, 0.4e-6), height)
     for name, z in (("before", height), ("after", worn)):
         noisy = z + 2e-8 * draw.standard_normal(x.size)
-        np.savetxt(folder / f"{name}.csv", np.c_[1e3 * x, 1e6 * noisy], "%.6g", delimiter=",", header="x [mm],z [um]",
+        np.savetxt(folder / f"{name}.csv", np.c_[1e3 * x, 1e6 * noisy], "%.3f", delimiter=",", header="x [mm],z [um]",
                    comments="")
 
 
@@ -71,8 +72,9 @@ def main() -> None:
         patchfem("new", "misalignment", "-o", "tilts.toml")
         patchfem("sweep", "tilts.toml", "-o", "tilts")
         shot(here / "tilts/report.html", "sweep", 1130, 900)
-        traces(here)
-        patchfem("compare", "before.csv", "after.csv", "--direction", "x", "-o", "worn")
+        traces()
+        patchfem("compare", *(ROOT / f"studies/wear/{name}.csv" for name in ("before", "after")), "--direction", "x",
+                 "-o", "worn")
         shot(here / "worn/report.html", "compare", 1130, 760)
 
 
