@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["cho_factor", "cho_solve", "dpotrf", "dpotri", "dpotrs", "dtrsm", "one_thread"]
+__all__ = ["cho_factor", "cho_solve", "dpotrf", "dpotri", "dpotrs", "dtrsm", "dtrtri", "one_thread"]
 
 
 def _module(name: str):
@@ -29,7 +29,7 @@ def _module(name: str):
 
 
 _LAPACK, _BLAS = _module("_flapack"), _module("_fblas")
-dpotrf, dpotri, dpotrs = _LAPACK.dpotrf, _LAPACK.dpotri, _LAPACK.dpotrs
+dpotrf, dpotri, dpotrs, dtrtri = _LAPACK.dpotrf, _LAPACK.dpotri, _LAPACK.dpotrs, _LAPACK.dtrtri
 dtrsm = _BLAS.dtrsm
 
 

@@ -16,33 +16,46 @@ from functools import cached_property
 
 import numpy as np
 
-from .. import compiled
 from ..contact.unilateral import INDEFINITE
 from ..core import Compliance, PatchfemError, frozen_array
-from ..elasticity.lapack import dpotrf, dpotri, one_thread
+from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, one_thread
 
-KERNELS = "slip.yield_kernels"
+SAME = 1e-11  # of a yield slide: nodes that yield at once, as mirrored ones do; round-off parts 801 of them by 7e-13
+TRIES = 12  # orders of yields that are tried before points are taken out one by one: rough gaps ask for 1 to 36
 SHEAR_MODES = 4  # modes a shear reduction starts from: of bare pieces they leave 1e-6 of the friction limit
 FEW, BEYOND = 16, 0.8  # modes that fewer are held against; share of a tolerance that they may miss these by
 GATHERED = 16, 32, 64  # points that may stand for all of a patch
 BACK = 2.0  # bond lengths: exp(2) of the stiffness at rest
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
 class JenkinsSet:
     """Parallel Jenkins elements: springs that slip at a yield slide.
 
     stiffness: (t,) [N/m]; yield_slide: (t,) [m]; sum stiffness * yield_slide = friction limit. points: (a,) nodes of
-    the contact set; limit: (a,) their yield forces [N]; share: (a, t) [N/m], the force of a point is share @ stretch
-    for any history. reluctant: nodes that at first carry the wrong sign.
+    the contact set; limit: (a,) their yield forces [N]. order: (a,) places in `points`, the last to yield first; low:
+    lower Cholesky factor (a, a) of the compliance in that order, empty of one spring before rigid points; starts: (t,)
+    yields after which that of an element comes first. reluctant: nodes that at first carry the wrong sign.
     """
 
     stiffness: np.ndarray
     yield_slide: np.ndarray
     points: np.ndarray
     limit: np.ndarray
-    share: np.ndarray
+    order: np.ndarray
+    low: np.ndarray
+    starts: np.ndarray
     reluctant: int
+
+    @cached_property
+    def share(self) -> np.ndarray:
+        """(a, t) [N/m]: the force of a point is share @ stretch for any history."""
+        if not self.low.size:
+            return self.limit[:, None] / self.yield_slide
+        inverse, _ = dtrtri(self.low, lower=1)
+        out = np.empty((self.limit.size, self.starts.size))
+        out[self.order] = np.add.reduceat((inverse.sum(axis=1)[:, None] * inverse)[::-1], self.starts).T
+        return frozen_array(out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,37 +141,67 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
     if not (limit > 0).any():
         raise PatchfemError("contact.shear: no point carries friction")
     points = np.flatnonzero(limit > 0)
-    force = limit[points]
+    force, none = limit[points], np.zeros(0, np.int64)
     if local_length == 0 and np.ptp(tangential) == 0:  # a spring before rigid points: they all slip at once
         stiffness = 1 / tangential[0, 0]
-        at = [force.sum() / stiffness]
-        return JenkinsSet(frozen_array([stiffness]), frozen_array(at), frozen_array(points, np.int64),
-                          frozen_array(force), frozen_array(force[:, None] / at), 0)
-    c = tangential[np.ix_(points, points)] + np.diag(local_length / force)
-    inverse, at, rates = inverse_of(c), np.empty(force.size), np.zeros((force.size + 1, force.size))
-    yields = compiled.kernels(KERNELS).yields
-    count, reluctant = yields(inverse, inverse.sum(axis=0), force.copy(), np.arange(force.size), at, rates)
-    if reluctant < 0:
-        raise PatchfemError(INDEFINITE)
-    drop, at = np.ascontiguousarray((rates[:count] - rates[1:count + 1]).T), at[:count]
-    return JenkinsSet(frozen_array(drop.sum(axis=0)), frozen_array(at), frozen_array(points, np.int64),
-                      frozen_array(force), frozen_array(drop), reluctant)
-
-
-def inverse_of(c: np.ndarray) -> np.ndarray:
-    """Inverse (n, n) of a symmetric positive definite matrix; PatchfemError where it is not, to working precision."""
+        return JenkinsSet(frozen_array([stiffness]), frozen_array([force.sum() / stiffness]),
+                          frozen_array(points, np.int64), frozen_array(force), none, np.zeros((0, 0)), none, 0)
     with one_thread():  # more wait for each other: 5 ms of one are 270 ms of two beside other work
-        low, fault = dpotrf(c, lower=1)
-        if fault:
-            raise PatchfemError(INDEFINITE)
-        low, _ = dpotri(low, lower=1)
-    return np.tril(low) + np.tril(low, -1).T
+        order, low, root, at, reluctant = _in_order(tangential[np.ix_(points, points)] + np.diag(local_length / force),
+                                                    force)
+    starts = np.flatnonzero(np.diff(at, prepend=-np.inf) > SAME * at)
+    return JenkinsSet(frozen_array(np.add.reduceat(root[::-1] ** 2, starts)), frozen_array(at[starts]),
+                      frozen_array(points, np.int64), frozen_array(force), order, low, starts, reluctant)
+
+
+def _in_order(c: np.ndarray, force: np.ndarray) -> tuple:
+    """(order (n,), L (n, n), L^-1 1 (n,), rising slides (n,) [m] of the yields, number of reluctant points) of points
+    behind the compliance c = L L' in an order, the last that yields first, that yield at `force` (n,) [N].
+
+    While the first m of them stick, their rates solve the leading block of c. So what the m-th carries less by its
+    yield is the m-th row of L^-1 times (L^-1 1)_m, and slides at which all yield solve share @ slides = force: they are
+    (L' force)/(L^-1 1). An order is right where these rise, as a rate only grows until its point yields. The first is
+    that of no yields, a further one that of these slides.
+    """
+    rate = dpotrs(_factor(c), np.ones(force.size), lower=1)[0]
+    order, slides = np.arange(force.size), np.divide(force, rate, out=np.full(force.size, np.inf), where=rate > 0)
+    for tried in range(TRIES + 2):
+        order = order[np.argsort(-slides, kind="stable")] if tried < TRIES + 1 else _one_by_one(c, force)
+        low = _factor(c[np.ix_(order, order)])
+        root = dtrsm(1.0, low, np.ones((force.size, 1)), lower=1)[:, 0]
+        slides = np.divide(force[order] @ low, root, out=np.full(force.size, np.inf), where=root > 0)
+        if (slides[1:] <= slides[:-1] * (1 + SAME)).all():
+            break
+    return order, low, root, np.maximum.accumulate(slides[::-1]), int((rate <= 0).sum())
+
+
+def _factor(c: np.ndarray) -> np.ndarray:
+    """Lower Cholesky factor (n, n); PatchfemError where c is not positive definite to working precision."""
+    low, fault = dpotrf(c.T, lower=1)
+    if fault:
+        raise PatchfemError(INDEFINITE)
+    return low
+
+
+def _one_by_one(c: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """`order` of `_in_order` by taking points out of the inverse of c after each yield: n^3 products."""
+    inverse, left, out = np.linalg.inv(c), force.copy(), []
+    rate = inverse.sum(axis=0)
+    for _ in range(force.size):
+        wait = np.divide(left, rate, out=np.full(force.size, np.inf), where=rate > 0)
+        wait[out] = np.inf
+        out.append(int(wait.argmin()))
+        left -= rate * max(wait[out[-1]], 0.0)
+        column, pivot = inverse[out[-1]].copy(), inverse[out[-1], out[-1]]
+        rate = rate - column / pivot * rate[out[-1]]
+        inverse -= np.outer(column, column / pivot)
+    return np.array(out[::-1])
 
 
 def scaled(group: JenkinsSet, factor: float) -> JenkinsSet:
     """The elements of points that yield at `factor` > 0 times the force: the same springs, each that much further."""
-    return JenkinsSet(group.stiffness, frozen_array(factor * group.yield_slide), group.points,
-                      frozen_array(factor * group.limit), group.share, group.reluctant)
+    return replace(group, yield_slide=frozen_array(factor * group.yield_slide),
+                   limit=frozen_array(factor * group.limit))
 
 
 def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, count: int,

@@ -1,9 +1,10 @@
-"""Points that yield one after the other: the compiled order beside its NumPy twin, which solves anew after each."""
+"""Points that yield one after the other: elements from one factor beside those of a solve after each yield."""
 
 import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
+from patchfem.slip import shear_modes
 from patchfem.slip.shear_modes import jenkins_set
 
 
@@ -30,9 +31,11 @@ def half_plane(count: int):
     return np.log((x[-1] + 2 - x[0]) / np.where(apart > 0, apart, 0.3))
 
 
+@pytest.mark.parametrize("tries", [shear_modes.TRIES, -1])  # -1: points are taken out one by one at once
 @pytest.mark.parametrize("count", [1, 2, 7, 60])
 @pytest.mark.parametrize("local", [0.0, 0.05])
-def test_exact_the_order_is_that_of_an_inverse_made_anew_after_every_yield(count, local):
+def test_exact_the_order_is_that_of_a_system_solved_anew_after_every_yield(count, local, tries, monkeypatch):
+    monkeypatch.setattr(shear_modes, "TRIES", tries)
     r = np.random.default_rng(count)
     limit, c = r.uniform(0.5, 2, count), half_plane(count)
     group = jenkins_set(c, limit, local)
@@ -41,16 +44,19 @@ def test_exact_the_order_is_that_of_an_inverse_made_anew_after_every_yield(count
     share = -np.diff(rates, axis=0, append=np.zeros((1, count))).T
     np.testing.assert_allclose(group.share, share, rtol=0, atol=1e-11 * np.abs(rates).max())
     np.testing.assert_allclose(group.stiffness, share.sum(axis=0), rtol=0, atol=1e-11 * rates.sum(axis=1).max())
+    assert group.reluctant == np.sum(rates[0] <= 0)
 
 
-def test_exact_mirrored_points_yield_at_once():
-    """Eight points of even pressure on an even line: four yields of two points each."""
-    apart = np.abs(np.subtract.outer(np.arange(8.0), np.arange(8.0)))
-    c = np.log(20 / np.where(apart > 0, apart, 0.3))
-    group = jenkins_set(c, np.ones(8))
-    assert group.yield_slide.size == 4 and (np.count_nonzero(group.share[:, 0]) == 8)
-    np.testing.assert_allclose(group.share[:4], group.share[:3:-1], rtol=0, atol=1e-14 * group.share.max())
-    np.testing.assert_allclose(group.share @ group.yield_slide, np.ones(8), rtol=1e-12)
+@pytest.mark.parametrize("count", [8, 400])
+def test_exact_mirrored_points_yield_at_once(count):
+    """Points of even pressure on an even line: half as many yields of two points each."""
+    apart = np.abs(np.subtract.outer(np.arange(float(count)), np.arange(float(count))))
+    c = np.log(3 * count / np.where(apart > 0, apart, 0.3))
+    group = jenkins_set(c, np.ones(count))
+    assert group.yield_slide.size == count // 2 and np.count_nonzero(group.share[:, 0]) == count
+    np.testing.assert_allclose(group.share[:count // 2], group.share[:count // 2 - 1:-1], rtol=0,
+                               atol=1e-12 * group.share.max())
+    np.testing.assert_allclose(group.share @ group.yield_slide, np.ones(count), rtol=1e-12)
 
 
 def test_refuses_a_compliance_that_is_not_positive_definite():
