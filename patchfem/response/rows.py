@@ -185,104 +185,108 @@ def _shaken(name: str, unit: str, floor: float, words: str) -> tuple:
 
 FOURTH = 0.2, 0.0  # of the change by half the samples: what is read off cubics between them is of fourth order
 ROWS = (
-    Row("relative_displacement_amplitude", "m", 1e-10, "half peak-to-peak motion at the output, relative to the base",
+    Row("relative_displacement_amplitude", "m", 1e-10, "half peak-to-peak displacement at the output, relative to the "
+                                                       "base",
         lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2 if s.own.swing is None else s.own.swing),
     Row("absolute_acceleration_peak", "m s-2", 1e-4, "largest acceleration at the output, base motion included",
         lambda s: acceleration_peak(s.window) if s.own.acceleration is None else s.own.acceleration),
-    Row("friction_force_peak", "N", 1e-6, "largest resultant friction force of the interface",
+    Row("friction_force_peak", "N", 1e-6, "largest friction force of the whole interface",
         lambda s: None if s.load is None else s.own.loops[0].force if s.own.loops else
         float(np.abs(s.window.force).max()), group="friction"),
     Row("energy_balance", "1", 1e-8,
-        "error of the energy balance over the run: work less what is stored and dissipated, relative to the energy "
-        "that went to and fro and the largest stored",
+        "error of the energy balance over the run: work minus stored and dissipated energy, relative to the energy "
+        "exchanged plus the largest energy stored",
         lambda s: energy_balance(s.book), group="energy", term=("1", lambda _: 1.0)),
     Row("absolute_acceleration_fundamental", "m s-2", FLOOR,
         "first harmonic of the acceleration at the output, base motion included",
         lambda s: s.waves.get("absolute_acceleration_fundamental")),
     Row("acceleration_distortion", "1", 1e-6,
-        "third over first harmonic of the acceleration at the output, base motion included; without a value where the "
-        "output stands still",
+        "third over first harmonic of the acceleration at the output, base motion included; null if the output does "
+        "not move",
         lambda s: s.waves.get("acceleration_distortion")),
     Row("drift_per_cycle", "m", 1e-11,
-        "time mean of the slide in the last cycle less that in the first of the last cycles, per cycle between them",
+        "change of the time mean of the slide from the first to the last cycle of the window, per cycle",
         lambda s: drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period) if s.own.drift is None
         else s.own.drift,
         term=("slip, or motion", _moved), halves=FOURTH),
     Row("slip_amplitude", "m", 1e-10,
-        "half peak-to-peak of the irreversible part of the slide, its parts weighted by their "
-        "friction limits: the points of a patch by the pressure, the sliders of law 'iwan' by their slip forces",
+        "half peak-to-peak of the irreversible part of the slide, as a weighted mean: points of a patch are weighted "
+        "by the pressure, sliders of law 'iwan' by their slip forces",
         lambda s: s.slip.get("slip_amplitude"), group="friction"),
     Row("stick_fraction", "1", 1e-3,
-        "share of the last cycles in which the interface as a whole sticks: over half of its slide, weighted as in "
-        "slip_amplitude, is elastic; part of a patch, or some sliders of law 'iwan', may slip "
-        "meanwhile",
+        "share of the last cycles in which the interface as a whole sticks, that is, over half of its slide, weighted "
+        "as in slip_amplitude, is elastic; part of a patch, or some sliders of law 'iwan', may slip meanwhile",
         lambda s: s.slip.get("stick_fraction"), 0.35, group="friction", term=("1", lambda _: 1.0),
         halves=(2.5, 0.5)),
     Row("slip_start_phase", "rad", 1e-3,
-        "phase of the base displacement at which the mean slip, that of slip_amplitude, starts after a stick, modulo "
-        "pi; printed in degrees",
+        "phase of the base displacement at which slip starts after stick, modulo pi; slip is the mean used in "
+        "slip_amplitude; printed in degrees",
         lambda s: s.slip.get("slip_start_phase"), 1.0, group="friction", term=("pi", lambda _: np.pi),
         halves=(2.5, 1.0)),
     Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together", lambda s: s.load,
         group="friction"),
     Row("loop_area", "J", 1e-10,
-        "work of friction of this interface alone per cycle; null if the drive is not a sine and the loop does not "
-        "close: the interface then stores or gives back more than it dissipates",
+        "energy dissipated per cycle in this interface alone; null if the drive is not a sine and the loop does not "
+        "close, because the interface then stores or returns more than it dissipates",
         lambda s: s.cycle.get("loop_area"), group="energy"),
     Row("equivalent_stiffness", "N m-1", 1.0,
-        "part of the friction's first harmonic in phase with the slide over the first harmonic of the slide, negative "
-        "where friction holds the spring while stuck", lambda s: s.cycle.get("equivalent_stiffness"), group="friction",
-        term=("whole first harmonic", first_harmonic)),
+        "in-phase part of the first harmonic of the friction force over the first harmonic of the slide; negative if "
+        "friction holds the spring deflected during stick",
+        lambda s: s.cycle.get("equivalent_stiffness"), group="friction", term=("whole first harmonic", first_harmonic)),
     Row("secant_stiffness", "N m-1", 1.0,
-        "friction at the largest slide of a cycle less that at the smallest over their distance, where it jumps the "
-        "mean of both sides", lambda s: s.cycle.get("secant_stiffness"), group="friction", halves=FOURTH),
+        "friction force at the largest minus that at the smallest slide of a cycle, over the range of the slide; where "
+        "the force jumps, the mean of both sides counts",
+        lambda s: s.cycle.get("secant_stiffness"), group="friction", halves=FOURTH),
     Row("equivalent_damping", "1", 1e-8,
-        "damping ratio that friction gives mode 1: loop area over 2 pi K A^2, K = moving_mass omega_1^2 the stiffness "
-        "of the first mode that is not rigid, A its motion, half the range of the slide in a cycle over its slide, the "
-        "mean over the last cycles; without a value where another mode carries more than 5 % of the slide",
+        "equivalent damping ratio of friction in the first mode that is not rigid: loop area over 2 pi K A^2, with K = "
+        "moving_mass omega_1^2 and A half the range of the slide in a cycle over the mode's `slide`, averaged over the "
+        "last cycles; null if other modes carry more than 5 % of the slide",
         lambda s: s.cycle.get("equivalent_damping"), group="friction", halves=FOURTH),
-    Row("friction_work", "J", 1e-10, "work that went into all interfaces together over the run",
+    Row("friction_work", "J", 1e-10, "work done on all interfaces together over the run",
         lambda s: s.energies.get("friction_work"), group="energy"),
-    Row("energy_stored", "J", 1e-10, "energy in all interfaces at the end: elastic, over grooves with the "
-        "height of the load, or what was done against a load that changes", group="energy"),
-    Row("energy_dissipated", "J", 1e-10, "energy that friction of all interfaces turned into heat over the run",
+    Row("energy_stored", "J", 1e-10, "energy stored in all interfaces at the end: elastic energy, and over grooves the "
+                                     "potential energy of the load or, for a load that changes, the work done against "
+                                     "it", group="energy"),
+    Row("energy_dissipated", "J", 1e-10, "energy dissipated by friction in all interfaces over the run",
         lambda s: s.energies.get("energy_dissipated"), group="energy"),
     Row("energy_created", "J", 1e-10,
-        "energy that a law without passivity, the report's as printed, created over the run",
+        "energy created over the run by a law that is not passive, such as the law as printed in the report",
         lambda s: s.energies.get("energy_created"), group="energy"),
     Row("normal_load_least", "N", 1e-6, "smallest normal load in the last cycles", lambda s: s.of_load(np.min),
         group="friction"),
     Row("normal_load_peak", "N", 1e-6, "largest normal load in the last cycles", lambda s: s.of_load(np.max),
         group="friction"),
-    Row("open_fraction", "1", 1e-3, "share of the time without contact",
+    Row("open_fraction", "1", 1e-3, "share of the last cycles without contact",
         lambda s: s.of_load(lambda load: np.mean(load <= 0)), 4.0, group="friction", term=("1", lambda _: 1.0)),
     Row("relative_displacement_amplitude_steady", "m", 1e-10,
-        "amplitude at which a motion that has not settled would settle, extrapolated"),
-    Row("peak_frequency", "Hz", 0.0, "drive frequency of the largest amplitude on a curve of steady motions"),
+        "extrapolated steady amplitude of a motion that has not settled"),
+    Row("peak_frequency", "Hz", 0.0, "drive frequency at the largest amplitude of a curve of steady states"),
     Row("friction_ratio_end", "1", 1e-9, "ratio of friction to normal load at the end of the slide", group="friction"),
     Row("friction_ratio_peak", "1", 1e-9, "largest ratio of friction to normal load over the run", group="friction"),
     Row("flutter_amplitude", "m", 1e-10,
-        "half peak-to-peak of the output in the motion without a drive in which friction just takes what a mode of "
-        "damping below 0 gives, and which does not last: what swings less falls, what swings more grows"),
+        "half peak-to-peak at the output of the unstable undriven motion in which friction dissipates exactly what a "
+        "mode of negative damping supplies: smaller motions decay, larger ones grow"),
     Row("work_check", "1", 1e-2,
-        "friction work by the trapezoidal rule on the run's own samples against that of its ledger, relative",
+        "relative difference between the friction work by the trapezoidal rule on the samples of the run and that in "
+        "its energy balance",
         lambda s: s.work_check, group="energy"),
-    *_shaken("relative_displacement_rms", "m", 1e-10, "root mean square of the motion at the output about its mean, "
-             "under a random drive"),
-    *_shaken("absolute_acceleration_rms", "m s-2", 1e-4, "root mean square of the acceleration at the output, base "
-             "motion included, under a random drive"),
-    *_shaken("response_frequency", "Hz", 1e-3, "frequency of the largest peak of H1, the response to a random drive"),
-    *_shaken("response_damping", "1", 1e-5, "damping ratio of that peak, of structure and friction together"),
-    Row("ring_frequency", "Hz", 1e-3, "frequency at which the rig rings while it sticks"),
-    Row("ring_damping", "1", 1e-6, "damping ratio of that ringing"),
+    *_shaken("relative_displacement_rms", "m", 1e-10, "root mean square displacement at the output about its mean, "
+                                                      "under a random drive"),
+    *_shaken("absolute_acceleration_rms", "m s-2", 1e-4, "root mean square acceleration at the output, base motion "
+                                                         "included, under a random drive"),
+    *_shaken("response_frequency", "Hz", 1e-3, "frequency of the largest peak of H1, the frequency response under a "
+                                               "random drive"),
+    *_shaken("response_damping", "1", 1e-5, "damping ratio of that peak, structure and friction together"),
+    Row("ring_frequency", "Hz", 1e-3, "frequency of the free vibration (ringing) during stick"),
+    Row("ring_damping", "1", 1e-6, "damping ratio of that free vibration"),
     Row("onset_level", "m s-2", 0.0,
-        "level of the drive at which slip begins, as drive.onset says, found by halving between two levels; N under a "
-        "force", group="friction"),
+        "level of the drive at the onset that drive.onset defines, found by bisection between two levels; in N for a "
+        "force drive", group="friction"),
     Row("jump_level", "m s-2", 0.0,
-        "level after the largest jump of the amplitude between two levels, by a factor of 1.5 or more beyond the "
-        "drive's; N under a force"),
+        "level after the largest jump of the amplitude between two levels; a jump is larger than the change of the "
+        "drive by a factor of 1.5 or more; in N for a force drive"),
     Row("level_hysteresis", "m", 0.0,
-        "hysteresis: largest difference of the amplitude between rising and falling levels, at one level"),
+        "hysteresis: largest difference of the amplitude between rising and falling levels at the same level"),
 )
 TABLE = {row.name: row for row in ROWS}
 OF_EACH = ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area")  # of every interface

@@ -220,10 +220,9 @@ def limits(name: str) -> list:
             for sentence in beside(name, other):
                 said.setdefault(sentence, []).append(f"`{other}`")
     rows = [(", ".join(dict.fromkeys(words)), sentence) for sentence, words in said.items()]
-    more = "[What it cannot do](../../../../patchfem/scene/LIMITS.md) has the bounds of all numbers and what the " \
-           "models leave out."
-    return [*([keys_page.grid(("not beside", "what the program says"), rows)] if rows else
-              ["Every other effect that its scene can hold goes with it."]), more]
+    more = "[Limits](../../../../patchfem/scene/LIMITS.md) has the bounds of all numbers and what the models neglect."
+    return [*([keys_page.grid(("not with", "message"), rows)] if rows else
+              ["It can be combined with every other effect that its scene can hold."]), more]
 
 
 def beside(name: str, other: str) -> list:

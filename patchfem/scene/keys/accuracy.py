@@ -19,7 +19,7 @@ Summing = Annotated[Literal["auto", "direct", "truncated", "merged", "recursion"
 
 
 class Accuracy(Table):
-    """The tolerance from which every numerical choice follows, and the knobs that pin one."""
+    """The tolerance, from which every numerical choice follows, and parameters that fix single choices."""
 
     tolerance: key(number(gt=0, lt=1), "largest relative error wanted in any measure; the numerical settings "
                    "follow from it") = 1e-3

@@ -40,16 +40,16 @@ Substance = Annotated[Material, BeforeValidator(material)]
 
 
 class Coating(Table):
-    """A hard layer on a piece: what it is made of and how thick it is, part of the piece's height."""
+    """A hard layer on a piece; its thickness is part of the height of the piece."""
 
     material: key(Substance, "material of the coating, given in the same way as substrate")
     thickness: key(Length, "thickness of the coating, included in the height of its piece")
 
 
 class OnePiece(Table):
-    """What one of the two pieces has otherwise than the other; `coating = "none"` leaves it bare."""
+    """Properties of one piece that differ from those in [contact]; `coating = "none"` removes the coating."""
 
-    height: key(Length | None, "height of this piece; contact.height unless given") = None
+    height: key(Length | None, "height of this piece; default contact.height") = None
     length: key(Length | None, "length of this piece, centred at x = 0; contact.length unless given; the interface "
                 "has the length of the shorter piece") = None
     substrate: key(Substance | None, "material of this piece; contact.substrate unless given") = None
@@ -69,7 +69,7 @@ class Tilt(Table):
 
 
 class LoadLine(Table):
-    """The line of the load beside the middle of a piece that is free to rotate, by offset or by moment."""
+    """An off-centre load, given by its offset or its moment; the upper piece is free to rotate."""
 
     offset: key(Place | None, "distance of the load line from the middle of the patch; > 0 moves the pressure to "
                 "+x", "unless moment") = None
@@ -77,13 +77,13 @@ class LoadLine(Table):
 
 
 class Approach(Table):
-    """A prescribed closing of the holders in place of the load."""
+    """A prescribed approach of the holders in place of the load."""
 
     distance: key(quantity("length", ge=0), "approach of the holders from first touch, in place of a load")
 
 
 class Holder(Table):
-    """The springs between the far face and what holds it."""
+    """Springs between the far face of a piece and its holder."""
 
     rotational_stiffness: key(quantity("rotational stiffness", gt=0) | None, "rotational stiffness between the far "
                               "face and its holder", "unless tangential_stiffness") = None
@@ -101,14 +101,14 @@ def convex(value: object) -> object:
 
 
 class Crown(Table):
-    """A rounding of this radius over the patch."""
+    """A cylindrical crown of the patch."""
 
     radius: key(Annotated[Length, BeforeValidator(convex)], "radius of the crown: the gap grows as x^2/(2 radius)")
     on: key(Piece, "the piece that carries the shape") = "upper"
 
 
 class Step(Table):
-    """A step of this height at this place."""
+    """A step of the gap at one position along x."""
 
     height: key(Place, "height of the step: the gap is wider by it where x > at")
     at: key(Place, "position x of the step, 0 at the middle of the patch")
@@ -116,7 +116,7 @@ class Step(Table):
 
 
 class ProfileFile(Table):
-    """Measured heights, added to the gap."""
+    """Measured heights that are added to the gap."""
 
     file: key(Text, "file of one height trace along x: text with units in its header, or an instrument's file")
     heights: key(Literal["gap", "surface"], "'gap': larger heights open the gap; 'surface': a stylus trace, whose "
@@ -133,7 +133,7 @@ class Asperities(Table):
                           "law 'exponential' its value at first touch") = None
     decay_length: key(Length | None, "compression over which the pressure of law 'exponential' grows by a "
                       "factor e") = None
-    radius: key(Length | None, "radius of the tips of the peaks", "law `hertz`, unless from or rms_height") = None
+    radius: key(Length | None, "tip radius of the peaks", "law `hertz`, unless from or rms_height") = None
     density: key(quantity("areal density", gt=0) | None, "number of peaks per area", "as radius") = None
     height_deviation: key(Length | None, "standard deviation of the peak heights", "as radius") = None
     from_: key(Text | None, "file of a height trace from which the peaks are taken: one rough piece on a smooth one",
@@ -141,8 +141,8 @@ class Asperities(Table):
     rms_height: key(Length | None, "root mean square height of the rough trace; for two rough pieces the root of "
                     "the sum of both squares, as for slope and curvature",
                     "law `hertz`, unless radius or from") = None
-    rms_slope: key(Positive | None, "root mean square of the slope of that trace", "as rms_height") = None
-    rms_curvature: key(quantity("curvature", gt=0) | None, "root mean square of the curvature of that trace",
+    rms_slope: key(Positive | None, "root mean square slope of that trace", "as rms_height") = None
+    rms_curvature: key(quantity("curvature", gt=0) | None, "root mean square curvature of that trace",
                        "as rms_height") = None
     cutoff: key(Length | None, "wavelength that splits a trace (Gaussian filter of ISO 16610-21): longer waves belong "
                 "to [contact.profile], shorter ones to the asperities; length/100 beside a profile, else all waves "
@@ -152,7 +152,7 @@ class Asperities(Table):
 
 
 class Shear(Table):
-    """Tangential compliance of the pieces; it has no keys."""
+    """Tangential compliance of the pieces, which allows partial slip; it has no keys."""
 
 
 class Grooves(Table):
@@ -173,7 +173,7 @@ def outermost(width: float, count: int) -> float:
 
 
 class Strips(Table):
-    """The patch as equal strips side by side over the width."""
+    """The patch divided into equal strips side by side over the width."""
 
     count: key(whole(1, 10_000), "number of equal strips side by side over the width")
     roll: key(quantity("angle"), "rotation of the holder about x, which shifts the pressure sideways") = 0.0
@@ -181,13 +181,13 @@ class Strips(Table):
 
 
 class Contact(Table):
-    """The patch: two alike pieces pressed together; its sub-tables change the shape or add compliance."""
+    """The patch: two equal pieces pressed together; sub-tables change one piece or the gap, or add compliance."""
 
     length: key(Length, "length of both pieces along the sliding direction x")
-    width: key(Length, "width of the patch across the plane of the model")
+    width: key(Length, "width of the patch perpendicular to the plane of the model")
     height: key(Length, "height of each piece from the interface to its held far face, coating included")
-    load: key(Force | None, "total normal force on the interface, weight included; [contact.approach] may stand in its "
-              "place", "unless [contact.approach]") = None
+    load: key(Force | None, "total normal force on the interface, weight included; or give "
+              "[contact.approach]", "unless [contact.approach]") = None
     pairs: key(whole(1, 1_000_000), "number of equal patches that share the load; forces and stiffnesses are reported "
                "for all of them together") = 1
     plane: key(Literal["strain", "stress"], "plane strain or plane stress in the pieces") = "strain"

@@ -42,11 +42,11 @@ LawName, WaveName = Literal[tuple(LAWS)], Literal[tuple(WAVEFORMS)]
 
 
 class Normal(Table):
-    """A normal load on a single point, with an optional oscillation."""
+    """A normal load on a single contact point, constant or oscillating."""
 
     load: key(Force, "normal force on the point; for an oscillating load its mean")
     amplitude: key(Force | None, "amplitude of an oscillating load, load + amplitude cos(2 pi frequency t + phase), "
-                   "never below 0", "with frequency") = None
+                   "which is never below 0", "with frequency") = None
     frequency: key(Frequency | None, "frequency of the oscillating load", "with amplitude") = None
     phase: key(quantity("angle") | None, "phase of the oscillating load at t = 0") = None
     width: key(Length | None, "width of the contact across the path, for "
@@ -55,14 +55,14 @@ class Normal(Table):
 
 
 class Temperature(Table):
-    """Surface temperature and the activation of bond growth."""
+    """Surface temperature and activation temperatures of bond growth."""
 
     surface: key(Kelvin, "absolute temperature of the surfaces")
     reference: key(Kelvin, "absolute temperature at which rest_growth and slip_growth hold")
-    rest_activation: key(quantity("temperature", ge=0) | None, "activation temperature of the growth at rest; 0 unless "
-                         "given") = None
-    slip_activation: key(quantity("temperature", ge=0) | None, "activation temperature of the growth in slip; 0 unless "
-                         "given") = None
+    rest_activation: key(quantity("temperature", ge=0) | None, "activation temperature of the growth at rest; default "
+                         "0") = None
+    slip_activation: key(quantity("temperature", ge=0) | None, "activation temperature of the growth in slip; default "
+                         "0") = None
 
 
 class Friction(Table):
@@ -70,10 +70,10 @@ class Friction(Table):
 
     law: key(LawName, "the law of friction")
     static: key(NotNegative, "coefficient of static friction mu_s")
-    kinetic: key(NotNegative | None, "coefficient of kinetic friction mu_k, at most static; static unless given") = None
-    reference_speed: key(Speed | None, "speed v_0 over which the friction of the law tanh saturates") = None
-    bond_length: key(Length | None, "length eps_0 over which a bond forms and breaks, at rest; law elastic-plastic "
-                     "takes stiffness in its place") = None
+    kinetic: key(NotNegative | None, "coefficient of kinetic friction mu_k, at most static; default static") = None
+    reference_speed: key(Speed | None, "speed v_0 over which law tanh saturates") = None
+    bond_length: key(Length | None, "bond length eps_0 at rest: the slide over which a bond forms and breaks; "
+                     "law elastic-plastic may take stiffness in its place") = None
     stiffness: key(quantity("stiffness", gt=0) | None, "initial slope of force over slide, for the whole contact; a "
                    "patch shares it in proportion to the normal force") = None
     chi: key(number(gt=-1, le=0) | None, "exponent of the distribution of sliders: in micro-slip the energy "
@@ -88,11 +88,11 @@ class Friction(Table):
     viscous: key(quantity("damping", ge=0), "viscous force per sliding speed, for the whole contact") = 0.0
     reading: key(Literal["stretch", "report"], "'stretch': eq. 2.17 with the stretch of a bond kept apart from its "
                  "damage, which never creates energy; 'report': eq. 2.17 as printed") = "stretch"
-    order: key(number(le=100), "power p with which a bond grows stronger along its path; > -1, and >= 0 for the "
+    order: key(number(le=100), "power p with which the strength of a bond rises along its path; > -1, and >= 0 with "
                "reading stretch") = 1.0
     rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (2.10); without it and slip_growth "
                      "the bond length is constant", "with slip_growth") = None
-    slip_growth: key(Length | None, "length l_k by which the bond length grows with slip "
+    slip_growth: key(Length | None, "slip length l_k over which the bond length approaches its value in fast slip "
                      "(2.10)", "with rest_growth") = None
     rest_speed: key(Speed | None, "least speed v_h taken for |v| in a_s/|v|; 1e-3 of the peak speed unless "
                                   "given") = None
@@ -103,7 +103,7 @@ class Friction(Table):
 
 
 class Slide(Table):
-    """A prescribed motion; which keys it needs depends on `kind`."""
+    """A prescribed slide; which keys it needs depends on `kind`."""
 
     kind: key(Literal["constant", "sine", "triangle", "dwell", "file"], "prescribed motion: constant speed, sine, "
               "triangle, slide with a rest, or a table of positions")
@@ -112,16 +112,17 @@ class Slide(Table):
     speed: key(Speed | None, "speed of the slide") = None
     distance: key(quantity("length", ge=0) | None, "sliding distance; for a dwell, up to its rest; for a triangle, "
                   "before its cycles (0 unless given)") = None
-    hold: key(quantity("time", ge=0) | None, "time at rest") = None
+    hold: key(quantity("time", ge=0) | None, "duration of the rest") = None
     distance_after: key(quantity("length", ge=0) | None, "sliding distance after the rest; 0 unless given") = None
-    cycles: key(Positive | None, "number of cycles, fractions allowed; 1 unless given") = None
-    file: key(Text | None, "table with columns time and displacement, and lateral for a slide in two directions") = None
+    cycles: key(Positive | None, "number of cycles, may be fractional; default 1") = None
+    file: key(Text | None, "table with columns time and displacement; a column lateral makes the slide "
+              "two-dimensional") = None
 
 
 class Mode(Table):
-    """One mode of the rig: how it vibrates, how it moves the patch, the base's share and the accelerometer's."""
+    """One mode of the rig: how it vibrates, how it moves the patch and the output, how the base drives it."""
 
-    name: key(Text, "name of the mode, unique")
+    name: key(Text, "unique name of the mode")
     frequency: key(quantity("frequency", ge=0), "natural frequency; 0 Hz for a rigid mode")
     damping: key(number(gt=-1), "damping ratio; below 0 the mode gains energy, which friction must dissipate (flutter)")
     slide: key(Number, "motion of the patch along x per unit of the modal coordinate")
@@ -130,14 +131,14 @@ class Mode(Table):
     lateral: key(Number, "motion of the patch across x per unit of the modal coordinate") = 0.0
     yaw: key(PerMetre, "rotation of the patch about its normal per unit of the modal coordinate; needs "
              "[contact.strips]") = 0.0
-    base: key(Number | None, "share of the base motion that drives the mode; slide for the first mode, 0 for the "
-              "others unless given; the squares sum to at most 1") = None
-    output: key(Number | None, "motion of the accelerometer and gauge per unit of the modal coordinate; slide for the "
-                "first mode, 0 for the others unless given") = None
-    accelerometer: key(Number | None, "motion of the accelerometer per unit of the modal coordinate; output unless "
-                       "given") = None
-    gauge: key(Number | None, "motion of the displacement gauge per unit of the modal coordinate; output "
-               "unless given") = None
+    base: key(Number | None, "participation in the base motion; default: slide for the first mode, 0 for the others; "
+              "the squares sum to at most 1") = None
+    output: key(Number | None, "motion of the accelerometer and gauge per unit of the modal coordinate; default: slide "
+                "for the first mode, 0 for the others") = None
+    accelerometer: key(Number | None, "motion of the accelerometer per unit of the modal coordinate; default "
+                       "output") = None
+    gauge: key(Number | None, "motion of the displacement gauge per unit of the modal coordinate; default "
+               "output") = None
 
 
 class Stiffening(Table):
@@ -147,12 +148,12 @@ class Stiffening(Table):
 
 
 class Bonded(Table):
-    """A second load path beside the contact."""
+    """A second load path in parallel with the contact."""
 
     stiffness: key(quantity("stiffness", ge=0), "stiffness of the spring in parallel with the contact")
-    damping: key(quantity("damping", ge=0), "damping of that spring") = 0.0
-    wavelength: key(Length | None, "period of an interlocking spring, k wavelength/(2 pi) sin(2 pi x/wavelength); "
-                    "linear unless given") = None
+    damping: key(quantity("damping", ge=0), "damping coefficient of that spring") = 0.0
+    wavelength: key(Length | None, "period of an interlocking spring with the force k wavelength/(2 pi) sin(2 pi "
+                    "x/wavelength); default: a linear spring") = None
 
 
 MOST_MASSES = 1_000_000
@@ -160,17 +161,17 @@ Between = tuple[whole(0, MOST_MASSES), whole(0, MOST_MASSES)]
 
 
 class Spring(Table):
-    """A spring between two masses, 0 being the base."""
+    """A spring between two masses; 0 is the base."""
 
-    between: key(Between, "the two masses that it joins, counted from 1, 0 for the base")
+    between: key(Between, "numbers of the two masses, counted from 1; 0 is the base")
     stiffness: key(quantity("stiffness", ge=0), "stiffness of the spring")
 
 
 class Damper(Table):
-    """A damper between two masses, 0 being the base."""
+    """A damper between two masses; 0 is the base."""
 
-    between: key(Between, "the two masses that it joins, counted from 1, 0 for the base")
-    coefficient: key(quantity("damping", ge=0), "force per relative velocity")
+    between: key(Between, "numbers of the two masses, counted from 1; 0 is the base")
+    coefficient: key(quantity("damping", ge=0), "damping coefficient, force per relative velocity")
 
 
 class Interface(Friction):
@@ -190,9 +191,9 @@ class Reduced(Table):
 
     stiffness: key(Text, "file of the stiffness matrix: Matrix Market or Abaqus text (.mtx), MATLAB (.mat), NumPy or "
                    "SciPy (.npz), Nastran (.op4, .pch)")
-    mass: key(Text, "file of the mass matrix; may be the file of the stiffness")
-    damping: key(number(ge=0, lt=1) | Text | None, "damping ratio of every mode, or a file of the damping matrix; none "
-                 "unless given") = None
+    mass: key(Text, "file of the mass matrix; may be the file of the stiffness matrix")
+    damping: key(number(ge=0, lt=1) | Text | None, "damping ratio of every mode, or a file of the damping matrix; "
+                 "default none") = None
     boundary: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)], "boundary coordinates to keep: "
                   "rows of the matrices, or node:direction such as 1201:x if the files name nodes; interfaces, "
                   "drive.mass and structure.output_mass count them from 1")
@@ -202,34 +203,34 @@ class Reduced(Table):
     moved: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)] | None, "coordinates that a base drive moves "
                "along x, by row, range a..b:n of rows, node or direction; unless given, all in direction x, or all "
                "if the files name no directions") = None
-    slide: key(Between | None, "two boundary coordinates between which [contact] or [normal] slides, 0 for the base",
+    slide: key(Between | None, "the two boundary coordinates between which [contact] or [normal] slides; 0 is the base",
                "with [friction]") = None
-    unit: key(Length, "unit of length of the files, whose forces are in N; \"1 mm\" for N, mm and tonne") = 1.0
+    unit: key(Length, 'length unit of the files, whose forces are in N; "1 mm" means N, mm and tonne') = 1.0
 
 
 class Start(Table):
     """Displacements and velocities at t = 0, one per mode or mass."""
 
-    displacement: key(Annotated[tuple[quantity("length"), ...], Field(min_length=1)] | None,
-                      "displacements at t = 0, one per mode or mass; 0 unless given") = None
-    velocity: key(Annotated[tuple[quantity("velocity"), ...], Field(min_length=1)] | None,
-                  "velocities at t = 0, one per mode or mass; 0 unless given") = None
+    displacement: key(Annotated[tuple[quantity("length"), ...], Field(min_length=1)] | None, "displacements at t = 0, "
+                      "one per mode or mass; default 0") = None
+    velocity: key(Annotated[tuple[quantity("velocity"), ...], Field(min_length=1)] | None, "velocities at t = 0, one "
+                  "per mode or mass; default 0") = None
 
 
 class Structure(Table):
-    """The rig: modes, or masses with springs, or a file; `..._at` name places in a file of measured modes."""
+    """The rig, as modes, as masses with springs, or from a file; `..._at` names a place in a file of measured modes."""
 
     moving_mass: key(Mass | None, "modal mass of every mode", "with modes") = None
-    travel: key(Length | None, "stop of the flexure: a motion beyond it ends the run; none unless given") = None
+    travel: key(Length | None, "stop of the flexure: a larger motion ends the run; default none") = None
     mode: tuple[Mode, ...] = ()
     measured: key(Literal["free", "stuck"], "'free': the modes are those without the joint; 'stuck': "
                   "frequencies and damping were measured with the joint bolted, and its stiffness is "
                   "subtracted") = "free"
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
-    masses: key(tuple[Mass, ...] | None, "masses of a rig of springs, in place of modes") = None
-    output_mass: key(whole(1, MOST_MASSES) | None, "number of the mass that carries the accelerometer; 1 "
-                     "unless given") = None
+    masses: key(tuple[Mass, ...] | None, "masses that are connected by springs, in place of modes") = None
+    output_mass: key(whole(1, MOST_MASSES) | None, "number of the mass that carries the accelerometer; default "
+                     "1") = None
     spring: tuple[Spring, ...] = ()
     damper: tuple[Damper, ...] = ()
     interface: tuple[Interface, ...] = ()
@@ -251,17 +252,17 @@ class Drive(Table):
               "or 'free', a release without a drive")
     waveform: key(WaveName, "waveform of the drive over time") = "sine"
     frequency: key(Frequency | None, "frequency of a sine or of levels") = None
-    from_: key(Frequency | None, "frequency at which a sweep begins, or the lowest one of a random "
+    from_: key(Frequency | None, "start frequency of a sweep, or lowest frequency of a random "
                "drive") = Field(None, alias="from")
-    to: key(Frequency | None, "frequency at which a sweep ends, or the highest one of a random drive") = None
+    to: key(Frequency | None, "end frequency of a sweep, or highest frequency of a random drive") = None
     spectrum: key(quantity("acceleration spectrum", gt=0) | None, "one-sided spectral density of a random base "
                   "acceleration, constant between `from` and `to`", "waveform `random` unless a file") = None
-    seed: key(whole(0, 2**32 - 1) | None, "number of the random record; 0 unless given") = None
-    rate: key(quantity("sweep rate", gt=0) | None,
-              "change of frequency per time of a linear sweep", "waveform `sweep` unless log_rate") = None
-    log_rate: key(quantity("logarithmic sweep rate", gt=0) | None, "octaves per time of a logarithmic sweep") = None
-    acceleration: key(quantity("acceleration", ge=0) | None,
-                      "acceleration of the base, zero to "
+    seed: key(whole(0, 2**32 - 1) | None, "seed of the random record; default 0") = None
+    rate: key(quantity("sweep rate", gt=0) | None, "rate at which the frequency of a linear sweep "
+              "changes", "waveform `sweep` unless log_rate") = None
+    log_rate: key(quantity("logarithmic sweep rate", gt=0) | None, "rate of a logarithmic sweep, in octaves per "
+                  "time") = None
+    acceleration: key(quantity("acceleration", ge=0) | None, "amplitude of the base acceleration, zero to "
                       "peak", "kind `base` unless displacement, levels or a file") = None
     displacement: key(quantity("length", ge=0) | None, "displacement of the base, zero to peak, in place of an "
                       "acceleration; for kind `free` the displacement at release", "kind `free` unless "
@@ -271,19 +272,18 @@ class Drive(Table):
                 "that the one before it reached") = None
     frequencies: key(Annotated[tuple[Frequency, ...], Field(min_length=2, max_length=100)] | None, "frequencies of "
                      "tones that act at the same time") = None
-    accelerations: key(Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=2)] | None,
-                       "acceleration of the base of each tone, zero to peak") = None
+    accelerations: key(Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=2)] | None, "amplitude "
+                       "of the base acceleration of each tone, zero to peak") = None
     phases: key(Annotated[tuple[quantity("angle"), ...], Field(min_length=2)] | None, "phase of each tone at the "
-                "start; 0 unless given") = None
+                "start; default 0") = None
     onset: key(Literal["slip", "distortion", "gauge"], "what counts as the onset of slip in onset_level; 'slip': the "
                "first irreversible motion (for an elastic interface, more than a thousandth of its elastic range); "
                "'distortion': a third harmonic of the acceleration above 3 % of the first; 'gauge': half the "
                "peak-to-peak motion at the output above onset_length") = "distortion"
     onset_length: key(Length | None, "smallest motion that the gauge shows, as half "
                       "peak-to-peak at the output", "onset `gauge`") = None
-    force: key(Force | None, "force, zero to peak", "kind `force` unless a file") = None
-    mass: key(whole(1, MOST_MASSES) | None, "number of the mass on which the force acts; the output unless "
-              "given") = None
+    force: key(Force | None, "amplitude of the force, zero to peak", "kind `force` unless a file") = None
+    mass: key(whole(1, MOST_MASSES) | None, "number of the mass on which the force acts; default: the output") = None
     cycles: key(Positive | None, "length of the run, or of each level, in cycles of the drive; for a release in "
                 "cycles of the first mode that is not rigid", "unless duration, a sweep or a file") = None
     duration: key(Seconds | None, "length of the run, or of each level, as a time in place of cycles") = None
@@ -300,10 +300,10 @@ class Drive(Table):
 
 
 class WornFriction(Table):
-    """Friction that changes with the worn depth: a table, straight between its rows, held beyond the last."""
+    """Friction that changes with the worn depth: a table, interpolated linearly, constant beyond its last row."""
 
     depth: key(Annotated[tuple[quantity("length", ge=0), ...], Field(min_length=2)], "mean worn depth of both pieces "
-               "together, worn volume over the area of the patch; rising from 0")
+               "together, which is the worn volume over the area of the patch; rising from 0")
     coefficient_factor: key(Annotated[tuple[Positive, ...], Field(min_length=2)] | None, "factor on static and kinetic "
                             "at each depth; 1 at depth 0", "unless bond_length_factor") = None
     bond_length_factor: key(Annotated[tuple[Positive, ...], Field(min_length=2)] | None, "factor on bond_length at "
@@ -329,11 +329,11 @@ class Wear(Table):
 
 
 class Measured(Table):
-    """A table of measurements to stand beside the results."""
+    """Measurements that are drawn beside the results."""
 
     file: key(Text, "table of measured rows: frequency, input, acceleration, displacement, flag")
-    acceleration_gain: key(Positive, "factor by which the reading exceeds the true acceleration") = 1.0
-    displacement_gain: key(Positive, "factor by which the reading of the gauge exceeds the true displacement") = 1.0
+    acceleration_gain: key(Positive, "ratio of the accelerometer reading to the true acceleration") = 1.0
+    displacement_gain: key(Positive, "ratio of the gauge reading to the true displacement") = 1.0
     reading: key(Literal["peak", "fundamental", "rms", "lowpass"], "what the accelerometer shows: 'peak': the "
                  "largest acceleration; 'fundamental': its part at the drive frequency; 'rms': its root mean "
                  "square; 'lowpass': its largest value after a second-order low-pass filter") = "peak"
@@ -341,7 +341,7 @@ class Measured(Table):
 
 
 class Tables(Table):
-    """The whole scene as tables, in the order in which effects are named."""
+    """Keys at the top of the file, before the first table."""
 
     title: key(Title, "title of the results, one line of text") = ""
     contact: Contact | None = None

@@ -19,14 +19,14 @@ NEEDS = {f"{table}.{key}": used for table, (_, key, used) in SELECTORS.items()} 
     "drive.waveform": {name: one.keys for name, one in WAVEFORMS.items()}}
 SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 HEAD = """\
-# What a scene may say
+# Keys of a scene
 
-Generated from the program's own records by `python tests/support/reference`; a test holds the two together.
-A quantity is a text of one number and one unit, `"12.7 mm"`; the units of each kind stand below. An effect is
-on if its table is present. A key that only some values of a selector need names them under "required".
+`python tests/support/reference` generates this page from the program's own records. A quantity is a text of one number
+and one unit, `"12.7 mm"`; the last section lists the units of each kind. An effect is on if its table is present.
+The column "required" says "yes" or gives the condition under which a key is required.
 
-[The guide](GUIDE.md) explains; [what a run answers](MEASURES.md), [materials by name](MATERIALS.md) and
-[what it cannot do](LIMITS.md) have pages of their own.
+See also [the guide](GUIDE.md), [the measures of a run](MEASURES.md), [materials by name](MATERIALS.md) and
+[limits](LIMITS.md).
 """
 
 
@@ -64,7 +64,7 @@ def _keys() -> list:
         own = [key for key, name in keys(model).items() if name in model.__annotations__ and not _is_table(model, name)]
         about = " ".join((model.__doc__ or "").split())
         if parent in heads:
-            about += f" It carries the keys of {heads[parent][0]} as well."
+            about += f" It also takes the keys of {heads[parent][0]}."
         out += ["### " + (", ".join(f"`{header}`" for header in named) if model is not Tables else "At the top"), about]
         if own:
             out.append(grid(("key", "kind", "default", "required", "meaning"),
@@ -110,7 +110,13 @@ def _kind(model: type, name: str) -> str:
         words.append("number" if float in types else "whole number" if int in types else "text")
     arrays = [get_args(part) for part in types if get_origin(part) is tuple]
     many = "" if not arrays else "list of " if ... in arrays[0] else "pair of "
-    return ", ".join([many + ", ".join(dict.fromkeys(words)), *_limits(model, name)])
+    words = dict.fromkeys(map(_plural, words) if many else words)
+    return ", ".join([many + ", ".join(words), *_limits(model, name)])
+
+
+def _plural(word: str) -> str:
+    """Several of a kind: masses, velocities, lengths."""
+    return f"{word[:-1]}ies" if word.endswith("y") else f"{word}es" if word.endswith("s") else f"{word}s"
 
 
 def _limits(model: type, name: str) -> list:

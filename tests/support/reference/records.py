@@ -6,7 +6,7 @@ from patchfem.scene.keys.materials import MATERIALS, THERMAL, YIELD
 
 from .keys import FOLDER, grid
 
-MADE = "Generated from the program's own records by `python tests/support/reference`; a test compares the two."
+MADE = "`python tests/support/reference` generates this page from the program's own records."
 
 
 class Measures:
@@ -14,15 +14,18 @@ class Measures:
 
     FILE = FOLDER / "MEASURES.md"
     HEAD = f"""\
-# What a run answers
+# Measures of a run
 
 {MADE}
-Values in summary.json are in SI and have all digits. The error is an estimated half-width; it should stay
-below tolerance × |value| + floor, else a warning says so. What is printed ends at the second digit of its error; a
-value without one is known to its last digit, and what is 0 within its floor is printed as 0. Measures of a motion are
-those of the last cycles, the last ten or the last tenth of a shorter run. A number behind a name counts the interfaces
-(strips, where strips slide apart): `slip_amplitude_2` is that of the second. Of a displacement the floor is 1e-5 of
-what the drive itself moves, a/omega^2, where that is less.
+
+Values in `summary.json` are in SI and have all digits. The error is the estimated half-width of the interval that
+contains the exact value of the model. A warning appears if the error exceeds tolerance × |value| + floor. Printed
+values end at the second digit of their error. A value that is printed without an error is exact to its last digit. A
+value that is 0 within its floor is printed as 0.
+
+Measures of a motion refer to the window: the last ten cycles, or the last tenth of a shorter run. A number at the end
+of a name counts the interfaces, or the strips if they slide separately: `slip_amplitude_2` is that of the second. The
+floor of a displacement is at most 1e-5 of the amplitude of the drive, a/omega^2.
 """
 
     @classmethod
@@ -48,10 +51,10 @@ class Materials:
 # Materials by name
 
 {MADE}
-A name stands in `contact.substrate` and in a coating's `material`; a table
-`{{young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"}}` in its place is a material of your own. Elastic
-constants of one alloy differ by a few per cent between handbooks and by far more in a sprayed coating: where a number
-decides, measure it.
+
+`contact.substrate` and the `material` of a coating take one of these names, or a table with your own values:
+`{{young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"}}`. Elastic constants of one alloy differ by a few per
+cent between handbooks, and those of a sprayed coating by far more. Measure a constant on which your result depends.
 """
 
     @classmethod
@@ -64,8 +67,9 @@ decides, measure it.
         heads = (("name", "young [GPa]", "poisson", "density [kg/m^3]", "source"),
                  ("name", "conductivity [W/(m K)]", "heat capacity [J/(kg K)]", "source"),
                  ("name", "yield strength [MPa]", "source"))
-        return "\n\n".join([cls.HEAD.strip(), grid(heads[0], rows), "## Heat", "For the note on how far friction warms "
-                            "the faces, beside `[friction.temperature]`.", grid(heads[1], warm), "## Strength",
-                            "For the note on pieces whose stress is beyond it, which the run, elastic throughout, "
-                            "leaves out. The fifth of a piece beside its held far face does not count.",
+        return "\n\n".join([cls.HEAD.strip(), grid(heads[0], rows), "## Heat",
+                            "With `[friction.temperature]` a note uses these values to estimate how much friction "
+                            "heats the faces.", grid(heads[1], warm), "## Strength",
+                            "Pieces are elastic throughout a run. A note appears if their stress exceeds the yield "
+                            "strength; the fifth of a piece next to its fixed far face does not count.",
                             grid(heads[2], firm)]) + "\n"
