@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core import BaseSine, NotConverged, PatchfemError
 from .backbone import FreeBalance, trace
-from .continuation import follow
+from .continuation import GOAL, correct, follow
 from .laws import synthesis
 from .point import LADDER, Periodic, balance_of, by_level, by_omega, cut, group_of, plain, point
 from .stability import with_stability
@@ -120,6 +120,34 @@ def _followed(modes, drives, group, parameter, h, first, longest) -> tuple:
             break
         samples = want
     return tuple(p for p, _ in made), max(a for _, a in made), path, 2 * np.pi if frequency else 1.0
+
+
+def way(one: Periodic, other: Periodic, width: float) -> float:
+    """Way from one Periodic of a branch to another, over the size of the motion and the `width` [rad/s]."""
+    return float(np.linalg.norm(_step(one, other, width)[0]))
+
+
+def _step(one: Periodic, other: Periodic, width: float) -> tuple:
+    """((N + 1,) from the unknowns and omega of one Periodic to those of another, over their size; that size)."""
+    size = max(float(np.linalg.norm(one.unknowns)), float(np.linalg.norm(other.unknowns))) or 1.0
+    return np.append((other.unknowns - one.unknowns) / size, (other.omega - one.omega) / width), size
+
+
+def between(modes, drive, one: Periodic, other: Periodic, share: float, width: float) -> Periodic:
+    """The Periodic of a branch over frequency at a share of the way from one of its points to another.
+
+    Newton goes across the straight line that joins them, so folds are no obstacle; width: as of `way`. NotConverged
+    where it leads elsewhere.
+    """
+    balance = balance_of(modes, one.group, one.base_samples)
+    step, size = _step(one, other, width)
+    h, length = one.harmonics, float(np.linalg.norm(step))
+    found = correct(lambda x, p: by_omega(balance, x, p, drive.acceleration, h), one.unknowns
+                    + share * size * step[:-1], one.omega + share * width * step[-1], step[:-1] / length,
+                    step[-1] / length, size, width, GOAL)
+    if found is None:
+        raise NotConverged("accuracy.method: the branch has no point between two of its own")
+    return plain(balance, found[0], replace(drive, omega=float(found[1])), h)[0]
 
 
 def branches(modes, drive: BaseSine, group, tolerance: float = 1e-3, stability: bool = True) -> list:

@@ -14,6 +14,9 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 from ...core import NotConverged
 
 
+GOAL = 1e-9  # change of a motion over its size at which Newton's steps end
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Path:
     """Points x (k, N) and parameters p (k,) in order, dp/ds (k,) per arc, the scaled arc s (k,); folds: parameters
@@ -30,7 +33,7 @@ class Path:
 
 
 def follow(system, x, p: float, bounds: tuple, forward: bool = True, step: float = 0.02, longest: float = 0.1,
-           most: int = 2000, goal: float = 1e-9, scale: float = 0.0) -> Path:
+           most: int = 2000, goal: float = GOAL, scale: float = 0.0) -> Path:
     """The curve through (x, p), a solution to be polished, until p leaves bounds = (low, high).
 
     system(x, p) -> (residual (N,), d/dx (N, N), d/dp (N,)). step, longest: of the scaled arc, in which the width of the
@@ -40,7 +43,7 @@ def follow(system, x, p: float, bounds: tuple, forward: bool = True, step: float
     width = bounds[1] - bounds[0]
     x, p = np.array(x, float), float(p)
     size = scale or float(np.linalg.norm(x)) or 1.0
-    x = _correct(system, x, p, np.zeros(x.size), 1.0, size, width, goal, p)
+    x = correct(system, x, p, np.zeros(x.size), 1.0, size, width, goal, p)
     if x is None:
         raise NotConverged("accuracy.method: the branch has no first point near the start given")
     x, p = x[0], x[1]
@@ -52,7 +55,7 @@ def follow(system, x, p: float, bounds: tuple, forward: bool = True, step: float
             size = max(size, 0.5 * float(np.linalg.norm(x)))
         t = tangent[1]
         guess = (x + step * size * t[:-1], p + step * width * t[-1])
-        new = _correct(system, *guess, t[:-1], t[-1], size, width, goal)
+        new = correct(system, *guess, t[:-1], t[-1], size, width, goal)
         if new is not None and not _alike(new, x, p, t, size, width, step):
             new = None
         if new is None:
@@ -64,7 +67,7 @@ def follow(system, x, p: float, bounds: tuple, forward: bool = True, step: float
         if not bounds[0] <= new[1] <= bounds[1]:
             at = bounds[1] if new[1] > bounds[1] else bounds[0]
             share = (at - p) / (new[1] - p)
-            last = _correct(system, x + share * (new[0] - x), at, np.zeros(x.size), 1.0, size, width, goal, at)
+            last = correct(system, x + share * (new[0] - x), at, np.zeros(x.size), 1.0, size, width, goal, at)
             if last is not None:
                 found.append((last[0], at, t, arc + share * step))
             ended = "end" if (at == bounds[1]) == forward else "start"
@@ -89,7 +92,7 @@ def _bordered(jacobian, by_p, t, size, width) -> np.ndarray:
     return matrix
 
 
-def _correct(system, x, p, tx, tp, size, width, goal, fixed=None):
+def correct(system, x, p, tx, tp, size, width, goal, fixed=None):
     """Newton across the tangent from a guess: (x, p, iterations) or None; fixed: the parameter stays there."""
     t, before = np.append(tx, tp), np.inf
     for count in range(1, 13):

@@ -130,7 +130,8 @@ def _extra(run: Coupled, notes: list) -> dict:
     numbers = {"steps_per_cycle": numerics.steps, "iterations": raw.book.get("iterations")}
     out = {"engine": numerics.engine, "cycles": numerics.cycles} | raw.extra | {"window": numerics.window}
     out |= {name: numbers[name] for name in tells}
-    out.pop("at", None)
+    for name in ("at", "at_error"):
+        out.pop(name, None)
     if raw.levels:
         out["levels"] = levels.in_scene_units(rig, raw.levels)
     if run.rubs:
@@ -198,7 +199,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
             kinds = [*(one.of for one in (*ways, *meshed)), *["end"] * len(late)]
             left = left_open(kinds, [*time, *space, *late], runs)
             found = replace(found, extra=found.extra | {"left_open": left})
-            return found, numerics, measures | curve_measures(found.extra)
+            return found, numerics, measures | curve_measures(found.extra, made.values())
         made[Variant(numerics, patch)] = found
         spent += found.seconds
         numerics = numerics.finer()

@@ -11,6 +11,9 @@ from ...response.rows import Seen
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
 
 
+OF_OTHERS = 3.0  # times the way that a peak moves by a coarser mesh or fewer modes
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Solution:
     """One run of an engine before its errors are known.
@@ -110,15 +113,14 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
     return slide, pull, work
 
 
-def curve_measures(extra: dict) -> dict:
-    """Measure of a curve of steady motions: the frequency [Hz] of its largest amplitude, to the points beside it.
+def curve_measures(extra: dict, coarser=()) -> dict:
+    """Measure of a curve of steady motions: the frequency [Hz] of its largest amplitude.
 
-    extra: of a Solution; {} without a curve.
+    extra: of a Solution; {} without a curve; coarser: Solutions of coarser runs, which have their peak elsewhere.
     """
-    curve = extra.get("curve")
-    if curve is None:
+    if "at_error" not in extra:
         return {}
-    at, places = float(extra["at"].omega / (2 * np.pi)), curve["frequency"]
-    k = int(np.argmin(np.abs(places - at)))
-    spacing = float(np.abs(np.diff(places[max(k - 1, 0):k + 2])).max(initial=0.0))
-    return {"peak_frequency": Measure(at, "Hz", spacing, spacing)}
+    at, others = (np.array([one["at"].omega for one in every]) / (2 * np.pi)
+                  for every in ([extra], [one.extra for one in coarser if "at" in one.extra]))
+    error = extra["at_error"] + OF_OTHERS * float(np.abs(others - at).max(initial=0.0))
+    return {"peak_frequency": Measure(float(at[0]), "Hz", error, 0.0)}

@@ -58,7 +58,7 @@ class Balanced(Reader):
 class BalanceFinder:
     """Laws with memory and springs that bend, by harmonic balance."""
 
-    tries_another = False
+    tries_another, leaves = False, (1e-2, 0.1)
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         load("dynamics.harmonic.cycle_kernels", say)
@@ -207,12 +207,27 @@ class BalanceFinder:
         first = BaseSine(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
         branch = branches.response(self.modes, first, self.group, (drive.low, drive.high), True,
                                    harmonics=self.harmonics, tolerance=self.tolerance)
-        found = branch.points if self.climbing is None else [self._judged(one, first) for one in branch.points]
-        points = [self._shown(one)._replace(regime="stable" if one.stable else "unstable") for one in found]
-        return [self._with_errors(one) for one in points], branch.folds
+        return [self._of_branch(one, first) for one in branch.points], branch.folds
 
-    def _with_errors(self, point: Shown) -> Shown:
-        """A point of a curve with its errors."""
+    def apart(self, one: Shown, other: Shown) -> float:
+        """Way along a curve from one of its points to another, in which the whole range counts as the largest."""
+        return branches.way(one.near, other.near, self._range)
+
+    def between(self, one: Shown, other: Shown, share: float) -> Shown:
+        """The point of a curve at a share of the way from one of its points to another, across the line to it."""
+        drive = replace(one.drive, omega=one.near.omega)
+        return self._of_branch(branches.between(self.modes, drive, one.near, other.near, share, self._range), drive)
+
+    @property
+    def _range(self) -> float:
+        """Width [rad/s] of the range that is swept."""
+        drive = self.model.rig.drive
+        return 2 * np.pi * abs(drive.high - drive.low)
+
+    def _of_branch(self, found, drive) -> Shown:
+        """A Periodic of a branch as a point of a curve with its errors."""
+        found = self._judged(found, drive) if self.climbing is not None or found.stable is None else found
+        point = self._shown(found)._replace(regime="stable" if found.stable else "unstable")
         errors = self._errors(point.values, point.near, point.drive, self._read)
         least = {"acceleration_distortion": LAST}  # besides that of the value
         return point._replace(errors={name: error + LAST * abs(point.values[name]) + least.get(name, 0.0)

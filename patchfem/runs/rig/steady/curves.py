@@ -67,6 +67,21 @@ def lost(drive) -> Shown:
     return Shown(drive, {}, {}, "not found", np.nan, False, Outcome.NOT_CONVERGED)
 
 
+class Followed:
+    """Curves over frequency whose points `shown` finds at any frequency; leaves: as of `top.highest`."""
+
+    leaves = 1e-2, 0.1
+
+    def apart(self, one: Shown, other: Shown) -> float:
+        """Way [rad/s] along the curve from one of its points to another."""
+        return abs(other.drive.omega - one.drive.omega)
+
+    def between(self, one: Shown, other: Shown, share: float) -> Shown:
+        """The point of the curve at a share of the way from one of its points to another."""
+        omega = one.drive.omega + share * (other.drive.omega - one.drive.omega)
+        return self.shown(replace(one.drive, omega=omega), one.near)
+
+
 def traced(modes, drive, find) -> list:
     """Points of the curve of a sweep. find(sine, near) -> Shown; near: the start that the point before gives, or None.
 

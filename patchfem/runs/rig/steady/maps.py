@@ -22,7 +22,7 @@ from ....response.spectrum import wave_measures
 from ....structure.drive_sizes import largest
 from ....structure.response import receptance
 from ..pieces import Pieces, RigidElements, YieldingElements
-from .curves import SHOWN, Shown, exact_errors, traced, unlasting
+from .curves import SHOWN, Followed, Shown, exact_errors, traced, unlasting
 
 
 class Repeating(NamedTuple):
@@ -51,7 +51,7 @@ class Repeating(NamedTuple):
         return float(np.abs(self.multipliers).max(initial=0.0))
 
 
-class Maps:
+class Maps(Followed):
     """Steady motions by the map of a period; `repeating` finds one, from `near` where there are several."""
 
     name, elements, tries_another = "", None, False
@@ -154,15 +154,17 @@ class EventFinder(Maps):
 
     def curve(self, drive) -> tuple:
         """As of `Maps.curve`, without friction in closed form."""
-        return traced(self.modes, drive, self.shown if self.forces.any() else self._linear), ()
+        return traced(self.modes, drive, self.shown), ()
 
-    def _linear(self, drive, near=None) -> Shown:
-        """A point of a curve without friction, in closed form; on a resonance that nothing damps as `shown`."""
+    def shown(self, drive, near=None) -> Shown:
+        """As of `Maps.shown`, without friction in closed form, but on a resonance that nothing damps."""
+        if self.forces.any():
+            return super().shown(drive, near)
         modes, gauge = self.modes, self.modes.output if self.modes.gauge is None else self.modes.gauge
         try:
             seen, felt = receptance(modes, drive.omega, [gauge, modes.output], modes.base)[0, :, 0] * modes.mass
         except PatchfemError:
-            return self.shown(drive)
+            return super().shown(drive)
         size = drive.acceleration * float(abs(drive.moving + drive.omega**2 * felt))
         values = _of_curve(drive.acceleration * float(abs(seen)), size, wave_measures(size, 0.0))
         return Shown(drive, values, exact_errors(values, 0.0), "sliding", float(np.exp(self.decay * drive.period)),

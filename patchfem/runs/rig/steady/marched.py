@@ -15,7 +15,7 @@ from ....response.measures import peaks_between
 from ..interface import contact_of
 from ..march import MarchReader
 from ..solution import Solution
-from .curves import Shown, curve_point, traced, unlasting
+from .curves import Followed, Shown, curve_point, traced, unlasting
 
 STEPS, MOST = 256, 4096  # of a cycle, at first and at most
 FINE = 512  # of a cycle of marches that a balance is disturbed in
@@ -49,10 +49,10 @@ def left_grooves(model, numerics, patch, drive, contact, start=None) -> Solution
     return replace(found[0], errors=errors, extra={"regime": "leaves its grooves", "multipliers": np.zeros(0)})
 
 
-class MarchFinder:
+class MarchFinder(Followed):
     """Laws over grooves by a march that is brought to repeat."""
 
-    tries_another = True
+    tries_another, leaves = True, (0.3, 30.0)  # its points have errors of a tolerance
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         self.model, self.patch, self.frames = model, patch, frames

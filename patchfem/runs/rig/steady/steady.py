@@ -5,12 +5,11 @@ by harmonic balance (`balance`), some over grooves by a march (`marched`). What 
 motion that repeats with the drive; its regime, multipliers and stability are named.
 """
 
-from dataclasses import replace
-
 from ....core import BaseSine, NotConverged
 from ..engines import FINDERS, PIECES, function_of, steady_by
 from ..solution import Solution
-from .curves import curve_columns, largest_of, motion_at_levels
+from .curves import motion_at_levels
+from .top import at_the_top
 
 
 def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -34,7 +33,4 @@ def _found(finder, model) -> Solution:
         return finder.point(drive)[0]
     if model.rig.levels:
         return motion_at_levels(finder, drive)
-    points, folds = finder.curve(drive)
-    best = points[largest_of(points)]
-    raw, _ = finder.point(best.drive, best.near)
-    return replace(raw, extra=raw.extra | {"curve": curve_columns(points, folds), "at": best.drive})
+    return at_the_top(*finder.curve(drive), finder)
