@@ -13,7 +13,6 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ...core import NotConverged
 
-
 GOAL = 1e-9  # change of a motion over its size at which Newton's steps end
 
 

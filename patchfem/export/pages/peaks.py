@@ -1,12 +1,11 @@
 """Where a swept frequency has its peak: its place, height and half-power width for each value of the other keys."""
 
 from html import escape
-from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from ...scales import plain, short
+from ...scales import plain, told
 from ..written import label
 from . import document
 from .changes import lines_of, shown_of
@@ -15,20 +14,22 @@ from .words import linked, zero_below
 KEYS = ("drive.frequency",)
 HEIGHTS = ("relative_displacement_amplitude", "absolute_acceleration_peak")
 LEAST = 5  # frequencies that show a peak
+SURE = 3.0  # times what polynomials differ by
+NEWTON = 30  # steps from a vertex, or a straight line's crossing
 KNOWN = 0.01  # of a steady estimate, up to which it tells the height of a peak
 
 
 class Peak(NamedTuple):
     """The peak along one line of cases: name of the measure; what the other keys are; frequency [Hz], its distance to
-    the next cases [Hz], height [SI], NaN where cases beside the largest do not count; half-power width [Hz], NaN where
-    a side stays above it; unit of the height."""
+    the next cases [Hz], height [SI], half-power width [Hz], NaN where a side stays above it, each with its error, NaN
+    where cases beside the largest do not count; unit of the height."""
 
     name: str
     held: str
-    frequency: float
+    frequency: tuple
     between: float
-    height: float
-    width: float
+    height: tuple
+    width: tuple
     unit: str
 
 
@@ -40,9 +41,9 @@ def found(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
         return []
     others = [one for one in keys if one is not key and len(set(one["texts"])) > 1]
     shown = {one["name"]: str if one["words"] else shown_of(one) for one in others}
-    out, height = [], _heights(name, measures, trusted)
+    out, (height, error) = [], _heights(name, measures, trusted)
     for line in lines_of(key, others):
-        peak = _peak(np.asarray(key["values"], float)[line], height[line])
+        peak = _peak(np.asarray(key["values"], float)[line], height[line], error[line])
         if peak is not None:
             held = ", ".join(f"{one['name']} {one['texts'][line[0]] if one['words'] else shown[one['name']](line[0])}"
                              for one in others)
@@ -50,47 +51,84 @@ def found(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
     return out
 
 
-def _heights(name: str, measures: dict, trusted: dict) -> np.ndarray:
-    """The measure of every case that settled, the steady estimate of one that has not where it is KNOWN, else NaN."""
-    values, steady = np.asarray(measures[name][0], float), measures.get(f"{name}_steady")
+def _heights(name: str, measures: dict, trusted: dict) -> tuple:
+    """The measure of every case that settled, the steady estimate of one that has not where it is KNOWN, else NaN; its
+    error."""
+    (value, error, _), steady = measures[name], measures.get(f"{name}_steady")
+    value, error = np.asarray(value, float), np.nan_to_num(np.asarray(error, float))
     if steady is None:
-        return np.where(trusted[name], values, np.nan)
-    estimate = np.where(np.asarray(steady[1], float) <= KNOWN * np.abs(steady[0]), steady[0], np.nan)
-    return np.where(trusted[name], values, estimate)
+        return np.where(trusted[name], value, np.nan), error
+    known = np.asarray(steady[1], float) <= KNOWN * np.abs(steady[0])
+    return (np.where(trusted[name], value, np.where(known, steady[0], np.nan)),
+            np.where(trusted[name], error, np.asarray(steady[1], float)))
 
 
-def _peak(frequency: np.ndarray, height: np.ndarray) -> tuple | None:
-    """(frequency, distance of the cases there, height, half-power width) of the largest value inside the range, NaN
-    where a case beside it has none, None where it stands at an end: by the parabola of 1/y^2 over f^2 through it and
-    its neighbours, which one mode has."""
+def _peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) -> tuple | None:
+    """((frequency, its error), distance of the cases there, (height, its error), (half-power width, its error)) of the
+    largest value inside the range, NaN where a case beside it has none, None where it stands at an end.
+
+    By the parabola of 1/y^2 over f^2 through it and its neighbours, which one mode has. What polynomials through more
+    cases, or those on one side, tell otherwise is its error, beside that of the cases.
+    """
     there = np.isfinite(height) & (height > 0)
     x, y = frequency[there], height[there]
     top = int(np.argmax(y)) if y.size >= LEAST else 0
     if not 0 < top < y.size - 1:
         return None
+    nowhere = (np.nan, np.nan)
     if not there[np.flatnonzero(there)[top] + np.array([-1, 1])].all():
-        return (np.nan,) * 4
-    part, square = slice(top - 1, top + 2), x**2 - x[top]**2
-    a, b, c = np.polyfit(square[part], y[part]**-2.0, 2)
-    at = float(np.clip(-b / (2 * a), square[top - 1], square[top + 1])) if a > 0 else 0.0
-    least = a * at**2 + b * at + c
-    at, high = (at, float(least**-0.5)) if least > 0 else (0.0, float(y[top]))
-    ends = [_crossing(x[top::step], y[top::step], high / sqrt(2)) for step in (-1, 1)]
-    return float(np.sqrt(x[top]**2 + at)), float((x[top + 1] - x[top - 1]) / 2), high, ends[1] - ends[0]
+        return nowhere, np.nan, nowhere, nowhere
+    between, off = float(x[top + 1] - x[top - 1]) / 2, float(np.nanmax(error[there][top - 1:top + 2]) / y[top])
+    square, g = x**2 - x[top]**2, (y[top] / y)**2
+    at, least = _lowest(square, g, top, top - 1, top + 2) or (0.0, 1.0)
+    others = [_lowest(square, g, top, low, high) for low, high in
+              ((top - 2, top + 2), (top - 1, top + 3), (top - 2, top + 3)) if low >= 0 and high <= y.size]
+    places = np.sqrt(x[top]**2 + np.array([at, *(one[0] for one in others if one)]))
+    heights = y[top] * np.array([least, *(one[1] for one in others if one)])**-0.5
+    lost = len(places) < len(others) + 1 or not others  # one has no top here
+    place, high = float(places[0]), float(heights[0])
+    apart = SURE * float(np.ptp(heights)) + (high * (1 - (y[top - 1:top + 2] / high).min()) if lost else 0.0)
+    ends = [_crossing(square[top::step], g[top::step], x[top], (y[top] / high)**2) for step in (-1, 1)]
+    width = float(ends[1][0] - ends[0][0])
+    slack = off + apart / high  # of the height: a crossing moves by as much of the width on each side
+    wide = (width, ends[0][1] + ends[1][1] + 2 * width * slack)
+    moved = SURE * float(np.ptp(places)) + (between if lost else 0.0)
+    moved += slack * (width if np.isfinite(width) else between)
+    return (place, moved), between, (high, apart + off * high), wide
 
 
-def _crossing(x: np.ndarray, y: np.ndarray, level: float) -> float:
-    """Where a curve first falls to a level, by a straight line between its points; NaN where it stays above."""
-    below = np.flatnonzero(y <= level)
-    if not below.size or below[0] == 0:
-        return np.nan
-    k = below[0]
-    return float(x[k - 1] + (y[k - 1] - level) / (y[k - 1] - y[k]) * (x[k] - x[k - 1]))
+def _lowest(square: np.ndarray, g: np.ndarray, top: int, low: int, high: int) -> tuple | None:
+    """(place, value) of the least of the polynomial through g at the cases from low to high over the squares of their
+    frequencies less that of `top`, between the neighbours of that; None where it has none above 0 there."""
+    line = np.polynomial.Polynomial.fit(square[low:high], g[low:high], high - low - 1)
+    slope, bend, at = line.deriv(), line.deriv(2), 0.0
+    for _ in range(NEWTON):
+        at = float(np.clip(at - slope(at) / bend(at), square[top - 1], square[top + 1])) if bend(at) > 0 else 0.0
+    inside = bend(at) > 0 and square[top - 1] < at < square[top + 1] and line(at) > 0
+    return (at, float(line(at))) if inside else None
+
+
+def _crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) -> tuple:
+    """(frequency where 1/y^2 first rises to twice its least, its error): by parabolas through the interval and a
+    case on either side of it, which differ by the error; NaN where it stays below."""
+    above = np.flatnonzero(g >= 2 * least)
+    if not above.size or above[0] == 0:
+        return np.nan, np.nan
+    k, level, found = above[0], 2 * least, []
+    line = square[k - 1] + (level - g[k - 1]) / (g[k] - g[k - 1]) * (square[k] - square[k - 1])
+    for part in (slice(max(k - 2, 0), k + 1), slice(k - 1, k + 2)):
+        if square[part].size == 3:
+            curve, at = np.polynomial.Polynomial.fit(square[part], g[part], 2) - level, line
+            for _ in range(NEWTON):
+                at -= curve(at) / curve.deriv()(at)
+            found += [at] if (at - square[k - 1]) * (at - square[k]) <= 0 else []
+    at = np.sqrt(np.array([*found, line] if len(found) < 2 else found) + top**2)
+    return float(at[0]), SURE * float(np.ptp(at))
 
 
 def sentence(peaks: list) -> str:
     """Where the peak is, or from where to where it moves; "" without one."""
-    known, lost = ([one for one in peaks if np.isfinite(one.height) == there] for there in (True, False))
+    known, lost = ([one for one in peaks if np.isfinite(one.height[0]) == there] for there in (True, False))
     return " ".join(said for said in (_known(known), _lost(lost, bool(known))) if said)
 
 
@@ -117,26 +155,28 @@ def _known(peaks: list) -> str:
 
 
 def _at(one: Peak) -> str:
-    return f"{plain(one.frequency, 5)} Hz (cases lie {plain(one.between, 2)} Hz apart)"
+    return f"{told(*one.frequency, unit='Hz')} (cases lie {plain(one.between, 2)} Hz apart)"
 
 
 def _high(one: Peak) -> str:
-    return short(one.height, one.unit, 3, zero_below(one.name))
+    return told(*one.height, zero_below(one.name), one.unit)
 
 
 def _width(one: Peak) -> str:
-    return f", half-power width {plain(one.width, 2)} Hz" if np.isfinite(one.width) else ""
+    return f", half-power width {told(*one.width, unit='Hz')}" if np.isfinite(one.width[0]) else ""
 
 
 def table(peaks: list) -> str:
     """The peaks as a table; "" without any."""
     if not peaks:
         return ""
-    told = [(plain(one.frequency, 5), _high(one)) if np.isfinite(one.height) else ("not known",) * 2 for one in peaks]
-    rows = [[escape(one.held), *cells, plain(one.width, 2) if np.isfinite(one.width) else "&ndash;"]
-            for one, cells in zip(peaks, told)]
+    cells_of = [(told(*one.frequency, unit="Hz"), _high(one)) if np.isfinite(one.height[0]) else ("not known",) * 2
+            for one in peaks]
+    rows = [[escape(one.held), *cells, told(*one.width, unit="Hz") if np.isfinite(one.width[0]) else "&ndash;"]
+            for one, cells in zip(peaks, cells_of)]
     return (f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve, by a parabola "
-            "of 1/y&sup2; over f&sup2; through the largest case and its neighbours. An unsettled case counts by "
+            "of 1/y&sup2; over f&sup2; through the largest case and its neighbours. Its errors are those of the cases "
+            "and what polynomials through more of them tell otherwise. An unsettled case counts by "
             "its steady estimate if that is known to 1 %, else it is left out. "
             "A width is given where the curve falls to its peak/&radic;2 on both sides within the swept range.</p>"
-            + document.table(("", ">at [Hz]", ">height", ">half-power width [Hz]"), rows, "wide"))
+            + document.table(("", ">at", ">height", ">half-power width"), rows, "wide"))

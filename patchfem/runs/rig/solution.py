@@ -10,7 +10,6 @@ from ...response.reasons import SHARED
 from ...response.rows import Seen
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
 
-
 OF_OTHERS = 3.0  # times the way that a peak moves by a coarser mesh or fewer modes
 
 

@@ -6,6 +6,7 @@ the lines meet in it; a smooth peak is closed in as the square of the spacing.
 """
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -43,7 +44,7 @@ def highest(points: list, finder, tolerance: float) -> Top:
     """
     points = list(points)
     for left in range(MOST, -1, -1):
-        s = np.cumsum([0.0, *(finder.apart(a, b) for a, b in zip(points, points[1:]))])
+        s = np.cumsum([0.0, *(finder.apart(a, b) for a, b in pairwise(points))])
         y, lasting = _heights(points), np.array([one.stable for one in points])
         best, (reach, at) = largest_of(points), ceilings(s, y)
         if not y[best] > 0 or not reach.size:
@@ -82,7 +83,8 @@ def _closer(s, y, best: int, share: float) -> tuple | None:
     gap = slopes[0] - slopes[1]
     off = (slopes[0] * after + slopes[1] * before) / (2 * gap) if gap > 0 else 0.0
     if abs(off) <= 0.1 * (after if off > 0 else before):
-        off = max(0.1 * max(before, after), min(0.8 * want, before, after), 2 * abs(off)) * (1 if after > before else -1)
+        size = max(0.1 * max(before, after), min(0.8 * want, before, after), 2 * abs(off))
+        off = size if after > before else -size
     return (best, off / after) if off > 0 else (best - 1, 1 + off / before)
 
 

@@ -1,0 +1,194 @@
+"""Peaks of curves of steady motions hold within their bars: random rigs and structures against sines one by one.
+
+Each reference is the largest of the same scene's motions under sines, found by the golden section over the
+frequency. The seeds from 71_000_000 on were drawn for no other use.
+"""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, minimize_scalar
+
+import patchfem as pf
+from patchfem.core import BaseSine
+from patchfem.export.pages import peaks
+from patchfem.runs.rig.steady.curves import Followed, Shown
+from patchfem.runs.rig.steady.top import highest
+from patchfem.scene.starting import text_of
+
+LAWS = ("none", "coulomb", "elastic-plastic", "chain", "iwan", "bouc-wen")
+FIRST, COUNT = 71_000_000, 30
+MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "friction_force_peak", "loop_area",
+        "slip_amplitude", "equivalent_stiffness", "equivalent_damping")
+
+
+def wide(r, low, high):
+    return float(np.exp(r.uniform(np.log(low), np.log(high))))
+
+
+def scene(seed: int) -> tuple:
+    """(law, text without a drive, low and high end of the sweep [Hz], force [N]) of a random rig of 1 to 3 modes under
+    a force, or of a chain of three masses of which the last one rubs."""
+    r, law = np.random.default_rng(seed), LAWS[seed % len(LAWS)]
+    own, mass, force, damping = wide(r, 60, 300), wide(r, 0.2, 2), wide(r, 0.5, 50), wide(r, 2e-3, 2e-2)
+    reach = force / (mass * (2 * np.pi * own)**2 * 2 * damping)
+    limit, slips = force * wide(r, 0.05, 3.0), f"{reach * wide(r, 0.003, 0.3)!r} m"
+    if law == "chain":
+        k = mass * (2 * np.pi * own)**2
+        masses = ", ".join(f'"{mass * r.uniform(0.3, 2)!r} kg"' for _ in range(3))
+        text = f"[structure]\nmasses = [{masses}]\n"
+        for a, b in ((1, 2), (2, 3), (3, 0)):
+            stiff = k * r.uniform(0.5, 2)
+            text += f'[[structure.spring]]\nbetween = [{a}, {b}]\nstiffness = "{stiff!r} N/m"\n' \
+                f'[[structure.damper]]\nbetween = [{a}, {b}]\ncoefficient = "{damping * stiff / (2 * own)!r} N s/m"\n'
+        text += f'[[structure.interface]]\nbetween = [3, 0]\nlaw = "elastic-plastic"\nstatic = 0.3\n' \
+            f'load = "{limit / 0.3!r} N"\nbond_length = "{slips}"\n'
+        return law, text, 0.15 * own, 1.2 * own, f'force = "{force!r} N"\nmass = 1\n'
+    text = f'[structure]\nmoving_mass = "{mass!r} kg"\n'
+    for n in range(int(r.integers(1, 4))):
+        text += f'[[structure.mode]]\nname = "m{n}"\nfrequency = "{own * (1 + 0.4 * n * r.uniform(0.5, 1.5))!r} Hz"\n' \
+            f"damping = {damping!r}\nslide = {1.0 if n == 0 else r.uniform(-1, 1)!r}\n" \
+            f"output = {1.0 if n == 0 else r.uniform(-1, 1)!r}\n" + "base = 1.0\n" * (n == 0)
+    if law != "none":
+        stiff = f'stiffness = "{limit / reach * wide(r, 1, 30)!r} N/m"\n'
+        keys = {"coulomb": "", "elastic-plastic": f'bond_length = "{slips}"\n', "bouc-wen": stiff,
+                "iwan": stiff + "chi = -0.5\nbeta = 0.5\n"}[law]
+        text += f'[normal]\nload = "{limit / 0.3!r} N"\n[friction]\nlaw = "{law}"\nstatic = 0.3\n{keys}'
+    return law, text, 0.7 * own, 2.0 * own, f'force = "{force!r} N"\n'
+
+
+def swept(seed: int, tolerance: float = 1e-2):
+    """(Result of the curve, function frequency [Hz] -> Result of the sine there) of a random scene."""
+    law, text, low, high, force = scene(seed)
+    how = '[accuracy]\nmethod = "harmonic"\ntolerance = {}\n'
+    fine = how.format(1e-4 if law in ("iwan", "bouc-wen") else tolerance)
+    text += f'[drive]\nkind = "force"\n{force}'
+    curve = pf.run(f'{text}waveform = "sweep"\nfrom = "{low!r} Hz"\nto = "{high!r} Hz"\nrate = "1 Hz/s"\n'
+                   f'{how.format(tolerance)}')
+    return curve, lambda f: pf.run(f'{text}frequency = "{f!r} Hz"\ncycles = 2\n{fine}')
+
+
+def largest(at, curve) -> float:
+    """Frequency [Hz] of the largest amplitude of sines, from the highest of 9 even places about that of the curve."""
+    f = curve.extra["curve"]["frequency"]
+    span = 0.01 * (f.max() - f.min())
+
+    def height(x):
+        return -at(float(x)).measures[MAIN[0]].value
+    places = np.clip(curve.measures["peak_frequency"].value + np.linspace(-span, span, 9), f.min(), f.max())
+    k = int(np.argmin([height(x) for x in places]))
+    ends = places[max(k - 1, 0)], places[min(k + 1, 8)]
+    return float(minimize_scalar(height, bounds=ends, method="bounded", options={"xatol": 1e-8 * ends[1]}).x)
+
+
+def outside(seed: int) -> list:
+    """(name, error over its bar) of the measures of a random scene."""
+    curve, at = swept(seed)
+    place = largest(at, curve)
+    true, mine, out = at(place).measures, curve.measures, []
+    peak = mine["peak_frequency"]
+    out.append(("peak_frequency", abs(peak.value - place) / (peak.error + 2e-7 * place)))
+    for name in MAIN:
+        if name in mine and mine[name].value is not None and true[name].value is not None:
+            gap = abs(mine[name].value - true[name].value)
+            out.append((name, gap / max(mine[name].error + true[name].error + 1e-9 * abs(mine[name].value), 1e-15)))
+    return out
+
+
+@pytest.mark.share(0, 1, 5, 10)
+@pytest.mark.parametrize("seed", range(FIRST, FIRST + COUNT))
+def test_always_the_peak_of_a_random_rig_is_within_its_bars(seed):
+    """Largest error over its bar seen: .34, of an Iwan balance; the median is .004, as a smooth peak is bracketed."""
+    assert [one for one in outside(seed) if one[1] > 1] == []
+
+
+@pytest.mark.slow
+def test_always_peaks_between_cases_hold_19_times_of_20():
+    """Of cases of a swept frequency 0.08, 0.2 or 0.35 of the half-power width apart, from a random place on."""
+    held = []
+    for seed in range(72_000_000, 72_000_030):
+        if LAWS[seed % len(LAWS)] in ("iwan", "bouc-wen"):
+            continue
+        curve, at = swept(seed)
+        (f0, f_open), (h0, h_open) = ((curve.measures[one].value, curve.measures[one].error)
+                                      for one in ("peak_frequency", MAIN[0]))
+        f, y = curve.extra["curve"]["frequency"], curve.extra["curve"]["amplitude"]
+        low, high = f[(f < f0) & (y < h0 / 2**0.5)], f[(f > f0) & (y < h0 / 2**0.5)]
+        if not (low.size and high.size and f.min() < f0 < f.max()):
+            continue
+
+        def height(x, at=at):
+            return at(float(x)).measures[MAIN[0]].value
+        ends = [brentq(lambda x, height=height, h0=h0: height(x) - h0 / 2**0.5, a, b, xtol=1e-6)
+                for a, b in ((low.max(), f[f > low.max()].min()), (f[f < high.min()].max(), high.min()))]
+        width, r = ends[1] - ends[0], np.random.default_rng(seed)
+        for share in (0.08, 0.2, 0.35):
+            step, count = width * share * r.uniform(0.7, 1.3), int(2 / share)
+            x = f0 + step * (np.arange(-count, count + 1) + r.uniform(-0.5, 0.5))
+            values = np.array([height(one) for one in x[x > 0]])
+            (place, off), _, (top, above), (wide_, apart) = peaks._peak(x[x > 0], values, 0 * values)
+            held.append((abs(place - f0) <= off + f_open, abs(top - h0) <= above + h_open,
+                         not abs(wide_ - width) > apart + 2e-6))
+    assert len(held) > 40 and np.mean(held, axis=0).min() >= 0.95
+
+
+class Lines:
+    """A finder of points of a curve y(f) of which `lasts` tells where it is stable."""
+
+    leaves = 1e-2, 0.1
+    apart, count = Followed.apart, 0
+
+    def __init__(self, y, lasts=lambda f: True):
+        self.y, self.lasts = y, lasts
+
+    def at(self, f):
+        self.count += 1
+        values = {MAIN[0]: self.y(f)} if np.isfinite(self.y(f)) else {}
+        return Shown(BaseSine(1.0, f), values, {}, "", 0.0, self.lasts(f), "steady")
+
+    def between(self, one, other, share):
+        return self.at(one.drive.omega + share * (other.drive.omega - one.drive.omega))
+
+
+def mode(f):
+    return 1 / np.abs(1 - f**2 + 0.02j * f)
+
+
+@pytest.mark.parametrize(("y", "lasts", "place"), [
+    (mode, lambda f: True, np.sqrt(1 - 2e-4)), (lambda f: 1 - abs(f - 0.98765), lambda f: True, 0.98765),
+    (mode, lambda f: f < 0.993, 0.993), (lambda f: np.minimum(mode(f), 30 + 200 * (1 - f)), lambda f: True, None),
+    (mode, lambda f: f > 1.011, 1.011)], ids=["mode", "kink", "until", "cut", "from"])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+def test_exact_the_top_of_a_curve_is_closed_in(y, lasts, place, tolerance):
+    finder, fine = Lines(y, lasts), np.linspace(0.9, 1.1, 2_000_001)
+    points = [finder.at(f) for f in np.linspace(0.9, 1.1, 81)]
+    top = highest(points, finder, tolerance)
+    here, most = top.points[top.best], np.max(y(fine), where=lasts(fine) * np.ones(fine.size, bool), initial=0)
+    missed = most - here.values[MAIN[0]]
+    assert -1e-10 <= missed <= top.above + 1e-9 <= 1.1e-2 * tolerance * most and finder.count < 81 + 40
+    place = fine[np.argmax(np.where(lasts(fine), y(fine), 0))] if place is None else place
+    assert abs(here.drive.omega - place) < 1e-3 * tolerance / 1e-2
+
+
+def test_exact_a_top_beside_a_hole_is_not_known_and_one_at_an_end_is():
+    finder = Lines(lambda f: np.nan if abs(f - 1) < 1e-9 else 1 / abs(1 - f**2))
+    assert highest([finder.at(f) for f in np.linspace(0.9, 1.1, 21)], finder, 1e-3).above == np.inf
+    finder = Lines(lambda f: 2 - f)
+    top = highest([finder.at(f) for f in np.linspace(0.9, 1.1, 21)], finder, 1e-3)
+    assert (top.best, finder.count) == (0, 21) and top.above < 1e-15
+
+
+def test_exact_a_stuck_curve_has_the_peak_of_its_held_structure():
+    """patchfem new damper under 3000 N: the platform stays on its spring, and the force meets one receptance."""
+    text = text_of("damper")
+    one = text[:text.index("\n[sweep]")] + text[text.index("\n[accuracy]"):]
+    found = pf.run(one, **{"structure.interface[1].load": "3000 N"}).measures
+    mass, damp = np.diag([0.15, 0.25]), np.array([[2.0, -2], [-2, 12]])
+    stiff = np.array([[1e6, -1e6], [-1e6, 6e6 + 70e6]])
+
+    def height(f):
+        w = 2 * np.pi * f
+        return -2 * abs(np.linalg.inv(stiff - w**2 * mass + 1j * w * damp)[0, 0])
+    true = minimize_scalar(height, bounds=(405, 415), method="bounded", options={"xatol": 1e-10})
+    size, place = found[MAIN[0]], found["peak_frequency"]
+    assert abs(size.value + true.fun) <= size.error < 1e-6 * size.value
+    assert abs(place.value - true.x) <= place.error < 1e-2
