@@ -55,6 +55,7 @@ def test_exact_combined_modulus_is_two_compliances_in_series():
 
 # ---- bonds
 
+@pytest.mark.slow
 def test_exact_steady_length_is_where_growth_stops():
     args = {"length": 2e-6, "ratio": 0.7, "rest_growth": 10.0, "slip_growth": 0.2e-6}
     for v in (5e-4, 5e-3, -5e-2):

@@ -156,6 +156,7 @@ def level(x, load, offset):
     return load * np.where(left, (b - offset) / left.sum(), (offset - a) / right.sum()) / (b - a)
 
 
+@pytest.mark.slow
 def test_always_300_random_gaps_converge_and_the_fallbacks_agree():
     for k, (pair, gap, load, offset) in enumerate(random_cases(300)):
         x = pair.interface.x

@@ -175,6 +175,7 @@ def test_exact_layers_of_triangles_within_one_percent_and_never_too_soft(wave):
     assert -1e-2 <= harmonic_error(wave, 96) < 0
 
 
+@pytest.mark.slow
 def test_always_twenty_thousand_unknowns_condense_within_a_second():
     mesh = of_grid(graded_grid(LENGTH, HEIGHT, LENGTH / 200, COATING, 1.05), 0.5, seed=1)
     assert 2 * (len(mesh.points) - mesh.far.size) > 18000 and mesh.interface.size == 201

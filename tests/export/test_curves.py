@@ -113,6 +113,7 @@ def test_exact_the_regimes_over_a_sweep_of_a_coulomb_rig(written):
     assert np.abs(data.relative_displacement).max() == pytest.approx(top, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_exact_a_folded_curve_and_the_motion_at_its_top(written):
     """Of three motions at one frequency the measures are of the largest, which the curve found."""
     folder, data = written(STIFFENED + SWEEP.format(140, 180, 2))

@@ -120,6 +120,7 @@ def rubbing(tmp_path_factory):
     return pressed, kept["blocks"], folder / NAME, np.min(seconds, axis=0)
 
 
+@pytest.mark.slow
 def test_always_packing_errs_as_little_as_it_says_and_less_than_the_elements(rubbing):
     """In energy norm rounding changes the stress by at most a quarter of its estimated error, in every frame."""
     result, blocks, path, _ = rubbing

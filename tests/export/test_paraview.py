@@ -93,6 +93,7 @@ def test_exact_paraview_colours_pressure_and_stress_alike_in_every_frame(bench, 
     assert len(line.points) == len(blocks_at(simple.shown[1][0], times_and_files(simple.shown[2][0].Input)[0][1])[0][0])
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("of, place", [("sigma_yy", 1), ("tau_xy", 3)])
 def test_exact_a_script_colours_a_component_in_megapascal(bench, tmp_path, monkeypatch, of, place):
     """As far below 0 as above, whatever its sign; the script names it and the factors of the motion."""

@@ -118,6 +118,7 @@ def test_always_the_list_of_a_block_that_is_pushed_once_is_foreseen():
     assert book["strips"] <= 1.2 * foreseen
 
 
+@pytest.mark.slow
 def test_always_the_halvings_of_the_steps_of_a_block_on_its_bonds_are_foreseen(counted):
     """It swings on them at 1810 Hz: 300 steps per cycle of 262 Hz are halved until that has enough."""
     scene = loads(PUSHED.format(cycles=10))

@@ -48,6 +48,7 @@ def test_a_release_below_the_flutter_amplitude_comes_to_rest_and_one_above_it_gr
     assert "10.08" not in "".join(found.notes) and "decays to rest" in found.notes[-1]
 
 
+@pytest.mark.slow
 def test_a_spring_before_the_slip_keeps_a_small_swing_up():
     """Nothing is lost before the elements yield: a small release rises to the limit cycle that lasts."""
     law = {"law": "elastic-plastic", "more": 'bond_length = "20 um"'}

@@ -97,6 +97,7 @@ def test_points_and_cells_agree_within_their_bars(tmp_path, pieces):
             assert error <= 2e-3 * abs(value), name
 
 
+@pytest.mark.slow
 def test_a_smooth_trace_asks_for_no_points_and_a_rough_one_does(tmp_path):
     """Heights down to four samples, of which length/200 showed 60 %: the share, the peak and the stiffness of the
     points are those of twice as many within a few per cent."""

@@ -188,6 +188,7 @@ def test_a_ripple_is_said_where_the_pressure_zigzags(worn, said):
     assert [text for text in patch.notes if "ripple" in text] == said * ["contact.mesh: is expected to ripple by 6.7 %"]
 
 
+@pytest.mark.slow
 def test_no_tighter_tolerance_is_offered_against_what_a_poisson_ratio_leaves():
     """It was 1e-5, which left the peak at 2e-4."""
     stiff = PIECE + 'load = "100 N"\n' + TITANIUM.replace("0.32", "0.49") + '[contact.crown]\nradius = "1 m"\n'

@@ -25,6 +25,7 @@ def test_exact_faces_that_decide_at_one_instant(seed, limited):
     assert right(found), found
 
 
+@pytest.mark.slow
 def test_exact_dependent_faces_move_as_a_march_of_impulses_says(limited):
     """Three faces over two masses: what they hold is not unique, how they move is."""
     found = compared(spec(29_500_034))

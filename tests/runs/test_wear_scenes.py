@@ -308,6 +308,7 @@ def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(tmp_path, m
         assert {**one, "seconds": 0, "effects": 0} == {**two, "seconds": 0, "effects": 0}
 
 
+@pytest.mark.share(2)
 @pytest.mark.parametrize("more", ["jumps = 3\n", "", "upper_share = 0.2\njumps = 40\n"])
 def test_exact_a_coating_worn_through_ends_the_run_at_its_cycle(more):
     """The volume is that of the cycles so far, the depth at the deepest place the coating of the piece that loses

@@ -82,6 +82,7 @@ def test_refuses_more_masses_than_can_be_solved_at_the_line_that_counts_them():
     assert message.startswith("a.toml:3: structure.masses: 20000 are more than 2000") and "9.6 GB" in message
 
 
+@pytest.mark.slow
 def test_always_twenty_thousand_mistakes_are_told_one_by_one():
     begin = time.process_time()
     found = mistakes(POINT + "".join(f"k{k} = 1\n" for k in range(20_000)))

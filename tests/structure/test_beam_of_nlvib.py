@@ -88,6 +88,7 @@ def test_exact_beam_whose_friction_speed_goes_with_the_frequency(tmp_path, omega
     np.testing.assert_allclose(truth, near, rtol=2e-6)
 
 
+@pytest.mark.share(1)
 @pytest.mark.skipif(not (FOLDER and FILE.is_file()), reason="PATCHFEM_DATA has no nlvib-beam.mat")
 @pytest.mark.parametrize("omega", [193.0, 300.0])
 def test_always_the_bar_holds_where_friction_nearly_jumps(tmp_path, omega):

@@ -15,6 +15,7 @@ def check_speeds(rows):
             assert row[order][0] == pytest.approx(row[order][1], rel=2e-6)
 
 
+@pytest.mark.slow
 def test_exact_friction_against_speed_is_the_lorentzian_and_g_of_it(tmp_path):
     rows = study("bench/stribeck.py").main((1.0,), (0.1,), tmp_path / "picture.svg")
     check_speeds(rows)

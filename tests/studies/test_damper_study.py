@@ -22,6 +22,7 @@ def test_exact_the_plateau_begins_half_a_stroke_after_a_reversal():
     assert damper.plateau(slide).tolist() == [False, False, True, False, True, True, False, True]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not FILE.exists(), reason="PATCHFEM_DATA names no folder with friction-damper-1hz.csv")
 def test_one_length_describes_the_plateaus_and_no_law_the_backlash():
     rows = {row.law: row for row in damper.main(FILE, ("coulomb", "elastic-plastic", "stretch"))}

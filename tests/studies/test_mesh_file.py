@@ -8,6 +8,7 @@ from study_module import study
 mesh_file = study("patch/from_file.py")
 
 
+@pytest.mark.slow
 def test_always_a_mesh_from_a_file_presses_as_the_made_one():
     """Every departure lies within the error stated for it, and the docstring has the numbers."""
     printed = [[float(number) for number in re.findall(r"-?[0-9.]+", line)] for line in mesh_file.__doc__.splitlines()

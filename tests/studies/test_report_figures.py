@@ -123,6 +123,7 @@ def test_figure_15_rest_of_a_released_block():
     assert one.REPRODUCED.startswith("in part: ")
 
 
+@pytest.mark.slow
 def test_figures_30_and_31_a_share_of_the_traces(tmp_path):
     one = study("report/figures_30_31.py")
     (sets, row), = one.main((2,), 4, None).values()

@@ -8,6 +8,7 @@ from study_module import study
 STUDY = study("speed/large_pair.py")
 
 
+@pytest.mark.slow
 def test_exact_the_factors_agree_on_the_peak_pressure(capsys):
     one, other = STUDY.main(("fronts", "superlu"), 40, 62)
     assert one["unknowns"] == other["unknowns"] > 4000

@@ -60,6 +60,7 @@ def told(story, rows, within):
     assert [r.onset for r in (new, ten, hundred)] == pytest.approx([3.88, 3.90, 4.00], abs=0.02)
 
 
+@pytest.mark.slow
 def test_always_the_sentence_on_the_worn_rig(story, tmp_path):
     """Short marches and a loose tolerance: the patch is the same to some percent."""
     rows = story.main((1e-14, 1e-13), motion=60, tolerance="3e-2", path=tmp_path / "x.svg")

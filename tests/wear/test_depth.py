@@ -146,6 +146,7 @@ def test_order_ten_jumps_find_the_depth_of_a_thousand():
         assert abs(some.depth.max() - many.depth.max()) <= some.error + many.error
 
 
+@pytest.mark.slow
 def test_always_automatic_jumps_meet_the_tolerance():
     asked, counts = crowned(), []
     fine, _ = evolved(asked, 1e-6)

@@ -34,6 +34,7 @@ def test_exact_meshes_are_made_once_and_travel_with_the_work():
     assert with_meshes(work) is work and len(work.meshes.meshes) == 1
 
 
+@pytest.mark.slow
 def test_exact_processes_that_begin_before_the_meshes_are_chosen_take_them():
     here = joined_answers(4, [part[:2] for part in solved(WORK, range(4), Here())])
     pool = Pool(2)

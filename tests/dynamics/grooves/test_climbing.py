@@ -62,7 +62,7 @@ def twin(law, grooves, slide, loads=None):
     return np.array(forces), np.array(losses)
 
 
-@pytest.mark.parametrize("swing", [STEADY, SWING])
+@pytest.mark.parametrize("swing", [STEADY, pytest.param(SWING, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_a_slow_slide_by_the_numpy_law(law, swing):
     """Under a load that swings the energy in the height is what was done against it, int N dz."""
@@ -77,7 +77,8 @@ def test_exact_a_slow_slide_by_the_numpy_law(law, swing):
     assert work - energies[:-1, 0].sum() == pytest.approx(energies[-1, 1] - energies[0, 1], rel=1e-9)
 
 
-@pytest.mark.parametrize(("law", "swing"), [("elastic-plastic", STEADY), ("bonds", STEADY), ("elastic-plastic", SWING)])
+@pytest.mark.parametrize(("law", "swing"), [("elastic-plastic", STEADY), ("bonds", STEADY),
+                                           pytest.param("elastic-plastic", SWING, marks=pytest.mark.slow)])
 def test_always_short_bonds_are_coulombs_law_on_the_flank(law, swing):
     """The amplitude goes to that of the exact stops and releases; what rings on the bonds dies out with them."""
     grooves = Grooves(80e-6, 7.5e-6, 0.3)

@@ -75,7 +75,8 @@ PAIRS = {
 
 
 @pytest.mark.parametrize("law, beside", [
-    ("coulomb", True), ("elastic-plastic", False), ("bonds", False), ("tanh", False),
+    ("elastic-plastic", False), ("bonds", False), ("tanh", False),
+    pytest.param("coulomb", True, marks=pytest.mark.slow),
     pytest.param("list", True, marks=pytest.mark.slow),
     pytest.param("elastic-plastic", True, marks=pytest.mark.slow),
     pytest.param("bonds", True, marks=pytest.mark.slow)])

@@ -154,6 +154,7 @@ def test_order_points_under_the_pressure_of_the_lower_piece_are_the_numpy_sum(re
     assert np.abs(work - lost - energies[1:, 1]).max() < 1e-12 * np.abs(np.diff(work)).sum()
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize(("order", "grows"), [(0.0, False), (1.0, False), (0.5, True)])
 def test_order_two_a_prescribed_load_is_that_of_the_numpy_sum(order, grows):
     """One point of the print under a load that falls to zero and rises again: the force at every sample is that of the

@@ -42,6 +42,7 @@ def test_always_the_order_of_150_made_traces_is_known():
     assert wrong <= 2 / 150 and right >= 0.8, (wrong, right)
 
 
+@pytest.mark.slow
 @pytest.mark.share(1)
 @pytest.mark.parametrize("share", [0.0, 0.5])
 def test_exact_the_headline_names_the_order_first(share):

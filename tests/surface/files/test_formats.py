@@ -374,6 +374,7 @@ def open_topography(path):
 """
 
 
+@pytest.mark.slow
 def test_always_one_process_reads_all_files_and_its_limit_is_cpu_time(tmp_path, monkeypatch):
     """A stand-in for SurfaceTopography: what works on and on, sleeps, ends, fails or takes all memory is refused by
     name, and the next file is read; the process stays where nothing happened to it."""

@@ -166,6 +166,7 @@ def test_refuses_a_parameter(name, says):
         interval_of(name, made())
 
 
+@pytest.mark.slow
 def test_always_a_million_samples_take_two_seconds():
     trace = sine(np.arange(1_000_000) * 0.1 * UM, UM, 80 * UM)
     report_of(made(), 250 * UM)  # what scipy loads once

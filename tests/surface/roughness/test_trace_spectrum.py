@@ -49,6 +49,7 @@ def test_always_the_band_holds_the_true_density():
     assert 0.93 < inside < 0.97
 
 
+@pytest.mark.slow
 def test_always_the_density_of_a_ring_surface_is_found():
     """The mean over 100 traces of 4 mm in the waves from 40 to 200 um, within 10 % of the density they were made of."""
     found = [spectrum_of(row, UM, 4) for row in traces(100, 4e-3, UM, 6e-6, 3)]

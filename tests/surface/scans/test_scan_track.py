@@ -88,6 +88,7 @@ def test_exact_the_direction_of_a_turned_track():
         assert found == pytest.approx(angle, abs=0.01) and coherence > 0.9
 
 
+@pytest.mark.slow
 def test_always_two_scans_tell_their_track():
     depth, _ = made(0.35, 0.0, middle=(0.0, 0.0))
     random, axis = np.random.default_rng(3), CELL * np.arange(COUNT)

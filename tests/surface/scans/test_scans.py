@@ -96,6 +96,7 @@ def test_exact_a_scan_that_is_mirrored_or_turned_over_has_the_same_volume(groove
     assert mirrored in change.sentences(other)[0] and ("turned over" in change.over(other)) == turned
 
 
+@pytest.mark.slow
 def test_exact_a_scan_that_is_turned_half_round_is_found(grooved, worn):
     scan = grooved[1]
     half = Areal(scan.x, scan.y, scan.z[::-1, ::-1], scan.source)
@@ -117,12 +118,14 @@ def test_always_files_in_the_wrong_order_are_named(grooved):
     assert change.headline(found) == change.GREW and found.values["grown_volume"].low > 0
 
 
+@pytest.mark.slow
 def test_always_two_places_have_no_depth(grooved):
     found = change.changed(grooved[0], scans(groove, seed=5)[1])
     assert change.headline(found) == change.ELSEWHERE and found.values["worn_volume"].value is None
     assert found.registration["shift_x"].reason
 
 
+@pytest.mark.slow
 def test_always_either_side_of_an_edge_may_be_the_unworn_one():
     """A wedge that begins in the middle: both halves are planes."""
     def wedge(x, y, z):
@@ -146,6 +149,7 @@ def test_always_a_part_as_large_as_the_rest_leaves_open_whether_it_wore_or_the_r
     assert volume.low <= common(0.03, (12e-6, -18e-6), wide) <= volume.high
 
 
+@pytest.mark.slow
 def test_always_a_noisy_height_between_holes_is_no_growth():
     """One height, four times the noise off, in the middle of a hole that is filled from it."""
     before, after = scans(lambda x, y, z: 0 * x, angle=0.0, shift=(0.0, 0.0), noise=2e-8, holes=0.0)
@@ -193,6 +197,7 @@ def test_always_a_spike_on_a_slope_is_left_out():
     assert count == 4 and np.isnan(kept.z[30:32, 20:22]).all()
 
 
+@pytest.mark.slow
 def test_always_kept_spikes_count_and_the_others_do_not(grooved, worn):
     scan, z = grooved[1], grooved[1].z.copy()
     z[120:122, 20:22] += 4e-6
