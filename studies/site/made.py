@@ -75,8 +75,9 @@ def fenced(kind: str, text: str) -> str:
 
 def effects_index() -> str:
     """The list of all effects, group by group."""
-    parts = ["# Effects", "An effect is on if its table or its value stands in the scene. Each page has the equation, "
-             "a scene that was run when this site was built, its picture, the keys and what the effect cannot do yet."]
+    parts = ["# Effects", "An effect is on if its table or its value is in the scene. Each page has the equation, a "
+                          "scene that was run when this site was built, its picture, the keys and the limits of the "
+                          "effect."]
     for title, table in GROUPS.items():
         of = [name for name in SHOWN if re.split(r"[.=]", name)[0] == table]
         parts += [f"## {title}", keys_page.grid(("effect", "what it does"), [
@@ -195,7 +196,7 @@ def key_rows(name: str) -> list:
     """The keys of the effect: of a table all of them, of a value those that it needs and may have."""
     table, key, value = table_of(name)
     if name == "sweep":
-        return ["Its keys are dotted keys of the scene in quotes; a value is a list, or a range with its number of "
+        return ["Its keys are dotted keys of the scene in quotes. A value is a list, or a range with its number of "
                 "values."]
     model = TABLES[table]
     used = keys_page.NEEDS.get(f"{table}.{key}", {}).get(value, ("", ""))
@@ -258,7 +259,7 @@ def glossary() -> str:
         text = f"{row.text[:1].upper()}{row.text[1:]} [{row.unit}]. A measure: `{row.name}` in `summary.json`."
         words.setdefault(row.name.replace("_", " "), text)
     body = "\n\n".join(f"{term}\n  {text}" for term, text in sorted(words.items(), key=lambda one: one[0].lower()))
-    return f"# Glossary\n\nTerms of the field as this program uses them, and every measure that it answers.\n\n" \
+    return f"# Glossary\n\nTerms as this program uses them, and every measure of a run.\n\n" \
            f"{fenced('{glossary}', body)}\n"
 
 
@@ -266,7 +267,7 @@ def commands() -> str:
     """The help of every verb, as the command line prints it."""
     from patchfem.__main__ import VERBS
 
-    parts = ["# Commands", "What `patchfem VERB --help` prints."]
+    parts = ["# Commands", "The text that `patchfem VERB --help` prints."]
     for verb in VERBS:
         said = subprocess.run([sys.executable, "-m", "patchfem", verb, "--help"], capture_output=True, text=True,
                               cwd=ROOT, check=True, env=dict(examples.ENVIRON, COLUMNS="110")).stdout
@@ -292,10 +293,10 @@ def python() -> str:
 def code() -> str:
     """The reading order of the package and what each folder says of itself."""
     order = re.findall(r"^\d+\. `(\w+)`\s+(.*)$", pf.__doc__, re.M)
-    parts = ["# How the code is laid out", "The package is a ladder of folders: a module imports its own folder and "
-             "the folders before it. A test counts every import.",
-             "[How to add a law, a gap shape, a drive, a measure](../../../patchfem/ADDING.md) tells which files each "
-             "of them takes. [tests/README.md](../../../tests/README.md) says which test proves what."]
+    parts = ["# How the code is laid out", "The folders of the package have an order: a module imports only its own "
+                                           "folder and the folders before it. A test checks every import.",
+             "[How to add a law, a gap shape, a drive, a measure](../../../patchfem/ADDING.md) lists the files that "
+             "each of them needs. [tests/README.md](../../../tests/README.md) says which test proves what."]
     for name, words in order:
         file = ROOT / "patchfem" / name / "__init__.py"
         file = file if file.exists() else file.parent.with_suffix(".py")
