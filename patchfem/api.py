@@ -155,7 +155,7 @@ def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Pat
         runs[knob] = cost_curves.curve(model, knob, _on_stderr if say is None else say)
         if out is not None:
             cost_files.write(Path(out), runs)
-            names = cost_files.shown(runs[knob])
+            names = cost_files.shown(runs[knob], model.accuracy.tolerance)
             cost_files.write_picture(Path(out), knob, runs[knob], model.accuracy.tolerance, names)
     return {knob: cost_files.answer_of(each, model.accuracy.tolerance) for knob, each in runs.items()}
 

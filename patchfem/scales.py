@@ -118,8 +118,17 @@ def told(value: float | None, error: float | None = None, least: float = 0.0, un
     if value is None:
         return f"- {unit}".removesuffix(" 1")
     name, scale = fitting(value, unit, error)
-    value, error = rounded(value * scale, None if error is None else error * scale, least * scale, unit == "1")
-    return f"{f'{value} ± {error}' if error else value} {name}".strip()
+    return paired(*rounded(value * scale, None if error is None else error * scale, least * scale, unit == "1"), name)
+
+
+def paired(value: str, error: str, unit: str) -> str:
+    """A value and its error, as `rounded` writes them, as one text with a unit; a power of ten that both have stands
+    once: `(0.5 ± 1.0)e-8`."""
+    if not error:
+        return f"{value} {unit}".strip()
+    (first, power), (second, other) = (one.partition("e")[::2] for one in (value, error))
+    both = f"({first} ± {second})e{power}" if power and power == other else f"{value} ± {error}"
+    return f"{both} {unit}".strip()
 
 
 def short(value: float, unit: str, digits: int, least: float = 0.0) -> str:

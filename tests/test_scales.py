@@ -61,7 +61,8 @@ def test_always_the_printed_value_lies_within_the_printed_bar(seed):
     (3.2e-11, 1e-20, 1e-10, "J", "0.032 nJ"),  # a small joint: below the floor, and yet known
     (5e-16, 1.3e-15, 1e-8, "1", "0"), (5.4e-8, 5e-17, 1e-6, "1", "0"), (5e-4, 1e-6, 1e-3, "1", "0.0005000 ± 0.0000010"),
     (0.25, 0.12, 0.0, "1", "0.25 ± 0.12"), (448.0, 250.0, 0.0, "Pa", "450 ± 250 Pa"),
-    (2.34e-5, 1e-6, 0.0, "1", "2.34e-5 ± 0.10e-5"), (5.3907e8, 1.7e6, 0.0, "N m-1", "539.1 ± 1.7 N/um"),
+    (2.34e-5, 1e-6, 0.0, "1", "(2.34 ± 0.10)e-5"), (0.5e-8, 1e-8, 0.0, "1", "(0.5 ± 1.0)e-8"),
+    (5.3907e8, 1.7e6, 0.0, "N m-1", "539.1 ± 1.7 N/um"),
     (1.0, 0.0996, 0.0, "1", "1.00 ± 0.10"), (3.0, None, 0.0, "N", "3 N"), (None, None, 0.0, "N", "- N")])
 def test_exact_a_number_as_a_person_writes_it(value, error, least, unit, text):
     assert told(value, error, least, unit) == text

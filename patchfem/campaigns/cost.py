@@ -224,6 +224,12 @@ def sentence(runs: list, tolerance: float) -> str:
            f"{_seconds(least)}: {least.words}"
 
 
+def worst_of(runs: list, tolerance: float) -> set:
+    """The measure of each run that is farthest from a tolerance."""
+    names = _stated(runs)
+    return {_worst(one, names, tolerance)[1] for one in runs if one.errors or one.distances}
+
+
 def _seconds(one: Cost) -> str:
     """CPU seconds to two digits."""
     return f"{float(f'{one.seconds:.2g}'):g} CPU s"

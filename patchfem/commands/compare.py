@@ -77,7 +77,7 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
         pressing = _pressed(scene, set_, parts[0], folder.path, quiet) if scene is not None else None
         data = paper.data_of(parts, found, directions, pressing)
         summary.write_json(data, folder.path / "compare.json")
-        paper.write_page(folder.path / "report.html", parts, found, pressing)
+        paper.write_page(folder.path / "report.html", parts, found, directions, pressing)
         paper.write_difference(folder.path, parts[0])
     for text in data["notes"]:
         note(text)

@@ -48,7 +48,7 @@ def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle,
     target, curves, answer = placed(out, f"{found.source.path.stem}-cost"), {}, {}
     for knob in knobs:
         runs = curves[knob] = cost_curves.curve(found, knob, None if quiet else say)
-        names = cost_files.shown(runs)
+        names = cost_files.shown(runs, found.accuracy.tolerance)
         table = cost_files.write(target, curves)
         picture = cost_files.write_picture(target, knob, runs, found.accuracy.tolerance, names)
         answer[knob] = cost_files.answer_of(runs, found.accuracy.tolerance)

@@ -92,7 +92,8 @@ def page(found: Backbone, title: str) -> str:
     made = [one | {"anchor": f"chart{number}"} for number, one in enumerate(drawn(found))] if found.curves else []
     cells = "".join(f'<div id="{one["anchor"]}" class=chart role=img aria-label="{escape(one["title"])}"></div>'
                     for one in made)
-    told = "".join(f"<p>{escape(text)}</p>" for text in sentences(found))
+    first, *more = sentences(found)
+    told = f"<div class=verdict><b>{escape(first)}</b>{''.join(f'<p>{escape(text)}</p>' for text in more)}</div>"
     sections = [Section("curves", "Frequency and damping over the amplitude",
                         f"<figure><div class=row>{cells}</div><figcaption>Bars are numerical errors.</figcaption>"
                         "</figure>" if made else "<p>No curve was found.</p>"),
@@ -120,11 +121,14 @@ def _told(one, k: int) -> tuple:
 
 
 def sentences(found: Backbone) -> list:
-    """The answer in sentences."""
+    """The answer in sentences: frequency and damping ratio at both ends of the amplitudes first."""
     held = "" if found.stuck is None else f", and {found.stuck:.5g} Hz while the contact holds"
     out = [f"Mode {found.mode} has {found.free:.5g} Hz without the contact{held}."]
     best = next((found.curves[way] for way in ("balance", "quasi-static", "decay") if way in found.curves), None)
     if best is not None:
+        ends = [_told(best, k) for k in sorted({0, best.amplitude.size - 1})]
+        said = "; at ".join(f"{place}: {frequency}, damping ratio {damping}" for place, frequency, damping in ends)
+        out.insert(0, f"Mode {found.mode} at {said}.")
         k = int(np.argmax(best.damping))
         inside = 0 < k < best.amplitude.size - 1
         where = "Its damping ratio is largest" if inside else "Within these amplitudes its damping ratio is largest"

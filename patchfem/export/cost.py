@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from ..campaigns.cost import cheapest, quickest, sentence, turned_by
+from ..campaigns.cost import cheapest, quickest, sentence, turned_by, worst_of
 from ..disk.whole import write_rows, write_text
 from .drawing.pictures import drawing, styled
 
@@ -14,10 +14,11 @@ MAIN = ("worn_depth_max", "relative_displacement_amplitude", "absolute_accelerat
 TOUCHING = 0.14  # share of the width within which two labels would touch
 
 
-def shown(runs: list) -> list:
-    """Names of the measures that a picture of a knob shows, in the order of MAIN."""
-    turned = turned_by(runs)
-    return [name for name in MAIN if name in turned]
+def shown(runs: list, tolerance: float) -> list:
+    """Names of the measures that a picture and the table of a knob show: those of MAIN that it turns, and each that is
+    farthest from the tolerance in a run, by which the sentence judges."""
+    turned, worst = turned_by(runs), worst_of(runs, tolerance)
+    return [name for name in (*MAIN, *sorted(worst.difference(MAIN))) if name in turned]
 
 
 def write(folder: Path, curves: dict) -> Path:

@@ -162,7 +162,20 @@ def _bodies(data: dict) -> Picture | None:
     largest = max(float(np.max(part)) for part in mises)
     unit, scale = scales.axis_unit([largest], "Pa")
     return Picture(charts.bodies, (data["x"], data["bodies"]["depth"], mises, data["fields"]["normal_stress"][0]),
-                   f"Both pieces {coated}{cause}{alone}. The largest value of a cell is {largest * scale:.3g} {unit}.")
+                   f"Both pieces {coated}{cause}{alone}. The largest value of a cell is {largest * scale:.3g} "
+                   f"{unit}{_at_corner(data['bodies'])}.")
+
+
+def _at_corner(bodies: dict) -> str:
+    """Where the largest stress of both pieces has no bound, in words; "" where it has one."""
+    parts = zip(bodies["depth"], bodies["coating"], bodies["mises"])
+    depth, coating, part = max(parts, key=lambda one: one[2].max())
+    column, row = np.unravel_index(np.argmax(part), part.shape)
+    if column not in (0, part.shape[0] - 1):
+        return ""
+    faces = {"the face of the coating meets the end of the piece": coating, "the held far face ends": depth[-1]}
+    near = [words for words, face in faces.items() if face > 0 and np.isclose(depth[row:row + 2], face).any()]
+    return f", where {near[0]}: stress has no bound in this corner, and a finer mesh shows more" if near else ""
 
 
 def _loop(data: dict) -> Picture | None:

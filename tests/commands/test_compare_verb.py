@@ -1,6 +1,7 @@
 """patchfem compare: verdict, table, JSON of the contract, page, a scene pressed with both, refusals."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -128,6 +129,9 @@ def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
     found = json.loads(cli("compare", *files[:2], *across, "--json", "-o", tmp_path / "out").out)
     assert found["verdict"] == "worn, waves reduced along x, no change shown along y"
     assert set(found["directions"]) == {"x", "y"} and set(found["anisotropy"]) == {"before", "after"}
+    page, ratio = (tmp_path / "out" / "report.html").read_text("utf-8"), found["anisotropy"]["after"]["amplitude_ratio"]
+    assert page.index("<h2>x over y</h2>") < page.index("<h2>What changed along x</h2>")
+    assert re.search(rf"amplitude before \S+ \S+ .. \S+; after {ratio['value']:.3g}", page)
     x, y, z = report_area((64, 64), 4 * UM, 1)
     scan = tmp_path / "scan.csv"
     scan.write_text("x [um],y [um],z [um]\n" + "".join(

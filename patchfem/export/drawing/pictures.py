@@ -80,6 +80,8 @@ def draw(made: list, onto=None, height: float = TALL):
             axis.set(**{f"{name}label": f"{how['label']} [{how['unit']}]" if how["unit"] else how["label"]})
             if how.get("log"):
                 axis.set(**{f"{name}scale": "log"})
+            if "ticks" in how:
+                axis.set(**dict(zip((f"{name}ticks", f"{name}ticklabels"), zip(*how["ticks"]))))
             if "range" in how:
                 axis.set(**{f"{name}lim": how["range"]})
         axis.set_title(one["title"])

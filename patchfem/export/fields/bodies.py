@@ -57,6 +57,7 @@ def write_fields(result, path: Path) -> dict:
         return {}
     shape, shown = (patch.x.size - 1, -1), result.extra.get("wear_shown", {"states": 0})["states"]
     return {"depth": (patch.pair.grid.depth, patch.pair.upper_grid.depth),
+            "coating": (patch.pair.grid.coating, patch.pair.upper_grid.coating),
             "mises": [body["mises"][shown].reshape(shape) for body in (low, high)]}
 
 

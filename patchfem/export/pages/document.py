@@ -14,6 +14,9 @@ from . import library
 DIGITS = 9  # of the numbers in a page: a picture shows four, a hovered value seven
 NUMBER = f"%.{DIGITS}g,"
 NOT_FINITE = re.compile("nan|-?inf")
+# colours of `drawing.pictures`, and those of the page that stand for them in either theme
+INKS = {"#ffffff": "paper", "#000000": "ink", "#4d4d4d": "ink", "#e3e3e3": "line", "#1f5f99": "accent",
+        "#c8551b": "warm", "#8a8a8a": "soft"}
 
 
 class Section(NamedTuple):
@@ -24,13 +27,12 @@ class Section(NamedTuple):
     html: str
 
 
-def document(title: str, lead: str, sections: list, data: dict | None = None, scripts: tuple = (),
-             paper: bool = False) -> str:
+def document(title: str, lead: str, sections: list, data: dict | None = None, scripts: tuple = ()) -> str:
     """The whole HTML page.
 
     title: plain text; lead: HTML under it; sections: of Section, one alone has no contents before it; data: what the
     scripts draw, plain lists and numbers; scripts: names of JavaScript files of this folder, without which no drawing
-    library is put in; paper: dark on white in the dark too, for pictures that were drawn beforehand.
+    library is put in.
     """
     contents = "".join(f'<a href="#{one.anchor}">{escape(one.heading)}</a>' for one in sections)
     contents = f"<nav aria-label=Contents>{contents}</nav>\n" if len(sections) > 1 else ""
@@ -41,7 +43,7 @@ def document(title: str, lead: str, sections: list, data: dict | None = None, sc
         text = encoded(data or {}).replace("<", "\\u003c")
         drawn = (f"<script>{library.bokeh()}</script>\n<script type=application/json id=data>{text}</script>\n"
                  + "".join(f"<script>{library.inert(library.own(name))}</script>\n" for name in scripts))
-    return (f"<!doctype html><html lang=en{' data-inks=paper' * paper}><head><meta charset=utf-8>"
+    return (f"<!doctype html><html lang=en><head><meta charset=utf-8>"
             f"<meta name=viewport content='width=device-width, initial-scale=1'><title>{escape(title)}</title>"
             f"<style>{library.own('page.css')}</style></head><body>\n"
             f"<header><h1>{escape(title)}</h1>{lead}</header>\n{contents}<main>\n{body}\n</main>\n{drawn}</body></html>\n")
@@ -72,11 +74,12 @@ def warned(texts: Sequence, heading: str = "") -> str:
 
 
 def figure(number: int | str, svg: str, caption: str, alternative: str) -> str:
-    """A picture drawn beforehand with its caption and the text in its place; one page holds many, so their ids are
-    told apart by the number."""
+    """A picture drawn beforehand, in the colours of the page, with its caption and the text in its place; one page
+    holds many, so their ids are told apart by the number."""
     svg = svg.replace("<svg", f'<svg role="img" aria-label="{escape(alternative, quote=True)}"', 1)
     svg = re.sub(r'\bid="([^"]+)"', rf'id="f{number}\1"', svg)
     svg = re.sub(r'(url\(|href=")#', rf"\1#f{number}", svg)
+    svg = re.sub(r"(?<=: )#[0-9a-f]{6}\b", lambda one: f"var(--{INKS[one[0]]})" if one[0] in INKS else one[0], svg)
     return f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
 
 

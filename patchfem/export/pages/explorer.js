@@ -29,13 +29,15 @@
     data.keys.forEach((one) => option(at("along"), one.name, one.label));
     if (data.measures.some((one) => one.name === data.first)) at("measure").value = data.first;
     at("along").value = data.along;
-    ["measure", "along", "beside", "shown", "log"].forEach((id) => at(id).addEventListener("change", () => refresh(id)));
+    ["measure", "along", "beside", "shown", "log", "log-along"].forEach((id) => at(id).addEventListener("change", () => refresh(id)));
     scaled();
     beside();
   }
 
   function beside() {                            // the second key: those that are not along the axis
-    const select = at("beside"), old = select.value;
+    const select = at("beside"), old = select.value, x = key(at("along").value);
+    at("log-along").checked = x.log;
+    at("log-along").disabled = Boolean(x.words) || !x.values.some((v) => v > 0);
     select.replaceChildren();
     option(select, "", "none");
     data.keys.filter((one) => one.name !== at("along").value).forEach((one) => option(select, one.name, one.label));
@@ -120,8 +122,7 @@
     const xs = cases.map((i) => x.values[i]);
     const made = source(cases, m, {x: xs, y: cases.map((i) => m.values[i] ?? NaN), ...spread(cases, m),
       fill: cases.map((i) => m.over[i] ? ink("--paper") : colour), edge: cases.map((i) => bad(i) ? ink("--warm") : colour), stroke: cases.map((i) => bad(i) ? 2.5 : m.over[i] ? 1.8 : 1)});
-    fig.add_layout(new Bokeh.Band({base: {field: "x"}, lower: {field: "low"}, upper: {field: "high"}, source: made,
-      fill_color: colour, fill_alpha: 0.22, line_color: null}));
+    fig.varea({field: "x"}, {field: "low"}, {field: "high"}, {source: made, fill_color: colour, fill_alpha: 0.22});
     const named = label ? {legend_label: label} : {};
     fig.line({field: "x"}, {field: "y"}, {source: made, line_color: colour, line_width: 2, ...named});
     return fig.scatter({field: "x"}, {field: "y"}, {source: made, size: 8, fill_color: {field: "fill"},
@@ -236,7 +237,8 @@
   }
 
   function draw() {
-    const every = chosen(), x = key(at("along").value), beside = key(at("beside").value);
+    const every = chosen(), beside = key(at("beside").value);
+    const x = {...key(at("along").value), log: at("log-along").checked};
     const m = of(at("measure").value);
     const mapped = data.grid && beside && at("shown").value === "map";
     const axes = [x, ...(beside && (mapped || !data.grid) ? [beside] : [])].filter((one) => one.log);

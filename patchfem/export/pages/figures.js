@@ -11,7 +11,10 @@ const pictures = (() => {
     if (size <= least && (e === null || (e <= least && (e > 0.1 * size || size <= 1e-6 * least)))) return "0";
     if (e === null || e === 0 || e < 1e-5 * size) return number(v);
     const places = Math.max(0, 1 - Math.floor(Math.log10(Math.abs(e))));
-    if (size >= 1e7 || places > 12) return `${number(v)} ± ${Number(e.toPrecision(2))}`;
+    if (size >= 1e7 || places > 12) {            // one power of ten for both
+      const power = Math.floor(Math.log10(Math.max(size, e))), more = Math.max(0, places + power);
+      return `(${(v / 10 ** power).toFixed(more)} ± ${(e / 10 ** power).toFixed(more)})e${power}`;
+    }
     return `${(Number(v.toFixed(places)) || 0).toFixed(v.toFixed(places) == 0 ? 0 : places)} ± ${e.toFixed(places)}`;
   };
   const named = (one) => one.unit ? `${one.label} [${one.unit}]` : one.label;
@@ -31,8 +34,11 @@ const pictures = (() => {
     for (let k = Math.ceil(start / step); k * step <= end; k++) all.push(k * step);
     return all;
   }
-  const short = (v) => Math.abs(v) >= 1e-4 && Math.abs(v) < 1e6 ? Number(v.toPrecision(4)).toString() :
-    Number(v.toPrecision(4)).toExponential().replace("e+", "e");
+  const short = (v) => {                         // a tick: ticks of a narrow axis far from 0 differ in the ninth digit
+    const rounded = Number(v.toPrecision(9));
+    return rounded === 0 || (Math.abs(v) >= 1e-4 && Math.abs(v) < 1e6) ? rounded.toString() :
+      rounded.toExponential().replace("e+", "e");
+  };
   const plain = () => new Bokeh.CustomJSTickFormatter({code: "return pictures.short(tick)"});
   function ticked(axis) {                        // labels that are numbers, not powers of ten
     axis.ticker = new Bokeh.CustomJSTicker({major_code: "return pictures.readable(cb_data.range.start, cb_data.range.end)",
@@ -54,8 +60,8 @@ const pictures = (() => {
     for (const grid of [fig.xgrid, fig.ygrid]) grid.grid_line_color = ink("--line");
     fig.xaxis.axis_label = named(x);
     fig.yaxis.axis_label = title;
-    if (x.log) ticked(fig.xaxis);
-    if (options?.y_axis_type === "log") ticked(fig.yaxis);
+    for (const [axis, log] of [[fig.xaxis, x.log], [fig.yaxis, options?.y_axis_type === "log"]])
+      if (log) ticked(axis); else axis.formatter = plain();
     return fig;
   }
 
@@ -81,6 +87,7 @@ const pictures = (() => {
     if (place.nextElementSibling?.classList.contains("onpaper")) place.nextElementSibling.remove();
     const twice = Boolean(fig.scaled) && root.dataset.drawn === "dark";
     place.classList.toggle("twice", twice);
+    if (fig.height > place.clientHeight) place.style.height = `${fig.height}px`;  // room for the legend below
     show(fig, place);
     if (!twice) return;
     const copy = document.createElement("div");  // a scale of colours cannot be inverted: paper gets a picture of its own

@@ -96,6 +96,7 @@ def _explorer(said: str) -> str:
     thinned = said and f"<p class=soft>{escape(said)}</p>"
     return ("<div class=choices><label>Measure<select id=measure></select></label>"
             "<label>Along the axis<select id=along></select></label>"
+            "<label>Logarithmic axis<input type=checkbox id=log-along></label>"
             "<label>Second key<select id=beside></select></label>"
             "<label>Shown as<select id=shown><option value=lines>lines</option><option value=map>map</option></select>"
             "</label><label>Logarithmic values<input type=checkbox id=log></label>"

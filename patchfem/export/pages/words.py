@@ -67,7 +67,7 @@ def pair(name: str, measure: dict) -> str:
     if value == "-":
         return value
     unit = units(name, measure["value"], measure["unit"], measure["error"])[0][0]
-    return f"{f'{value} ± {error}' if error else value} {unit}".strip()
+    return scales.paired(value, error, unit)
 
 
 def zero_below(name: str, measure: dict = NONE) -> float:

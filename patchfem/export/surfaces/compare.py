@@ -182,12 +182,12 @@ def write_difference(folder: Path, one: Comparison) -> None:
     write_columns(folder / "difference.csv", *place)
 
 
-def write_page(path: Path, parts: list, found: tuple, pressing: Pressed | None = None) -> None:
-    """Write the page."""
-    write_text(path, page(parts, found, pressing))
+def write_page(path: Path, *told) -> None:
+    """Write the page; arguments as `page`."""
+    write_text(path, page(*told))
 
 
-def page(parts: list, found: tuple, pressing: Pressed | None = None) -> str:
+def page(parts: list, found: tuple, directions: list = (), pressing: Pressed | None = None) -> str:
     """The page of a comparison, the verdict first, nothing fetched."""
     headline, sentences = found
     names = [Path(each.source).name for each in (parts[0].before, parts[0].after)]
@@ -197,6 +197,12 @@ def page(parts: list, found: tuple, pressing: Pressed | None = None) -> str:
             + "".join(f"<p>{escape(text)}</p>" for text in sentences) + "</div>"
             + warned([f"{text}." for one in parts for text in one.notes]))
     sections = []
+    if directions:
+        said = "; ".join(f"{when} {' '.join(shown(one)[:2])}" for when, one, _ in directions)
+        sections.append(Section("directions", "x over y", figure(
+            "xy", pictures.crossed(parts, directions), "Left: spectra of both directions. Right: amplitude of the band "
+            "and slope along x over those along y, with their 95 % intervals; 1 is a surface that is alike both ways.",
+            f"Waves along x over those along y: amplitude {said}")))
     for number, one in enumerate(parts):
         body = [*(figure(f"{number}{place}", *each) for place, each in enumerate(figures(one))), _table(one),
                 f"<p class=soft>{escape(NOTE)}</p>"]
@@ -208,9 +214,9 @@ def page(parts: list, found: tuple, pressing: Pressed | None = None) -> str:
         sections.append(Section("pressed", f"{pressing.title}, pressed with each surface", _pressing(pressing)))
     found = parts[0].change
     if found is None or found.found is None:
-        return document(title, lead, sections, paper=True)
-    sections.insert(1, line.section(found))
-    return document(title, lead, sections, {"charts": [], "scans": line.film(found)}, line.SCRIPTS, paper=True)
+        return document(title, lead, sections)
+    sections.insert(1 + bool(directions), line.section(found))
+    return document(title, lead, sections, {"charts": [], "scans": line.film(found)}, line.SCRIPTS)
 
 
 def figures(one: Comparison) -> list:

@@ -152,7 +152,7 @@ def page(rows: list, name: str) -> str:
               escape(row["message"] or row["verdict"]), escape("; ".join(_lead(row)))] for row in rows]
     heads = (">line", "before", "after", *map(escape, rows[0]["labels"]), "verdict", "main numbers, 95 %")
     sections.append(Section("pairs", "Each pair", table(heads, cells)))
-    return document(f"{name}: pairs before and after", lead, sections, paper=True)
+    return document(f"{name}: pairs before and after", lead, sections)
 
 
 def _heading(group: tuple, count: int) -> str:

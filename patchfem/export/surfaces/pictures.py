@@ -212,6 +212,27 @@ def both_statistics(curves: tuple, spectra: tuple, band: tuple) -> str:
                        axis("density", "um$^3$", True), marks)])
 
 
+def crossed(parts: list, directions: list) -> str:
+    """Spectra along x and y before and after in one chart, and the ratios x over y with their intervals; directions:
+    (when, amplitude ratio, slope ratio) each."""
+    made, unit, scale = [], *_wave(parts[0].sizes[0].spectrum)
+    for one, colour in zip(parts, ("accent", "warm")):
+        for found, when, dash in zip((each.spectrum for each in one.sizes), ("before", "after"), ("dashed", "solid")):
+            *_, curve = _density(found, scale, colour, "", f"{one.direction} {when}")
+            made.append(curve | {"dash": dash})
+    marks, places = [line([0.5, 2 * len(directions) + 0.5], [1.0, 1.0], "#4d4d4d", width=0.8)], []
+    for row, name in enumerate(("amplitude", "slope")):
+        for when, *ratios in directions:
+            one, place = ratios[row], len(places) + 1
+            places.append((place, f"{name}\n{when}"))
+            if one.value is not None:
+                marks += [line([place, place], [one.low, one.high], "accent"),
+                          mark("dots", "accent", x=[place], y=[one.value])]
+    ratio = axis("") | {"range": [0.5, len(places) + 0.5], "ticks": places}
+    return draw([chart("Power spectral density", axis("wavelength", unit, True), axis("density", "um$^3$", True), made),
+                 chart("x over y", ratio, axis("ratio"), marks)])
+
+
 def each_and_mean(panels: list) -> str:
     """Numbers of pairs with their intervals, and their mean; panels: (title, [(line of the pair, quantity)], mean)
     each."""

@@ -215,7 +215,7 @@ def page(reports: list) -> str:
     title = "Roughness of " + ", ".join(Path(one.source).name for one in reports)
     sections = [_mean_section(one) for one in means.means_of(reports)]
     sections += [_section(number, one) for number, one in enumerate(reports)]
-    return document(title, f"<p class=soft>patchfem {escape(__version__)}</p>", sections, paper=True)
+    return document(title, f"<p class=soft>patchfem {escape(__version__)}</p>", sections)
 
 
 def write_page(path: Path, reports: list) -> None:

@@ -423,7 +423,7 @@ def write_page(path: Path, one: Lost, found: tuple) -> None:
     runs.append(table(("measure", ">before", ">after"), [[escape(text) for text in row] for row in _beside(one)]))
     sections = [Section("changes", "What wore off", "\n".join(body)),
                 Section("runs", "Pressure, contact and loop", "\n".join(runs))]
-    write_text(path, document(f"{names[0]} and {names[1]}: before and after", lead, sections, paper=True))
+    write_text(path, document(f"{names[0]} and {names[1]}: before and after", lead, sections))
 
 
 def _figures(one: Lost) -> list:

@@ -1,13 +1,14 @@
 """Printed pages: what is drawn in the dark theme has the colours of the light one on paper."""
 
 import io
+import re
 
 import numpy as np
 import pytest
 from chromium import Chromium
 
-from patchfem.export.drawing import charts
-from patchfem.export.pages.document import Section, document
+from patchfem.export.drawing import charts, pictures
+from patchfem.export.pages.document import INKS, Section, document, figure
 from patchfem.export.pages.sweep import page
 
 TURN = "const e=document.getElementById('shown');e.value='map';e.dispatchEvent(new Event('change'))"
@@ -57,6 +58,18 @@ def test_exact_a_map_on_paper_has_the_colours_of_its_scale(chromium, table, kind
     light, dark = (on_paper(chromium, text, theme) for theme in (False, True))
     assert light.shape == dark.shape and light.std() > 0.1
     assert np.mean(np.abs(light - dark) > 0.02) < 2e-3
+
+
+@pytest.mark.parametrize("dark, ink", [(False, "rgb(28, 36, 48)"), (True, "rgb(228, 233, 239)")])
+def test_exact_a_picture_drawn_beforehand_has_the_colours_of_the_page(chromium, dark, ink):
+    """Pages of surfaces stood dark on white in the dark."""
+    svg = pictures.draw([charts.chart("Trace", charts.axis("x", "mm"), charts.axis("z", "um"), [
+        charts.line([0.0, 1.0], [0.0, 1.0], "accent", "before")])])
+    text = document("Traces", "", [Section("a", "Traces", figure(0, svg, "Two", "a line"))])
+    assert not re.search("|".join(INKS), text[text.index("<svg"):]) and set(pictures.COLOURS.values()) < set(INKS)
+    seen = chromium.opened(text, dark=dark)
+    assert seen.js("getComputedStyle(document.querySelector('figure text')).fill") == ink
+    assert seen.js("getComputedStyle(document.body).color") == ink
 
 
 def test_always_lines_are_dark_on_white_paper_and_the_screen_stays_dark(chromium):

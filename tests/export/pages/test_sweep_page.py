@@ -226,6 +226,23 @@ def test_exact_values_over_two_decades_have_a_logarithmic_axis_and_what_misses_t
     assert chromium.js("document.getElementById('log').checked") is False
 
 
+def test_exact_the_axis_can_be_switched_and_no_band_leaves_it(chromium, table):
+    """A band drawn for a wider page once stayed on a phone, beyond the axes."""
+    held = "Bokeh.documents[Bokeh.documents.length - 1].roots()[0]"
+    for key in table["keys"]:
+        key["log"] = True
+    chromium.opened(page(table), width=420)
+    scales = []
+    for _ in range(2):
+        scales.append(chromium.js(f"{held}.x_scale.type"))
+        chromium.js("document.getElementById('log-along').click()")
+        chromium.settled()
+    assert scales == ["LogScale", "LinearScale"] and not chromium.faults
+    kinds = chromium.js(f"[...{held}.references()].map((one) => one.type)")
+    assert "VArea" in kinds and "Band" not in kinds
+    assert chromium.js("document.documentElement.scrollWidth") <= 420
+
+
 @pytest.mark.share(1)
 @pytest.mark.parametrize("shown", ["lines", "map", "cloud"])
 def test_always_a_browser_draws_it(table, browser, shown):
