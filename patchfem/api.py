@@ -1,5 +1,5 @@
-"""The verbs for Python: `new` for a scene to start from, `load` and `build` one, `plan`, `run`, `sweep` or `cost` it,
-look at the `Result`; `compare` two measured surfaces.
+"""The commands as Python functions. `new` gives a scene to start from. `load` and `build` read one. `plan`, `run`,
+`sweep` and `cost` compute, and `run` returns a `Result`. `compare` compares two measured surfaces.
 
     import patchfem as pf
     result = pf.run("scene.toml", **{"contact.tilt.angle": "1 mrad"})
@@ -70,12 +70,13 @@ TEXT = "<text>"  # the name of a scene that came without a file
 
 
 def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene:
-    """Read a scene from a file, a text or a dict of its tables; SceneError with every mistake at once.
+    """Read a scene from a file, a text or a dict of its tables.
 
-    A str that holds a newline or a bracket is the text of a scene, any other and a Path name a file. sets: keys with
-    their values, as ``**{"contact.load": "26 lbf"}``; a text stands as in the scene, a number is in SI, lists are
-    taken too. A Scene is read again with the sets added to its own. A length that is a number alone and more than the
-    patch is long, or than 1 m, is refused, as somebody meant millimetres; a radius and a text are taken as they are.
+    A Path, or a str without newline and bracket, is the name of a file; any other str is the text of a scene. A Scene
+    is returned with the sets applied. sets: keys with new values, passed as ``**{"contact.load": "26 lbf"}``. A value
+    is a text as in the scene, a number in SI, or a list of these. A plain number for a length is refused if it exceeds
+    the length of the patch or 1 m, because it was probably meant in millimetres; texts and radii are not checked in
+    this way. Raises SceneError, which lists every mistake.
     """
     added = assignments(sets)
     if isinstance(scene, Mapping):
@@ -98,9 +99,9 @@ _bases: list[Base] = []
 
 
 def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
-    """Everything that a scene means, made once; nothing is solved. `scene` and sets as `load` takes them.
+    """Build the model of a scene without solving anything. `scene` and sets are those of `load`.
 
-    PatchfemError for sets beside a Model, which is already made.
+    Raises PatchfemError for sets with a Model, which cannot be changed.
     """
     if isinstance(scene, Model):
         _without(sets, "Model")
@@ -109,17 +110,19 @@ def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
 
 
 def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
-    """Plan a scene: what it would run, its sizes, cost, stiffness chain and groups; no physics is computed."""
+    """Plan a scene: what it would run, its size, its cost, its stiffnesses and dimensionless groups. Nothing is
+    computed.
+    """
     return plan_model(build(scene, **sets))
 
 
 def run(scene: str | Path | Scene | Model | Plan, /, *, say: Callable[[str], None] | None = None,
         progress: Callable[[float], None] | None = None, **sets: Any) -> Result:
-    """Run a scene and estimate the errors of its measures; `scene` and sets as `load` takes them.
+    """Run a scene and estimate the errors of its measures. `scene` and sets are those of `load`.
 
-    say: called with one line where something takes long (compiling); on stderr unless given. progress: called with the
-    share that is done: of all passes of a rig, of the main one of a bench. SceneError for mistakes in the scene,
-    PatchfemError where it cannot run, NotConverged and Missing among them.
+    say: function that takes one line of text, called before steps that take long, such as compiling; default: print to
+    stderr. progress: function that takes the completed share of the run, from 0 to 1. Raises SceneError for mistakes in
+    the scene, and PatchfemError (also NotConverged and Missing) if the scene cannot be run.
     """
     if isinstance(scene, Plan):
         _without(sets, "Plan")
@@ -129,26 +132,33 @@ def run(scene: str | Path | Scene | Model | Plan, /, *, say: Callable[[str], Non
 
 
 def demo(**sets: Any) -> Result:
-    """Run the scene that comes with the program, the rig of the 1985 report at 143 Hz and 5 g; sets as `load` takes
-    them."""
+    """Run the scene that comes with the program: the rig of the 1985 report at 143 Hz and 5 g. sets are those of
+    `load`.
+    """
     return run(starting.shipped(), **sets)
 
 
 def new(kind: str, /) -> str:
-    """The text of a scene of this kind to start from, which `load` and `run` take: patch, joint, bench, rig, beam,
-    damper, shroud, linear, misalignment or wear; PatchfemError for any other word, with those that there are."""
+    """Return the text of a scene to start from, for `load` and `run`.
+
+    kind: patch, joint, bench, rig, beam, damper, shroud, linear, misalignment or wear. Raises PatchfemError for any
+    other kind.
+    """
     return starting.text_of(_word(kind, "new"))
 
 
 def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Path | None = None,
          say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
-    """Error against CPU seconds of a scene: knob -> `runs`, `cheapest`, `sentence`, the dict of `patchfem cost --json`.
+    """Measure error against CPU seconds for the numerical settings of a scene: the dict of `patchfem cost --json`.
 
-    scene and sets as `load` takes them. over: one knob (element_size, steps_per_cycle, shear_modes, jumps) in place of
-    all that the scene has. Of each run CPU `seconds` and `wall_seconds`, and by measure its `values`, the `errors` that
-    it states and its `distances` to the best run, in SI; settings that gave the same run, bit for bit, are one. out: a
-    folder for cost.csv and pictures. say: called with one line per run, on
-    stderr unless given. {} where the answer is exact; PatchfemError for a knob that the scene does not have.
+    scene and sets are those of `load`. over: one setting (element_size, steps_per_cycle, shear_modes, jumps) instead of
+    all settings of the scene. out: folder for cost.csv and pictures. say: function that takes one line of text per run;
+    default: print to stderr.
+
+    The dict has an entry per setting with `runs`, `cheapest` and `sentence`. Each run has CPU `seconds`,
+    `wall_seconds`, and by measure its `values`, its stated `errors` and its `distances` from the best run, in SI.
+    Settings that gave bit-identical runs are listed as one. The dict is empty if the solution is exact. Raises
+    PatchfemError for a setting that the scene does not have.
     """
     model, runs = build(scene, **sets), {}
     for knob in [over] if _word(over, "cost: over") else cost_curves.knobs_of(model):
@@ -162,14 +172,16 @@ def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Pat
 
 def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "",
              amplitudes: float | str | Iterable | None = None, method: str = "all", **sets: Any) -> Dataset:
-    """Frequency and damping ratio of a mode over its amplitude at the output, with errors, as an xarray.Dataset.
+    """Compute frequency and damping ratio of a mode against its amplitude at the output, with errors: an
+    xarray.Dataset.
 
-    scene and sets as `load` takes them. mode: its name, of masses its number; the first unless given. amplitudes: one
-    or more [m], or a text such as "1 um..1 mm:25"; around where the contact slips unless given. method: "balance",
-    "decay", "quasi-static" or "all"; each has variables of its own name over amplitudes of its own. The attributes have
-    `free_frequency` and `stuck_frequency` [Hz], `exponent_micro` and `exponent_gross` of the contact's loss,
-    `flutter_amplitude` [m], where they are known; `missing`: why a method gave no curve. PatchfemError for a scene
-    without a rig or friction, no such mode and amplitudes that are no lengths above 0.
+    scene and sets are those of `load`. mode: name of the mode, or its number for a rig of masses; default: the first.
+    amplitudes: one or more in m, or a text such as "1 um..1 mm:25"; default: around the amplitude at which the contact
+    slips. method: "balance", "decay", "quasi-static" or "all". Each method has its own variables and amplitudes in the
+    Dataset. Attributes are `free_frequency` and `stuck_frequency` [Hz], the exponents of the energy dissipated per
+    cycle `exponent_micro` and `exponent_gross`, and `flutter_amplitude` [m], where they are known. `missing` says why a
+    method gave no curve. Raises PatchfemError for a scene without rig or friction, an unknown mode and amplitudes that
+    are not positive lengths.
     """
     model = joint.freed(build(scene, **sets))
     ways = backbones.WAYS if _word(method, "backbone: method") == "all" else (method,)
@@ -183,15 +195,16 @@ def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "",
 def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *, out: str | Path | None = None,
           draw: int = 0, seed: int = 0, sobol: bool = False, jobs: int = 1, executor: str = "",
           resume: bool = False) -> Dataset:
-    """Run a scene for all combinations of the values of some keys: the Dataset that sweep.nc holds; its attribute
-    `answer` says in a sentence what came out.
+    """Run a scene for all combinations of the values of some keys: the Dataset of sweep.nc.
 
-    `scene` as `load` takes it. over: key -> list of values, texts as in a scene or numbers in SI, or one text such as
-    "1e-6 rad..1e-2 rad:9"; left out, those of its table [sweep]. draw: so many cases in place of all combinations,
-    drawn with `seed` between the ends of ranges "1e-6 rad..1e-2 rad", by Sobol's sequence where asked; the cases then
-    are rows of one dimension `case`. out: the folder that `patchfem sweep -o` writes, with `resume` gone on with.
-    jobs: processes; executor: "dask" or "dask:ADDRESS". A case that is refused or fails has outcome "failed" and its
-    message; SceneError where no case is valid.
+    `scene` is that of `load`. over: dict of key -> list of values (texts as in a scene, or numbers in SI) or a range
+    such as "1e-6 rad..1e-2 rad:9"; default: the table [sweep] of the scene. draw: number of cases to draw between the
+    ends of ranges such as "1e-6 rad..1e-2 rad", instead of all combinations; with `seed`, or by Sobol's sequence with
+    `sobol`. Drawn cases are rows of one dimension `case`. out: folder to write, as `patchfem sweep -o` does; `resume`
+    continues it. jobs: number of processes. executor: "dask" or "dask:ADDRESS".
+
+    The attribute `answer` states the main result in one sentence. A case that is refused or fails has the outcome
+    "failed" and its message. Raises SceneError if no case is valid.
     """
     if over is not None and not isinstance(over, Mapping):
         raise PatchfemError(f"sweep: over is a dict of key: values, not {over!r:.60}")
@@ -215,10 +228,10 @@ class SweepPlots:
 
     @staticmethod
     def sweep(dataset: Dataset, measure: str, ax: Axes | None = None) -> Axes:
-        """A measure of the Dataset of a sweep over its key with most values, with the numerical errors.
+        """Plot a measure of a sweep, with its numerical errors, against the key that has most values.
 
-        Hollow points miss the tolerance; values over two decades have a logarithmic axis. ax: Axes to draw on.
-        PatchfemError for what is no Dataset of a sweep, and for a measure that it has not.
+        Hollow points miss the tolerance. Values over two decades have a logarithmic axis. ax: Axes to draw on. Raises
+        PatchfemError for a Dataset that is not that of a sweep, and for a measure that it does not have.
         """
         if not hasattr(dataset, "coords") or not any(str(name).endswith("_error") for name in dataset):
             raise PatchfemError("plot.sweep: the Dataset of pf.sweep is needed, with measures and their errors")
@@ -227,10 +240,10 @@ class SweepPlots:
 
     @staticmethod
     def backbone(dataset: Dataset, ax: Axes | None = None) -> Axes:
-        """Frequency of a mode over its amplitude by each way, with the errors; beside it, unless on `ax`, its damping
-        ratio.
+        """Plot the frequency of a mode against its amplitude for each method, with errors, and its damping ratio.
 
-        dataset: of `pf.backbone`; PatchfemError for any other, and for one without a curve.
+        The damping ratio is left out with `ax`. dataset: the result of `pf.backbone`. Raises PatchfemError for any
+        other Dataset, and for one without a curve.
         """
         ways = [way for way in backbones.WAYS if f"{way.replace('-', '_')}_amplitude" in getattr(dataset, "coords", ())]
         if not ways:
@@ -246,11 +259,11 @@ plot = SweepPlots()
 
 
 def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[str], None] | None = None) -> Answers:
-    """Answers of many models, or of scenes as `load` takes them: a column per measure, a place per model.
+    """Run many models, or scenes as for `load`: the result has a column per measure and a row per model.
 
-    Models that share work are run together, with the answers of single runs; patches of one geometry share the mesh
-    that serves all of them, as in a sweep. A model that cannot run has outcome "failed" and its message; SceneError
-    for a mistake in a scene. One scene or model alone is a list of one.
+    Models that share work are computed together, with the same results as single runs. Patches of equal geometry share
+    one mesh, as in a sweep. A model that cannot be run has the outcome "failed" and its message. A single scene or
+    model counts as a list of one. Raises SceneError for a mistake in a scene.
     """
     if isinstance(models, str | Path | Scene | Model | Mapping) or not isinstance(models, Iterable):
         models = [models]
@@ -262,17 +275,21 @@ def fit(scene: str | Path | Scene, /, *, to: str | Path = "", free: Mapping[str,
         offset: Iterable[str] = (), warm_up: bool = False, leave_out: str = "", starts: int = 8, seed: int = 0,
         unstable: str = "bound", placebo: Iterable[str] = (), resume: bool = False, out: str | Path | None = None,
         say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
-    """Values of keys of a scene from what was measured, with intervals: the dict that fit.json holds, in SI.
+    """Find values of keys of a scene from measurements, with intervals: the dict of fit.json, in SI.
 
-    scene and sets as `load` takes them. to: a loop of a bench, rows of a rig or its frequency and damping over the
-    amplitude, a worn depth of a scene with [wear]. free: key -> (low, high), texts as in a scene or numbers in SI, or a
-    text such as "0.1..0.6". from_patch: laws of one point from the loops of the scene's own patch in place of both;
-    amplitudes: of its slide, [m] or a text such as "0.1 um..10 um:25". hold: rows that are only predicted, such as
-    "frequency=135 Hz,150 Hz"; offset, warm_up: of a loop; leave_out: a column of which each value is left out in turn;
-    unstable: "bound", "out" or "read", what rows flagged U count as; placebo: values such as
-    "structure.mode.yaw.frequency=110 Hz,138 Hz", with each of which a whole fit is made; starts, seed: of the search
-    over rows. out: the folder that `patchfem fit -o` writes, with `resume` gone on with. say: called with one line
-    where something takes long. SceneError, PatchfemError as `patchfem fit` refuses.
+    scene and sets are those of `load`. to: file of the measurements, which are a friction loop for a bench; rows of
+    responses, or frequency and damping against amplitude, for a rig; or a worn depth for a scene with [wear]. free:
+    dict of key -> (low, high) or a text such as "0.1..0.6". hold: rows to predict without fitting them, such as
+    "frequency=135 Hz,150 Hz". leave_out: a column each of whose values is left out in turn. unstable: "bound", "out" or
+    "read", the treatment of rows with the flag U. placebo: values such as "structure.mode.yaw.frequency=110 Hz,138 Hz",
+    for each of which the whole fit is repeated. starts, seed: number of starting points and their seed. offset,
+    warm_up: options of a loop. out: folder to write, as `patchfem fit -o` does; `resume` continues it. say: function
+    that takes a line of text before steps that take long.
+
+    from_patch: instead of `to` and `free`, replace the patch of the scene by laws of a single point, fitted to the
+    patch's own loops. amplitudes: amplitudes of the slide for from_patch, in m or as a text such as "0.1 um..10 um:25".
+
+    Raises SceneError or PatchfemError in the same cases as `patchfem fit`.
     """
     found, tell = load(scene, **sets), _on_stderr if say is None else say
     if not isinstance(free, Mapping | None):
@@ -307,12 +324,12 @@ def _words(given: str | Iterable[str], what: str) -> tuple:
 
 def profile(*files: str | Path, cutoff: float | str | None = None, window: Iterable | None = None,
             tip: float | str | None = None, units: tuple[str, str] | None = None) -> dict[str, Any]:
-    """Roughness of measured traces or areal scans: the dict that `patchfem profile --json` prints, in SI.
+    """Compute the roughness of measured traces or areal scans: the dict of `patchfem profile --json`, in SI.
 
-    cutoff: wavelength that splits roughness from waviness; window: first and last place, of a scan first those of x;
-    tip: radius of the stylus; each in m, or a text such as "0.25 mm". units: of x and of z for files that name none.
-    `profiles` has a dict per file, `means` those over all. PatchfemError for a file that cannot be read and what is no
-    length, of cutoff and tip above zero.
+    cutoff: wavelength that separates roughness from waviness. window: first and last position, for a scan those of x
+    first. tip: tip radius of the stylus. Each is in m or a text such as "0.25 mm". units: units of x and z for files
+    that give none. The dict has `profiles` with an entry per file and `means` over all files. Raises PatchfemError for
+    a file that cannot be read and for invalid lengths.
     """
     asked = {"cutoff": _metres(cutoff, "profile: cutoff"), "tip": _metres(tip, "profile: tip"), "window": None}
     if window is not None:
@@ -328,10 +345,10 @@ def profile(*files: str | Path, cutoff: float | str | None = None, window: Itera
 
 def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None = None, *,
            measured: str | Path | None = None) -> Path:
-    """Lay the results folders of a list side by side on one page, of one sweep its own; the path of the page.
+    """Put the results folders of a list side by side on one page and return its path. A single sweep gets its own page.
 
-    out: the page, report.html unless given. measured: a file of a laboratory, laid over the pictures. PatchfemError for
-    folders that do not stand together, and for none.
+    out: the page, default report.html. measured: laboratory file to draw over the pictures. Raises PatchfemError for an
+    empty list and for folders that cannot be compared.
     """
     return Path(page_of_several.report_of(_paths(folders, "report"), None if out is None else _path(
         out, "report: out"), None if measured is None else _path(measured, "report: measured")))
@@ -339,13 +356,13 @@ def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None
 
 def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, histories: bool = False,
            of: str = "") -> Path:
-    """Write a results folder, or the structure of a scene (.toml), in another format, by the ending of `out`; its path.
+    """Write a results folder, or the structure of a scene (.toml), in another format, and return the path.
 
-    Fields: .pvd, .vtu, .vtkhdf, .csv (the interface); histories and loops: .uff, .mat, and .csv where `histories` asks
-    for them or the folder has no fields; .py: a script that plays the last cycle in ParaView. Of a scene: matrices and
-    friction elements, .mat for NLvib, .npz for TMDSimPy and pyHarm. frame: number of the frame of a .vtu or .csv, the
-    last one unless given; of: the stress that a script colours, such as "sigma_yy". PatchfemError as `patchfem export`
-    refuses.
+    The ending of `out` gives the format. Fields: .pvd, .vtu, .vtkhdf or .csv (the interface). Histories and loops:
+    .uff, .mat, or .csv with `histories` or if the folder has no fields. A script that plays the last cycle in ParaView:
+    .py. Matrices and friction elements of a scene: .mat for NLvib, .npz for TMDSimPy and pyHarm. frame: number of the
+    frame of a .vtu or .csv, default the last. of: the stress that a script shows, such as "sigma_yy". Raises
+    PatchfemError in the same cases as `patchfem export`.
     """
     folder, out = _path(folder, "export"), _path(out, "export: out")
     if folder.suffix != ".toml":
@@ -361,19 +378,21 @@ def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, 
 
 def view(folder: str | Path, out: str | Path | None = None, /, *, frame: int | None = None,
          magnify: float | None = None) -> None:
-    """Show the pieces of a results folder in a window, or draw them into `out`: a picture, or the last cycle as .gif,
-    .mp4 or .html; arguments as those of `patchfem view`."""
+    """Show the pieces of a results folder in a window, or draw them into the file `out`.
+
+    `out` is a picture, or the last cycle as .gif, .mp4 or .html. The arguments are those of `patchfem view`.
+    """
     chosen.view(_path(folder, "view"), None if out is None else _path(out, "view: out"), frame, magnify)
 
 
 def import_(file: str | Path, out: str | Path, /, *, map: str | Iterable[str] = (), zero: bool = False,
             decay: bool = False, **how: str) -> dict[str, Any]:
-    """Write the records of a laboratory's file (.uff, .mat, .csv) as the table that scenes and fits read (.csv), as
-    modes of a scene (.toml) or as a frequency response (.uff): the dict that `patchfem import --json` prints, in SI.
+    """Convert laboratory records (.uff, .mat, .csv): the dict of `patchfem import --json`, in SI.
 
-    map: which channel is what, as "force=Load cell [lbf]"; zero: time and displacement count from their first row;
-    decay: the record is a free decay; how: the words of segment, window, band and begin, as segment="2 s".
-    PatchfemError as `patchfem import` refuses.
+    The ending of `out` gives the result: a table that scenes and fits read (.csv), modes for a scene (.toml) or a
+    frequency response (.uff). map: the quantity of each channel, such as "force=Load cell [lbf]". zero: subtract the
+    first row from time and displacement. decay: the record is a free decay. how: the options segment, window, band and
+    begin as texts, such as segment="2 s". Raises PatchfemError in the same cases as `patchfem import`.
     """
     from .export.lab import imported
 
@@ -386,7 +405,10 @@ def import_(file: str | Path, out: str | Path, /, *, map: str | Iterable[str] = 
 
 
 def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> Path:
-    """Write the tagged mesh of the pieces of a scene as .msh or .vtu; its path. PatchfemError without [contact]."""
+    """Write the tagged mesh of the pieces of a scene as .msh or .vtu and return its path.
+
+    Raises PatchfemError without [contact].
+    """
     model = build(scene, **sets)
     if model.patch is None:
         raise PatchfemError("only a scene with [contact] has a mesh", "contact")
@@ -398,18 +420,20 @@ def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> 
 
 def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | None = None, shift: float | None = None,
             keep_spikes: bool = False, pairs: str | Path | None = None) -> dict[str, Any]:
-    """Compare a measured surface before with the same surface after: the dict that compare.json holds, in SI.
+    """Compare a measured surface before and after wear: the dict of compare.json, in SI.
 
-    files: before and after, two traces or two areal scans; then the pair of traces of the other direction. direction:
-    "x" or "y", along which the first two run. units: of x and of z for files that name none, as ("mm", "um").
-    shift [m]: of two traces whose places are known, 0.0 where both start at one mark. keep_spikes: spikes, dropouts and
-    dust stay in. In the dict `verdict` and `sentences` are words; `shift`, `worn_depth_mean`, `amplitude_ratio` and so
-    on have `value`, `low`, `high`, `unit`, and a `reason` where the value is None. Two scans have `worn_volume`,
-    `grown_volume`, `worn_share` and the `registration` by x, y and rotation. pairs: in place of files a table of
-    them, or of results folders, with the columns before and after: `pairs` then has the dict of each pair, `means`
-    mean, interval and scatter over them; a pair that fails has its reason as `message`. Two results folders, the second
-    of a run with [wear]: what wore off between them, over the whole patch, with the measures of both under `runs`.
-    PatchfemError for files that do not fit together.
+    files: the surface before and the one after, as two traces or two areal scans; optionally a second pair of traces in
+    the other direction. direction: "x" or "y", along which the first two traces run. units: units of x and z for files
+    that give none, such as ("mm", "um"). shift: known shift of the second trace [m], 0.0 if both start at the same
+    mark. keep_spikes: do not remove spikes, dropouts and dust. pairs: a table of pairs instead of files, with the
+    columns before and after.
+
+    In the dict, `verdict` and `sentences` are texts. `shift`, `worn_depth_mean`, `amplitude_ratio` and others have
+    `value`, `low`, `high`, `unit`, and a `reason` if the value is None. Two scans also have `worn_volume`,
+    `grown_volume`, `worn_share` and the `registration` in x, y and rotation. With `pairs` the dict has `pairs`, an
+    entry per pair, and `means` with mean, interval and scatter; a pair that fails has its reason as `message`. For the
+    results folders of two runs, the second with [wear], it has the wear between them over the whole patch, and the
+    measures of both under `runs`. Raises PatchfemError for files that do not fit together.
     """
     how = {"units": units, "shift": _metres(shift, "compare: shift"), "keep_spikes": keep_spikes}
     files = [_path(one, "compare") for one in files]
@@ -477,7 +501,7 @@ def _without(sets: dict, kind: str) -> None:
 
 
 class Measures(Mapping):
-    """The measures of a run by name, read-only; also as attributes. It shows itself as a table."""
+    """The measures of a run by name or as attributes, read-only. A notebook shows them as a table."""
 
     def __init__(self, measures: dict[str, Measure]):
         self._measures = dict(measures)
@@ -516,15 +540,17 @@ class Measures(Mapping):
 class Plots:
     """The pictures of a run, each as matplotlib Axes: ``result.plot.loop().figure.savefig("loop.png")``.
 
-    ax: Axes to draw on; without it a new figure is made, whose `axes` may be more than the first one, which is
-    returned. A notebook shows them; PatchfemError where the run has nothing to show, with what it lacks.
+    ax: Axes to draw on. Without it each method makes a new figure, which may have more Axes than the one it returns.
+    Raises PatchfemError if the run does not have what the picture needs.
     """
 
     def __init__(self, result: Result):
         self._result = result
 
     def pressure(self, ax: Axes | None = None) -> Axes:
-        """Normal stress along the interface; beside it, unless on `ax`, the shear stress where some acts."""
+        """Normal stress along the interface, and the shear stress if there is any. `ax` shows the normal stress
+        only.
+        """
         return self._drawn(ax, ("pressure",), "the scene has no [contact]" if self._result.patch is None else
                            "the pieces do not touch")
 
@@ -533,16 +559,20 @@ class Plots:
         return self._drawn(ax, ("loop",), self._still() or "no friction acted, or nothing slid")
 
     def history(self, ax: Axes | None = None) -> Axes:
-        """Displacement over the whole run; beside it, unless on `ax`, the last cycles or the friction force."""
+        """Displacement over the whole run, and the last cycles or the friction force. `ax` shows the displacement
+        only.
+        """
         return self._drawn(ax, ("history",), self._still())
 
     def levels(self, ax: Axes | None = None) -> Axes:
-        """Amplitude level by level, or along the curve of steady motions over level or frequency."""
+        """Amplitude at each level, or along the curve of steady states against level or frequency."""
         return self._drawn(ax, ("levels", "curve"), self._still() or 'the drive has no levels; use drive.waveform = '
                            '"levels", or a sweep with accuracy.method = "harmonic"')
 
     def stress(self, ax: Axes | None = None) -> Axes:
-        """Von Mises stress in both pieces, pressed; beside it, unless on `ax`, the part around the contact."""
+        """Von Mises stress in both pieces under load, and an enlarged view of the contact. `ax` shows the pieces
+        only.
+        """
         if self._result.patch is None:
             raise PatchfemError("plot.stress: nothing to draw: the scene has no [contact]")
         from .export.fields import bodies
@@ -567,9 +597,9 @@ class Plots:
 
 
 class Result(run_result.Result):
-    """A finished run: `outcome`, `measures`, `warnings`, `notes`, `seconds`, the kept histories in `response`.
+    """A finished run: `outcome`, `measures`, `warnings`, `notes`, `seconds`, and the stored histories in `response`.
 
-    `outcome.sentence` says how it ended; `measures[name]` has `value`, `error`, `unit` and `text`, in SI.
+    `outcome.sentence` says how the run ended. `measures[name]` has `value`, `error`, `unit` and `text`, in SI.
     """
 
     measures: Measures
@@ -581,7 +611,7 @@ class Result(run_result.Result):
 
     @property
     def notes(self) -> list[str]:
-        """Sentences on what the model leaves out."""
+        """Sentences on what the model neglects."""
         return list(self.extra.get("notes", ()))
 
     @property
@@ -590,8 +620,10 @@ class Result(run_result.Result):
         return Plots(self)
 
     def table(self) -> Any:
-        """The measures as rows of name, value, error and unit in SI: a pandas.DataFrame where pandas is installed, else
-        a list of dicts."""
+        """The measures as rows of name, value, error and unit in SI.
+
+        It is a pandas.DataFrame if pandas is installed, otherwise a list of dicts.
+        """
         rows = [{"measure": name, "value": one.value, "error": one.error, "unit": one.unit}
                 for name, one in self.measures.items()]
         try:
@@ -601,13 +633,14 @@ class Result(run_result.Result):
         return DataFrame(rows).set_index("measure")
 
     def to_xarray(self) -> Dataset:
-        """Histories and fields with units and the scene they came from: the Dataset that result.nc holds."""
+        """The Dataset of result.nc: histories and fields with units, and the scene."""
         return histories.contents(self).to_xarray()
 
     def save(self, folder: str | Path) -> Path:
-        """Write the results folder that `patchfem run -o` writes, and give its path; an older one is replaced.
+        """Write the results folder, as `patchfem run -o` does, and return its path. An older results folder is
+        replaced.
 
-        PatchfemError for a folder that holds other files.
+        Raises PatchfemError for a folder that holds other files.
         """
         folder = _path(folder, "save")
         results_folder.save(self, folder)
