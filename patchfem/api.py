@@ -272,9 +272,9 @@ def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[
 
 def fit(scene: str | Path | Scene, /, *, to: str | Path = "", free: Mapping[str, Any] | None = None,
         from_patch: bool = False, amplitudes: str | Iterable | None = None, hold: Iterable[str] = (),
-        offset: Iterable[str] = (), warm_up: bool = False, leave_out: str = "", starts: int = 8, seed: int = 0,
-        unstable: str = "bound", placebo: Iterable[str] = (), resume: bool = False, out: str | Path | None = None,
-        say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
+        offset: Iterable[str] = (), warm_up: bool = False, leave_out: str = "", starts: int | None = None,
+        seed: int = 0, unstable: str = "bound", placebo: Iterable[str] = (), resume: bool = False,
+        out: str | Path | None = None, say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
     """Find values of keys of a scene from measurements, with intervals: the dict of fit.json, in SI.
 
     scene and sets are those of `load`. to: file of the measurements, which are a friction loop for a bench; rows of

@@ -427,7 +427,8 @@ def _free(group: Group, joint: Joint, amplitudes, harmonics: int, count=None) ->
 
 def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
     """The `harmonic.backbone.Free` motions at amplitudes (k,) [m] of the output from the first that is found, None
-    before it, as far as there is one near the one before."""
+    before it, as far as there is one near the one before. The first is sought beside the held mode, else on the way
+    from where the contact holds."""
     modes = joint.modes
     omega, shape = modes.held(group.rows, group.stiffness(), joint.mode)
     reach = abs(float(modes.output @ shape))
@@ -437,11 +438,12 @@ def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
     balance = equations.balance
     y = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
     y[:, 1] = balance.faces @ shape
-    x, out, done = np.append(harmonics_packed(y), [1.0, 0.0]), [], 0.0
+    first, out = np.append(harmonics_packed(y), [1.0, 0.0]), []
+    x, done, small = first, 0.0, LOW * float(_amplitude_of(joint, _knee(joint))) / reach
     for amplitude in amplitudes:
         here = amplitude / reach
         try:
-            x = equations.towards(x, done, here) if any(out) else x
+            x = equations.towards(x, done, here) if any(out) else _begun(equations, first, small, here)
             for _ in range(6):
                 x, free = equations.solve(x, here)
                 size = _largest(free.modal @ modes.output)
@@ -456,6 +458,16 @@ def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
         done, reach = here, amplitude / here
         out.append(free)
     return out
+
+
+def _begun(equations: FreeBalance, first, small: float, here: float) -> np.ndarray:
+    """Unknowns (N,) at an amplitude `here` [m] from those of the held mode, at once or by way of a small one."""
+    try:
+        return equations.solve(first, here)[0]
+    except NotConverged:
+        if not small < here:
+            raise
+        return equations.towards(equations.solve(first, small)[0], small, here)
 
 
 def _largest(harmonics) -> float:

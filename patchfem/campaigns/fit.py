@@ -12,6 +12,7 @@ from ..identify.least_squares import Fit, fit
 from ..identify.words import remarks
 from ..inputs.loops import Loop, read_loop
 from ..scene.keys.quantities import KINDS
+from ..scene.lines import pieces_of
 from ..scene.ranges import ranges
 from ..scene.scene import Scene, SceneError
 from .fit_model import BenchModel
@@ -139,13 +140,19 @@ def own_values(scene: Scene, wanted: list) -> list:
     out = []
     for one in wanted:
         value = scene
-        for part in one.key.split("."):
-            value = getattr(value, part, None)
+        for part in pieces_of(one.key):
+            value = _item(value, part) if isinstance(value, tuple) else getattr(value, part, None)
         if not isinstance(value, float):
             wide = one.low > 0 and one.high > 10 * one.low
             value = np.sqrt(one.low * one.high) if wide else (one.low + one.high) / 2
         out.append(float(np.clip(value, one.low, one.high)))
     return out
+
+
+def _item(items: tuple, word: str):
+    """The table of an array by its name or its number from 0; None where there is none."""
+    named = [one for one in items if getattr(one, "name", None) == word]
+    return named[0] if named else items[int(word)] if word.isdecimal() and int(word) < len(items) else None
 
 
 def _doubts(fitted: Fitted, led: bool) -> list:

@@ -1,13 +1,16 @@
 """Identification of a joint from frequency and damping over the amplitude: a decay, or any backbone."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
-from ..core import NotConverged, Outcome, PatchfemError
+from ..core import Outcome, PatchfemError
+from ..core import say as words
 from ..identify.least_squares import Fit, fit
+from ..identify.space import space, spread_points
 from ..identify.words import remarks
 from ..inputs.cells import text_of
 from ..inputs.columns import read_columns
@@ -25,7 +28,8 @@ HEADER = "decay_amplitude [m],decay_frequency [Hz],decay_damping [1]"
 HALVES = 0.5 * np.array([1e-3, 5e-2])  # of frequency and damping, standard deviations of rows without errors
 LEAST = 1e-6  # of a value, a standard deviation at least
 WAYS = ("balance", "quasi-static")  # the first tells, the last is quick
-ROUNDS, SAME = 8, 1e-7  # of the search, until the share of the balance in the static curve changes by less
+OTHERS = 8  # values tried besides the scene's own, until a curve is known
+ROUNDS, SAME = 8, 1e-3  # of the search, until the balance over the static curve changes by less standard deviations
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -83,13 +87,15 @@ def read_curve(path) -> tuple:
     return columns["amplitude"][order], value[:, order], np.maximum(spread, LEAST * np.abs(value))[:, order]
 
 
-def fit_decay(scene: Scene, to: Path, free, say=None) -> FittedDecay:
+def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> FittedDecay:
     """Fit the keys `free` ("table.key=low..high" texts) of a rig's scene to the curve in the file `to`.
 
     The model's curve is that of a periodic motion at the same amplitudes, by balance. The values are searched by the
     curve of one static force, which takes a hundredth of the time, times the share of the balance in it at the values
-    found before, until that share stays; where one of the two is not known, by the other. Each row counts by its
-    error. SceneError and PatchfemError name bad input.
+    found before, until that share stays; where it does not, by the balance from the best values seen; where one of the
+    two is not known, by the other. Each row counts by its error. Values at which the mode does not oscillate at all
+    amplitudes are passed over; rows that only the balance lacks have its share of the nearest row, with a warning.
+    starts: of the search. SceneError and PatchfemError name bad input.
     """
     begin = perf_counter()
     wanted, wrong = ranges(free)
@@ -99,11 +105,9 @@ def fit_decay(scene: Scene, to: Path, free, say=None) -> FittedDecay:
     if 2 * amplitude.size <= len(wanted):
         raise PatchfemError(f"{to}: {amplitude.size} amplitudes cannot determine {len(wanted)} values")
     base, apart = Base(scene), np.unique(amplitude)
-    ways = _known(scene, apart)
-    if say:
-        say(f"{amplitude.size} amplitudes by {' and '.join(ways)}")
 
-    def curve(values, method: str) -> np.ndarray:
+    @lru_cache(8)
+    def computed(values: tuple, method: str) -> np.ndarray:
         sets = [one.assigned(value) for one, value in zip(wanted, values)]
         try:
             model = joint.freed(build(base.changed(sets)))
@@ -111,43 +115,93 @@ def fit_decay(scene: Scene, to: Path, free, say=None) -> FittedDecay:
             raise PatchfemError(wrong_scene.mistakes[0]) from None
         return _curve(model, apart, method)[:, np.searchsorted(apart, amplitude)]
 
-    share, start, starts = np.ones_like(measured), own_values(scene, wanted), 3
-    for _ in range(ROUNDS):
-        found = fit(lambda values: ((curve(values, ways[-1]) * share - measured) / error).ravel(),  # noqa: B023
-                    [one.low for one in wanted], [one.high for one in wanted], start=start, starts=starts,
-                    bars="series")
-        best = curve(found.values, ways[0])
-        before, share = share, best / curve(found.values, ways[-1]) if len(ways) > 1 else share
-        if np.abs(share / before - 1).max() < SAME:
-            break
-        start, starts = found.values, 1
+    def curve(values, method: str) -> np.ndarray:
+        return computed(tuple(map(float, values)), method)
+
+    def quick(values) -> np.ndarray:
+        found = curve(values, ways[-1])
+        if (lost := np.isnan(found[0])).any():
+            raise PatchfemError(f"the model's mode does not oscillate at {_listed(amplitude[lost])}; leave out these "
+                                "rows, or narrow --free")
+        return found * share
+
+    def balanced(values) -> np.ndarray:
+        found, beside = curve(values, ways[0]), curve(values, ways[-1])
+        return np.where(np.isnan(found), beside * _nearest(found / beside, amplitude), found)
+
+    def fitted(model, bars: str = "") -> Fit:
+        return fit(lambda values: ((model(values) - measured) / error).ravel(), box.low, box.high, start=start,
+                   starts=starts, bars=bars)
+
+    start, box = own_values(scene, wanted), space([one.low for one in wanted], [one.high for one in wanted])
+    ways = _known(curve, [start, *map(box.values, spread_points(OTHERS, len(start)))])
+    if say:
+        say(f"{amplitude.size} amplitudes by {' and '.join(ways)}")
+    share, settled, tried = np.ones_like(measured), len(ways) == 1, []
+    while not settled and len(tried) < ROUNDS:
+        start = fitted(quick).values
+        try:
+            told = balanced(start)
+        except PatchfemError as reason:
+            raise PatchfemError(f"at the values found balance knows no oscillation at {_listed(amplitude)}: {reason}; "
+                                "leave out the rows of the largest damping, or narrow --free") from None
+        settled = np.abs((told - quick(start)) / error).max() < SAME
+        tried.append((float(np.square((told - measured) / error).sum()), len(tried), start))
+        share, starts = share * told / quick(start), 1
+    model = quick if settled else balanced
+    start = start if settled else min(tried)[2]
+    found = fitted(model, "series")
+    best, lost = model(found.values), amplitude[np.isnan(curve(found.values, ways[0])[0])]
+    warned = [f"balance found no oscillation at {_listed(lost)}, where the static curve stands for it, corrected as at "
+              "the nearest amplitude"] if lost.size else []
     sets = [one.assigned(value) for one, value in zip(wanted, found.values)]
     return FittedDecay(scene, Path(to), wanted, found, amplitude, measured, error, best, ways[0], sets,
-                       [*scene.remarks, *remarks(found, [one.key for one in wanted])], perf_counter() - begin)
+                       [*scene.remarks, *warned, *remarks(found, [one.key for one in wanted])], perf_counter() - begin)
 
 
-def _known(scene: Scene, amplitude) -> list:
-    """The ways of WAYS that give the scene's own curve; PatchfemError with the reasons where none does."""
-    found, reasons, model = [], [], joint.freed(build(scene))
-    for method in WAYS:
-        try:
-            _curve(model, amplitude, method)
-            found.append(method)
-        except (NotConverged, PatchfemError) as reason:
-            reasons.append(f"{method}: {reason}")
-    if not found:
-        raise PatchfemError(f"no curve of the scene is known; {'; '.join(reasons)}")
-    return found
+def _known(curve, tried: list) -> list:
+    """The ways of WAYS that give a curve(values, way) at the first of some values at which all do, or at which most do;
+    PatchfemError with the reasons where none does."""
+    reasons, most = [], []
+    for values in tried:
+        found = []
+        for method in WAYS:
+            try:
+                curve(values, method)
+                found.append(method)
+            except PatchfemError as reason:
+                reasons.append(f"{method}: {reason}")
+        most = max(most, found, key=len)
+        if len(most) == len(WAYS):
+            break
+    if not most:
+        raise PatchfemError(f"no curve of the scene is known within --free; {'; '.join(reasons[:len(WAYS)])}; leave "
+                            "out the rows of the largest damping, or change the ranges of --free")
+    return most
+
+
+def _nearest(share, amplitude) -> np.ndarray:
+    """Shares (2, k) with those of the row nearest in amplitude (k,) [m] in the rows that are NaN."""
+    known = np.flatnonzero(~np.isnan(share[0]))
+    return share[:, known[_places(amplitude[known], amplitude)]]
+
+
+def _places(amplitude, of) -> np.ndarray:
+    """Numbers (m,) of the amplitudes (k,) [m] nearest to others (m,) [m], by their ratio."""
+    return np.abs(np.log(np.asarray(of)[:, None] / amplitude)).argmin(axis=1)
+
+
+def _listed(amplitudes) -> str:
+    return ", ".join(words(one, 3) for one in amplitudes[:6]) + (", ..." if len(amplitudes) > 6 else "")
 
 
 def _curve(model, amplitude, method: str) -> np.ndarray:
-    """Frequency [Hz] and damping ratio (2, k) at rising amplitudes (k,) [m]."""
+    """Frequency [Hz] and damping ratio (2, k) at rising amplitudes (k,) [m], NaN where the mode does not oscillate;
+    PatchfemError where it does so nowhere."""
     with placed(model.source):
         found = backbone(model, "", amplitude, (method,))
     if method not in found.curves:
         raise PatchfemError(found.missing[method])
-    one = found.curves[method]
-    if one.amplitude.size != amplitude.size:
-        lost = ", ".join(f"{a:.3g} m" for a in np.setdiff1d(amplitude, one.amplitude)[:6])
-        raise PatchfemError(f"the model's mode does not oscillate at {lost}; leave out these rows, or narrow --free")
-    return np.array([one.frequency, one.damping])
+    one, out = found.curves[method], np.full((2, amplitude.size), np.nan)
+    out[:, _places(amplitude, one.amplitude)] = one.frequency, one.damping
+    return out

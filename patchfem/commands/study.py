@@ -101,8 +101,9 @@ class Rows:
 
     leave_out: word("refit without each value of a column such as frequency, input or run, and score the rows left "
                     "out") = ""
-    starts: Annotated[int, Parameter(help="random starts inside the ranges, such as 20; the best training score is "
-                                          "taken")] = 8
+    starts: Annotated[int | None, Parameter(
+        help="starts inside the ranges, such as 20, of which the best is taken; 8, or 3 for a curve over the "
+             "amplitude, unless given")] = None
     seed: Annotated[int, Parameter(help="seed seed of the random starts, such as 1")] = 0
     unstable: Annotated[Literal["bound", "out", "read"], Parameter(
         help="how rows flagged U count in the fit: lower bounds, nothing, or as read, such as out")] = "bound"

@@ -24,21 +24,23 @@ from . import fit_folder, fitted_decay, fitted_patch, wear_fit
 from . import fit_rows as written
 from .results import STARTS, Folder
 
-LOOP, ROWS = ("offset", "warm_up"), ("leave_out", "starts", "seed", "unstable", "placebo", "resume")
+LOOP, ROWS = ("offset", "warm_up"), ("leave_out", "seed", "unstable", "placebo", "resume")
+STARTED = {"rows": 8, "curve": 3}  # starts of a search, unless given
 BELONG = {"hold": "a loop of a bench or to rows of a rig", **dict.fromkeys(LOOP, "a loop of a bench"),
-          **dict.fromkeys(ROWS, "rows of a rig"), "amplitudes": "--from-patch"}
+          "starts": "rows of a rig or to its curve over the amplitude", **dict.fromkeys(ROWS, "rows of a rig"),
+          "amplitudes": "--from-patch"}
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What stands beside the free keys: `hold` of a loop and of rows, LOOP of a loop, ROWS of rows, `amplitudes` of the
-    patch that stands in place of a measurement."""
+    """What stands beside the free keys: `hold` of a loop and of rows, LOOP of a loop, ROWS of rows, `starts` of rows
+    and of a curve (None: STARTED), `amplitudes` of the patch that stands in place of a measurement."""
 
     hold: tuple = ()
     offset: tuple = ()
     warm_up: bool = False
     leave_out: str = ""
-    starts: int = 8
+    starts: int | None = None
     seed: int = 0
     unstable: str = UNSTABLE[0]
     placebo: tuple = ()
@@ -80,7 +82,8 @@ def fit_into(whole, to: str, free: Sequence[str], options: Options, target: Path
         if kind == "rows":
             return _of_rows(whole, Path(to), free, options, folder, heard)
         if kind == "curve":
-            return fitted_decay.fit_into(fit_decay(whole, Path(to), free, heard.say), folder)
+            return fitted_decay.fit_into(fit_decay(whole, Path(to), free, heard.say, options.starts or
+                                                  STARTED[kind]), folder)
         if kind == "loop":
             how = LoopOptions(options.offset, options.warm_up)
             return fit_folder.fit_into(fit_loop(whole, Path(to), free, options.hold, heard.say, how), folder)
@@ -97,7 +100,8 @@ def kind_of(whole, to: str) -> str:
 
 
 def _refuse(kind: str, options: Options, named: Callable) -> None:
-    here = {"loop": ("hold", *LOOP), "rows": ("hold", *ROWS), "patch": ("from_patch", "amplitudes")}.get(kind, ())
+    here = {"loop": ("hold", *LOOP), "rows": ("hold", "starts", *ROWS), "curve": ("starts",),
+            "patch": ("from_patch", "amplitudes")}.get(kind, ())
     is_ = {"loop": "a bench", "rows": "a rig", "wear": "one with [wear]",
            "curve": "a rig, fitted to a curve over the amplitude", "patch": "fitted to its own patch"}[kind]
     others = [name for name in options.given() if name not in here]
@@ -106,7 +110,7 @@ def _refuse(kind: str, options: Options, named: Callable) -> None:
         raise PatchfemError(f"{belong}; this scene is {is_}, leave {'it' if len(others) == 1 else 'them'} out")
     for name, least in (("starts", 1), ("seed", 0)):
         value = getattr(options, name)
-        if not isinstance(value, int) or value < least:
+        if value is not None and (not isinstance(value, int) or value < least):
             wanted = "at least one is needed" if least else "a whole number >= 0 is needed"
             raise PatchfemError(f"{named(name)} {value}: {wanted}")
     if options.unstable not in UNSTABLE:
@@ -120,7 +124,7 @@ def _of_rows(whole, path: Path, free: Sequence[str], options: Options, folder: F
     question = (whole.resolved(), free, options.hold, options.leave_out, options.placebo, options.seed,
                 options.unstable, path.read_bytes() if path.is_file() else "")
     kept = written.Starts(folder.path / STARTS, question, options.resume)
-    how = Search(options.starts, options.seed, options.unstable, kept)
+    how = Search(options.starts or STARTED["rows"], options.seed, options.unstable, kept)
     asked = RowsOptions(options.hold, options.leave_out, options.placebo, how)
     found = fit_rows(Question(whole, wanted, path), asked, heard.say, heard.progress)
     return written.fit_into(found, folder.path, folder.target)

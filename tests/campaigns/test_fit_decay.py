@@ -3,20 +3,22 @@
 import numpy as np
 import pytest
 from command_line import cli
-from scene_texts import DRIVE, KILOGRAM, POINT, friction_of
+from scene_texts import DRIVE, KILOGRAM, POINT, friction_of, shaken
 
 import patchfem as pf
+from patchfem.campaigns import fit_decay
 from patchfem.campaigns.fit_decay import read_curve
 from patchfem.core import PatchfemError
 
 IWAN = POINT + friction_of("iwan").replace("1e7 N/m", "1e6 N/m").replace("chi = -0.5", "chi = -0.35") + KILOGRAM + DRIVE
 START = IWAN.replace("chi = -0.35", "chi = -0.6").replace("1e6 N/m", "6e5 N/m")
+AMPLITUDES = np.geomspace(1e-6, 2e-5, 3)
 FREE = {"friction.stiffness": ("3e5 N/m", "3e6 N/m"), "friction.chi": (-0.9, -0.05)}
 
 
-def written(path, text: str, noise: float = 0.0, seed: int = 0, count: int = 3):
+def written(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=AMPLITUDES):
     """The balanced curve of a scene as a decay on disk, with relative noise on frequency (a hundredth) and damping."""
-    curve = pf.backbone(text, amplitudes=np.geomspace(1e-6, 2e-5, count), method="balance")
+    curve = pf.backbone(text, amplitudes=amplitudes, method="balance")
     a, f, z = (curve[f"balance_{name}"].values for name in ("amplitude", "frequency", "damping"))
     rng = np.random.default_rng(seed)
     f, z = f * (1 + noise / 100 * rng.normal(size=f.size)), z * (1 + noise * rng.normal(size=z.size))
@@ -35,6 +37,48 @@ def test_exact_a_made_up_joint_is_found_again(tmp_path):
     assert values["friction.chi"] == pytest.approx(-0.35, abs=1e-5)
     assert found["outcome"] == "done" and found["rms"]["damping"] < 1e-5
     assert pf.load(tmp_path / "out/scene.fitted.toml").friction.chi == pytest.approx(-0.35, abs=1e-5)
+
+
+HEAVY = shaken('law = "elastic-plastic"\nbond_length = "1 um"').replace("static = 0.3", "static = 0.02")
+FLUID = shaken('law = "tanh"\nreference_speed = "0.3 m/s"').replace("static = 0.3", "static = 0.6")
+
+
+def test_exact_trials_that_do_not_oscillate_are_passed_over(tmp_path):
+    """A block damped by a film, 60 N at high speed: below some 0.1 m/s, where the scene begins, its damping ratio is
+    above 1 at the smallest amplitude; with 1 kN at all of them."""
+    path = written(tmp_path / "decay.csv", FLUID, amplitudes=np.geomspace(1e-4, 1e-3, 3))
+    free = {"friction.reference_speed": ("0.01 m/s", "3 m/s")}
+    found = pf.fit(FLUID, to=path, free=free, out=tmp_path / "out", starts=1, **{"friction.reference_speed": "20 mm/s"})
+    assert found["method"] == "balance" and found["rms"]["damping"] < 1e-4 and found["failures"] > 0
+    assert found["values"]["friction.reference_speed"]["value"] == pytest.approx(0.3, rel=1e-5)
+    with pytest.raises(PatchfemError, match=r"no curve of the scene is known.*balance: the mode does not oscillate.*"
+                                            r"leave out the rows of the largest damping"):
+        pf.fit(FLUID, to=path, free={"friction.static": (10.0, 20.0)}, out=tmp_path / "none")
+
+
+@pytest.mark.slow
+def test_a_row_that_the_balance_lacks_is_corrected_as_its_neighbour(tmp_path, monkeypatch):
+    path, plain = written(tmp_path / "decay.csv", HEAVY, amplitudes=np.geomspace(1e-5, 2e-5, 4)), fit_decay._curve
+
+    def lacking(model, amplitude, method):
+        found = plain(model, amplitude, method)
+        found[:, 1] = np.where(method == "balance", np.nan, found[:, 1])
+        return found
+
+    monkeypatch.setattr(fit_decay, "_curve", lacking)
+    found = pf.fit(HEAVY, to=path, free={"friction.static": (0.005, 0.1)}, out=tmp_path / "out", starts=1)
+    assert found["values"]["friction.static"]["value"] == pytest.approx(0.02, rel=0.02)
+    assert "balance found no oscillation at 12.6 um" in found["warnings"][0]
+
+
+@pytest.mark.slow
+def test_exact_a_share_that_does_not_settle_leaves_the_search_to_the_balance(tmp_path):
+    """The static curve of a heavily damped block is off by half, differently from value to value."""
+    path = written(tmp_path / "decay.csv", HEAVY, amplitudes=np.geomspace(8e-6, 2e-5, 3))
+    free = {"friction.static": (0.005, 1.0), "friction.bond_length": ("0.2 um", "5 um")}
+    found = pf.fit(HEAVY, to=path, free=free, out=tmp_path / "out", **{"friction.static": 0.5})
+    assert found["values"]["friction.static"]["value"] == pytest.approx(0.02, rel=1e-6)
+    assert found["values"]["friction.bond_length"]["value"] == pytest.approx(1e-6, rel=1e-6)
 
 
 def test_the_verb_reads_a_curve_and_refuses_what_is_none(tmp_path, monkeypatch):

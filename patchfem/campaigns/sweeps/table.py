@@ -12,7 +12,7 @@ from ...inputs.cells import NUMBER
 from ...scene.axes import Axis, values_of
 from .cases import Cases
 
-_HEAD = re.compile(r"\s*([^\[\]]+?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
+_HEAD = re.compile(r"\s*((?:[^\[\]]|\[[1-9][0-9]*\](?=\.))+?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
 HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
 
 

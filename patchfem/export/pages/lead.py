@@ -121,27 +121,34 @@ def span(measures: dict, trusted: dict, settled: np.ndarray) -> str:
 
 def least(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
     """Where between other cases the motion is least, as over the load of a friction damper, and its peak frequency
-    there; "" where its least is at an end of the one swept key, or below the ends by less than 5 %.
+    there; "" where its least is at an end of the swept key, below the ends by less than 5 %, or where a case that does
+    not count may lie below it. Several keys count as one where all rise or fall with the first of them.
 
     keys: as of `changes`; measures and trusted: as of `span`; shown: {name: `shown_of` the key}, of keys of numbers.
     """
     swept, name = [one for one in keys if len(set(one["texts"])) > 1], FIRST[0]
-    if len(swept) != 1 or swept[0]["name"] not in shown or swept[0]["name"] in peaks.KEYS or name not in measures:
+    if not swept or name not in measures or not all(one["name"] in shown and one["name"] not in peaks.KEYS
+                                                    for one in swept):
         return ""
-    key, (value, _, unit) = swept[0], measures[name]
-    place = np.asarray(key["values"], float)
-    order = [case for case in np.argsort(place, kind="stable").tolist() if np.isfinite(value[case])]
-    if len(order) < peaks.LEAST or not trusted[name][order].all():
+    value, error, unit = (part if isinstance(part, str) else np.asarray(part, float) for part in measures[name])
+    places = np.array([one["values"] for one in swept], float)
+    order = np.array([case for case in np.argsort(places[0], kind="stable") if np.isfinite(value[case])], int)
+    steps = np.diff(places[:, order], axis=1)
+    alike = ((steps > 0).all(axis=1) | (steps < 0).all(axis=1)).all()
+    if order.size < peaks.LEAST or (len(swept) > 1 and not alike):
         return ""
-    height = np.asarray(value, float)[order]
-    low = int(np.argmin(height))
-    if min(height[0], height[-1]) < 1.05 * height[low]:
+    height = value[order]
+    low = int(np.argmin(np.where(trusted[name][order], height, np.inf)))
+    known = trusted[name][order] | (height - error[order] > height[low] + error[order[low]])
+    if min(height[0], height[-1]) < 1.05 * height[low] or not known.all():
         return ""
-    before, at, after = (shown[key["name"]](case) for case in order[low - 1:low + 2])
-    told = f"{label(name).capitalize()} is least at {key['name']} {at}: {short(height[low], unit, 4, zero_below(name))}"
+    names, best = [one["name"] for one in swept], int(order[low])
+    at = ", ".join(f"{key} {shown[key](best)}" for key in names)
+    before, after = (" with ".join(shown[key](int(case)) for key in names) for case in (order[low - 1], order[low + 1]))
+    told = f"{label(name).capitalize()} is least at {at}: {short(height[low], unit, 4, zero_below(name))}"
     peak = measures.get("peak_frequency")
-    if peak is not None and np.isfinite(peak[0][order[low]]):
-        told += f", at its peak frequency of {plain(peak[0][order[low]], 4)} Hz"
+    if peak is not None and np.isfinite(peak[0][best]):
+        told += f", at its peak frequency of {plain(peak[0][best], 4)} Hz"
     return f"{told} (next cases: {before} and {after})."
 
 

@@ -21,6 +21,13 @@ def test_exact_units_stand_in_the_header_or_in_the_cells(tmp_path):
     assert tilt.values == (1e-3, 2e-3) and static.values == (0.3, 0.3) and law.values == ("coulomb", "tanh")
 
 
+def test_exact_items_stand_in_the_header_as_they_are_printed(tmp_path):
+    for key in ("structure.interface[1].load", "structure.interface.0.load"):
+        cases, wrong = read(written(tmp_path, f"{key} [N],{key.replace('load', 'bond_length')}[um]\n2,0.3\n5,0.7\n"))
+        assert wrong == [] and cases.axes[0].key == key and cases.texts(1) == ("5 N", "0.7 um")
+        assert cases.axes[0].values == (2.0, 5.0) and cases.axes[1].unit == "m"
+
+
 @pytest.mark.parametrize("text, says", [
     ("contact.load [lb]\n1\n2\n", ["cases.csv:2: contact.load: 'lb' is ambiguous", "cases.csv:3: contact.load"]),
     ("contact.load [N],friction.static\n1 N,0.3\n2,a\n", ["cases.csv:2: contact.load: '1 N' is not a number",
