@@ -145,8 +145,8 @@ class Asperities(Table):
     rms_curvature: key(quantity("curvature", gt=0) | None, "root mean square curvature of that trace",
                        "as rms_height") = None
     cutoff: key(Length | None, "wavelength that splits a trace (Gaussian filter of ISO 16610-21): longer waves belong "
-                "to [contact.profile], shorter ones to the asperities; length/100 beside a profile, else all waves "
-                "of `from` are asperities") = None
+                               "to [contact.profile], shorter ones to the asperities; default: length/100 with a "
+                               "profile, all waves of `from` without one") = None
     tangential_ratio: key(Positive | None, "tangential over normal stiffness of the rough layer; the "
                           "layer is rigid along x unless given") = None
 

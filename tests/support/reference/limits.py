@@ -92,8 +92,8 @@ def text() -> str:
     body += ["A bench can slide in two directions with "
              + _listed(name for name, one in laws().items() if not across(one))
              + ", but not with " + _listed(name for name, one in laws().items() if across(one)) + ".",
-             "## Methods", "The scene is a single point under a sine drive, with `accuracy.method` set; `auto` chooses "
-             "an available method.",
+             "## Methods", "In this table the scene is a single point under a sine drive, with `accuracy.method` set; "
+             "`auto` chooses an available method.",
              _methods(notes), "### Messages", _said(notes),
              "## Numbers",
              f"A number with a unit is at most {LARGEST:g} in SI. A quantity that occurs as a divisor ("
