@@ -19,6 +19,9 @@ def program() -> str | None:
                 None)
 
 
+LATER = "document.addEventListener('unpacked', () => {{{}}})"  # a script that waits until the page is unpacked
+
+
 class Chromium:
     """A browser with one page; `opened` shows a text of HTML, what was wrong in its scripts is in `faults`."""
 
@@ -109,10 +112,12 @@ class Chromium:
         self.asked("Page.loadEventFired", "Page.navigate", url=path.as_uri())
 
     def settled(self) -> None:
-        """Wait until every picture of BokehJS is drawn."""
-        self.js("""new Promise((done) => { const look = () => [...document.querySelectorAll('.chart')].every((one) =>
-            one.firstElementChild?.shadowRoot) ? requestAnimationFrame(() => requestAnimationFrame(done))
-            : setTimeout(look, 20); look(); setTimeout(done, 8000); })""")
+        """Wait until the page is unpacked and every picture of BokehJS is drawn."""
+        self.js("""new Promise((done) => {
+            const stands = () => !document.getElementById('library') &&
+                [...document.querySelectorAll('.chart')].every((one) => one.firstElementChild?.shadowRoot);
+           const look = () => stands() ? requestAnimationFrame(() => requestAnimationFrame(done)) : setTimeout(look, 9);
+            look(); setTimeout(done, 8000); })""")
 
     def sized(self, width: int, height: int) -> None:
         self.ask("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)

@@ -1,15 +1,15 @@
 """What a page holds besides its words: the data that the browser draws, and the page without the drawing library."""
 
+import gzip
 import json
 import re
-
-from patchfem.export.pages import library
+from base64 import b64decode
 
 
 def data_of(text: str) -> dict:
     """The data of a page, {} where it draws nothing."""
-    found = re.search(r"<script type=application/json id=data>(.*?)</script>", text, re.S)
-    return json.loads(found[1]) if found else {}
+    found = re.search(r"<script type=text/plain id=data>(.*?)</script>", text, re.S)
+    return json.loads(gzip.decompress(b64decode(found[1]))) if found else {}
 
 
 def charts_of(text: str) -> dict:
@@ -19,4 +19,4 @@ def charts_of(text: str) -> dict:
 
 def own_part(text: str) -> str:
     """The page without scripts."""
-    return re.sub(r"<script.*?</script>", "", text.replace(library.bokeh(), ""), flags=re.S)
+    return re.sub(r"<script.*?</script>", "", text, flags=re.S)

@@ -13,6 +13,8 @@ from . import library
 
 DIGITS = 9  # of the numbers in a page: a picture shows four, a hovered value seven
 NUMBER = f"%.{DIGITS}g,"
+OLD = ("The pictures of this page are packed, and this browser cannot unpack them: it has no DecompressionStream, "
+       "which browsers have had since 2023. Texts and tables are whole.")
 NOT_FINITE = re.compile("nan|-?inf")
 # colours of `drawing.pictures`, and those of the page that stand for them in either theme
 INKS = {"#ffffff": "paper", "#000000": "ink", "#4d4d4d": "ink", "#e3e3e3": "line", "#1f5f99": "accent",
@@ -28,7 +30,7 @@ class Section(NamedTuple):
 
 
 def document(title: str, lead: str, sections: list, data: dict | None = None, scripts: tuple = ()) -> str:
-    """The whole HTML page.
+    """The whole HTML page; what draws it and its data are packed and unpacked by the browser (`unpack.js`).
 
     title: plain text; lead: HTML under it; sections: of Section, one alone has no contents before it; data: what the
     scripts draw, plain lists and numbers; scripts: names of JavaScript files of this folder, without which no drawing
@@ -40,9 +42,11 @@ def document(title: str, lead: str, sections: list, data: dict | None = None, sc
                      for one in sections)
     drawn = ""
     if scripts:
-        text = encoded(data or {}).replace("<", "\\u003c")
-        drawn = (f"<script>{library.bokeh()}</script>\n<script type=application/json id=data>{text}</script>\n"
-                 + "".join(f"<script>{library.inert(library.own(name))}</script>\n" for name in scripts))
+        lead = f"<p id=old class='verdict warn' hidden>{OLD}</p>{lead}"
+        drawn = (f"<script type=text/plain id=library>{library.bokeh()}</script>\n<script type=text/plain id=data>"
+                 f"{library.packed(encoded(data or {}))}</script>\n"
+                 + "".join(f"<script type=text/plain class=own>{library.inert(library.own(name))}</script>\n"
+                           for name in scripts) + f"<script>{library.own('unpack.js')}</script>\n")
     return (f"<!doctype html><html lang=en><head><meta charset=utf-8>"
             f"<meta name=viewport content='width=device-width, initial-scale=1'><title>{escape(title)}</title>"
             f"<style>{library.own('page.css')}</style></head><body>\n"

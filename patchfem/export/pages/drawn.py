@@ -8,7 +8,7 @@ import numpy as np
 from ..written import label
 from .document import encoded
 
-ROOM = 1_200_000  # bytes of what is drawn; a page with its library of 1.4 MB stays below 3 MB
+ROOM = 1_200_000  # bytes of what is drawn; packed, with its library, a page stays below 1.5 MB
 FEWEST, LOOKED = 64, 32  # cases that are drawn at least; of which the bytes are looked at
 SHORT, BAR = 7, 3  # digits of a value and of an error in the page of a sweep that is not drawn whole
 

@@ -1,7 +1,9 @@
 """The drawing library that a page carries: BokehJS 3.9.2, which lies in `bokehjs` with its licence (BSD)."""
 
 import re
+from base64 import b64encode
 from functools import cache
+from gzip import compress
 from pathlib import Path
 
 FILES = ("bokeh.min.js", "bokeh-api.min.js")
@@ -10,8 +12,13 @@ HERE = Path(__file__).parent
 
 @cache
 def bokeh() -> str:
-    """BokehJS as one text of JavaScript, safe inside a script element."""
-    return "\n".join(inert(own(f"bokehjs/{name}")) for name in FILES)
+    """BokehJS as one text of JavaScript, packed."""
+    return packed("\n".join(own(f"bokehjs/{name}") for name in FILES))
+
+
+def packed(text: str) -> str:
+    """A text as gzip in base64, the same for the same text, which `unpack.js` reads."""
+    return b64encode(compress(text.encode(), 6, mtime=0)).decode()
 
 
 @cache

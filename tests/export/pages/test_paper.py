@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from chromium import Chromium
+from chromium import LATER, Chromium
 
 from patchfem.export.drawing import charts, pictures
 from patchfem.export.pages.document import INKS, Section, document, figure
@@ -30,7 +30,7 @@ def stress_map() -> str:
 
 
 def sweep_map(table: dict) -> str:
-    return page(table).replace("</body>", f"<script>{TURN}</script></body>")
+    return page(table).replace("</body>", f"<script>{LATER.format(TURN)}</script></body>")
 
 
 def on_paper(chromium: Chromium, text: str, dark: bool) -> np.ndarray:

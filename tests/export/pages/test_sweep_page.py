@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from chromium import LATER
 from page_data import data_of, own_part
 
 from patchfem.export.pages import drawn, library
@@ -50,7 +51,7 @@ def test_always_texts_from_outside_are_shown_as_texts(table):
     assert "Tilt &lt;/script&gt;&lt;b&gt;&amp;amp;" in text
     for foreign in ("<b>&amp;", "<i>a scene", "<i>peak", "<refused>"):
         assert foreign not in text
-    assert whole.count("</script>") == 4
+    assert whole.count("</script>") == 5
 
 
 @pytest.mark.parametrize("value, error, shown", [
@@ -72,7 +73,7 @@ def test_always_a_measure_without_any_value_is_not_offered_and_a_failed_case_is_
     text = page(table)
     assert "loop_area" not in [one["name"] for one in data_of(text)["measures"]]
     assert "<b>12 cases</b> over contact.tilt.angle × normal.load: 10 steady, 1 failed, 1 grows." in text
-    assert "<i>grows</i>: The motion still rises and no bounded steady motion was found" in text
+    assert "<i>grows</i>: The motion still grows, and no bounded steady motion was found" in text
     assert "<i>steady</i>" not in text and "<i>failed</i>" not in text
     assert "1 case failed: normal.load: &lt;refused&gt;" in text
 
@@ -250,7 +251,7 @@ def test_always_a_browser_draws_it(table, browser, shown):
     text = page(table)
     if shown == "map":
         turn = "const e=document.getElementById('shown');e.value='map';e.dispatchEvent(new Event('change'))"
-        text = text.replace("</body>", f"<script>{turn}</script></body>")
+        text = text.replace("</body>", f"<script>{LATER.format(turn)}</script></body>")
     seen = browser(text)
     words = re.search(r'<p id="?means"?[^>]*>(.*?)</p>', seen, re.S)[1]
     # grid: the loads are lines of their own, so the highest is that of 40 N at 1 mrad: 1e-5 * 5 * 4 = 200 um
@@ -363,3 +364,17 @@ def test_exact_the_load_that_lets_a_blade_move_least():
     for ends in ([1, 2, 3, 4, 5, 6, 7], [7, 6, 5, 4, 3, 2, 1], [1.04, 1, 2, 3, 4, 5, 6], [2, 1, 2, 2]):
         assert swept(np.array(ends) * 1e-6) == ""
     assert swept(np.array([9, 5, 1, 2, 3, 4, 4]) * 1e-6, known=0.1) == ""
+
+
+def test_always_a_browser_that_cannot_unpack_says_so(chromium, table):
+    text = page(table)
+    chromium.opened(text)
+    assert chromium.js("document.getElementById('old').hidden") and not chromium.faults
+    chromium._to(text.replace("<body>", "<body><script>delete window.DecompressionStream</script>", 1))
+    assert chromium.js("document.getElementById('old').innerText").startswith("The pictures of this page are packed")
+    assert chromium.js("document.getElementById('old').offsetHeight") > 0 and not chromium.faults
+
+
+def test_exact_a_page_is_half_as_large_as_its_library_was(table):
+    assert len(page(table)) < 0.6e6 and library.bokeh() == library.packed("\n".join(
+        library.own(f"bokehjs/{name}") for name in library.FILES))
