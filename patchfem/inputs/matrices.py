@@ -6,6 +6,7 @@ Nastran.
 """
 
 import zipfile
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,6 +20,11 @@ from . import matlab, nastran
 ENDINGS = (".mtx", ".mat", ".npz", ".op4", ".pch", ".bdf", ".dat")
 NAMES = {"stiffness": ("k", "kaax", "kaa", "kgg", "stiffness"), "mass": ("m", "maax", "maa", "mgg", "mass"),
          "damping": ("c", "d", "baax", "baa", "bgg", "damping")}  # of matrices in files that hold several
+SAMPLE = 500  # numbers by which it shows to how many digits a matrix was rounded
+FEW = 10  # different numbers below which it does not show
+NEED = 0.6  # least share of them that need all digits but two
+SHORT = 7  # digits that single precision holds
+WHOLE = 15  # digits and more that double precision does not tell from all
 SKEW = 1e-8  # share of the largest entry by which a symmetric matrix may differ from its transpose
 
 
@@ -44,6 +50,38 @@ def read(path, wanted: str) -> Matrix:
     except Exception as error:  # a damaged file raises whatever its reader trips over
         raise PatchfemError(f"{path} cannot be read ({' '.join(str(error).split())[:160]})") from None
     return found._replace(values=_symmetric(path, found.values, wanted))
+
+
+def rounding(values) -> tuple | None:
+    """(digits in words, by how much each of the numbers (k,) of a sparse array may be off, as a standard deviation);
+    None where the array has all digits of double precision, or too few different numbers to tell."""
+    data = values.data
+    some = np.unique(np.abs(data[::max(1, data.size // (20 * SAMPLE))]))
+    some = some[some > 0]
+    some = some[::max(1, some.size // SAMPLE)]
+    digits = np.array([len(repr(one).split("e")[0].replace(".", "").strip("0")) for one in some.tolist()])
+    if some.size < FEW:
+        return None
+    if digits.max() > SHORT and np.array_equal(some.astype(np.float32), some):
+        return "single precision", np.where(data == 0, 0.0, np.spacing(np.abs(data).astype(np.float32))) / np.sqrt(12)
+    if digits.max() < WHOLE and np.mean(digits >= digits.max() - 2) >= NEED:  # a sign or an exponent may take two
+        count = int(np.median(digits))
+        with np.errstate(divide="ignore"):
+            power = np.where(data == 0, -np.inf, np.floor(np.log10(np.abs(data))))
+        return f"{count} digits", 10.0**(power + 1 - count) / np.sqrt(12)
+    return None
+
+
+def scatter(values, off, shape) -> float:
+    """Standard deviation of shape^T A shape, of a sparse array A whose different numbers (k,) are off by `off` (k,)
+    independently of one another; shape (n,)."""
+    found = values.tocoo()
+    i, j = found.coords
+    _, which = np.unique(np.abs(found.data), return_inverse=True)
+    share = np.bincount(which, shape[i] * shape[j] * np.sign(found.data))
+    each = np.zeros(share.size)
+    each[which] = off
+    return float(np.sqrt(share**2 @ each**2))
 
 
 def _symmetric(path, values, wanted: str):
@@ -103,8 +141,9 @@ def _market(path: Path, wanted: str) -> Matrix:
 def _abaqus(path: Path) -> Matrix:
     """Lines of row, column, number or of node, direction, node, direction, number; one triangle stands for both."""
     with open(path, encoding="latin-1") as file:
-        lines = [line.replace(",", " ") for line in file if line.strip() and line.lstrip()[0] not in "*%#"]
-    rows = np.loadtxt(lines, ndmin=2)
+        lines = (line for line in file if line.strip() and line.lstrip()[0] not in "*%#")
+        first = next(lines, "")
+        rows = np.loadtxt(chain([first], lines), delimiter="," if "," in first else None, ndmin=2)
     if rows.shape[1] not in (3, 5) or not rows.size:
         raise PatchfemError(f"{path}: neither Matrix Market nor lines of row, column, number or of node, direction, "
                             "node, direction, number")
@@ -113,7 +152,7 @@ def _abaqus(path: Path) -> Matrix:
         raise PatchfemError(f"{path}: rows, nodes and directions must be whole numbers")
     places = None
     if rows.shape[1] == 5:
-        places, where = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
+        places, where = nastran.ranked(ends.reshape(-1, 2))
         i, j = where.reshape(-1, 2).T
     elif ends.min() < 1 or ends.max() > nastran.SIDE:
         raise PatchfemError(f"{path}: rows and columns count from 1 to {nastran.SIDE} at most")
@@ -144,7 +183,7 @@ def _numpy(path: Path, wanted: str) -> Matrix:
 def _nastran(reader):
     def of_file(path: Path, wanted: str) -> Matrix:
         found = reader(path)
-        one = found[_named(path, found, wanted)]
+        one = found[_named(path, found, wanted)].cards()
         return Matrix(one.values, one.places, one.places is None)
     return of_file
 

@@ -10,6 +10,7 @@ from ..inputs import matrices
 from ..structure import reduced
 from ..structure.places import AXES
 
+TOLD = 1e-5  # of a frequency, an uncertainty that is told
 FILES = ("stiffness", "mass", "damping")
 _PLACE, _RANGE = re.compile(r"(\d+)(?::(r?[xyz]))?"), re.compile(r"(\d+)\.\.(\d+)(?::(\d+))?")
 
@@ -69,8 +70,22 @@ def _reduction(files: tuple, boundary: tuple, modes: int, method: str, moved: tu
     every = [_file(*one) for one in files]
     rows, moving, notes = _placed(every, boundary, moved, driven)
     found = dict(zip((key for key, *_ in files), (one.values / unit for one in matrices.aligned(*every))))
-    return reduced.reduction(found["stiffness"], found["mass"], found.get("damping"), rows, modes, method,
-                             moving), notes
+    made = reduced.reduction(found["stiffness"], found["mass"], found.get("damping"), rows, modes, method, moving)
+    return made, [*notes, *_rounded(files, every, found["stiffness"], unit, made.lowest)]
+
+
+def _rounded(files: tuple, every: list, stiffness, unit: float, shape) -> list:
+    """A sentence for each of stiffness and mass whose digits leave the lowest frequency uncertain."""
+    out, square = [], shape @ (stiffness @ shape)
+    for (key, path, *_), one, scale in zip(files, matrices.aligned(*every), (square, 1.0)):
+        told = matrices.rounding(one.values)
+        if told is None or not square:
+            continue
+        share = matrices.scatter(one.values, told[1], shape) / unit / scale  # two deviations, of half a square
+        if share > TOLD:
+            out.append(f"{path.name} has its {key} in {told[0]}, which leaves the lowest frequency of the structure "
+                       f"uncertain by {100 * share:.2g} %; write it in double precision")
+    return out
 
 
 def checked(folder, table, driven: bool) -> None:

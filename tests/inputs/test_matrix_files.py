@@ -142,6 +142,39 @@ def test_exact_lines_of_abaqus(tmp_path):
     assert np.array_equal(by_nodes.values.toarray(), K) and by_nodes.places.tolist() == [list(p) for p in PLACES]
 
 
+def slender(seed: int, n: int = 60):
+    """Stiffness (n, n) of a clamped beam of rigid links and hinges, in a random unit for each coordinate, and its shape
+    (n,) of lowest stiffness."""
+    D = np.eye(n) - 2 * np.eye(n, k=-1) + np.eye(n, k=-2)
+    unit = np.random.default_rng(seed).uniform(1, 2, n)
+    stiff = D.T @ D * np.outer(unit, unit) * 1e7
+    return sparse.csr_array(stiff), np.linalg.eigh(stiff)[1][:, 0]
+
+
+@pytest.mark.parametrize("told, rounded", [
+    ("10 digits", lambda values: [float(f"{one:.9e}") for one in values]),
+    ("4 digits", lambda values: [float(f"{one:.3e}") for one in values]),
+    ("single precision", lambda values: values.astype(np.float32).astype(float))])
+def test_exact_what_digits_that_a_file_lacks_leave_uncertain(told, rounded):
+    """Of 200 rounded matrices the stiffness of a shape scatters by what is told; K rounds alike above and below the
+    diagonal."""
+    shares = []
+    for seed in range(200):
+        whole, shape = slender(seed)
+        assert matrices.rounding(whole) is None
+        short = whole.copy()
+        short.data = np.array(rounded(whole.data))
+        words, off = matrices.rounding(short)
+        assert words == told
+        shares.append(shape @ (short - whole) @ shape / matrices.scatter(short, off, shape))
+    assert 0.85 < np.sqrt(np.mean(np.square(shares))) < 1.15
+
+
+def test_exact_few_or_whole_numbers_show_no_rounding():
+    assert matrices.rounding(sparse.csr_array(K)) is None
+    assert matrices.rounding(sparse.csr_array(slender(1)[0] / 3)) is None
+
+
 def test_exact_rows_of_places_that_files_order_in_their_own_way():
     one = matrices.Matrix(sparse.csr_array(np.diag([1.0, 2.0])), np.array([[5, 1], [2, 3]]))
     other = matrices.Matrix(sparse.csr_array(np.diag([7.0])), np.array([[3, 1]]))
