@@ -24,17 +24,17 @@ class Accuracy(Table):
     tolerance: key(number(gt=0, lt=1), "largest relative error wanted in any measure; the numerical settings "
                    "follow from it") = 1e-3
     method: key(Literal["auto", "exact", "march", "duhamel", "newmark", "euler", "harmonic"],
-                "solver of the motion; chosen from the scene unless given") = "auto"
-    steps_per_cycle: key(whole(4, 10_000_000) | None, "time steps per cycle; set by the tolerance unless given") = None
-    quadrature: key(Summing, "method of the sum over bonds; the cheapest within the tolerance unless given") = "auto"
-    tail: key(Share | None, "share of the bonds that quadrature 'truncated' leaves out; set by the "
-              "tolerance unless given") = None
-    merge: key(Share | None, "width, in bond lengths, within which bonds are merged; set by the tolerance "
-               "unless given") = None
-    harmonics: key(whole(1, 10_000) | None, "number of harmonics in the harmonic balance; set by the tolerance "
-                                            "unless given") = None
-    shear_modes: key(whole(1, 10_000) | None, "number of shear modes of the pieces; set by the tolerance "
-                     "unless given") = None
+                "solver of the motion; default: chosen from the scene") = "auto"
+    steps_per_cycle: key(whole(4, 10_000_000) | None, "time steps per cycle; default: set by the tolerance") = None
+    quadrature: key(Summing, "method of the sum over bonds; default: the cheapest within the tolerance") = "auto"
+    tail: key(Share | None, "share of the bonds that quadrature 'truncated' leaves out; default: set by the "
+                            "tolerance") = None
+    merge: key(Share | None, "width, in bond lengths, within which bonds are merged; default: set by the "
+                             "tolerance") = None
+    harmonics: key(whole(1, 10_000) | None, "number of harmonics in the harmonic balance; default: set by the "
+                                            "tolerance") = None
+    shear_modes: key(whole(1, 10_000) | None, "number of shear modes of the pieces; default: set by the "
+                                              "tolerance") = None
     convergence: key(Literal["force", "velocity", "displacement"] | None, "quantity whose change ends the iteration of "
                      "method 'duhamel'") = None
     convergence_tolerance: key(Positive | None, "relative change at which the iteration of method 'duhamel' "

@@ -50,11 +50,11 @@ class OnePiece(Table):
     """Properties of one piece that differ from those in [contact]; `coating = "none"` removes the coating."""
 
     height: key(Length | None, "height of this piece; default contact.height") = None
-    length: key(Length | None, "length of this piece, centred at x = 0; contact.length unless given; the interface "
-                "has the length of the shorter piece") = None
-    substrate: key(Substance | None, "material of this piece; contact.substrate unless given") = None
+    length: key(Length | None, "length of this piece, centred at x = 0; default contact.length; the interface has the "
+                               "length of the shorter piece") = None
+    substrate: key(Substance | None, "material of this piece; default contact.substrate") = None
     coating: key(Coating | Literal["none"] | None, 'coating of this piece, {material = ..., thickness = ...}, or '
-                 '"none"; contact.coating unless given') = None
+                                                   '"none"; default contact.coating') = None
     chamfer: key(Length | None, "size of the 45 degree chamfer at both ends; the interface stops where the chamfer "
                  "starts") = None
     end_radius: key(Length | None, "radius of the rounded ends; the interface stops where the slope of "
@@ -88,7 +88,7 @@ class Holder(Table):
     rotational_stiffness: key(quantity("rotational stiffness", gt=0) | None, "rotational stiffness between the far "
                               "face and its holder", "unless tangential_stiffness") = None
     tangential_stiffness: key(quantity("stiffness", gt=0) | None, "stiffness along x between the far face and its "
-                              "holder; rigid unless given") = None
+                                                                  "holder; default rigid") = None
 
 
 def convex(value: object) -> object:
@@ -147,8 +147,8 @@ class Asperities(Table):
     cutoff: key(Length | None, "wavelength that splits a trace (Gaussian filter of ISO 16610-21): longer waves belong "
                                "to [contact.profile], shorter ones to the asperities; default: length/100 with a "
                                "profile, all waves of `from` without one") = None
-    tangential_ratio: key(Positive | None, "tangential over normal stiffness of the rough layer; the "
-                          "layer is rigid along x unless given") = None
+    tangential_ratio: key(Positive | None, "tangential over normal stiffness of the rough layer; default: rigid along "
+                                           "x") = None
 
 
 class Shear(Table):

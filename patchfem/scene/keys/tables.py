@@ -94,11 +94,10 @@ class Friction(Table):
                      "the bond length is constant", "with slip_growth") = None
     slip_growth: key(Length | None, "slip length l_k over which the bond length approaches its value in fast slip "
                      "(2.10)", "with rest_growth") = None
-    rest_speed: key(Speed | None, "least speed v_h taken for |v| in a_s/|v|; 1e-3 of the peak speed unless "
-                                  "given") = None
+    rest_speed: key(Speed | None, "least speed v_h taken for |v| in a_s/|v|; default 1e-3 of the peak speed") = None
     initial_bonds: key(Share, "share m_0 of the bonds that exist when the run begins") = 1.0
     breakaway: key(number(ge=0, le=1), "share of the bond length over which a bond stretches without damage") = 0.0
-    spread: key(Length | None, "width rho of the bonds across the path (2.15); ignored unless given") = None
+    spread: key(Length | None, "width rho of the bonds across the path (2.15); default: ignored") = None
     temperature: Temperature | None = None
 
 
@@ -111,9 +110,9 @@ class Slide(Table):
     frequency: key(Frequency | None, "frequency of the sine") = None
     speed: key(Speed | None, "speed of the slide") = None
     distance: key(quantity("length", ge=0) | None, "sliding distance; for a dwell, up to its rest; for a triangle, "
-                  "before its cycles (0 unless given)") = None
+                                                   "before its cycles (default 0)") = None
     hold: key(quantity("time", ge=0) | None, "duration of the rest") = None
-    distance_after: key(quantity("length", ge=0) | None, "sliding distance after the rest; 0 unless given") = None
+    distance_after: key(quantity("length", ge=0) | None, "sliding distance after the rest; default 0") = None
     cycles: key(Positive | None, "number of cycles, may be fractional; default 1") = None
     file: key(Text | None, "table with columns time and displacement; a column lateral makes the slide "
               "two-dimensional") = None
@@ -318,7 +317,7 @@ class Wear(Table):
     upper_share: key(Share, "share of the worn depth that is worn off the upper piece") = 0.5
     cycles: key(Positive, "number of cycles over which material is removed, each like the converged last cycle")
     jumps: key(Literal["auto"] | whole(1, 1_000_000), "number of equal steps into which these cycles are divided; "
-               "set by the tolerance unless given") = "auto"
+                                                      "default: set by the tolerance") = "auto"
     form: key(Literal["archard", "energy"], "'archard': depth proportional to pressure and slip path; 'energy': to "
               "friction work per area") = "archard"
     scheme: key(Literal["implicit", "explicit"], "'explicit' uses the pressure at the start of each step; steps "
