@@ -100,16 +100,35 @@ def test_exact_a_release_has_no_excitation(tmp_path):
         assert not found["Fex1"].any() and not {"force", "base", "Omega"} & set(found.files)
 
 
+HEAD = RUB.split("[drive]")[0]
+LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "100 Hz"\nlevels = ["1 g", "2 g"]\ncycles = 5\n'
+
+
+@pytest.mark.parametrize("text, says", [
+    (RUB, "1 coordinate, 1 friction element\n"),
+    (RUB + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n', "; not written: [wear]\n"),
+    (RUB.replace("[structure]", '[structure]\ntravel = "5 mm"'), "; not written: structure.travel\n"),
+    (RUB.replace("[drive]", '[structure.start]\ndisplacement = ["5 um"]\n[drive]'),
+     "; not written: the initial motion\n"),
+    (HEAD + LEVELS, "; Fex1 is that of 1 m/s^2, not of waveform = 'levels'\n")])
+def test_always_the_line_says_what_the_file_has_not(tmp_path, text, says):
+    (tmp_path / "rig.toml").write_text(text)
+    answer = cli("export", tmp_path / "rig.toml", "-o", tmp_path / "rig.npz")
+    assert answer.code == 0 and answer.out.endswith(says), answer.out
+    with np.load(tmp_path / "rig.npz") as found:
+        assert found["Omega"] == pytest.approx(2 * np.pi * (100 if LEVELS in text else 143), rel=1e-12)
+
+
 @pytest.mark.parametrize("text, ending, says", [
     (POINT + friction_of("coulomb") + STRUCTURE, ".mat", "law 'coulomb'"),
     (POINT + friction_of("bouc-wen") + STRUCTURE, ".npz", "law 'bouc-wen' is not a set of elements"),
     (POINT + friction_of("tanh") + STRUCTURE.replace("[drive]", CUBIC + "[drive]"),
-     ".mat", "cannot be written beside [structure.stiffening]"),
-    (STRUCTURE.replace("[drive]", CUBIC + "[drive]"), ".npz", "cannot be written beside [structure.stiffening]"),
+     ".mat", "cannot be written with [structure.stiffening]"),
+    (STRUCTURE.replace("[drive]", CUBIC + "[drive]"), ".npz", "cannot be written with [structure.stiffening]"),
     (POINT + WAVE + friction_of("tanh") + STRUCTURE, ".npz", "cannot be written under a load that changes"),
     (POINT + WAVE + PLASTIC + STRUCTURE, ".npz", "cannot be written under a load that changes; leave that out"),
     (POINT + "[normal.grooves]\nwavelength = \"80 um\"\namplitude = \"1 um\"\n" + friction_of("tanh") + STRUCTURE,
-     ".npz", "cannot be written beside [normal.grooves]"),
+     ".npz", "cannot be written with [normal.grooves]"),
     (RUB, ".csv", "a structure is exported as .mat or .npz"),
     (POINT + PLASTIC + '[slide]\nkind = "triangle"\namplitude = "8 um"\nspeed = "1 mm/s"\n', ".mat", "which it lacks"),
 ])

@@ -16,6 +16,7 @@ import numpy as np
 from ...core import BaseSine, Outcome, PatchfemError
 from ...disk.whole import whole
 from ...model.model import Model
+from ...model.rig import BEYOND
 from ...model.source import placed
 from ...runs.patch import result as patch_result
 from ...runs.rig import engines, numerics, pieces
@@ -56,12 +57,24 @@ def export(model: Model, out: Path) -> str:
             np.savez(file, **arrays, **found._asdict())
         else:
             _matlab(file, arrays, found)
-    return f"{out}: {len(arrays['M'])} coordinates, {found.limit.size} friction elements"
+    counts = (f"{count} {name}{'s' * (count != 1)}" for count, name in (
+        (len(arrays["M"]), "coordinate"), (found.limit.size, "friction element")))
+    return f"{out}: {', '.join(counts)}{_left_out(model)}"
+
+
+def _left_out(model: Model) -> str:
+    """What the scene has and the file has not, as the end of a sentence."""
+    rig = model.rig
+    out = ["[wear]"] * (model.wear is not None) + ["structure.travel"] * (rig.travel < BEYOND)
+    out += ["the initial motion"] * (rig.start is not None)
+    unit = "" if isinstance(rig.drive, BaseSine) or rig.kind == "free" else \
+        f"; Fex1 is that of {'1 N' if rig.kind == 'force' else '1 m/s^2'}, not of waveform = '{rig.waveform}'"
+    return unit + ("; not written: " + ", ".join(out) if out else "")
 
 
 def matrices_of(model: Model) -> dict:
     """M, C, K (n, n) [kg, N s/m, N/m], output (n,), Fex1 (n,) [N] of the drive, force or base (n,), slide (i, n),
-    Omega [rad/s] of a sine; without a sine Fex1 is that of 1 N or 1 m/s^2, and 0 of a release."""
+    Omega [rad/s] of a sine and of levels; but for a sine Fex1 is that of 1 N or 1 m/s^2, and 0 of a release."""
     rig, modes = model.rig, model.rig.modes
     turn, mass = _motions(modes.interfaces if rig.interfaces else np.zeros((0, modes.omega.size))), modes.mass
     sine = isinstance(rig.drive, BaseSine)
@@ -69,7 +82,7 @@ def matrices_of(model: Model) -> dict:
     found = {"base": np.linalg.solve(turn, modes.base)} if rig.kind == "base" else \
         {"force": -modes.base @ turn} if rig.kind == "force" else {}
     found |= {"slide": modes.interfaces @ turn} if rig.interfaces else {}
-    found |= {"Omega": rig.drive.omega} if sine else {}
+    found |= {"Omega": 2 * np.pi * rig.frequency} if sine or rig.levels else {}
     M, C, K = (mass * turn.T @ one @ turn for one in (np.eye(len(turn)), modes.dampers, np.diag(modes.omega**2)))
     return {"M": M, "C": C, "K": K, "output": modes.output @ turn, "Fex1": -size * mass * modes.base @ turn, **found}
 
