@@ -22,10 +22,16 @@ PYTHON_PIECE, PYTHON_SAMPLE, PYTHON_READ = 7e-5, 0.1, 0.5
 # where bonds grow and for each of several interfaces; of a sample over grooves
 CYCLE, STEP, STEP_ELEMENT = 3e-4, 4.3e-7, 9e-10
 BOND_STEP, STEP_MODE, GROWS, JOINT, CLIMB = 7e-7, 1e-7, 3.0, 2.5, 3e-6
+PRESSING_STEP, PRESSING_NODE = 4.5e-5, 1.7e-7  # of a step of pieces that heave or pitch, and per node of theirs
 FIELD_NODE, SLIP_NODE = 6e-8, 3e-9  # of a step per node: of bonds at every node, of elements for partial slip
 
 SMOOTH_STEP, SMOOTH = 2e-6, 0.02  # of a step of high order, and of such a run besides
-CURVE, POINT, BALANCE = 0.1, 0.05, 8e-10  # of steady motions: of all, of a point, per cubed number of its unknowns
+KEPT_SAMPLE = 8e-6, 2.5e-6  # of a sample of the last cycles, kept, read and written: of steps, from event to event
+
+# of a point of steady motions: in closed form, by the map of events or yields; of a piece while all holds, the same per
+# squared number of modes, of an event; by a balance, and per cubed number of its unknowns
+CLOSED_POINT, MAPPED_POINT, RINGING_PIECE, RINGING_MODES, EVENT = 3e-4, 3e-3, 4e-5, 4e-7, 3e-4
+BALANCED_POINT, BALANCE = 0.1, 8e-10
 
 # of the pieces of a patch: of a call, a shape of its fronts, a front, an entry of the factors, an operation; fitted to
 # 15 grids of 21 x 20 to 301 x 201 nodes, each both ways: 0.85 to 1.07 of what they took

@@ -10,11 +10,14 @@ from ..dynamics.events import cost as events_cost
 from ..dynamics.march import capacity
 from ..model.model import Model
 from .rig import costs, engines
+from .rig import plan as of_rig
 
 PACKAGES = 80e6  # bytes of what every run imports
 FULL = 125.0  # per pair of coordinates: matrices, shapes and what diagonalises them
 WAVE = 94.0  # per pair of sines and cosines of harmonic balance: its Jacobian and the factors of its error
-KEPT = 32.0  # per number of a kept sample: the window, the response, what is read off it
+# per number of a kept sample, by the engine (those of events if it is not named): the window, the response, what is
+# read off it; of random records of 4e5 to 2e6 samples, 0.8 to 1.2 of what they took
+KEPT, KEPT_BY = 32.0, {"smooth": 80.0, "march": 45.0}
 GRID = 24.0  # per number of a step of the comparison methods, which keep all of them
 SLIDE = 250.0  # per sample of a bench
 ROW = 400.0  # per row of a recorded drive
@@ -42,7 +45,6 @@ SMOOTH, PIECES, BALANCE = EngineCode(74e6, 0.15, 9.0), EngineCode(82e6, 0.15, 12
 CODES = {"static": NONE, "bench, closed form": NONE, "bench, law step by step": NONE, "bench, two directions": NONE,
          **dict.fromkeys(("bench, parallel elements", "bench, recursion", "duhamel", "newmark", "euler"), FOLLOWED),
          "smooth": SMOOTH, "exact": PIECES, "piecewise": PIECES, "harmonic": BALANCE}
-OF_EVENTS = "exact", "piecewise"  # engines whose loop runs as Python where it is over soon
 
 
 def code(model: Model, engine: str) -> EngineCode:
@@ -50,7 +52,7 @@ def code(model: Model, engine: str) -> EngineCode:
     rig = model.rig
     if rig is None:
         return CODES.get(engine, STEPS)
-    if engine in OF_EVENTS and not rig.interfaces:  # a linear motion in closed form
+    if engine in of_rig.OF_EVENTS and not rig.interfaces:  # a linear motion in closed form
         return LINEAR
     engine = engines.steady_by(model).like if engines.ENGINES[engine].steady else engine
     return CODES.get(engine, SHEARED if model.soft else STEPS)
@@ -78,7 +80,7 @@ def compile_seconds(model: Model, engine: str, unknowns: dict) -> float:
 
 def _short(model: Model, engine: str) -> bool:
     """Whether this is a run from event to event that is over soon as Python."""
-    if engine not in OF_EVENTS:
+    if engine not in of_rig.OF_EVENTS:
         return False
 
     return _as_python(model) <= compiled.PATIENCE
@@ -146,8 +148,9 @@ def _of_rig(model: Model, engine: str, steps: int, numerics) -> list:
             size = 2.0 * model.accuracy.harmonics * max(1, len(rig.interfaces))
             parts.append(Need(WAVE * size**2, f"{model.accuracy.harmonics} harmonics", "accuracy.harmonics"))
     elif numerics is not None:
-        window = max(2, numerics.window) * numerics.steps
-        parts.append(Need(KEPT * width * window, f"{window} samples of the last cycles", "accuracy.steps_per_cycle"))
+        window, key = of_rig.kept_samples(numerics), "drive.duration" if rig.waveform == "random" else "drive.cycles"
+        key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else key
+        parts.append(Need(KEPT_BY.get(engine, KEPT) * width * window, f"{window:.0f} samples of the last cycles", key))
     rows = len(getattr(rig.drive, "breaks", ())) if not rig.drive.segments else 0
     parts.append(Need(ROW * rows, f"{rows} rows of the drive",
                       "drive.duration" if rig.waveform != "file" else "drive.file"))

@@ -87,10 +87,10 @@ def expected_elements(model: Model) -> tuple:
 
 def pieces_per_cycle(model: Model) -> float:
     """Pieces of the motion per cycle of the drive at most: of its fastest rate while all holds, and of every event."""
-    return sum(_ringing_and_events(model))
+    return sum(ringing_and_events(model))
 
 
-def _ringing_and_events(model: Model) -> tuple:
+def ringing_and_events(model: Model) -> tuple:
     """Pieces per cycle of a motion whose elements hold all the time, and those of every event and row."""
     modes, drive = model.rig.modes, model.rig.drive
     (count, stiff), made = expected_elements(model), plant.plant_of(modes)
@@ -131,7 +131,7 @@ def expected_seconds(model: Model) -> float:
     rig, (count, stiff) = model.rig, expected_elements(model)
     limit = sum(one.numbers.static * (model.nominal_load if one.load is None else one.load) for one in rig.interfaces)
     push = rig.force or rig.mass * largest(rig.drive)
-    ringing, events = _ringing_and_events(model)
+    ringing, events = ringing_and_events(model)
     share = min(1.0, limit / push)**HELD if stiff and push else 1.0
     return (rates.PIECE + _of_size(model) + rates.PIECE_ELEMENT * count) * (ringing * share + events) * rig.cycles
 
@@ -246,10 +246,3 @@ def smooth_cost(model: Model, numerics, unknowns: dict) -> tuple:
         cycles = min(cycles, 20 + REPEATS / decay)
     steps = 2 * cycles * smooth_steps(model, smooth_element(model))
     return int(steps), rates.SMOOTH + rates.SMOOTH_STEP * steps
-
-
-def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:
-    """Points of a curve of steady motions and the seconds that they take."""
-    points = 1 if model.rig.waveform == "sine" else 120
-    size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(model.rig.interfaces))
-    return points, rates.CURVE + rates.POINT * points + rates.BALANCE * size**3

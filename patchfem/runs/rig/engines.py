@@ -290,7 +290,7 @@ SMOOTH = Engine("smooth", "", "smooth run_smooth", _smooth_in_time, _own_errors,
 MARCH = Engine("march", "march", "march run_march", _march_in_time, _march_in_space, "plan march_cost",
                chosen="numerics by_steps", refuse="lists refuse_long_list",
                notes="remarks marched_elements", tells=("steps_per_cycle", "iterations"), resumes=True)
-HARMONIC = Engine("harmonic", "harmonic", "steady.steady run_steady", _none, _steady_in_space, "costs steady_cost",
+HARMONIC = Engine("harmonic", "harmonic", "steady.steady run_steady", _none, _steady_in_space, "plan steady_cost",
                   words="plan steady_words", notes="remarks unmoved_elements", closes=None, steady=True)
 ENGINES = {one.name: one for one in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC, *(
     Engine(name, name, "comparison run_comparison", _march_in_time, _march_in_space, "plan march_cost",

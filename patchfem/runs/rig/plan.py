@@ -13,10 +13,14 @@ from ...model.model import Model
 from ...slip import shear_modes
 from ...structure.drive_sizes import largest, omega_of
 from . import lists
-from .costs import exact_words
+from .costs import exact_words, ringing_and_events, steps_per_cycle
 from .engines import ENGINES, PIECES, steady_by
 from .numerics import choose
 
+OF_EVENTS = "exact", "piecewise"  # engines whose loop runs as Python where it is over soon
+SAMPLES = 400  # of a kept cycle, of `dynamics.events.histories` and `dynamics.smooth`
+CURVE = 160, 250  # points over a frequency, with those that its bends and its peak ask for: by a map, by a balance
+MARCHED = 400.0  # cycles of the marches until a motion repeats, of all steps
 STIFF = 10.0  # times the stiffness of the mode, from which a link holds the block
 
 
@@ -62,7 +66,17 @@ def modes_of(rig, chain: dict) -> list:
 def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
     """Engine, steps of all passes and seconds of a coupled run; sizes that are foreseen go into `unknowns`."""
     numerics = choose(model, per_point)
-    return numerics.engine, *ENGINES[numerics.engine].call("cost", model, numerics, unknowns)
+    engine = ENGINES[numerics.engine]
+    steps, seconds = engine.call("cost", model, numerics, unknowns)
+    if not engine.steady:
+        seconds += kept_samples(numerics) * rates.KEPT_SAMPLE[numerics.engine in OF_EVENTS]
+    return numerics.engine, steps, seconds
+
+
+def kept_samples(numerics) -> float:
+    """Samples of the last cycles that a run keeps."""
+    each = SAMPLES if numerics.engine in (*OF_EVENTS, "smooth") else numerics.steps
+    return float(max(2, numerics.window) * each)
 
 
 def march_cost(model: Model, numerics, unknowns: dict) -> tuple:
@@ -84,6 +98,8 @@ def march_cost(model: Model, numerics, unknowns: dict) -> tuple:
         each = _of_modes(numerics, points, unknowns, True)
     elif soft:
         each = rates.SLIP_NODE * points + rates.LIST_STEP
+    elif rig.load_varies and model.patch is not None:
+        each = rates.PRESSING_STEP + rates.PRESSING_NODE * points
     passes = 0.75 + 2**(lists.halvings(model) + 1) - 1  # a half and a quarter of the steps, and each halving of them
     return int(steps * passes), steps * passes * each
 
@@ -190,3 +206,29 @@ def _held_words(model: Model) -> str:
         return f"bonds of order 0 hold the block, but give it no stiffness: {turns}"
     return f"the printed law holds the block, however small its stroke: {turns}" if lists.chatters(model) else \
         "the printed law holds the block at some level, or just: the list grows with every step"
+
+
+def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:
+    """Points of a curve of steady motions and the seconds that they take, those of coarser runs and of one with more
+    modes of a reduced structure among them."""
+    rig, by = model.rig, steady_by(model).name
+    points = CURVE[by == "balance"] if rig.waveform == "sweep" else max(1, len(rig.levels))
+    passes = 1.5 if by == "yields" and model.soft else 1.0  # a coarser mesh has half the elements
+    seconds = points * passes * _steady_point(model, by)
+    if rig.richer is not None:
+        seconds += points * _steady_point(replace(model, rig=rig.richer), by)
+    return points, seconds
+
+
+def _steady_point(model: Model, by: str) -> float:
+    """Seconds of a point of a curve of steady motions that is found `by` the finder of that name."""
+    rig, (ringing, events) = model.rig, ringing_and_events(model)
+    if by == "balance":
+        size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.interfaces))
+        return rates.BALANCED_POINT + rates.BALANCE * size**3
+    if by == "march":
+        return MARCHED * steps_per_cycle(model) * rates.CLIMB
+    if not rig.interfaces:
+        return rates.CLOSED_POINT
+    return rates.MAPPED_POINT + rates.EVENT * events + ringing * (
+        rates.RINGING_PIECE + rates.RINGING_MODES * len(rig.frequencies)**2)
