@@ -11,7 +11,7 @@ from ..effects import shown_absent
 from .drawing import charts
 from .pages import player
 from .pages.document import Section, document, table, warned
-from .pages.words import SHARP, G, headline, linked, others, pair, texts, units
+from .pages.words import SHARP, G, headline, in_order, linked, of_records, others, pair, texts, units
 
 SETTLED = ("steady", "stuck", "done")
 DASH = "&ndash;"
@@ -102,6 +102,19 @@ def _curve(data: dict) -> Picture | None:
     text = data.get("driven", "")
     return None if found is None else Picture(charts.curve, (found,), charts.caption(found) + (
         f" {text[0].upper()}{text[1:]}." if text else ""))
+
+
+def _spectra(data: dict) -> Picture | None:
+    if "spectra" not in data:
+        return None
+    found = data["summary"]["measures"]
+    at = found.get("response_frequency", {}).get("value")
+    told = "" if at is None else (
+        " Its peak, the ring, is that of a mode at {} ({}) with a damping ratio of {} ({}), friction included.".format(
+            *of_records("response_frequency", found), *of_records("response_damping", found)))
+    return Picture(charts.spectra, (data["spectra"], at), "One-sided spectral densities of "
+                   "output and drive, and H1, displacement of the output over acceleration of the base; H1 is drawn "
+                   f"faint where the coherence is below {charts.COHERENT:g}.{told}")
 
 
 def _decay(data: dict) -> Picture | None:
@@ -245,8 +258,9 @@ def _measured(data: dict) -> Picture | None:
 
 
 # in the order of the page
-PICTURES = {"wear": _wear, "worn": _worn_map, "curve": _curve, "decay": _decay, "levels": _levels,
-            "pressure": _interface, "bodies": _bodies, "loop": _loop, "history": _histories, "measured": _measured}
+PICTURES = {"wear": _wear, "worn": _worn_map, "curve": _curve, "spectra": _spectra, "decay": _decay,
+            "levels": _levels, "pressure": _interface, "bodies": _bodies, "loop": _loop, "history": _histories,
+            "measured": _measured}
 
 
 def _factors(measured: dict) -> tuple:
@@ -319,7 +333,8 @@ def measure(value: float, unit: str, error: float | None) -> dict:
 def _measures(data: dict) -> Section:
     """Every measure with its error, in other units, and what it means."""
     rows, means = [], data.get("means", {})
-    for name, m in data["summary"]["measures"].items():
+    found = data["summary"]["measures"]
+    for name, m in in_order(found).items():
         value, error = texts(name, m)
         cells = [f"<td id='measure-{escape(name)}'>{escape(name)}</td>", value]
         if m["value"] is None:
@@ -328,7 +343,9 @@ def _measures(data: dict) -> Section:
             unit = units(name, m["value"], m["unit"], m["error"])[0][0]
             error = error or ("unknown" if m["error"] is None else DASH)
             cells += [error, f"<td class=v>{escape(unit)}</td>", escape(others(name, m))]
-        rows.append([*cells, f"<td class=soft>{escape(means.get(name, ''))}</td>"])
+        others_lie = of_records(name, found)[1]
+        text = means.get(name, "") + (f"; {others_lie} over records of the drive" if others_lie else "")
+        rows.append([*cells, f"<td class=soft>{escape(text)}</td>"])
     note = (f"<p class=soft>The run holds {data['cycles']:.2g} of a cycle, so measures per cycle do not cover a "
             "whole one.</p>") if part_of_cycle(data) else ""
     heads = ("measure", ">value", ">error (±)", "unit", "in a workshop's units", "what it is")

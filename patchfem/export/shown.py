@@ -33,10 +33,7 @@ def report_data(result: Result) -> dict:
             "x": None if result.patch is None else result.patch.x,
             "width": None if result.patch is None else result.plan.model.patch.width, "versions": versions(),
             "means": {name: one.text for name, one in result.measures.items()}}
-    if "curve" in result.extra:
-        data["curve"] = result.extra["curve"]
-    if "decay" in result.extra:
-        data["decay"] = result.extra["decay"]
+    data |= {name: result.extra[name] for name in ("curve", "decay", "spectra") if name in result.extra}
     if "wear" in result.extra:
         count, period = result.extra["wear_shown"]["states"], result.extra["wear_shown"]["period"]
         data["wear"] = {"history": result.extra["wear"], "period": period,

@@ -25,6 +25,7 @@ WORN = {"pressure_peak": "peak pressure", "contact_fraction": "contact fraction"
         "normal_stiffness": "normal stiffness", "loop_area": "loop area",
         "relative_displacement_amplitude": "amplitude"}  # measures over the cycles of wear
 PROFILES = 6  # of a patch that wears
+COHERENT = 0.5  # coherence from which H1 is drawn as known
 TALL, WIDEST = 270, 300  # pixels of a frame in which both axes have one scale
 
 
@@ -347,6 +348,37 @@ def curve(found: dict) -> list:
                                                  ("fundamental", "warm", "first harmonic", "dashed"))]
         out.append(chart("Its absolute acceleration", axis(what, unit), axis("acceleration", "g"), lines))
     return out
+
+
+def spectra(found, frequency: float | None) -> list:
+    """Densities of displacement and acceleration of the output and of the drive over its band, and the size of H1.
+
+    found: `response.stationary.Spectra`; frequency [Hz] of the mode that was fitted to the peak of H1, None without.
+    """
+    driven, out = np.isfinite(found.coherence), []  # beyond the band of the drive there is leakage
+    found = type(found)(*(column[driven] for column in found))
+    hertz = found.frequency
+    unit, scale = axis_unit([float(np.sqrt(found.place.max(initial=0.0)))], "m")
+    along = axis("frequency", "Hz", True)
+    out.append(chart("Displacement of the output", along, axis("spectral density", f"{unit}^2/Hz", True),
+                     [_above(hertz, found.place * scale**2, "accent")]))
+    out.append(chart("Acceleration of output and base", along, axis("spectral density", "g^2/Hz", True),
+                     [_above(hertz, found.acceleration / G_N**2, "accent", "output"),
+                      _above(hertz, found.drive / G_N**2, "soft", "base")]))
+    gain, told = np.abs(found.gain) * G_N, found.coherence >= COHERENT
+    unit, scale = axis_unit([gain.max(initial=0.0)], "m")
+    marks = [_above(hertz, gain * scale, "soft"), _above(hertz, np.where(told, gain * scale, np.nan), "accent", "H1")]
+    if frequency is not None:
+        top = float(np.interp(frequency, hertz, gain)) * scale
+        marks.append(mark("dots", "warm", "peak", x=[frequency], y=[top], errors=[0.0], shape="circle"))
+    out.append(chart("H1: displacement over acceleration of the base", along, axis("size", f"{unit}/g", True), marks))
+    return out
+
+
+def _above(x, y, colour: str, name: str = "") -> dict | None:
+    """The line of what is above 0; None where nothing is."""
+    there = np.isfinite(y) & (y > 0)
+    return line(x[there], y[there], colour, name) if there.any() else None
 
 
 def decay(found) -> list:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable
 from html import escape
-from math import inf, isfinite, pi
+from math import ceil, inf, isfinite, log10, pi
 from types import MappingProxyType
 
 from ... import scales
@@ -27,6 +27,9 @@ MARCHED = "over the cycles of the motion, not those of wear"
 OF_WHAT = {  # said behind a value that would otherwise be taken for another, or for more than it says
     "loop_area": "per cycle", "friction_work": WHOLE_RUN, "energy_dissipated": WHOLE_RUN, "energy_created": WHOLE_RUN,
     "stick_fraction": "of the interface as a whole", "equivalent_damping": "a damping ratio of mode 1"}
+SCATTER = "_scatter"  # behind the name of what a record of a random drive shows: how far other records differ
+SHAKEN = {"relative_displacement_rms": "the output moves {} rms", "absolute_acceleration_rms": "its acceleration is {} "
+          "rms", "response_frequency": "H1 peaks at {}", "response_damping": "the damping ratio of that peak is {}"}
 BETWEEN = ("jump_level",)  # known to lie between two levels of the drive, whatever the tolerance
 ROUND = 1e-12  # of the friction force times the motion: work that is round-off
 NONE = MappingProxyType({})
@@ -139,8 +142,10 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
     def said(name: str, text: str) -> None:
         found = measures.get(name)
         if found and found["value"] is not None:
-            value = pair(name, found)
-            parts.append(text.format(value if number is None else number(value, name)))
+            value, interval = of_records(name, measures)
+            value = value or pair(name, found)
+            parts.append(text.format(value if number is None else number(value, name))
+                         + (f" ({interval})" if interval else ""))
 
     if summary["outcome"] != "no_contact":
         worn = next((name for name in ("worn_depth_max", "worn_volume") if name in measures), "")
@@ -149,7 +154,10 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
             parts.append(released)
             said("friction_work", "friction takes {} in all")
         else:
-            said("relative_displacement_amplitude", "the output moves {} half peak-to-peak")
+            for name, text in SHAKEN.items():
+                said(name, text)
+            said("relative_displacement_amplitude", "the largest swing is {} half peak-to-peak"
+                 if next(iter(SHAKEN)) in measures else "the output moves {} half peak-to-peak")
             said("relative_displacement_amplitude_steady", "it would settle at {}")
             said("absolute_acceleration_peak", "peak acceleration {}")
         if "relative_displacement_amplitude" not in measures:
@@ -169,7 +177,7 @@ def least_known(result: Result) -> str:
     """The measure known least well for the tolerance, as one sentence; "" where one misses it, which a warning says."""
     tolerance = result.plan.model.accuracy.tolerance
     wide = {name: one.beyond(tolerance) for name, one in result.measures.items()
-            if one.value is not None and one.error is not None}
+            if one.value is not None and one.error is not None and not name.endswith(SCATTER)}
     if not wide or max(wide.values()) > 1:
         return ""
     told = {name: pair(name, measure_object(result.measures[name])) for name in wide}
@@ -217,13 +225,37 @@ def group_of(name: str, pressed: bool = True) -> str:
     return GROUPS[0] if row is None else row.group
 
 
+def in_order(measures: dict) -> dict:
+    """The measures as people read them: under a random drive first those of the record, each with its scatter in its
+    own row, which then has none itself."""
+    shaken = [name for name in measures if f"{name}{SCATTER}" in measures]
+    return {name: measures[name] for name in dict.fromkeys((*shaken, *measures))
+            if name.removesuffix(SCATTER) not in shaken or name in shaken}
+
+
+def of_records(name: str, measures: dict) -> tuple:
+    """(value, interval of 95 %) of what a finite record of a random drive shows, as texts to the digits that the
+    scatter of records leaves; ("", "") of any other measure."""
+    one, spread = measures.get(name, NONE), measures.get(f"{name}{SCATTER}", NONE)
+    if one.get("value") is None or spread.get("value") is None:
+        return "", ""
+    value, half = one["value"], spread["value"]
+    unit, scale = units(name, value, one["unit"])[0]
+    digits = max(2, 2 + ceil(log10(abs(value) / half))) if half > 0 and value else 6
+    own, low, high = (scales.plain(at * scale, digits + extra) for at, extra in
+                      ((value, 1), (max(value - half, 0.0), 0), (value + half, 0)))
+    return f"{own} {unit}".strip(), f"95 % interval {low} to {high} {unit}".strip()
+
+
 def table_of(measures: dict) -> list[str]:
-    """Lines of all measures in their groups, each with its error in people's units, or why it has no value."""
+    """Lines of all measures in their groups, each with its error in people's units, or why it has no value; under a
+    random drive with the interval of other records."""
+    every, measures = measures, in_order(measures)
     width = max(map(len, measures), default=0)
     out, pressed, worn = [], "contact_fraction" in measures, "worn_volume" in measures
     for group in GROUPS:
-        lines = [f"  {name:<{width}}  {_value(name, one, worn)}" for name, one in measures.items()
-                 if group_of(name, pressed) == group]
+        lines = [f"  {name:<{width}}  {_value(name, one, worn)}{_records(name, every)}"
+                 for name, one in measures.items() if group_of(name, pressed) == group]
         out += [group, *lines] if lines else []
     return out
 
@@ -239,6 +271,13 @@ def fragment(summary: dict, sentence: str, cycles: float | None, released: str =
     warnings = "".join(f"<p>&#9888; {escape(text)}</p>" for text in summary["warnings"])
     answer = escape(f"{summary['outcome']}: {sentence} {headline(summary, cycles, released=released)}")
     return f"<div>{title}{answer}{warnings}<table>{''.join(rows)}</table></div>"
+
+
+def _records(name: str, measures: dict) -> str:
+    """`of_records` behind a value, whose ± is then said to be that of the numerics alone."""
+    text = of_records(name, measures)[1]
+    numerics = "± of the numerics; " if "±" in pair(name, measures[name]) else ""
+    return f" ({numerics}{text} over records)" if text else ""
 
 
 def _value(name: str, one: dict, worn: bool) -> str:
