@@ -80,7 +80,7 @@ def compile_seconds(model: Model, engine: str, unknowns: dict) -> float:
 
 def _short(model: Model, engine: str) -> bool:
     """Whether this is a run from event to event that is over soon as Python."""
-    if engine not in of_rig.OF_EVENTS:
+    if model.rig is None or engine not in of_rig.OF_EVENTS:
         return False
 
     return _as_python(model) <= compiled.PATIENCE
