@@ -8,6 +8,7 @@ motion.
 """
 
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -34,12 +35,15 @@ from ..response.errors import OF_MODES, with_errors
 from ..runs.bench import bench
 from ..runs.bench.engine import steps_of
 from ..runs.bench.errors import errors_of
+from ..runs.bench.shear import GRAIN, STIFF
+from ..runs.joint import held_patch
 from ..runs.patch import result as patch_result
 from ..runs.plan import plan
 from ..runs.rig import engines, interface, numerics
 from ..runs.rig.engines import ENGINES
 from ..runs.rig.plan import held_stiffness
 from ..runs.rig.steady.balance import BalanceFinder
+from ..slip.grain import spread, stiffer
 from ..structure import drives
 
 WAYS = ("balance", "decay", "quasi-static")
@@ -51,6 +55,8 @@ MICRO, GROSS = 0.3, 3.0  # shares of that slide, below which the contact is in m
 SOFT, HARD = 0.7, 3.0  # of the amplitude at which a cubic spring has the mode's stiffness, the largest by default
 FREE = 2.0  # the first of rigid friction, over what friction deflects the mode by at rest
 CELLS = 4.0  # by which the change at four cells in one is divided, some 15 times the error
+RESOLVED = 4.0  # times its error, a loss that counts for an exponent
+FEW = 6  # amplitudes that are named one by one
 SMALL = 1e-5  # of the slide at which all of the contact slips, one in which nothing slips
 LOOPS, MOST_LOOPS = 3.0, 192.0  # cycles of a first loop on a bench, of which the last is read, and the most
 LOOP = ("secant_stiffness", "loop_area")
@@ -90,7 +96,8 @@ class Curve(NamedTuple):
 class Backbone(NamedTuple):
     """Curves of a mode by the way they were found; missing: way -> why it is none; free, stuck [Hz]: of the mode
     without the contact and with it held, None where it does not move then; micro, gross: exponents of the contact's
-    loss over the amplitude at both ends, None where it loses nothing; flutter [m]: the amplitude beyond which the mode
+    loss over the amplitude at both ends, None where it loses nothing, expected: the first by theory, None where none
+    tells; stuck_error [Hz]: of `stuck`, None of what is known; flutter [m]: the amplitude beyond which the mode
     gains energy, None without; notes: sentences."""
 
     mode: str
@@ -102,12 +109,14 @@ class Backbone(NamedTuple):
     gross: float | None
     flutter: float | None
     notes: tuple
+    expected: float | None = None
+    stuck_error: float | None = None
 
 
 class Joint(NamedTuple):
     """The rig of a backbone: its Model, pressed Patch or None, coarser Patch or None, number of the mode's coordinate,
     held: (omega [rad/s], shape (n,)) of the mode with the contact held by `stiffness` (i,) [N/m], omega None where
-    nothing gives way."""
+    nothing gives way. apart: all coarser Patches or Nones."""
 
     model: Model
     patch: object
@@ -115,6 +124,7 @@ class Joint(NamedTuple):
     mode: int
     held: tuple
     stiffness: np.ndarray
+    apart: tuple = (None,)
 
     @property
     def reach(self) -> float:
@@ -188,11 +198,11 @@ def _joint(model: Model, name: str) -> Joint:
     if model.rig is None:
         raise PatchfemError("a backbone needs a rig: give the scene [structure] and [drive]", "structure")
     modes, number = model.rig.modes, _number(model.rig, name)
-    patch, coarse = None, None
+    patch, apart = None, (None,)
     if model.patch is not None:
-        patch, coarse, *_ = *patch_result.solve_all(model.patch, model.accuracy.tolerance), None
+        patch, *apart = *patch_result.solve_all(model.patch, model.accuracy.tolerance), None
     alone = (None, np.eye(modes.omega.size)[number])
-    joint = Joint(model, patch, coarse, number, alone, np.zeros(len(modes.interfaces)))
+    joint = Joint(model, patch, apart[0], number, alone, np.zeros(len(modes.interfaces)), tuple(apart))
     if not joint.linear:
         stiffness = _held_by(joint._replace(stiffness=np.full(len(modes.interfaces),
                                                               held_stiffness(plan(model).chain))))
@@ -300,21 +310,28 @@ def _amplitude_of(joint: Joint, slide):
 
 
 def _knee(joint: Joint) -> float:
-    """Slide [m] at which all of the contact slips, of rigid friction 0; of springs alone that at which they bend."""
+    """Slide [m] at which all of the contact slips, of rigid friction the way by which friction deflects the mode; of
+    springs alone that at which they bend."""
     rig, stiffness = joint.model.rig, float(joint.stiffness[joint.face])
     if not _limit(joint):  # it doubles the mode's stiffness, or has a wave behind it
         return float(np.sqrt(_spring(joint) / abs(rig.cubic))) if rig.cubic is not None else rig.interlock[1]
-    return _limit(joint) / stiffness if stiffness else _limit(joint) / _spring(joint)
+    return _limit(joint) / stiffness if stiffness else _deflected(joint)
 
 
 def _spring(joint: Joint) -> float:
-    """Stiffness [N/m] of the mode without the contact."""
+    """Stiffness [N/m] of the mode without the contact, per unit of its coordinate."""
     return joint.modes.mass * float(joint.modes.omega[joint.mode] or joint.held[0])**2
+
+
+def _deflected(joint: Joint) -> float:
+    """Slide [m] by which the largest friction deflects the mode without the contact."""
+    return _limit(joint) * float(joint.modes.interfaces[joint.face] @ joint.held[1])**2 / _spring(joint)
 
 
 def _ends(joint: Joint) -> tuple:
     """Smallest and largest slide [m] of the default amplitudes."""
-    knee, stiffness, free = _knee(joint), float(joint.stiffness[joint.face]), _limit(joint) / _spring(joint)
+    knee, stiffness = _knee(joint), float(joint.stiffness[joint.face])
+    free = _deflected(joint) if _limit(joint) else 0.0
     if 0 < stiffness < np.inf or not free:
         return LOW * knee, HIGH * max(knee, free)
     return FREE * free, HIGH * HIGH * free
@@ -329,7 +346,10 @@ def _balanced(joint: Joint, amplitudes) -> Curve:
     group = _group(joint, joint.patch)
     found, error = _free(group, joint, amplitudes, LADDER[0]), None
     for harmonics in LADDER[1:]:
-        better = _free(group, joint, amplitudes, harmonics, 1 + int(np.isfinite(found[0]).nonzero()[0].max(initial=-1)))
+        count = 1 + int(np.isfinite(found[0]).nonzero()[0].max(initial=-1))
+        if not count:
+            raise NotConverged("no free motion of these amplitudes was found")
+        better = _free(group, joint, amplitudes, harmonics, count)
         error, found = LEFT * np.abs(better - found) + ROUND * np.abs(better), better
         known = np.isfinite(error[0])
         if (error[:2] <= model.accuracy.tolerance * np.abs(found[:2]))[:, known].all():
@@ -379,19 +399,25 @@ def _steady(model: Model) -> Model:
 
 
 def _in_space(joint: Joint, read) -> np.ndarray:
-    """Errors of what read(Group) gives from laws on the coarser mesh, and of a density of sliders from its cells: the
-    largest change where four of them are one, which is some 15 times the error, and a share of the usual one, as a
-    motion that turns where both have a border changes nothing."""
+    """Errors of what read(Group) gives: of a patch that slips part by part what a coarser mesh changes, or what the
+    grain of its nodes or the change of its stiffness would (`slip.grain`), where that is more; of a density of sliders
+    the largest change where four of its cells are one, which is some 15 times the error, and a share of the usual one,
+    as a motion that turns where both have a border changes nothing."""
     model, error = joint.model, 0.0
     celled = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
-    if not celled and (joint.coarse is None or not model.soft):
+    if not celled and not model.soft:
         return error
     fine = _group(joint, joint.patch)
     best = read(fine)
-    if joint.coarse is not None and model.soft:
-        error = error + np.abs(read(_group(joint, joint.coarse)) - best)
+    if model.soft:
+        apart = [GRAIN * np.abs(read(_remade(fine, _spread)) - best)]
+        if joint.coarse is not None:
+            rough = _group(joint, joint.coarse)
+            stiff = stiffer(float(fine.stiffness()[0]), float(rough.stiffness()[0]))
+            apart += [np.abs(read(rough) - best), STIFF * np.abs(read(_remade(fine, stiff)) - best)]
+        error = error + np.fmax.reduce(apart)
     if celled:
-        apart = [np.abs(read(_joined(fine, *one)) - best) for one in engines.JOINED]
+        apart = [np.abs(read(_remade(fine, partial(_joined, *one))) - best) for one in engines.JOINED]
         gap = np.max(apart, axis=0) / CELLS
         share = (gap / np.maximum(np.abs(best), 1e-300))[:, np.isfinite(gap).all(axis=0)]
         usual = np.median(share, axis=1, keepdims=True) if share.size else 0.0
@@ -399,18 +425,24 @@ def _in_space(joint: Joint, read) -> np.ndarray:
     return error
 
 
-def _joined(group: Group, count: int, first: int) -> Group:
-    """The laws of a group in which each `count` elements are one, from the number `first` on."""
-    def fewer(law):
-        if not isinstance(law, Jenkins):
-            return law
-        one = elements.merged(elements.Elements(law.stiffness, law.limit_slide, np.arange(law.stiffness.size)), count,
-                              first)
-        return Jenkins(one.stiffness, one.yield_slide)
-
+def _remade(group: Group, change) -> Group:
+    """The laws of a group with other elements: change(stiffness (t,) [N/m], yield slide (t,) [m]) -> both."""
     other = group.with_samples(group.samples)
-    other.laws = [tuple(map(fewer, laws)) for laws in group.laws]
+    other.laws = [tuple(Jenkins(*change(one.stiffness, one.limit_slide)) if isinstance(one, Jenkins) else one
+                        for one in laws) for laws in group.laws]
     return other
+
+
+def _joined(count: int, first: int, stiffness, slide) -> tuple:
+    """Elements of which each `count` are one, from the number `first` on."""
+    one = elements.merged(elements.Elements(stiffness, slide, np.arange(stiffness.size)), count, first)
+    return one.stiffness, one.yield_slide
+
+
+def _spread(stiffness, slide) -> tuple:
+    """`slip.grain.spread` of elements in any order."""
+    order = np.argsort(slide, kind="stable")
+    return spread(stiffness[order], slide[order])
 
 
 def _free(group: Group, joint: Joint, amplitudes, harmonics: int, count=None) -> np.ndarray:
@@ -517,6 +549,7 @@ def _static(joint: Joint, amplitudes) -> Curve:
         return _rows(joint, quasi_static.along(joint.modes, laws, amplitudes / reach, held, samples, along))
 
     best = read(group, SAMPLES)
+    best[0] = np.where(np.abs(best[0] / amplitudes - 1) < CLOSE, amplitudes, best[0])
     error = np.abs(best - read(group, SAMPLES // 2)) + ROUND * np.abs(best)
     error += _in_space(joint, lambda laws: read(laws, SAMPLES))
     return _rising(best, error)
@@ -713,14 +746,28 @@ def _put_together(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone
     if joint.model.rig.by_modes:
         own = np.eye(modes.omega.size) if modes.shapes is None else np.abs(modes.shapes)
         name = modes.names[int(np.argmax(own[:, joint.mode]))]
-    own = _free_frequency(joint)
-    stuck = None if joint.held[0] is None else joint.held[0] / (2 * np.pi)
+    own, (stuck, off) = _free_frequency(joint), _stuck_frequency(joint)
     first = next((curves[way] for way in ("quasi-static", "balance") if way in curves), None)
     micro, gross = _exponents(joint, first) if first is not None and not joint.linear else (None, None)
     edge = next((found for one in curves.values() if (found := _edge(one)) is not None), None)
     return Backbone(name, own, stuck, curves, missing, micro, gross, edge,
                     (*_unrubbed(joint), *_gaps(wanted, curves), *([] if joint.linear else _differences(curves)),
-                     *_unworn(joint.model)))
+                     *_regimes(joint, wanted, micro), *_secant(joint, wanted, curves), *_unworn(joint.model)),
+                    None if joint.linear else _expected(joint), off)
+
+
+def _stuck_frequency(joint: Joint) -> tuple:
+    """Of the mode [Hz] with the contact held and its error, None where nothing gives way: behind pieces alone that give
+    way from the stiffness that a run of the patch prints, extrapolated over its meshes."""
+    model, modes = joint.model, joint.modes
+    if joint.held[0] is None:
+        return None, None
+    told = held_patch(model, joint.patch, joint.apart)
+    if told is None or len(modes.interfaces) > 1 or model.rig.taken is not None:  # the last: held as it was measured
+        return joint.held[0] / (2 * np.pi), None
+    value, high = (modes.held(modes.interfaces, np.array([one]), joint.mode)[0] / (2 * np.pi)
+                   for one in (told.value, told.value + told.error))
+    return value, high - value
 
 
 def _free_frequency(joint: Joint) -> float:
@@ -733,17 +780,41 @@ def _free_frequency(joint: Joint) -> float:
 
 
 def _exponents(joint: Joint, one: Curve) -> tuple:
-    """Slopes of the logarithm of the loss over that of the amplitude between the first two points, where both lie in
-    micro-slip, and between the last two, where all of the contact slips at both; None elsewhere, and of a loss that is
-    round-off of the energy of the swing."""
+    """Slopes of the logarithm of the loss over that of the amplitude: between the first and the last point in
+    micro-slip, and between the last two at which all of the contact slips; None where there are no two. A loss counts
+    that is RESOLVED times its error, and no round-off of the energy of the swing."""
     a, loss, knee = one.amplitude, one.loss, _amplitude_of(joint, _knee(joint))
     if a.size < 2 or not _limit(joint):
         return None, None
     swing = joint.modes.mass * (2 * np.pi * one.frequency * a / joint.reach)**2
-    ends = (a[1] < MICRO * knee, (0, 1)), (a[-2] > GROSS * knee, (-2, -1))
-    return tuple(float(np.log(loss[j] / loss[i]) / np.log(a[j] / a[i]))
-                 if there and loss[i] > ROUND * swing[i] and loss[j] > ROUND * swing[j] else None
-                 for there, (i, j) in ends)
+    known = loss > np.maximum(ROUND, RESOLVED * 2 * np.pi * one.damping_error) * swing
+    micro, gross = (np.flatnonzero(known & there) for there in (a < MICRO * knee, a > GROSS * knee))
+    return tuple(float(np.log(loss[j] / loss[i]) / np.log(a[j] / a[i])) if i != j else None
+                 for i, j in ((micro[0], micro[-1]) if micro.size else (0, 0), (gross[-2:][0], gross[-1]) if gross.size
+                              else (0, 0)))
+
+
+def _expected(joint: Joint) -> float | None:
+    """Exponent of the loss in micro-slip by theory: chi + 3 of sliders (Segalman), 3 of bonds and of pieces whose
+    pressure falls to 0 at its edges (Cattaneo, Mindlin); None of others."""
+    f = joint.model.friction
+    if f is None or not _limit(joint):
+        return None
+    if has(f.law, "cells"):
+        return f.chi + 3
+    return 3.0 if has(f.law, "bonds") or joint.model.soft else None
+
+
+def _regimes(joint: Joint, wanted, micro: float | None) -> list:
+    """Sentences on amplitudes (k,) [m] that begin beyond micro-slip, or tell no exponent there."""
+    if joint.linear or _expected(joint) is None or micro is not None:
+        return []
+    edge = MICRO * _amplitude_of(joint, _knee(joint))
+    if wanted[0] > edge:
+        return [f"the smallest amplitude, {say(wanted[0], 3)}, is beyond micro-slip, which ends at some "
+                f"{say(edge, 2)}; amplitudes from {say(LOW / MICRO * edge, 2)} on show its exponent"]
+    return [f"no exponent of micro-slip is told: fewer than two amplitudes below {say(edge, 2)} have a loss of "
+            f"{RESOLVED:g} times its error or more; give amplitudes that end there, or a smaller accuracy.tolerance"]
 
 
 def _edge(one: Curve) -> float | None:
@@ -776,9 +847,19 @@ def _gaps(wanted, curves: dict) -> list:
     for way, one in curves.items():
         lacks = wanted[~np.isin(wanted, one.amplitude)]
         if lacks.size and one.amplitude.size < wanted.size:
-            out.append(f"{way} has {one.amplitude.size} of {wanted.size} points; those left out lie from "
-                       f"{say(lacks[0], 3)} to {say(lacks[-1], 3)}: {LEFT_OUT[way]}")
+            left = f"lie from {say(lacks[0], 3)} to {say(lacks[-1], 3)}" if lacks.size > FEW else \
+                f"are {', '.join(say(each, 3) for each in lacks)}"
+            out.append(f"{way} has {one.amplitude.size} of {wanted.size} points; those left out {left}: "
+                       f"{LEFT_OUT[way]}")
     return out
+
+
+def _secant(joint: Joint, wanted, curves: dict) -> list:
+    """A sentence on what a static curve in slip is, where no balance stands beside it."""
+    slips = not joint.linear and _limit(joint) and wanted[-1] > MICRO * _amplitude_of(joint, _knee(joint))
+    return ["quasi-static frequencies are those of the stiffness from turn to turn under a force of fixed shape; once "
+            "the contact slips they lie above those of --method balance, whose first harmonic has less of it"] \
+        if slips and "quasi-static" in curves and "balance" not in curves else []
 
 
 WHY = {"decay": "a decay shows the mean over a cycle, in which it loses {:.2g} of its swing there",

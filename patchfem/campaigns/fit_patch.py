@@ -19,6 +19,7 @@ from ..friction.record import law_from, loop_from
 from ..identify.least_squares import Fit, fit
 from ..model.model import Model, build
 from ..model.source import placed
+from ..runs.joint import held_patch
 from ..runs.patch import ladder
 from ..runs.patch.kept import elements, strip_elements
 from ..scene.scene import Scene
@@ -29,6 +30,8 @@ LEAST = 1e-3  # of 4 x force x slide, the loss from which a patch counts as one 
 FEW = 16  # of so many elements one, whose loss is that of the mesh
 LATE = 0.2  # of mu N/K, where a range begins at the latest
 WEIGHTS = np.array([[1.0], [0.2]])  # of the differences in force and loss, which are known about so well
+KNOWN, FINER, FINEST = 0.1, 10.0, 9e-5  # rms change of the loss by a coarser mesh, up to which the mesh is refined by
+# this tolerance over the one before, the last begun from one of at least FINEST
 WIDE = 20.0  # times the patch's stiffness and its inverse, between which that of a law is searched
 
 
@@ -74,8 +77,9 @@ class OneLaw(NamedTuple):
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedPatch:
     """Laws by name for a patch under a `load` [N] with the slip force `limit` [N] and the stiffness [N/m] while nothing
-    slips; slides (k,) [m]; own: its Curves; mesh: (2, k) what a coarser mesh changes of them, relative, None without
-    one; best: the law with the least squares."""
+    slips, extrapolated over the meshes where the pieces alone give way, stuck_error: its error, None of others; slides
+    (k,) [m]; own: its Curves; mesh: (2, k) what a coarser mesh changes of them, relative, None without one; best: the
+    law with the least squares; warnings: sentences on the mesh, nodes: of its interface."""
 
     scene: Scene
     load: float
@@ -87,6 +91,9 @@ class FittedPatch:
     laws: dict
     best: str
     seconds: float
+    stuck_error: float | None = None
+    warnings: tuple = ()
+    nodes: int = 0
 
 
 def fit_patch(scene: Scene, slides=None) -> FittedPatch:
@@ -96,29 +103,50 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
     times that by which the slip force stretches the held patch, to HIGH times that at which all of it slips.
     PatchfemError with what to change for a scene whose patch is no set of elastic-plastic elements.
     """
-    begin, model = perf_counter(), build(scene)
+    begin, model, tolerance = perf_counter(), build(scene), build(scene).accuracy.tolerance
     with placed(scene):
         _refuse(model)
-        patch, *others = ladder.solve_all(model.patch, model.accuracy.tolerance)
-        load = patch.pressure.load
-        if not load > 0:
-            raise PatchfemError("no load presses the pieces; raise it", "contact.load")
-        parts = _elements(model, patch)
-    limit, stiffness = float(parts[0] @ parts[1]), float(parts[0].sum())
-    if slides is None:
-        low, high = LOW * limit / stiffness, HIGH * float(parts[1].max())
-        near = np.geomspace(low, high, 1024)
-        force, loss = masing(*parts, near)
-        first = np.sort(parts[1])[parts[1].size // FEW]
-        low = max(near[np.argmax(loss > LEAST * 4 * near * force)], min(first, LATE * limit / stiffness))
-        slides = np.geomspace(low, high, max(ROWS, 1 + int(np.ceil(DECADE * np.log10(high / low)))))
-    slides = np.asarray(slides, float)
-    own = Curves(*masing(*parts, slides))
-    coarse = next((one for one in others if one is not None), None)
-    mesh = None if coarse is None else Curves(*masing(*_elements(model, coarse), slides)).off(own, slides)
-    laws = {law: fit_law(law, model.friction.static, load, slides, own, stiffness) for law in SEARCHED}
+        while True:
+            patch, *others = ladder.solve_all(model.patch, tolerance)
+            if not patch.pressure.load > 0:
+                raise PatchfemError("no load presses the pieces; raise it", "contact.load")
+            parts, coarse = _elements(model, patch), next((one for one in others if one is not None), None)
+            at = _slides(parts) if slides is None else np.asarray(slides, float)
+            own = Curves(*masing(*parts, at))
+            mesh = None if coarse is None else Curves(*masing(*_elements(model, coarse), at)).off(own, at)
+            open_ = 0.0 if mesh is None else float(np.sqrt(np.mean(mesh[1]**2)))
+            if open_ <= KNOWN or not model.patch.chosen or tolerance < FINEST:
+                break
+            tolerance /= FINER
+        held = held_patch(model, patch, tuple(others) or (None,))
+    load, limit, stiffness = patch.pressure.load, float(parts[0] @ parts[1]), float(parts[0].sum())
+    laws = {law: fit_law(law, model.friction.static, load, at, own, stiffness) for law in SEARCHED}
     best = min(laws, key=lambda law: laws[law].found.rms)
-    return FittedPatch(scene, load, limit, stiffness, slides, own, mesh, laws, best, perf_counter() - begin)
+    return FittedPatch(scene, load, limit, held.value if held else stiffness, at, own, mesh, laws, best,
+                       perf_counter() - begin, held.error if held else None, _coarse(model, patch, open_), patch.x.size)
+
+
+def _slides(parts: tuple) -> np.ndarray:
+    """Slides (k,) [m] from where elements (stiffness [N/m], yield slide [m]) begin to slip to where all do."""
+    limit, stiffness = float(parts[0] @ parts[1]), float(parts[0].sum())
+    low, high = LOW * limit / stiffness, HIGH * float(parts[1].max())
+    near = np.geomspace(low, high, 1024)
+    force, loss = masing(*parts, near)
+    first = np.sort(parts[1])[parts[1].size // FEW]
+    low = max(near[np.argmax(loss > LEAST * 4 * near * force)], min(first, LATE * limit / stiffness))
+    return np.geomspace(low, high, max(ROWS, 1 + int(np.ceil(DECADE * np.log10(high / low)))))
+
+
+def _coarse(model: Model, patch, left: float) -> tuple:
+    """Sentences on a mesh that leaves a share `left` of the loss open."""
+    if left <= KNOWN:
+        return ()
+    cure = "begin with larger amplitudes, where more of its elements slip"
+    if not model.patch.chosen:
+        cure = "leave contact.element_size out: the mesh is then refined until it is known" \
+            if model.patch.mesh is None else "cut the mesh of the file finer"
+    return (f"the mesh ({patch.x.size} interface nodes) leaves {100 * left:.2g} % (rms) of the loss open, and with it "
+            f"the exponent of micro-slip, which is chi of 'iwan'; {cure}",)
 
 
 def fit_law(law: str, static: float, load: float, slides, own: Curves, stiffness: float) -> OneLaw:

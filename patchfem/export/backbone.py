@@ -21,15 +21,17 @@ WAYS = {"balance": "The periodic motion that a negative damping of the whole rig
         "quasi-static": "One static force along the shape of the mode with the contact held, and the loops of the "
                         "friction law."}
 COLOURS = {"balance": "accent", "decay": "warm", "quasi-static": "#2f9e63"}
-LISTED = 9  # amplitudes in the table on the screen
+LISTED, MOST_LISTED = 9, 25  # amplitudes in the table on the screen of a curve of more, and the most of others
 
 
 def answer_of(found: Backbone) -> dict:
     """The object that `patchfem backbone --json` prints, in SI."""
     return {"mode": found.mode, "free_frequency": found.free, "stuck_frequency": found.stuck,
+            "stuck_frequency_error": found.stuck_error,
             "curves": {way: {name: getattr(one, name).tolist() for name in COLUMNS}
                        for way, one in found.curves.items()},
-            "missing": found.missing, "exponent": {"micro": found.micro, "gross": found.gross},
+            "missing": found.missing,
+            "exponent": {"micro": found.micro, "gross": found.gross, "micro_theory": found.expected},
             "flutter_amplitude": found.flutter, "notes": list(found.notes)}
 
 
@@ -120,9 +122,14 @@ def _told(one, k: int) -> tuple:
             scales.told(one.damping[k], one.damping_error[k]))
 
 
+def _held(found: Backbone) -> str:
+    """Frequency with the contact held in words, with its error where one is known."""
+    return f"{found.stuck:.5g} Hz" if not found.stuck_error else scales.told(found.stuck, found.stuck_error, unit="Hz")
+
+
 def sentences(found: Backbone) -> list:
     """The answer in sentences: frequency and damping ratio at both ends of the amplitudes first."""
-    held = "" if found.stuck is None else f", and {found.stuck:.5g} Hz while the contact holds"
+    held = "" if found.stuck is None else f", and {_held(found)} while the contact holds"
     out = [f"Mode {found.mode} has {found.free:.5g} Hz without the contact{held}."]
     best = next((found.curves[way] for way in ("balance", "quasi-static", "decay") if way in found.curves), None)
     if best is not None:
@@ -134,8 +141,9 @@ def sentences(found: Backbone) -> list:
         where = "Its damping ratio is largest" if inside else "Within these amplitudes its damping ratio is largest"
         out.append(f"{where} at {scales.short(best.amplitude[k], 'm', 3)}: {best.damping[k]:.3g}, at "
                    f"{best.frequency[k]:.5g} Hz.")
+    theory = "" if found.expected is None else f" (theory: {found.expected:.3g})"
     powers = [f"to the power {value:.3g} {where}" for value, where in (
-        (found.micro, "at the smallest of these amplitudes"), (found.gross, "at the largest")) if value is not None]
+        (found.micro, f"in micro-slip{theory}"), (found.gross, "in gross slip (theory: 1)")) if value is not None]
     if powers:
         out.append(f"The contact's loss per cycle rises with the amplitude {' and '.join(powers)}.")
     if found.flutter is not None:
@@ -147,6 +155,9 @@ def lines_of(found: Backbone) -> list:
     """The answer in lines for the screen: sentences, a table of some amplitudes, what is missing."""
     out = [*sentences(found), f"{'method':<13}{'amplitude':>12}{'frequency':>26}{'damping ratio':>26}"]
     for way, one in found.curves.items():
-        pick = np.unique(np.linspace(0, one.amplitude.size - 1, LISTED).round().astype(int))
+        count = one.amplitude.size
+        pick = np.unique(np.linspace(0, count - 1, count if count <= MOST_LISTED else LISTED).round().astype(int))
         out += [f"{way:<13}{cells[0]:>12}{cells[1]:>26}{cells[2]:>26}" for cells in (_told(one, k) for k in pick)]
+        if pick.size < count:
+            out.append(f"{way}: {pick.size} of {count} amplitudes are shown; backbone.csv has all")
     return [*out, *(f"{way}: not known: {text}" for way, text in found.missing.items())]

@@ -9,6 +9,7 @@ from ..campaigns.fit_patch import SEARCHED, FittedPatch
 from ..disk.whole import write_rows, write_text
 from ..model.model import build, resolved
 from ..scales import SPOKEN, axis_unit, plain, short
+from ..scales import told as with_error
 from ..scene.scene import loads, moved
 from ..scene.sets import text_of
 from .drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
@@ -28,10 +29,10 @@ def answer_of(fitted: FittedPatch) -> dict:
     return {"patchfem": __version__, "title": fitted.scene.title, "measured": fitted.scene.path.name,
             "quantity": "patch", "outcome": laws[fitted.best]["outcome"], "law": fitted.best,
             "values": laws[fitted.best]["values"], "laws": laws, "load": fitted.load, "slip_force": fitted.limit,
-            "stiffness": fitted.stiffness, "amplitudes": [float(fitted.slides[0]), float(fitted.slides[-1])],
-            "rows": int(fitted.slides.size),
-            "mesh": None if fitted.mesh is None else _sizes(fitted.mesh, fitted.slides),
-            "warnings": [*fitted.scene.remarks], "seconds": round(fitted.seconds, 6)}
+            "stiffness": fitted.stiffness, "stiffness_error": fitted.stuck_error, "rows": int(fitted.slides.size),
+            "amplitudes": [float(fitted.slides[0]), float(fitted.slides[-1])],
+            "mesh": None if fitted.mesh is None else _sizes(fitted.mesh, fitted.slides) | {"nodes": fitted.nodes},
+            "warnings": [*fitted.scene.remarks, *fitted.warnings], "seconds": round(fitted.seconds, 6)}
 
 
 def _sizes(off, slides) -> dict:
@@ -93,11 +94,17 @@ def draw(slides, curves: dict):
     return figure
 
 
+def _held(answer: dict) -> str:
+    """Stiffness of the patch while nothing slips in words, with its error where one is known."""
+    value, error = answer["stiffness"], answer["stiffness_error"]
+    return _value(value, "N/m") if error is None else with_error(value, error, unit=SPOKEN["N/m"])
+
+
 def lines_of(answer: dict) -> list:
     """The answer as lines of text; answer: the object of fit.json."""
     low, high = (short(one, "m", 3) for one in answer["amplitudes"])
     out = [f"{answer['outcome']}: laws of one point for a patch under {short(answer['load'], 'N', 4)} that slips at "
-           f"{short(answer['slip_force'], 'N', 4)} and has {_value(answer['stiffness'], 'N/m')} while nothing slips; "
+           f"{short(answer['slip_force'], 'N', 4)} and has {_held(answer)} while nothing slips; "
            f"{answer['rows']} amplitudes of the slide, {low} to {high}",
            f"  {'law':<16}{'stiffness off by':>22}{'loss off by':>22}   values"]
     for law, one in answer["laws"].items():
@@ -108,9 +115,9 @@ def lines_of(answer: dict) -> list:
     out += [f"  {line}" for line in sentences(answer["law"], answer)]
     if answer["mesh"] is not None:
         stiff, loss = (answer["mesh"][part] for part in PARTS)
-        out.append(f"  A coarser mesh changes the patch's own stiffness by {_percent(abs(stiff['largest']))} at most, "
-                   f"its loss by {_percent(abs(loss['largest']))}, at {short(loss['at'], 'm', 3)}, "
-                   f"{_percent(loss['rms'])} rms.")
+        out.append(f"  A mesh coarser than its {answer['mesh']['nodes']} interface nodes changes the patch's own "
+                   f"stiffness by {_percent(abs(stiff['largest']))} at most, its loss by "
+                   f"{_percent(abs(loss['largest']))}, at {short(loss['at'], 'm', 3)}, {_percent(loss['rms'])} rms.")
     return out
 
 

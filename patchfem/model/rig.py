@@ -43,7 +43,8 @@ class Rig:
     modes, that first one before the others, per coordinate; contact_mass [kg]: modal mass of that mode over
     slide_1^2, 0 where it leaves the interface at rest; stuck(stiffness [N/m]) -> the Rig without the joint, of modes
     that were measured with one that a patch holds, which is not pressed yet; None of any other. richer: the rig
-    of a reduced structure with more of its modes, None where none is left out; kept: notes on what is left of it.
+    of a reduced structure with more of its modes, None where none is left out; kept: notes on what is left of it;
+    taken: stiffness [N/m] of the joint that was taken off modes measured with it, None of others.
     """
 
     modes: ModalBasis
@@ -75,6 +76,7 @@ class Rig:
     stuck: Callable | None = None
     richer: "Rig | None" = None
     kept: tuple = ()
+    taken: float | None = None
 
     @property
     def speed(self) -> float:
@@ -117,7 +119,7 @@ def rig_asked(scene, joint: float | None = None) -> Rig:
     """
     more, kept = richer_modes(scene)
     return replace(_rig(scene, own_modes(scene, joint), joint), richer=None if more is None else _rig(scene, more),
-                   kept=tuple(kept))
+                   kept=tuple(kept), taken=joint)
 
 
 def _rig(scene, alone: ModalBasis, joint: float | None = None) -> Rig:

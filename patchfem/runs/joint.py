@@ -39,3 +39,12 @@ def patch_stiffness(model: Model, patch) -> float:
     if patch.strips is not None:
         return float(sum(one[0].sum() for one in strip_elements(patch, f.static, length)))
     return float(elements(patch, f.static, length).stiffness.sum())
+
+
+def held_patch(model: Model, patch, apart: tuple):
+    """The Measure of the stiffness [N/m] of a pressed Patch while nothing slips, extrapolated over its meshes, as its
+    run prints it, where the pieces alone give way; None of any other. apart: the coarser Patches or Nones."""
+    if patch is None or not model.soft or not has(model.friction.law, "set-valued"):
+        return None
+    found = patch_result.measured(model, patch, tuple(apart)).get("tangential_stiffness")
+    return None if found is None or found.value is None or found.error is None else found

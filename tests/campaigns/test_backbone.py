@@ -252,6 +252,79 @@ def test_exponents_only_where_both_points_lie_in_a_regime_and_the_loss_is_no_rou
     assert held.micro is None
 
 
+CROWNED = """\
+[contact]
+length = "20 mm"
+width = "20 mm"
+height = "8 mm"
+load = "2 kN"
+substrate = "steel"
+[contact.crown]
+radius = "20 m"
+[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.3
+""" + shaken("")[shaken("").index("[structure]"):]
+
+
+def test_always_the_mesh_is_in_the_bars_of_micro_slip():
+    """Below the yield slide of its first node neither a mesh nor one of half its nodes slips; the finer mesh does."""
+    coarse, fine = (backbone(pf.build(CROWNED, **{"accuracy.tolerance": one}), "", np.geomspace(1e-9, 1e-5, 25),
+                             ("quasi-static",)) for one in (1e-2, 2e-4))
+    one, other = coarse.curves["quasi-static"], fine.curves["quasi-static"]
+    for name in ("frequency", "damping"):
+        off, bar = abs(getattr(one, name) - getattr(other, name)), getattr(one, f"{name}_error")
+        assert np.mean(off <= bar + getattr(other, f"{name}_error")) >= 0.95, name
+    own = one.damping[0] * one.frequency[0] / 100
+    assert own == pytest.approx(0.002, rel=1e-9) and one.damping_error[0] > 1e-6 * one.damping[0]  # no slip is seen
+    assert fine.micro == pytest.approx(3, abs=0.3) and fine.expected == 3 and coarse.micro is None
+    assert any("no exponent of micro-slip is told" in note for note in coarse.notes)
+    assert any("those of --method balance" in note for note in fine.notes)
+
+
+def test_the_held_frequency_is_that_of_the_stiffness_which_a_run_prints():
+    found = backbone(pf.build(CROWNED), "", [1e-6], ("quasi-static",))
+    told = pf.run(CROWNED[:CROWNED.index("[structure]")] + '[slide]\nkind = "sine"\namplitude = "1 um"\n'
+                  'frequency = "1 Hz"\n').measures["tangential_stiffness"]
+    stuck = np.sqrt(OMEGA**2 + told.value / 0.5) / (2 * np.pi)
+    assert found.stuck == pytest.approx(stuck, rel=1e-9)
+    assert found.stuck_error == pytest.approx(stuck * told.error / told.value / 2, rel=0.1)
+    assert "beyond micro-slip" in " ".join(found.notes)
+
+
+@pytest.mark.parametrize("slide", [1.0, 0.01])
+def test_amplitudes_unless_given_end_where_the_mode_is_nearly_free(slide):
+    """A contact that slides by a hundredth of the output: the default ended at 7 m, not 0.7 mm, where `travel` did not
+    stop it."""
+    one = pf.build(shaken(IWAN).replace("slide = 1.0", f"slide = {slide}\noutput = 1.0"))
+    found = backbone(one, "", None, ("quasi-static",))
+    deflected = 30 * slide / (0.5 * OMEGA**2)  # by the largest friction
+    top = max(deflected, 1.5e-3 / slide)
+    assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(15 * top, rel=1e-6)
+    assert found.curves["quasi-static"].frequency[-1] < 1.05 * found.free
+
+
+def test_the_balance_finds_its_first_motion_by_way_of_a_small_one(monkeypatch):
+    """Where the held mode is too far a start, the motion is followed from where nothing slips."""
+    a, plain = np.array([2e-3]), backbone_module.FreeBalance.solve
+    straight = backbone(model(PLASTIC), "", a, ("balance",)).curves["balance"]
+    refused = set()
+
+    def near(self, x, amplitude):
+        if id(self) not in refused:
+            refused.add(id(self))
+            raise backbone_module.NotConverged("too far")
+        return plain(self, x, amplitude)
+
+    monkeypatch.setattr(backbone_module.FreeBalance, "solve", near)
+    found = backbone(model(PLASTIC), "", a, ("balance",)).curves["balance"]
+    assert len(refused) > 1 and found.frequency == pytest.approx(straight.frequency, rel=1e-6)
+    monkeypatch.setattr(backbone_module, "_begun", lambda one, first, small, here: one.solve(first, here))
+    lost = backbone(model(PLASTIC), "", a, ("balance",))
+    assert lost.missing == {"balance": "no free motion of these amplitudes was found"}
+
+
 def test_a_loop_that_remembers_is_read_when_it_has_settled():
     """Three cycles of bonds of order 2 are not their loop yet: the curve is that of thirty, within both bars."""
     bonds = 'law = "nonlocal"\nreading = "stretch"\norder = 2\nbond_length = "1 um"'

@@ -52,6 +52,16 @@ def test_exact_the_cells_of_an_iwan_law_are_that_law():
     assert found.values == pytest.approx({"stiffness": 5e6, "chi": -0.5, "beta": 0.5}, rel=1e-4)
 
 
+def test_a_mesh_is_refined_until_the_exponent_of_mindlins_contact_is_known():
+    """A crowned strip loses energy with the third power of a small slide, chi = 0. A pinned mesh that leaves the loss
+    open is told, and what is told serves."""
+    pinned = fit_patch(pf.load(JOINT + SLIDE))
+    assert "of the loss open" in pinned.warnings[0] and "leave contact.element_size out" in pinned.warnings[0]
+    found = fit_patch(pf.load(JOINT.replace('element_size = "0.2 mm"\n', "") + SLIDE))
+    assert found.laws["iwan"].values["chi"] > -0.02 and not found.warnings and found.nodes > 2 * pinned.nodes
+    assert np.sqrt(np.mean(found.mesh[1]**2)) < 0.1
+
+
 def test_exact_a_rough_wedge_is_an_iwan_law():
     """Under a pressure that falls linearly to zero the points behind a linear skin slip one after the other at slides
     that are spread evenly: chi = 0 and no last slider, K = k_t A."""
@@ -100,7 +110,7 @@ def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
         largest, rms = (f"{plain(100 * abs(one[name]), 2)} %" for name in ("largest", "rms"))
         assert words.format(largest, short(one["at"], "m", 3), rms) in answer.out
     for word in ("9 amplitudes of the slide, 10 nm to 200 nm", "iwan", "bouc-wen", "elastic-plastic", "% off at most",
-                 "A coarser mesh"):
+                 "A mesh coarser than its"):
         assert word in answer.out
     assert sorted(one.name for one in (tmp_path / "out").iterdir()) == [
         "fit.csv", "fit.json", "fit.svg", "scene.bouc-wen.toml", "scene.elastic-plastic.toml", "scene.fitted.toml",
