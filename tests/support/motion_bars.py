@@ -1,12 +1,13 @@
 """Bars of the measures of random rigs against what is true: an independent program, or the same one much finer.
 
-    python tests/support/motion_bars.py run FILE [--first SEED --count N] [--every K] [--truth OTHER]
+    python tests/support/motion_bars.py run FILE [--first SEED --count N] [--every K] [--method NAME] [--truth OTHER]
     python tests/support/motion_bars.py score FILE...
 
 `run` adds a line for each scene to FILE: the seeds from SEED on, or the held-out rigs of `motion_scenes.held_out`, of
-which --every K takes each K-th. A scene that FILE has is not run again. --truth takes the truth from an earlier FILE,
-of the same or another state of the package, where the run is as long and its window the same. `score` prints coverage
-and sharpness of the bars, of all and by engine. Only the public names of the package are used.
+which --every K takes each K-th, and --method NAME those that name a method, such as harmonic. A scene that FILE has is
+not run again. --truth takes the truth from an earlier FILE, of the same or another state of the package, where the run
+is as long and its window the same. `score` prints coverage and sharpness of the bars, of all and by engine. Only the
+public names of the package are used.
 """
 
 import argparse
@@ -284,6 +285,7 @@ def main() -> None:
     runs.add_argument("--first", type=int)
     runs.add_argument("--count", type=int, default=300)
     runs.add_argument("--every", type=int, default=1)
+    runs.add_argument("--method")
     runs.add_argument("--truth")
     reads.add_argument("files", nargs="+")
     asked = parser.parse_args()
@@ -293,7 +295,7 @@ def main() -> None:
     specs = held_out(asked.count) if asked.first is None else \
         [spec(seed) for seed in range(asked.first, asked.first + asked.count)]
     earlier = {one["seed"]: one for one in _lines([asked.truth])} if asked.truth else {}
-    campaign(specs[::asked.every], asked.file, earlier)
+    campaign([s for s in specs[::asked.every] if asked.method in (None, s.get("method"))], asked.file, earlier)
 
 
 if __name__ == "__main__":
