@@ -164,6 +164,25 @@ def test_refuses_places_that_are_not_there(folder, old, new, says):
     assert answer.code == 2 and says in answer.err, answer.err
 
 
+PATCH = '[contact]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "5 mm"\nload = "50 N"\n' \
+    'substrate = "Ti-8Al-1Mo-1V"\n[contact.shear]\n'
+OTHER = '[[structure.interface]]\nbetween = [2, 0]\nlaw = "coulomb"\nstatic = 0.4\nload = "9 N"\n[drive]'
+
+
+@pytest.mark.parametrize("text, says", [
+    (PATCH + SCENE, "use [friction] with structure.reduced.slide = [1, 0] instead of the interface"),
+    (PATCH + SCENE.replace("[drive]", OTHER), "find its law of one point by `patchfem fit SCENE --from-patch`")])
+def test_refuses_patches_of_interfaces_with_what_goes(folder, text, says):
+    """What is advised for one interface is a scene that can run."""
+    answer = cli("check", _written(folder, text))
+    assert answer.code == 2 and says in answer.err, answer.err
+    head, law = SCENE.split("[[structure.interface]]\nbetween = [1, 0]\n")
+    law = "[friction]\n" + law.replace('load = "50 N"\n', "").replace("elastic-plastic", "coulomb").replace(
+        'bond_length = "1 um"\n', "")
+    answer = cli("check", _written(folder, PATCH + head.replace("modes = 4\n", "modes = 4\nslide = [1, 0]\n") + law))
+    assert answer.code == 0, answer.err
+
+
 def test_exact_a_point_and_a_start_stand_on_the_boundary(folder):
     """[normal] with slide = [1, 0] is the interface between them; a release moves drive.mass alone."""
     head, tail = SCENE.split("[[structure.interface]]\n")

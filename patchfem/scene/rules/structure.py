@@ -59,6 +59,12 @@ def modes_instead(draft: Draft) -> str:
     structure = draft.tables.structure
     if structure is None or draft.given("structure.file"):
         return ""
+    if draft.given("structure.reduced"):
+        pairs = [list(one.between) for one in structure.interface or () if one.between]
+        if len(pairs) == 1:
+            return f"for this patch use [friction] with structure.reduced.slide = {pairs[0]} instead of the interface"
+        return ("one patch can act, with [friction] and structure.reduced.slide; for a patch at each interface find "
+                "its law of one point by `patchfem fit SCENE --from-patch`, from a scene of that patch alone")
     masses = structure.masses or (structure.moving_mass,)
     springs, dampers = ([(one.between, getattr(one, value)) for one in getattr(structure, name) or ()]
                         for name, value in (("spring", "stiffness"), ("damper", "coefficient")))  # fmt: skip
