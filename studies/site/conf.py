@@ -39,6 +39,7 @@ html_title = "patchfem"
 html_show_sourcelink = False
 html_copy_source = False
 html_static_path = []
+html_search_scorer = str(HERE / "scorer.js")
 html_theme_options = {"show_prev_next": False, "secondary_sidebar_items": ["page-toc"], "navigation_depth": 3,
                       "footer_start": ["copyright"], "footer_end": [], "logo": {"text": "patchfem"}}
 suppress_warnings = ["myst.header"]  # a page of the repository may begin below its first heading
