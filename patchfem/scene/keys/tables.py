@@ -109,8 +109,8 @@ class Slide(Table):
     amplitude: key(Length | None, "half the peak-to-peak motion, which starts in the middle and rises") = None
     frequency: key(Frequency | None, "frequency of the sine") = None
     speed: key(Speed | None, "speed of the slide") = None
-    distance: key(quantity("length", ge=0) | None, "sliding distance; for a dwell, up to its rest; for a triangle, "
-                                                   "before its cycles (default 0)") = None
+    distance: key(quantity("length", ge=0) | None, "sliding distance; of a dwell the part before the rest, of a "
+                                                   "triangle a first part before the cycles (default 0)") = None
     hold: key(quantity("time", ge=0) | None, "duration of the rest") = None
     distance_after: key(quantity("length", ge=0) | None, "sliding distance after the rest; default 0") = None
     cycles: key(Positive | None, "number of cycles, may be fractional; default 1") = None
