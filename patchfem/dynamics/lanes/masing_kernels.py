@@ -34,6 +34,7 @@ STACK, EACH = OWN + 22, 4  # those points: slide, friction, irreversible slide a
 DEPTH = (CURVE - STACK) // EACH
 OWN_STATE = CURVE - OWN + curve.ROOM
 LEAST = 1e-30  # of w
+CLOSE = 1e-9  # of a step, by which Newton's last goes: what is left is of its square
 MOST = 32  # events of a step
 NOTHING, PASSES, TURNS, SLIPS = 0, 1, 2, 3  # what happens, what counts more last
 FAR = 1e300
@@ -82,15 +83,16 @@ def slid(x, place, room, i, when=curve.ASKED):
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def energy(x, place, room, i):
-    """Elastic energy of the sliders [m^2]: what the friction took since the last turn without what slip lost."""
+def energy(x, place, slip, room, i):
+    """Elastic energy of the sliders [m^2]: what the friction took since the last turn without what slip lost, where the
+    irreversible slide is `slip`."""
     m, side, length = room[M * LANES + i], room[SIDE * LANES + i], room[LENGTH * LANES + i]
     whole, far = room[K * LANES + i] * length, side * (x - room[FROM * LANES + i])
     held, most = side * room[HELD * LANES + i], room[GK * LANES + i]
     w = min(far / (m * length), 1.0)
     work = m * m * (whole * length * curve.work(w, (side * place - held) / (m * whole), room, i)
                     + most * (far / m - w * length))
-    lost = most * side * (slid(x, place, room, i) - room[SLIP_FROM * LANES + i])
+    lost = most * side * (slip - room[SLIP_FROM * LANES + i])
     return room[ENERGY_FROM * LANES + i] + held * far + work - lost
 
 
@@ -199,17 +201,21 @@ def first_event(x, v, a0, x1, v1, a1, h, room, i):
     if side * v1 < 0.0:
         u = v / (v - v1) if side * v > 0.0 else 1.0 if side * m0 > 0.0 else 0.0
         for _ in range(6):
-            slope = m0 + u * (2 * c2 + 3 * c3 * u)
+            slope, before = m0 + u * (2 * c2 + 3 * c3 * u), u
             u = u - (v + u * (m0 + u * (c2 + u * c3))) / slope if slope != 0.0 else u
             u = min(max(u, 0.0), 1.0)
+            if abs(u - before) < CLOSE:
+                break
         share, what = u, TURNS
         far = x + h * u * (v + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4)))
     if side * (far - next_one) > 0.0:
         u, most = share * min(max((next_one - x) / (far - x), 0.0), 1.0), share
         for _ in range(6):
-            speed = side * (v + u * (m0 + u * (c2 + u * c3)))
+            speed, before = side * (v + u * (m0 + u * (c2 + u * c3))), u
             gap = side * (x + h * u * (v + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4))) - next_one)
             u = min(max(u - gap / (h * speed), 0.0), most) if speed > 0.0 else u
+            if abs(u - before) < CLOSE:
+                break
         share, what = u, PASSES
     return share, what
 
@@ -239,9 +245,9 @@ def drop(room, i):
 
 
 @njit(error_model="numpy", **LEAN)
-def turn_round(x, f, room, i):
+def turn_round(x, f, slip, room, i):
     """Begin a branch where the slide turns."""
-    side, slip, stored = room[SIDE * LANES + i], slid(x, f, room, i), energy(x, f, room, i)
+    side, stored = room[SIDE * LANES + i], energy(x, f, slip, room, i)
     if room[ALL * LANES + i] > 0.0:
         room[VIRGIN * LANES + i] = room[BEHIND * LANES + i] = 0.0
     else:
@@ -258,14 +264,14 @@ def turn_round(x, f, room, i):
 
 
 @njit(error_model="numpy", **LEAN)
-def close(x, f, room, i):
+def close(x, slip, room, i):
     """Forget the loop that closes here, if one does; a slide that all sliders follow goes on from where it would have
-    had to turn."""
+    had to turn; slip: the irreversible slide."""
     k, side, length = int(room[BEHIND * LANES + i]), room[SIDE * LANES + i], room[LENGTH * LANES + i]
     if side * (x - closing(room, i)) < 0.0 or k == 0:
         return
     if k == 1 and room[VIRGIN * LANES + i] == 0.0:
-        slip, most, whole = slid(x, f, room, i), room[GK * LANES + i], room[K * LANES + i] * length
+        most, whole = room[GK * LANES + i], room[K * LANES + i] * length
         gone, work = curve.slipped(1.0, most / whole, room, i, curve.ASKED), curve.work(1.0, most / whole, room, i)
         room[BEHIND * LANES + i], room[M * LANES + i] = 0.0, 2.0
         room[FROM * LANES + i], room[HELD * LANES + i] = x - side * 2 * length, -side * most
@@ -310,7 +316,7 @@ def advance(room, i, s0, c0, s1, c1, h):
     s, c, left, gone, weight = s0, c0, h, 0.0, NOTHING
     room[STIFF_0 * LANES + i] = k
     u, xe, ve, fe, turn, turned, stuck = 1.0, x, v, f, x, False, 0.0
-    room[STUCK_IN * LANES + i] = 0.0
+    room[STUCK_IN * LANES + i], slip = 0.0, slid(x, f, room, i)
     for events in range(MOST + 1):
         x1, v1, f1, k1 = flow(x, v, f, k, s, c, s1, c1, left, room, i)
         share, what = first_event(x, v, push * s - damp * v - square * x - f, x1, v1,
@@ -320,24 +326,26 @@ def advance(room, i, s0, c0, s1, c1, h):
         t = share * left
         se, ce = s * (1 - t * t / 2 + t**4 / 24) + c * t * (1 - t * t / 6 + t**4 / 120), \
             c * (1 - t * t / 2 + t**4 / 24) - s * t * (1 - t * t / 6 + t**4 / 120)
-        begun, was = slid(x, f, room, i), room[WAY * LANES + i]
+        begun, was = slip, room[WAY * LANES + i]
         x, v, f, k = flow(x, v, f, k, s, c, se, ce, t, room, i)
         f, before = friction(x, room, i)
-        gone += abs(slid(x, f, room, i) - begun)
+        slip = slid(x, f, room, i)
+        gone += abs(slip - begun)
         s, c, left, stuck = se, ce, left - t, stuck + (t if was == 0.0 else 0.0)
         if what == TURNS:
             v, turn, turned = 0.0, x, True
-            turn_round(x, f, room, i)
+            turn_round(x, f, slip, room, i)
         else:
-            close(x, f, room, i)
+            close(x, slip, room, i)
         look_ahead(x, room, i)
         f, k = friction(x, room, i)
+        slip = slid(x, f, room, i) if what == PASSES else slip
         now = SLIPS if room[WAY * LANES + i] != was else what
         if now >= weight:
             weight, u, xe, ve, fe = now, 1 - left / h, x, v, f
             room[STIFF_1 * LANES + i], room[STIFF_2 * LANES + i] = before, k
             room[STUCK_IN * LANES + i] = stuck / (h - left) if now == SLIPS else 0.0
-    room[GONE * LANES + i] = gone + abs(slid(x1, f1, room, i) - slid(x, f, room, i))
+    room[GONE * LANES + i] = gone + abs(slid(x1, f1, room, i) - slip)
     room[STIFF * LANES + i] = room[STIFF_3 * LANES + i] = k1
     curve.begin_at(within(x1, room, i), room, i)
     if weight == NOTHING:

@@ -57,7 +57,7 @@ def _of_sliders(law: str, cases: Cases, motion) -> np.ndarray:
         e = cases.law[:, 0]
         work, lost = w * (w / 2 - (w - g) / (e + 2)), e / (e + 2) * w * (w - g)
     else:
-        table = cases.law[:, 3:].reshape(len(w), own.curve.YIELDS, own.curve.COLUMNS)
+        table = cases.law[:, 3:3 + own.curve.BEGINS].reshape(len(w), own.curve.YIELDS, own.curve.COLUMNS)
         last = np.sum(table[:, 1:, own.curve.YIELD] <= w[:, None], axis=1)
         full, moment = (table[np.arange(len(w)), last, column] for column in (own.curve.FORCE, own.curve.MOMENT))
         work, lost = (w * (g + full) - moment) / 2, full * w - moment

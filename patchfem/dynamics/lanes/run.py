@@ -87,16 +87,20 @@ def tables_of(groups) -> np.ndarray:
     rising): two numbers of no meaning, the share of the last yield slide at which half of the friction slips, the table
     of `table_curve_kernels`, which says how many they may be."""
     of = load(f"{HERE}.table_curve_kernels")
-    head, out = np.ones((len(groups), 3)), np.zeros((len(groups), of.YIELDS, of.COLUMNS))
+    head, whole = np.ones((len(groups), 3)), np.zeros((len(groups), of.SIZE))
+    out = whole[:, :of.BEGINS].reshape(len(groups), of.YIELDS, of.COLUMNS)
     out[:, 1:, of.YIELD], out[:, 0, of.SLOPE] = BEYOND, 1.0
-    for first, one, (k, y) in zip(head, out, groups):
+    for first, one, of_parts, (k, y) in zip(head, out, whole, groups):
         w, part, t = y / y[-1], k / k.sum(), len(k)
         one[1:t + 1, of.YIELD] = w
         for column, values in ((of.FORCE, part * w), (of.MOMENT, part * w * w)):
             one[1:, column] = np.append(np.cumsum(values), np.zeros(of.YIELDS - 1 - t))
         one[1:t, of.SLOPE] = np.cumsum(part[:0:-1])[::-1]  # of those that are left: the last has none
         first[2] = w[np.searchsorted(one[1:t, of.FORCE], 0.5 * one[t, of.FORCE])]
-    return np.concatenate([head, out.reshape(len(groups), -1)], axis=1)
+        edges = np.linspace(w[0], w[-1], of.PARTS + 1)
+        of_parts[of.BEGINS:of.BEGINS + of.PARTS] = np.searchsorted(w, edges[:-1])
+        of_parts[of.LOWEST], of_parts[of.PER_PART] = w[0], of.PARTS / max(w[-1] - w[0], 1e-300)
+    return np.concatenate([head, whole], axis=1)
 
 
 def scales(law: str, force, omega) -> np.ndarray:

@@ -4,9 +4,10 @@ straight between their yields,
     g(w) = F + S w,  F = sum k y and S = sum k of those that have, and have not, yielded.
 
 A case has its table behind its numbers (`run.tables_of`): of each yield its place, F, S and B = sum k y^2, one beside
-the other in the room of a lane. In a step it is walked through once, from where the last one ended; what is found lies
-side by side with that of other lanes, as a compiler takes several at once only where it knows the distance of any two
-numbers. Twin: many elements, from event to event (`dynamics.events`).
+the other in the room of a lane. In a step it is walked through once, from where the last one ended, after an event from
+where the part of the way from the first yield to the last begins that holds it; what is found lies side by side with
+that of other lanes, as a compiler takes several at once only where it knows the distance of any two numbers. Twin: many
+elements, from event to event (`dynamics.events`).
 """
 
 from ...compiled.inner import njit
@@ -17,7 +18,11 @@ YIELDS = 512  # of a case, the first of which is none and the last beyond all sl
 YIELD, FORCE, SLOPE, MOMENT, COLUMNS = range(5)
 # number of the yield; F, S and B at WHERE, F and B where the step begins
 AT, FOUND_F, FOUND_S, FOUND_B, HERE_F, HERE_B = range(WHERE + 1, WHERE + 7)
-TABLE, SIZE = (WHERE + 7) * LANES, COLUMNS * YIELDS  # where the tables begin, and the numbers of one
+# behind the yields: how many of them are below the begin of each equal part of the way from the first to the last; the
+# first, and parts over that way
+PARTS, BEGINS = 128, COLUMNS * YIELDS
+LOWEST, PER_PART = range(BEGINS + PARTS, BEGINS + PARTS + 2)
+TABLE, SIZE = (WHERE + 7) * LANES, BEGINS + PARTS + 2  # where the tables begin, and the numbers of one
 ROOM = WHERE + 7 - CURVE  # numbers that it has in the state of a case
 PART = 0.25  # of LENGTH, over which a step may go at most
 FORETELLS = True
@@ -25,27 +30,32 @@ ASKED, FOUND, HERE = range(3)  # where the numbers of a curve are: in its table,
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def walk(at, w, room, i):
+    """Note the number of the last yield up to w, which is not far from the number `at`."""
+    first = TABLE + SIZE * i
+    while w >= room[first + COLUMNS * (at + 1)]:
+        at += 1
+    while w < room[first + COLUMNS * at]:
+        at -= 1
+    room[AT * LANES + i] = at
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def last(w, room, i):
-    """Place in the room of the last yield up to w: that of the last time, or by halves."""
-    k, step, first = int(room[AT * LANES + i]), YIELDS // 2, TABLE + SIZE * i
+    """Place in the room of the last yield up to w: that of the last time, or from the begin of its part on."""
+    k, first = int(room[AT * LANES + i]), TABLE + SIZE * i
     if w < room[first + COLUMNS * k] or w >= room[first + COLUMNS * (k + 1)]:
-        k = 0
-        while step > 0:
-            k = k + step if w >= room[first + COLUMNS * (k + step)] else k
-            step >>= 1
-        room[AT * LANES + i] = k
-    return first + COLUMNS * k
+        part = (w - room[first + LOWEST]) * room[first + PER_PART]
+        k = int(room[first + BEGINS + int(min(part, PARTS - 1.0))]) if part > 0.0 else 0
+        walk(k, w, room, i)
+    return first + COLUMNS * int(room[AT * LANES + i])
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def find(room, i):
     """Find the curve of a lane at WHERE."""
-    at, w, first = int(room[AT * LANES + i]), room[WHERE * LANES + i], TABLE + SIZE * i
-    while w >= room[first + COLUMNS * (at + 1)]:
-        at += 1
-    while w < room[first + COLUMNS * at]:
-        at -= 1
-    room[AT * LANES + i], place = at, first + COLUMNS * at
+    walk(int(room[AT * LANES + i]), room[WHERE * LANES + i], room, i)
+    place = TABLE + SIZE * i + COLUMNS * int(room[AT * LANES + i])
     room[FOUND_F * LANES + i], room[FOUND_S * LANES + i] = room[place + FORCE], room[place + SLOPE]
     room[FOUND_B * LANES + i] = room[place + MOMENT]
 

@@ -62,9 +62,9 @@ def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least
 # the first that does not refuse a model takes it
 BATCHES: tuple[Batch, ...] = (_batch("patches", "patch", compile=6.0, columns=True, together=2048),
                               _batch("benches", "bench", 0.4, together=64),
-                              _batch("lumped.lanes", "rig", compile=6.0, least=64, columns=True, together=256),
+                              _batch("lumped.lanes", "rig", compile=6.0, least=64, columns=True, together=1024),
                               _batch("lumped.lumped", "rig", compile=12.0),
-                              _batch("lumped.tabled", "rig", 0.2, 18.0, least=64, together=256),
+                              _batch("lumped.tabled", "rig", 0.2, 18.0, least=64, together=512),
                               _batch("lumped.sheared", "rig", 0.4, 12.0, together=64),
                               _batch("gathered", "rig", 0.05, 10.0, least=32, together=128))
 

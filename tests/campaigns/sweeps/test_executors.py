@@ -108,7 +108,7 @@ def test_exact_chunks_take_as_long_as_was_asked_and_end_together():
 def test_exact_cases_of_lanes_are_handed_out_as_many_as_march_together():
     """A few tell nothing of how long many take: a sweep of 10 000 said "53 min left" after its first four cases."""
     few, many, kept = work(RIG, 40), work(RIG, 300), replace(work(RIG, 300), keep=print)
-    assert [len(next(solved(one, range(len(one.cases)), Counting()))[0]) for one in (few, many, kept)] == [1, 256, 1]
+    assert [len(next(solved(one, range(len(one.cases)), Counting()))[0]) for one in (few, many, kept)] == [1, 300, 1]
     chunks = Chunks(range(200), 1, 64)
     chunks.take()
     chunks.done(range(64), 640.0)

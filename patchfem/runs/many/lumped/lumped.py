@@ -54,23 +54,26 @@ def group(model: Model) -> tuple:
 
 def solve(models: Sequence[Model], say=None, finer: int = 0) -> Answers:
     """Answers of models of one group; a case that needs it is run by itself. finer: how often twice the cells of a
-    density are taken."""
+    density are taken, in a check, for which a ring need not be told."""
     found = Answers.blank(len(models))
     for first in range(0, len(models), TOGETHER):
         part = models[first:first + TOGETHER]
-        found.place(range(first, first + len(part)), _solved(part, say, max(0, pieces.coarsened(part[0]) - finer)))
+        pairs = max(0, pieces.coarsened(part[0]) - finer)
+        found.place(range(first, first + len(part)), _solved(part, say, pairs, finer > 0))
     return found
 
 
-def _solved(models, say, pairs: int) -> Answers:
+def _solved(models, say, pairs: int, check: bool = False) -> Answers:
     begin, cycles = perf_counter(), int(models[0].rig.cycles)
     window = min(10, cycles // 10)
     runs = pieces.runs_of(models, cycles, window, say, pairs)
     found, alone, resolved = batch_answers(models, runs, {"engine": engine_of(models[0]).name, "window_cycles": window})
     found.seconds[:] = (perf_counter() - begin) / len(models)
     finer = ~resolved & ~runs.lost if pairs else np.zeros(len(models), bool)
-    for cases, solve_again in ((np.flatnonzero(alone & ~finer).tolist(), lambda these: one_by_one.solve(these, say)),
-                               (np.flatnonzero(finer).tolist(), lambda these: _solved(these, say, max(0, pairs - 2)))):
+    alone &= ~finer & ~(runs.lost & check)
+    for cases, solve_again in ((np.flatnonzero(alone).tolist(), lambda these: one_by_one.solve(these, say)),
+                               (np.flatnonzero(finer).tolist(),
+                                lambda these: _solved(these, say, max(0, pairs - 2), check))):
         if cases:
             take_out(found, cases)
             found.place(cases, solve_again([models[case] for case in cases]))

@@ -82,7 +82,7 @@ def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
 
 def runs_of_cases(cases: list, cycles: int, window: int, say=None, least: int = 0, steady: bool = True) -> Runs:
     """Runs of cases; least: cases of a thread, as `in_threads` has it; steady: whether the motion is sought that a case
-    settles to, as a run for an error does not."""
+    settles to, and what rings in it, as a run for an error does not."""
     histories.warm_up(say)
     rig = cases[0].model.rig
     histories.expect(rig.modes, rig.drive, cases[0].groups, cycles, window, len(cases))
@@ -112,7 +112,7 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
     known = np.full((2, len(done)), np.nan)
     for k, (model, one) in enumerate(zip(models, done)):
         ring = {} if rigid else held_ring(*one.ring, one.acceleration) if one.ring is not None \
-            else _rings(cases[k], one)
+            else _rings(cases[k], one) if steady else {}
         lost[k] = ring is None
         for name, value in (ring or {}).items():
             rings[name][k] = value
