@@ -7,8 +7,19 @@ import numpy as np
 from ..core import Measure, Outcome
 from ..structure import drive_sizes
 from . import stationary
-from .settling import CLASSES, GROWS, classes, classify, left_over, mean_amplitudes, steady_amplitude
+from .settling import (
+    CLASSES,
+    GROWS,
+    STEADY,
+    classes,
+    classify,
+    left_over,
+    mean_amplitudes,
+    steady_amplitude,
+    windows_of,
+)
 
+TELLS = 0.02  # of the tolerance, from which what an amplitude will still change by is told
 SMALL = 1e-12  # of the displacement a/omega^2 of the drive: a change of the amplitude that is round-off
 
 
@@ -16,13 +27,15 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
     """Outcome of a run, and its measures with the steady estimate where there is one.
 
     Under a sine, and under levels in their last one, the amplitudes of successive windows decide (`classify`), and what
-    free motion is left in them (`left_over`). A release or a step is steady once it is at rest, to the floor of its
-    amplitude; else the same amplitudes decide, but a release grows only where a mode gains energy. A motion whose
-    middle moves on is not steady (`moves_on`). A sweep or a recorded signal changes to the end: unless it leaves the
-    interface stuck it is transient, without a steady estimate; a random one is done where both halves of its record
-    move as much. So is an interface that holds while what it holds still
-    rises. What rises to a motion that is known to exist, `raw.bounded`, does not grow. level_cycles: of each level, 0
-    without levels; slowest: rate [1/s] at which the slowest mode decays, below 0 where one gains energy.
+    free motion is left in them (`left_over`). A steady one that will still change by TELLS of the tolerance has the
+    estimate too. A release or a step is steady once it is at rest, to the floor of its amplitude; else the same
+    amplitudes decide, but
+    a release grows only where a mode gains energy. A motion whose middle moves on is not steady (`moves_on`). A sweep
+    or a recorded signal changes to the end: unless it leaves the interface stuck it is transient, without a steady
+    estimate; a random one is done where both halves of its record move as much. So is an interface that holds while
+    what it holds still rises. What rises to a motion that is known to exist, `raw.bounded`, does not grow.
+    level_cycles: of each level, 0 without levels; slowest: rate [1/s] at which the slowest mode decays, below 0 where
+    one gains energy.
     """
     if raw.outcome is Outcome.STUCK and not hasattr(drive, "band") and still_loads(raw.window, drive.period, tolerance):
         return Outcome.TRANSIENT, measures
@@ -54,8 +67,8 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
     outcome = _held(CLASSES[number], measures, tolerance)
     if outcome is Outcome.GROWS:
         return outcome, without_bars(measures)
-    if outcome is Outcome.TRANSIENT and not np.isnan(steady):
-        base = measures["relative_displacement_amplitude"]
+    base = measures["relative_displacement_amplitude"]
+    if not np.isnan(steady) and (outcome is Outcome.TRANSIENT or goes_on(steady, error, base.value, tolerance)):
         total = steady_error(steady, error, base.value, base.error or 0.0)
         measures = measures | {"relative_displacement_amplitude_steady":
                                Measure(float(steady), "m", float(total), base.floor)}
@@ -110,7 +123,16 @@ def settled(amplitudes, extremes, window: int, steady, limits: tuple, bounded=Fa
         found = np.where((found != GROWS) & (left > tolerance * amplitudes[:, -1] + floor), 0, found)
         none, (mean, about) = np.isnan(value), mean_amplitudes(extremes, window)
         value, error = np.where(none, mean, value), np.where(none, about, error)
+        none = np.isnan(value) & (found == STEADY)  # no tail is seen: about the cycles of the last window
+        value = np.where(none, windows_of(extremes, window)[1][:, -1], value)
+        error = np.where(none, left + np.abs(amplitudes[:, -1] - value), error)
     return found, value, error
+
+
+def goes_on(steady, error, amplitude, tolerance) -> np.ndarray:
+    """Whether the amplitude of a motion that is steady to the tolerance will still change by a share of that which
+    tells, by the steady estimate and its error; [m], numbers or (n,)."""
+    return np.abs(steady - amplitude) + error > TELLS * tolerance * np.abs(amplitude)
 
 
 def steady_error(steady, error, amplitude, own):

@@ -259,7 +259,7 @@ ROWS = (
     Row("open_fraction", "1", 1e-3, "share of the last cycles without contact",
         lambda s: s.of_load(lambda load: np.mean(load <= 0)), 4.0, group="friction", term=("1", lambda _: 1.0)),
     Row("relative_displacement_amplitude_steady", "m", 1e-10,
-        "extrapolated steady amplitude of a motion that has not settled"),
+        "extrapolated steady amplitude of a motion that has not settled, or still changes by 2 % of the tolerance"),
     Row("peak_frequency", "Hz", 0.0, "drive frequency at the largest amplitude of a curve of steady states"),
     Row("friction_ratio_end", "1", 1e-9, "ratio of friction to normal load at the end of the slide", group="friction"),
     Row("friction_ratio_peak", "1", 1e-9, "largest ratio of friction to normal load over the run", group="friction"),

@@ -11,6 +11,8 @@ from scipy.optimize import brentq, minimize_scalar
 import patchfem as pf
 from patchfem.core import BaseSine
 from patchfem.export.pages import peaks
+from patchfem.response.outcome import goes_on, settled
+from patchfem.response.settling import CLASSES, steady_amplitudes, windows_of
 from patchfem.runs.rig.steady.curves import Followed, Shown
 from patchfem.runs.rig.steady.top import highest
 from patchfem.scene.starting import text_of
@@ -192,3 +194,47 @@ def test_exact_a_stuck_curve_has_the_peak_of_its_held_structure():
     size, place = found[MAIN[0]], found["peak_frequency"]
     assert abs(size.value + true.fun) <= size.error < 1e-6 * size.value
     assert abs(place.value - true.x) <= place.error < 1e-2
+
+
+def settles(seed: int) -> tuple | None:
+    """(amplitude at the end of a run of 40 to 250 cycles, its steady estimate or None, that of the motion that repeats)
+    of a random rig that is steady to 1 %; None of one that is not."""
+    law, text, low, _, force = scene(seed)
+    r = np.random.default_rng(seed + 1)
+    f = low / 0.15 * r.uniform(0.4, 0.7) if law == "chain" else low / 0.7 * r.uniform(0.9, 1.1)
+    text += f'[drive]\nkind = "force"\n{force}frequency = "{f!r} Hz"\ncycles = {int(r.integers(40, 250))}\n'
+    run, steady = pf.run(text + "[accuracy]\ntolerance = 1e-2\n"), pf.run(
+        text + '[accuracy]\ntolerance = 1e-4\nmethod = "harmonic"\n')
+    if (run.outcome, steady.outcome) != ("steady", "steady"):
+        return None
+    return run.measures[MAIN[0]], run.measures.get(f"{MAIN[0]}_steady"), steady.measures[MAIN[0]]
+
+
+@pytest.mark.share(0, 1)
+@pytest.mark.parametrize("seeds", [(73_000_045,), (73_000_047,), tuple(range(73_000_000, 73_000_070))])
+def test_always_a_steady_run_tells_where_it_still_goes(seeds):
+    """Of 25 held-out runs that were steady, 18 ended outside the bar of their last window, one by 1.3 %; of the 19
+    estimates 18 hold."""
+    told = []
+    for seed in seeds:
+        if LAWS[seed % len(LAWS)] in ("none", "iwan") or (one := settles(seed)) is None:
+            continue
+        last, steady, truth = one
+        if steady is None:
+            assert abs(last.value - truth.value) <= last.error + truth.error + 0.02 * 0.01 * last.value
+        else:
+            told.append(abs(steady.value - truth.value) <= steady.error + truth.error)
+    assert np.mean(told or [1]) >= (0.9 if len(told) > 9 else 1)
+
+
+def test_exact_a_step_to_where_it_settles():
+    """Cycles of amplitude 1 + 0.05 exp(-k/60) about 1, without a beat and with one of 13 cycles."""
+    k = np.arange(200)
+    for beat in (np.ones(200), np.cos(2 * np.pi * k / 13)):
+        size = 1 + 0.05 * np.exp(-k / 60) * beat
+        extremes = np.stack([-size, size], axis=1)[None]
+        ends = size[None, 9::10]
+        tail = steady_amplitudes(ends, ends + 0j) if beat.min() > 0 else np.full((2, 1), np.nan)
+        number, value, error = settled(windows_of(extremes, 10)[0], extremes, 10, tail, (1e-2, 0.0, 10 / 60))
+        assert CLASSES[number[0]] == "steady" and goes_on(value, error, windows_of(extremes, 10)[0][:, -1], 1e-2)[0]
+        assert abs(value[0] - 1) <= error[0] < 0.01

@@ -60,7 +60,8 @@ def test_exact_rig_of_one_spring_is_inside_the_bars_of_the_march(sets):
     exact, march = both(RIG, "accuracy.tolerance=1e-4", *sets)
     assert agree(exact, march) == []
     assert exact.measures["energy_balance"].value < 1e-12
-    assert all(m.error <= 1e-8 * abs(m.value) + m.floor for m in exact.measures.values() if m.value is not None)
+    assert all(m.error <= 1e-8 * abs(m.value) + m.floor for name, m in exact.measures.items()
+               if m.value is not None and not name.endswith("_steady"))  # which is extrapolated
     if not sets:
         assert exact.measures["stick_fraction"].value == pytest.approx(march.measures["stick_fraction"].value, abs=4e-3)
 

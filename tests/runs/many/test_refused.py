@@ -70,7 +70,7 @@ ENDS = {  # what is changed, the outcome and, where there is one, that its stead
                ('frequency = "143 Hz"\nacc', 'frequency = "120 Hz"\nacc')), "transient", True),
     "steady": ((("0.003", "0.3"),), "steady", False),
     "stuck": ((('"5 g"', '"0.1 g"'),), "stuck", False),
-    "remarked on": ((("cycles = 20", 'cycles = 20\nonset_length = "0.01 mil"'),), "steady", False),
+    "remarked on": ((("cycles = 20", 'cycles = 20\nonset_length = "0.01 mil"'),), "steady", True),
 }
 
 

@@ -12,7 +12,7 @@ from ....effects import has
 from ....model.alike import Alike, columns_of
 from ....response.errors import total_error
 from ....response.measures import energy_balance
-from ....response.outcome import SMALL, moves_on, settled, steady_error
+from ....response.outcome import SMALL, goes_on, moves_on, settled, steady_error
 from ....response.reasons import CYCLIC, without_value
 from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
@@ -105,7 +105,9 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     found.outcome[:] = [str(one) for one in outcome]
     alone = runs.lost | (values["energy_balance"] > runs.closes) | (values["work_check"] > BOOKS)
     grows = np.array([one is Outcome.GROWS for one in outcome])
-    still = np.array([one is Outcome.TRANSIENT for one in outcome]) & ~np.isnan(steady) & ~runs.stuck
+    with np.errstate(invalid="ignore"):
+        on = goes_on(steady, error, values[MAIN], tolerance) & np.array([one is Outcome.STEADY for one in outcome])
+    still = (on | np.array([one is Outcome.TRANSIENT for one in outcome])) & ~np.isnan(steady) & ~runs.stuck
     values["relative_displacement_amplitude_steady"] = np.where(still, steady, np.nan)
     errors["relative_displacement_amplitude_steady"] = steady_error(steady, error, values[MAIN], errors[MAIN])
     resolved, wide_of = np.ones(n, bool), np.zeros(n, bool)
