@@ -17,7 +17,7 @@ from scipy.interpolate import CubicHermiteSpline
 from ..compiled import load
 from ..core import NotConverged, Outcome, PatchfemError, Start, say
 from ..dynamics import limit_cycles
-from ..dynamics.events import elements
+from ..dynamics.events.elements import JOINED, cells_joined
 from ..dynamics.harmonic import quasi_static
 from ..dynamics.harmonic.backbone import FreeBalance
 from ..dynamics.harmonic.forces import Group
@@ -39,7 +39,7 @@ from ..runs.bench.shear import GRAIN, STIFF
 from ..runs.joint import held_patch
 from ..runs.patch import result as patch_result
 from ..runs.plan import plan
-from ..runs.rig import engines, interface, numerics
+from ..runs.rig import interface, numerics
 from ..runs.rig.engines import ENGINES
 from ..runs.rig.plan import held_stiffness
 from ..runs.rig.steady.balance import BalanceFinder
@@ -417,7 +417,7 @@ def _in_space(joint: Joint, read) -> np.ndarray:
             apart += [np.abs(read(rough) - best), STIFF * np.abs(read(_remade(fine, stiff)) - best)]
         error = error + np.fmax.reduce(apart)
     if celled:
-        apart = [np.abs(read(_remade(fine, partial(_joined, *one))) - best) for one in engines.JOINED]
+        apart = [np.abs(read(_remade(fine, partial(cells_joined, *one))) - best) for one in JOINED]
         gap = np.max(apart, axis=0) / CELLS
         share = (gap / np.maximum(np.abs(best), 1e-300))[:, np.isfinite(gap).all(axis=0)]
         usual = np.median(share, axis=1, keepdims=True) if share.size else 0.0
@@ -431,12 +431,6 @@ def _remade(group: Group, change) -> Group:
     other.laws = [tuple(Jenkins(*change(one.stiffness, one.limit_slide)) if isinstance(one, Jenkins) else one
                         for one in laws) for laws in group.laws]
     return other
-
-
-def _joined(count: int, first: int, stiffness, slide) -> tuple:
-    """Elements of which each `count` are one, from the number `first` on."""
-    one = elements.merged(elements.Elements(stiffness, slide, np.arange(stiffness.size)), count, first)
-    return one.stiffness, one.yield_slide
 
 
 def _spread(stiffness, slide) -> tuple:

@@ -8,6 +8,7 @@ import pytest
 from patchfem.core import Missing
 from patchfem.friction.bonds.parameters import LONGEST, Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction.record import loop_from
 from patchfem.model.model import build
 from patchfem.response.measures import work_check
 from patchfem.runs.bench import bench
@@ -254,3 +255,18 @@ def test_exact_work_over_a_pressure_that_stays_below_is_the_trapezoid_of_its_for
     fine = found[-1]
     assert fine.values["friction_work"] == pytest.approx(np.trapezoid(fine.force, fine.slide), rel=2e-3)
     assert fine.values["energy_created"] == 0
+
+
+@pytest.mark.parametrize("chi, beta, slide", [(-0.4, 0.5, 2e-7), (-0.4, 0.5, 2e-9), (0.0, 0.0, 2e-7), (-0.9, 2.0, 1e-5),
+                                              (-0.6, 0.0, 3e-6)])
+def test_exact_the_cells_of_iwans_law_are_in_the_bars(chi, beta, slide):
+    """Segalman's closed form of the steady loop: its area and its tip, which a first loading has as well."""
+    scene = loads('[normal]\nload = "5 kN"\n[friction]\nlaw = "iwan"\nstatic = 0.3\nstiffness = "1e9 N/m"\n'
+                  f'chi = {chi}\nbeta = {beta}\n[slide]\nkind = "sine"\namplitude = "{slide!r} m"\n'
+                  'frequency = "1 Hz"\ncycles = 2\n')
+    tip, area = loop_from(scene.friction, 5e3, slide)
+    measures = run(scene).measures
+    for name, exact in (("loop_area", area), ("friction_force_peak", tip), ("secant_stiffness", tip / slide)):
+        off = abs(measures[name].value - exact)
+        assert off <= measures[name].error + 1e-12 * abs(exact), name
+    assert 0 < measures["loop_area"].error < 40 * abs(measures["loop_area"].value - area) + 1e-6 * area

@@ -168,7 +168,8 @@ def cost(model, unknowns: dict) -> tuple:
     runs = bench_engine(model, slide, unknowns.get("interface_points", 1))
     if runs.choice is not None and runs.choice.strips:
         unknowns["bond_list_about"] = int(runs.choice.strips)
-    steps = 2 * time.size  # half and a quarter of the steps and what checks the sum beside them
+    cells = has(model.friction.law, "cells") and runs.kind == ELEMENTS
+    steps = (2 + cells) * time.size  # half and a quarter of the steps and what checks the sum or the cells beside them
     return runs.name, steps, steps * runs.seconds
 
 

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...effects import listed
+from ...effects import has, listed
 from ...response.coarser import Coarser, coarser_space, estimate, left_open
 from ...response.errors import change, step_error
 from ...slip import shear_modes
-from . import bench, shear
-from .engine import LIST, LISTS, PLANE, STEPPED, slips_by_elements
+from . import bench, rigid, shear
+from .engine import ELEMENTS, LIST, LISTS, PLANE, STEPPED, slips_by_elements
 from .law import tail_of
 from .ledger import Watch
 
@@ -20,8 +20,8 @@ MERGED = 2.0  # times its change: where merging is of second order 4/3 would do
 
 
 class Pass(NamedTuple):
-    """A pass beside: steps per cycle, on the coarser mesh or not, how bonds are summed, springs and modes of a `Watch`.
-    """
+    """A pass beside: steps per cycle, on the coarser mesh or not, how bonds are summed, springs and modes of a
+    `Watch`."""
 
     steps: int
     rough: bool
@@ -49,7 +49,8 @@ def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
 
 def ladder_of(model, patch, coarse, fine, steps: int) -> list:
     """The coarser runs of a bench: half and a quarter of the steps; at a quarter of them the coarser mesh, where there
-    is one, other shear modes behind which bonds slide, and for a merged list of bonds narrower strips."""
+    is one, other shear modes behind which bonds slide, fewer cells of a density of sliders, and for a merged list of
+    bonds narrower strips."""
     choice = fine.engine.choice
     half, few = Pass(max(4, steps // 8 * 4), False, choice), Pass(max(4, steps // 16 * 4), False, choice)
     times = 2.0 if model.load_varies else 1.0  # first order
@@ -65,6 +66,8 @@ def ladder_of(model, patch, coarse, fine, steps: int) -> list:
         out.append(coarser_space(few._replace(rough=True, modes=count), few))
         if count:
             out.append(coarser_space(few._replace(modes=shear_modes.beside(count)), few, "modes"))
+    if has(model.friction.law, "cells") and fine.engine.kind == ELEMENTS:
+        out.append(rigid.coarser_cells(few))
     if fine.engine.kind in (LIST, LISTS) and choice.merge > 0:
         narrow = few._replace(choice=replace(choice, merge=FINER * choice.merge))
         out.append(Coarser((narrow,), lambda a, b: {name: MERGED * gap for name, gap in change(a, b).items()}, few,

@@ -5,15 +5,20 @@ carries the load, times their own share of it.
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from ...dynamics.events.elements import JOINED, cells_joined
 from ...dynamics.grooves import climbing as flank_climbing
 from ...dynamics.march import varying_load
 from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
 from ...effects import carries, has
 from ...friction import grooves
+from ...friction.laws.elastic_plastic import parallel
 from ...friction.record import law_from
+from ...response.coarser import Coarser
+from ...response.errors import cells_error
 from .engine import ELEMENTS, BenchEngine
 from .follow import follow_path
 from .law import pressure_of
@@ -29,7 +34,7 @@ def rigid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Wa
     sigma, weight = pressure_of(model, patch)
     load = float(weight @ sigma)
     paced = f.rest_growth is not None or model.load_varies or not (has(f.law, "bonds") or has(f.law, "timeless"))
-    done = follow_path(one_point(model, load, engine), time, slide, frames, watch, paced)
+    done = follow_path(one_point(model, load, engine, watch.springs), time, slide, frames, watch, paced)
     tau = np.outer(done.force[done.at] / load if load > 0 else np.zeros(done.at.size), sigma)
     loads = model.point.at(time) if model.load_varies else np.full(time.size, load)
     if engine.kind == ELEMENTS or model.grooves is not None:
@@ -61,14 +66,23 @@ def swing_of(model):
         else grooves.STEADY
 
 
-def one_point(model, load: float, engine: BenchEngine) -> ContactModel:
-    """One point that carries the whole load [N], as a contact of the compiled loops."""
+def one_point(model, load: float, engine: BenchEngine, springs=None) -> ContactModel:
+    """One point that carries the whole load [N], as a contact of the compiled loops; springs: of its elements, as
+    `Watch` has them."""
     f = model.friction
     if model.grooves is not None:
         return climbing(model, load)
     if engine.kind == ELEMENTS:
-        return element_model(law_from(f, load).element(load))
+        one = law_from(f, load).element(load)
+        return element_model(one if springs is None else parallel(*springs(*np.split(one.numbers[2:], 2))))
     law, found = model.bonds, engine.choice
     if found.engine == "recursion":
         return points_model(law, [1.0], [load])
     return list_model(law, f.static * load, found.reach(law.order), found.merge)
+
+
+def coarser_cells(few) -> Coarser:
+    """The passes of a bench in which each four cells of a density of sliders are one; few: variant of `errors` beside
+    them."""
+    runs = tuple(few._replace(springs=partial(cells_joined, *one)) for one in JOINED)
+    return Coarser(runs, cells_error, few, "cells")

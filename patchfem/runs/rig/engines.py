@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...dynamics.events.elements import JOINED
 from ...effects import has
 from ...model.model import Model
 from ...response.coarser import Coarser, coarser_space
@@ -27,8 +28,6 @@ from .solution import gauged
 FINER, MERGED = 0.5, 2.0  # merge width of the run that shows what merging does, and times its change
 LOOSE = 1e-2  # tail over the tolerance from which it is checked by a run with less; unpinned it is a tenth of that
 LESS = 0.1  # tail of that run
-# (cells of a density that are one, from which on) in the runs for its error
-JOINED = (4, 0), (4, 1), (4, 2), (4, 3)
 MOST_PIECES = 1e5  # of a period, up to which a steady motion is found by the map of its yields
 
 

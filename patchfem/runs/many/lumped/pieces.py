@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....dynamics.events import histories
-from ....dynamics.events.elements import merged
+from ....dynamics.events.elements import JOINED, merged
 from ....dynamics.events.names_kernels import FORCE, HIGH, LOW, REACH
 from ....dynamics.events.reading import joined
 from ....effects import has
@@ -17,7 +17,7 @@ from ....response.measures import ROUND, energy_balance, window_amplitudes
 from ....response.ringing import held_ring
 from ....structure.drive_sizes import largest
 from ...rig.costs import pairs_of
-from ...rig.engines import EXACT, JOINED, PIECES, engine_of
+from ...rig.engines import EXACT, PIECES, engine_of
 from ...rig.pieces import RigidElements, elements_of_law, read_off, settles, still_changes
 from .columns import ENDS, MAIN, Runs
 from .threads import in_threads
