@@ -19,7 +19,8 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
                                    "matrices and friction elements as .mat (NLvib) or .npz (TMDSimPy, pyHarm)")],
            frame: Frame = None, sets: Sets = (),
            histories: flag("the histories and loops as .csv, not the interface") = False,
-           of: word("stress that a script for ParaView colours, such as sigma_yy or tau_xy; von_mises unless given",
+           of: word("stress that a script for ParaView colours, such as sigma_yy or tau_xy (von_mises unless given); "
+                    "status shows where the interface sticks and slips",
                     "--of") = ""):
     """Write the fields of a results folder in another format, or its histories and loops; of a fit the measured loop
     beside the fitted one; of a scene its structure for other programs.

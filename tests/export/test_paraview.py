@@ -109,6 +109,23 @@ def test_exact_a_script_colours_a_component_in_megapascal(bench, tmp_path, monke
         assert cells["shown"] == pytest.approx(1e-6 * block.cell_data["stress"][:, place], rel=1e-6)
 
 
+def test_exact_a_script_shows_where_the_interface_sticks_and_slips(bench, tmp_path, monkeypatch):
+    assert cli("export", bench, "-o", tmp_path / "play.py", "--of", "status").code == 0
+    simple = played(tmp_path / "play.py", monkeypatch)
+    _, (line, display), (clock, _) = simple.shown
+    assert simple.coloured[id(display)] == ("POINTS", "status") and display.LineWidth == 6
+    table = simple.tables["status"]
+    assert table.Annotations == ["0", "open", "1", "sticks", "2", "slips"] and len(table.IndexedColors) == 9
+    files, seen = times_and_files(clock.Input), set()
+    with Series(bench) as series:
+        for (_, file), number in zip(files, film_of(series).numbers):
+            known = series.frame(number).blocks["interface"].point_data["status"]
+            (_, points, _), = blocks_at(line, file)
+            assert points["status"].tolist() == known.tolist()
+            seen |= set(known.tolist())
+    assert {1, 2} <= seen <= {0, 1, 2}
+
+
 def test_refuses_a_stress_that_is_none(bench, tmp_path):
     wrong = cli("export", bench, "-o", tmp_path / "play.py", "--of", "sigma")
     assert wrong.code == 2 and "the stresses are von_mises, sigma_xx" in wrong.err

@@ -18,7 +18,8 @@ PROPERTIES = {"PVDReader": {"FileName"}, "WarpByVector": {"Input", "Vectors", "S
               "ExtractBlock": {"Input", "Selectors", "Assembly"}, "AnnotateTimeFilter": {"Input", "Format"},
               "RenderView": {"InteractionMode", "OrientationAxesVisibility", "ViewSize"},
               "Display": {"LineWidth", "Ambient", "Diffuse"},
-              "ScalarBar": {"Title", "ComponentTitle"}, "Table": {"AutomaticRescaleRangeMode"},
+              "ScalarBar": {"Title", "ComponentTitle"},
+              "Table": {"AutomaticRescaleRangeMode", "InterpretValuesAsCategories", "Annotations", "IndexedColors"},
               "AnimationScene": {"PlayMode"}}
 CALLS = {"Display": {"SetScalarBarVisibility"}, "Table": {"ApplyPreset", "RescaleTransferFunction"},
          "AnimationScene": {"UpdateAnimationUsingDataTimeSteps", "GoToFirst", "Play"}}

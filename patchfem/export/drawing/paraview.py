@@ -23,6 +23,8 @@ STRESSES = {  # name -> (title, place in the stored stress xx, yy, zz, xy, yz, x
     "von_mises": ("von Mises stress", None), "sigma_xx": ("stress sigma_xx", 0), "sigma_yy": ("stress sigma_yy", 1),
     "sigma_zz": ("stress sigma_zz", 2), "tau_xy": ("shear stress tau_xy", 3)}
 
+STATUS = "status"  # of the interface: 0 open, 1 sticks, 2 slips
+
 SCRIPT = '''\
 """Both pieces through the last cycle: {title} in them, contact pressure on their interface.
 
@@ -45,6 +47,7 @@ MOTION = {motion!r}  # factor of the motion and the gap
 SLIDE = {slide!r}  # factor of the slide of the upper piece as a whole
 STRESS = {stress!r}  # MPa, ends of the colours in every frame
 PRESSURE = {pressure!r}  # MPa, ends of the colours in every frame
+STATUS = {status!r}  # whether the interface shows where it is open, sticks and slips, in place of its pressure
 TIMES = 3  # the cycle is played
 PACE = {pace!r}  # frames per second of a film
 
@@ -84,7 +87,7 @@ view.InteractionMode = "2D"
 view.OrientationAxesVisibility = 0
 
 
-def show(source, where, name, title, ends, colours):
+def show(source, where, name, title, ends, colours, unit="[MPa]"):
     """Show a source coloured by one of its arrays, with the same colours in every frame."""
     shown = simple.Show(source, view)
     simple.ColorBy(shown, (where, name))
@@ -94,13 +97,21 @@ def show(source, where, name, title, ends, colours):
     table.RescaleTransferFunction(*ends)
     shown.SetScalarBarVisibility(view, True)
     bar = simple.GetScalarBar(table, view)
-    bar.Title, bar.ComponentTitle = title, "[MPa]"
+    bar.Title, bar.ComponentTitle = title, unit
     shown.Ambient, shown.Diffuse = 1.0, 0.0  # the colours of the bar, without light and shade
     return shown
 
 
 show(pieces, "CELLS", "shown", {title!r}, STRESS, {colours!r})
-show(interface, "POINTS", "contact_pressure", "contact pressure", PRESSURE, "Inferno (matplotlib)").LineWidth = 6
+if STATUS:
+    line = show(interface, "POINTS", "status", "interface", (0, 2), "Inferno (matplotlib)", "")
+    words = simple.GetColorTransferFunction("status")
+    words.InterpretValuesAsCategories = 1
+    words.Annotations = ["0", "open", "1", "sticks", "2", "slips"]
+    words.IndexedColors = [0.6, 0.6, 0.6, 0.12, 0.37, 0.6, 0.78, 0.33, 0.11]
+else:
+    line = show(interface, "POINTS", "contact_pressure", "contact pressure", PRESSURE, "Inferno (matplotlib)")
+line.LineWidth = 6
 simple.Show(clock, view)
 
 scene = simple.GetAnimationScene()
@@ -123,16 +134,19 @@ if not films:
 def write_script(folder: Path, out: Path, of: str = "von_mises") -> str:
     """Write the script `out`, and its fields beside it, for the last cycle of a results folder; one line on them.
 
-    of: the stress that colours the pieces, a key of STRESSES. Missing without fields or where `out` cannot be written;
+    of: the stress that colours the pieces, a key of STRESSES; STATUS: von Mises stress in the pieces, and where the
+    interface is open, sticks and slips. Missing without fields or where `out` cannot be written;
     PatchfemError for fields of one moment, in which nothing moves, and for a stress that is none.
     """
+    status, of = of == STATUS, "von_mises" if of == STATUS else of
     if of not in STRESSES:
-        raise PatchfemError(f"--of {of}: no stress of this name; the stresses are {', '.join(STRESSES)}")
+        raise PatchfemError(f"--of {of}: no stress of this name; the stresses are {', '.join(STRESSES)}; {STATUS} "
+                            "shows where the interface sticks and slips")
     out = Path(out)
     fields = out.with_suffix(".pvd")
     with Series(folder) as series:
         film = film_of(series)
-        text = script(out, film, of, _ends(series, film, of))
+        text = script(out, film, of, _ends(series, film, of), status)
         write_pvd(fields, series, film.numbers, lambda frame: with_motion(frame, of))
         write_text(out, text)
     return f"{out}: {len(film.numbers)} frames, {fields.name} and {frames_beside(fields).name} beside it"
@@ -155,11 +169,12 @@ def stress_of(cell_data: dict, of: str) -> np.ndarray:
     return cell_data["von_mises"] if place is None else cell_data["stress"][:, place]
 
 
-def script(out: Path, film: Film, of: str, ends: tuple) -> str:
-    """The text of the script `out` that plays a film; ends: of the colours of the stress [Pa]."""
+def script(out: Path, film: Film, of: str, ends: tuple, status: bool = False) -> str:
+    """The text of the script `out` that plays a film; ends: of the colours of the stress [Pa]; status: the
+    interface shows where it sticks and slips."""
     fields = out.with_suffix(".pvd")
     return SCRIPT.format(fields=fields.name, motion=film.factors[0], slide=film.aside,
-                         stress=tuple(MPA * one for one in ends), pressure=(0.0, MPA * film.pressure),
+                         stress=tuple(MPA * one for one in ends), pressure=(0.0, MPA * film.pressure), status=status,
                          pace=max(1, round(1 / film.seconds)), title=STRESSES[of][0],
                          colours="Viridis (matplotlib)" if of == "von_mises" else "Cool to Warm")
 
