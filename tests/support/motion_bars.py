@@ -258,8 +258,9 @@ def _lines(names) -> list:
     return [json.loads(line) for name in names for line in Path(name).read_text("utf-8").splitlines()]
 
 
-def campaign(specs: list, name: str, earlier: dict) -> None:
-    """Compare the scenes that the file of this name has not, a line for each; earlier: lines of a truth by seed."""
+def campaign(specs: list, name: str, earlier: dict, compared=compared) -> None:
+    """Compare the scenes that the file of this name has not, a line for each; earlier: lines of a truth by seed;
+    compared(spec, folder, earlier line or None) -> line."""
     signal.signal(signal.SIGPROF, _late)
     done = {one["seed"] for one in _lines([name])} if Path(name).exists() else set()
     for s in specs:
