@@ -55,9 +55,8 @@ def of_turns(times, places) -> HalfSwings:
 
 
 def curve_of(swings: HalfSwings) -> DecayCurve:
-    """Frequency and damping over the amplitude, at points whose spans overlap by half, of a computed
-    motion at every half swing; without a point where there are
-    fewer than FEWEST half swings."""
+    """Frequency and damping over the amplitude, at points whose spans overlap by half, of a computed motion at every
+    half swing; without a point where there are fewer than FEWEST half swings."""
     count, log = swings.size.size, np.log(swings.size)
     noise = _at_least(swings.size_noise / swings.size, log)
     wide = _at_least(swings.middle_noise, swings.middle)
@@ -70,7 +69,17 @@ def curve_of(swings: HalfSwings) -> DecayCurve:
         out.append((swings.middle[k], np.exp(size) / 2, 0.5 / half, 0.5 * half_error / half**2, fall / tilt,
                     fall_error * np.pi**2 / tilt**3))
         k += max(1, min(span, other)) if wide.any() else 1
-    return DecayCurve(*(np.array(part) for part in zip(*out))) if out else DecayCurve(*np.empty((6, 0)))
+    found = DecayCurve(*(np.array(part) for part in zip(*out))) if out else DecayCurve(*np.empty((6, 0)))
+    return _between_turns(found) if found.time.size > 1 else found
+
+
+def _between_turns(found: DecayCurve) -> DecayCurve:
+    """The curve with what it changes over delta^2/8 of its amplitude: half a half swing is cosh(delta/2) times the
+    amplitude in its middle, delta the decrement of half a cycle."""
+    delta = np.pi * found.damping / np.sqrt(np.maximum(1 - found.damping**2, ROUND))
+    share = delta**2 / 8 / np.maximum(np.abs(np.gradient(np.log(found.amplitude))), np.maximum(np.abs(delta), ROUND))
+    return found._replace(**{f"{name}_error": getattr(found, f"{name}_error") + share * np.abs(np.gradient(
+        getattr(found, name))) for name in ("frequency", "damping")})
 
 
 def smoothed(values, noise) -> np.ndarray:
