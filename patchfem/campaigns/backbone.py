@@ -556,7 +556,8 @@ def _rising(best, error) -> Curve:
     whole = np.isfinite(best + error).all(axis=0) & (np.diff(force, prepend=0.0) > 0)
     count = whole.size if whole.all() else int(np.argmin(whole))
     if not count:
-        raise NotConverged("no static force along the mode has an equilibrium at these amplitudes")
+        raise NotConverged("no static force along the mode has an equilibrium at these amplitudes; use --method "
+                           "balance")
     return Curve(best[0], best[1], error[1], best[2], error[2], best[3]).at(slice(count))
 
 

@@ -72,15 +72,19 @@ def along(modes: ModalBasis, group: Group, shares, held: tuple, samples: int = 4
 
     modes: as they are without the contact; group: laws on the rows; held: (omega [rad/s], shape (n,)) of the mode;
     samples: of a cycle, for laws without a closed form; of (n,): what the shares are given of, 1 for the shape itself,
-    such as the motion at the output; the part along the shape unless given. PatchfemError where a law follows the
-    speed, NotConverged where no equilibrium is found.
+    such as the motion at the output; the part along the shape unless given. NaN where no equilibrium is found.
+    PatchfemError where a law follows the speed.
     """
     if follows_speed(group, float(np.abs(group.rows).max()) * float(np.max(shares))):
         raise PatchfemError(RATE)
     (omega, shape), out = held, []
     near, of = np.append(shape, 1.0), shape / (shape @ shape) if of is None else of
     for share in shares:
-        near = _balanced(modes, group, (*held, of), float(share), near, samples)
+        try:
+            near = _balanced(modes, group, (*held, of), float(share), near, samples)
+        except NotConverged:
+            out.append(Static(float(share), np.nan, np.nan, np.full(modes.omega.size, np.nan), np.nan))
+            continue
         z, alpha = near[:-1] * share, float(near[-1]) * omega**2 * share
         loss = sum(loops(laws, abs(one), samples).area for one, laws in zip(group.rows @ z, group.laws))
         out.append(_read(modes, shape, (z, alpha, loss)))
@@ -120,7 +124,7 @@ def _balanced(modes, group, held: tuple, share: float, near, samples: int) -> np
         found = root(left, start, jac=slopes, tol=1e-13)
         if np.abs(found.fun).max() < 1e-9:
             return found.x
-    raise NotConverged(f"backbone: no equilibrium was found at {say(share, 3)} of the mode's coordinate")
+    raise NotConverged(f"backbone: no equilibrium was found at a share of {say(share, 3)}")
 
 
 def _slope(laws, u: float, samples: int) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from patchfem.core import ModalBasis, PatchfemError
+from patchfem.core import ModalBasis, NotConverged, PatchfemError
 from patchfem.dynamics.harmonic import quasi_static
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.laws import Jenkins, OfSpeed, Spring
@@ -39,6 +39,21 @@ def test_exact_one_mode_on_elastic_plastic_elements():
     again = quasi_static.through(ONE, ONE.slide, held(ONE, group), a, [quasi_static.Loops(*one) for one in zip(
         force, loss)])
     assert [one.omega for one in again] == pytest.approx(omega, rel=1e-12)
+
+
+def test_exact_an_amplitude_without_an_equilibrium_leaves_the_others_as_they_are(monkeypatch):
+    group, a, plain = Group(ONE, Jenkins(STIFF, LIMIT)), np.geomspace(3e-5, 3e-3, 4), quasi_static._balanced
+    whole = quasi_static.along(ONE, group, a, held(ONE, group))
+
+    def failing(modes, laws, mode, share, *more):
+        if share == a[2]:
+            raise NotConverged("none")
+        return plain(modes, laws, mode, share, *more)
+
+    monkeypatch.setattr(quasi_static, "_balanced", failing)
+    found = quasi_static.along(ONE, group, a, held(ONE, group))
+    assert np.isnan(found[2].omega) and np.isnan(found[2].z).all()
+    assert [found[k].omega for k in (0, 1, 3)] == pytest.approx([whole[k].omega for k in (0, 1, 3)], rel=1e-12)
 
 
 def test_exact_a_linear_spring_is_the_held_mode():
