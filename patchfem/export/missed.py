@@ -50,7 +50,9 @@ def sentence(measures: dict, tolerance, where) -> str:
     lost = {name: over(one, tolerance) for name, one in measures.items()}
     lost = {name: missed for name, missed in lost.items() if missed.any()}
     if not lost:
-        return f"All {number} cases meet {asked}."
+        ran = int(np.any([np.isfinite(np.asarray(one["values"], float)) for one in measures.values()], axis=0).sum())
+        return f"All {number} cases meet {asked}." if ran == number else \
+            f"{ran} of {number} cases have an answer; {'it meets' if ran == 1 else 'all of these meet'} {asked}."
     beyond = {name: float(np.max(_beyond(measures[name], tolerance), initial=0.0, where=missed))
               for name, missed in lost.items()}
     name = max([name for name in FIRST if name in lost] or lost, key=beyond.get)

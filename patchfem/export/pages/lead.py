@@ -15,7 +15,7 @@ from .changes import changes, shown_of
 from .words import zero_below
 
 EXACT = 1e-6  # of a value, up to which no error is told: the values are shown to four digits
-SETTLED = ("steady", "stuck", "done", "no_contact")
+SETTLED = ranked.SETTLES
 FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", "onset_level", "pressure_peak")
 
 

@@ -18,6 +18,7 @@ SPREAD = ("relative_displacement_amplitude", "loop_area", "equivalent_damping", 
 ENDS = 0.05, 0.5, 0.95
 FEW = 20  # drawn cases, below which nine in ten of them are no share
 SETTLED = 0.95  # of the drawn cases, below which those left out may be one of its ends
+SETTLES = "steady", "stuck", "done", "no_contact"  # outcomes
 NAMED = 3  # keys in the sentence
 
 
@@ -69,33 +70,37 @@ def _between(one) -> str:
 
 
 def quantiles(table: dict, trusted: dict) -> dict:
-    """{measure: (unit, quantiles of ENDS, number of cases)} of the drawn cases that have a value and can be trusted."""
-    out = {}
+    """{measure: (unit, quantiles of ENDS, number of cases, how many of these miss the tolerance)} of the drawn cases
+    that have a value and have settled, of all that have one where none has; trusted: as `lead` makes it."""
+    out, settled = {}, np.isin(np.asarray(table["outcome"], str), SETTLES)
     for name in RANKED if table.get("drawn") and len(table["outcome"]) >= FEW else ():
         one = table["measures"].get(name)
         if one is None:
             continue
         values = np.asarray(one["values"], float)
-        values = values[np.isfinite(values) & trusted[name]]
+        there = np.isfinite(values) & (settled | trusted[name] | ~np.isfinite(values)[settled].any())
+        misses, values = int(np.sum(there & ~trusted[name])), values[there]
         if values.size >= FEW and np.ptp(values) > 1e-9 * np.abs(values).max():
-            out[name] = one["unit"], np.quantile(values, ENDS), values.size
+            out[name] = one["unit"], np.quantile(values, ENDS), values.size, misses
     return out
 
 
 def scatter(found: dict, of: int, settled: bool = True) -> str:
-    """Where nine in ten of `of` drawn cases lie; found: as `quantiles` gives them; settled: whether any case has; ""
-    where there are none."""
+    """Where nine in ten of `of` drawn cases lie, and how many of them miss the tolerance; found: as `quantiles` gives
+    them; settled: whether cases without a value may not have settled; "" where there are none."""
     said, most = [], max((found[name][2] for name in SPREAD if name in found), default=0)
     if most and most < SETTLED * of:
-        missed = "have not settled within" if settled else "miss"
-        return (f"{of - most} of {of} drawn cases {missed} the tolerance, perhaps those that move most: "
+        missed = "have not settled within the tolerance" if settled else "have no value"
+        return (f"{of - most} of {of} drawn cases {missed}, perhaps those that move most: "
                 "how far the answers scatter is not known.")
     for name in [name for name in SPREAD if name in found]:
-        unit, (low, _, high), count = found[name]
+        unit, (low, _, high), count, misses = found[name]
         low, high = (short(one, unit, 3, zero_below(name)) for one in (low, high))
-        some = f" (in the {count} that have one)" if count < most else ""
-        said.append(f"{'an' if name[0] in 'aeio' else 'a'} {label(name)} from {low} to {high}{some}")
-    count = "settled" if settled else "meet the tolerance"
+        some = [f"in the {count} that have one"] * (count < most) + \
+            [f"{misses} of {count} miss the tolerance and count with their values"] * (misses > 0)
+        said.append(f"{'an' if name[0] in 'aeio' else 'a'} {label(name)} from {low} to {high}"
+                    + (f" ({'; '.join(some)})" if some else ""))
+    count = "settled" if settled else "have a value"
     whose = f"{of} drawn cases" if most == of else f"{most} of {of} drawn cases that {count}"
     return f"Nine in ten of the {whose} have {', '.join(said)}." if said else ""
 
@@ -128,12 +133,12 @@ def _range(one) -> str:
 def spread(found: dict) -> str:
     """Quantiles, as `quantiles` gives them, as a table; "" where there are none."""
     rows = []
-    for name, (unit, values, count) in found.items():
+    for name, (unit, values, count, misses) in found.items():
         of, scale = fitting(float(np.abs(values).max()), unit)
         rows.append([linked(label(name), name), *(plain(one * scale, 4) for one in values.tolist()), escape(of),
-                     str(count)])
+                     str(count), str(misses)])
     if not rows:
         return ""
-    return (document.table(("measure", ">5 %", ">half", ">95 %", "unit", ">cases"), rows, "wide") +
-            "<p class=soft>Share of the drawn cases with less; only cases that meet the tolerance count and, if "
-            "any case has settled, only settled ones.</p>")
+    return (document.table(("measure", ">5 %", ">half", ">95 %", "unit", ">cases", ">miss the tolerance"), rows, "wide")
+            + "<p class=soft>Share of the drawn cases with less; if any case has settled, only settled ones count. "
+            "Cases that miss the tolerance count with their values.</p>")

@@ -34,6 +34,8 @@ def test_exact_the_worst_is_relative_and_named_with_its_case():
     assert "in moment, worst at slide.amplitude 0.05 um: 50 %" in sentence(zero, 0.01, where)  # 50 times, not 10
     assert sentence({"energy": zero["energy"]}, 0.01, where).endswith("0.05 um: 0 within its error.")
     assert sentence({"loop_area": one([1, 1], [1e-3, 0])}, 0.01, where) == "All 2 cases meet the tolerance of 1 %."
+    assert sentence({"loop_area": one([1, NAN, 1], [1e-3, NAN, 0])}, 0.01, where) == \
+        "2 of 3 cases have an answer; all of these meet the tolerance of 1 %."
     assert sentence({"loop_area": loop}, np.array([9, 0.2, 0.1]), where) == "All 3 cases meet their tolerance."
     assert sentence({"loop_area": loop}, NAN, where) == sentence({"a": one([1], [NAN])}, 0.1, where) == ""
 
