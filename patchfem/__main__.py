@@ -86,8 +86,8 @@ SCREEN = {
               "export": (look, "fields for ParaView; histories", "out/joint -o play.py"),
               "import": (lab, "records of a laboratory", "shaker.uff -o record.csv"),
               "mesh": (scene, "the mesh of the pieces", "joint.toml -o pieces.vtu")},
-    "About": {"doctor": (start, "what this installation has", ""),
-              "schema": (start, "completion of scenes in an editor", "-o scene.json"),
+    "About": {"doctor": (start, "what is installed", ""),
+              "schema": (start, "JSON schema for editors", "-o scene.json"),
               "cite": (start, "BibTeX of a scene's sources", "joint.toml")}}
 VERBS = {verb: row[0] for verbs in SCREEN.values() for verb, row in verbs.items()}
 

@@ -368,7 +368,8 @@ def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, 
     if folder.suffix != ".toml":
         chosen.export(folder, out, frame, histories, of)
     elif frame is not None or histories or of:
-        raise PatchfemError("frame, histories, of: belong to a results folder; a scene is exported as its structure")
+        raise PatchfemError("frame, histories, of: can only be used for a results folder; of a scene only the "
+                            "structure is exported")
     else:
         from .export.lab import structures  # its folder holds more than words
 
@@ -497,7 +498,7 @@ def _on_stderr(text: str) -> None:
 
 def _without(sets: dict, kind: str) -> None:
     if sets:
-        raise PatchfemError(f"a {kind} is made once: {', '.join(sets)} cannot be set in it; set it in the scene")
+        raise PatchfemError(f"{', '.join(sets)} cannot be set in a {kind}; set it in the scene")
 
 
 class Measures(Mapping):

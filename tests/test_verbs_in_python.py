@@ -220,7 +220,7 @@ def test_exact_an_import_is_that_of_the_command_line(tmp_path):
     cli("import", path, "-o", tmp_path / "shell.csv", "--zero")
     assert (tmp_path / "python.csv").read_bytes() == (tmp_path / "shell.csv").read_bytes() and found["rows"] == 3
     for given, said in (({"segmet": "2 s"}, "segmet: unknown setting"), ({"map": 3}, "map: a text"),
-                        ({"segment": 2.0}, "segment: a text"), ({"begin": "1 s"}, "belong to modes")):
+                        ({"segment": 2.0}, "segment: a text"), ({"begin": "1 s"}, "can only be used for modes")):
         with pytest.raises(pf.PatchfemError, match=said):
             pf.import_(path, tmp_path / "other.csv", **given)
 

@@ -73,7 +73,7 @@ FINER = 3  # doublings of the steps of a decay
 DOWN = (1, 3)  # half swings of a reading, and of the one that shows how much the decay bends
 
 
-UNKNOWN = ("bonds have a loop in closed form only for the stretch reading of order 1 with constant length, no "
+UNKNOWN = ('bonds have a closed-form friction loop only with reading = "stretch", order = 1, constant bond length, no '
            "breakaway and pieces rigid in shear")
 
 
@@ -161,8 +161,8 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
         joint = _joint(model, mode)
         wanted = _default(joint) if amplitudes is None else np.unique(np.asarray(amplitudes, float))
         if wanted[-1] > joint.model.rig.travel:
-            raise PatchfemError(f"an amplitude of {say(wanted[-1], 3)} lies beyond it; give smaller ones "
-                                "with --amplitudes", "structure.travel")
+            raise PatchfemError(f"the amplitude {say(wanted[-1], 3)} lies beyond it; give smaller ones with "
+                                "--amplitudes", "structure.travel")
         curves, missing, richer = {}, {}, model.rig.richer
         other = None if richer is None else _joint(replace(model, rig=richer), mode)
         for way in methods:
@@ -186,7 +186,7 @@ def _beside(curve: Curve, other: Curve) -> Curve:
     a, ends = curve.amplitude, other.amplitude[[0, -1]] * [1 - CLOSE, 1 + CLOSE]
     curve = curve.at((a >= ends[0]) & (a <= ends[1]))
     if not curve.amplitude.size:
-        raise NotConverged("with more modes of the structure no motion of these amplitudes was found; keep more by "
+        raise NotConverged("with more modes of the structure no motion of these amplitudes was found; raise "
                            "structure.reduced.modes")
     frequency, damping = (OF_MODES * np.abs(np.interp(curve.amplitude, other.amplitude, theirs) - own) for own, theirs
                           in ((curve.frequency, other.frequency), (curve.damping, other.damping)))
@@ -208,10 +208,10 @@ def _joint(model: Model, name: str) -> Joint:
                                                               held_stiffness(plan(model).chain))))
         joint = joint._replace(held=modes.held(modes.interfaces, stiffness, number), stiffness=stiffness)
     if not _limit(joint) and model.rig.bends and (model.friction is not None or model.rig.interfaces):
-        raise PatchfemError("the load or the coefficient of friction is 0, so no friction acts; leave out the tables "
-                            "of the contact for the backbone of the springs alone", "friction.static")
+        raise PatchfemError("the load or the coefficient of friction is 0, so no friction acts; leave out [friction] "
+                            "and its load for the backbone without friction", "friction.static")
     if not (modes.omega[number] or joint.held[0]):
-        raise PatchfemError("the mode has 0 Hz and rigid friction, so it has no natural frequency")
+        raise PatchfemError("this mode has 0 Hz and its friction is rigid, so it has no natural frequency")
     if not (joint.linear or model.rig.bends or np.abs(modes.interfaces @ joint.held[1]).max() > 0):
         raise PatchfemError("the mode does not move the contact, so no friction acts on it; choose another with "
                             "--mode, or give it a slide")
@@ -367,10 +367,11 @@ def _balanced(joint: Joint, amplitudes) -> Curve:
 def _refuse(joint: Joint, way: str) -> None:
     """PatchfemError where a steady loop does not tell the free motion."""
     model = joint.model
-    for reason, holds in (("over grooves", model.grooves is not None),
-                          ("under a load that changes with the motion", model.rig.load_varies),
-                          ("of strips that slide apart", model.rig.strips_slide_apart),
-                          ("of several interfaces of rigid friction", _rigid(model) and len(model.rig.interfaces) > 1)):
+    for reason, holds in (("on grooves", model.grooves is not None),
+                          ("with a load that changes with the motion", model.rig.load_varies),
+                          ("for strips that slide independently", model.rig.strips_slide_apart),
+                          ("for several interfaces with rigid friction",
+                           _rigid(model) and len(model.rig.interfaces) > 1)):
         if holds:
             raise PatchfemError(f"no {way} is known {reason}")
 
@@ -505,14 +506,15 @@ def _turned(joint: Joint, amplitudes) -> Curve:
     """Curve under rigid friction; it begins where the motion no longer holds on the way."""
     model, modes, load = joint.model, joint.model.rig.modes, _limit(joint)
     if model.rig.bends or not modes.omega.all():
-        raise PatchfemError("under rigid friction it is not known with a nonlinear spring or a mode of 0 Hz")
+        raise PatchfemError("with rigid friction it cannot be computed if there is a nonlinear spring or a mode of 0 "
+                            "Hz")
     f, row = model.friction, modes.interfaces[0]
     kinetic = load if f.kinetic is None else load * f.kinetic / f.static
     found = limit_cycles.relay_backbone(modes, row, (kinetic, load), amplitudes, joint.mode)
     kept = [(a, *one) for a, one in zip(amplitudes, found) if one is not None]
     if not kept:
-        raise NotConverged("under rigid friction no motion of these amplitudes slides all the time; give larger "
-                           "ones")
+        raise NotConverged("with rigid friction no motion of these amplitudes slides all the time; give larger "
+                           "amplitudes")
     a = np.array([one[0] for one in kept])
     frequency, damping = np.array([(c.omega / (2 * np.pi), zeta) for _, c, zeta in kept]).T
     loss = 4 * kinetic * a * abs(row[joint.mode] / modes.output[joint.mode]) if modes.omega.size == 1 else \
@@ -526,7 +528,7 @@ def _static(joint: Joint, amplitudes) -> Curve:
     of the contact alone on a bench."""
     _refuse(joint, "static curve")
     if _rigid(joint.model):
-        raise PatchfemError("rigid friction has no stiffness, so the held mode has no static curve")
+        raise PatchfemError("rigid friction has no stiffness, so the stuck mode has no static curve")
     if (known := _in_closed_form(joint, amplitudes)) is not None:
         return known
     try:
@@ -829,7 +831,7 @@ def _unrubbed(joint: Joint) -> tuple:
 
 
 def _unworn(model: Model) -> tuple:
-    return () if model.wear is None else ("the pieces count as new: [wear] is not carried into these curves",)
+    return () if model.wear is None else ("these curves are for unworn pieces: [wear] is ignored",)
 
 
 LEFT_OUT = {"balance": "no free oscillation was found there", "quasi-static": "the static curve ends there",
@@ -857,9 +859,9 @@ def _secant(joint: Joint, wanted, curves: dict) -> list:
         if slips and "quasi-static" in curves and "balance" not in curves else []
 
 
-WHY = {"decay": "a decay shows the mean over a cycle, in which it loses {:.2g} of its swing there",
-       "quasi-static": "the static curve uses the secant stiffness and a fixed force shape; the balance follows the "
-                       "first harmonic"}
+WHY = {"decay": "a decay gives the mean over a cycle, in which the amplitude falls by the share {:.2g} there",
+       "quasi-static": "the static curve uses the secant stiffness and a fixed force shape; harmonic balance follows "
+                       "the first harmonic"}
 
 
 def _differences(curves: dict) -> list:

@@ -79,7 +79,7 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None, options: LoopOptio
     offsets = offsets_of(options.offsets, loop)
     everything = [*wanted, *(one.range for one in offsets)]
     if used <= len(everything):
-        raise PatchfemError(f"{to}: {used} rows that are not held out cannot determine {len(everything)} values and "
+        raise PatchfemError(f"{to}: {used} rows are not held out, too few to determine {len(everything)} values and "
                             "their intervals")
     bench = BenchModel(scene, loop, wanted, offsets, options.warm, say)
     scale = float(np.abs(loop.reading[~held]).max())
@@ -164,11 +164,12 @@ def _doubts(fitted: Fitted, led: bool) -> list:
     rms, step_error = fitted.rms, fitted.step_error
     out, peak, used = [], float(np.abs(loop.reading).max()), np.count_nonzero(~held)
     if rms > 1e-6 * peak and rows < FEWER * used:
-        out.append(f"the residual is correlated from row to row: its {used} rows count as {max(rows, 1):.3g} "
-                   "independent ones in the intervals; the law or the instrument misses something")
+        out.append(f"the residual is correlated from row to row, so the {used} rows count as {max(rows, 1):.3g} "
+                   "independent ones in the intervals; the law or the instrument does not describe everything")
     if abs(loop.reading[0]) > 0.2 * peak and not has(scene.friction.law, "memoryless") and not held[0] and not led:
         out.append(f"the first row is at {abs(loop.reading[0]) / peak:.0%} of the peak, but the model starts "
-                   "unstressed: use --warm-up, hold out the first cycle or begin the record at rest")
+                   "unstressed: use --warm-up, hold out the first cycle, or begin the record at rest")
     if step_error > scene.accuracy.tolerance * peak:
-        out.append(f"half the steps change the model by {step_error / peak:.1g} of the peak, more than the tolerance")
+        out.append(f"with half the steps the model changes by {step_error / peak:.1g} of the peak, more than the "
+                   "tolerance")
     return out

@@ -80,7 +80,8 @@ def read_curve(path) -> tuple:
     spread = np.array([columns[f"{name}_error"] / 2 if f"{name}_error" in columns else half * np.abs(one) for
                        name, half, one in zip(("frequency", "damping"), HALVES, value)])
     if (spread < 0).any():
-        raise PatchfemError(f"{path}: an error below 0; give half the width of its interval, or leave the column out")
+        raise PatchfemError(f"{path}: an error is below 0; give half the width of its interval, or leave out the "
+                            "column")
     if not (columns["amplitude"] > 0).all() or not (value[0] > 0).all():
         raise PatchfemError(f"{path}: amplitudes and frequencies must be above 0")
     order = np.argsort(columns["amplitude"], kind="stable")
@@ -143,8 +144,8 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
         try:
             told = balanced(start)
         except PatchfemError as reason:
-            raise PatchfemError(f"at the values found balance knows no oscillation at {_listed(amplitude)}: {reason}; "
-                                "leave out the rows of the largest damping, or narrow --free") from None
+            raise PatchfemError(f"at the fitted values harmonic balance finds no oscillation at {_listed(amplitude)}: "
+                                f"{reason}; leave out the rows of the largest damping, or narrow --free") from None
         settled = np.abs((told - quick(start)) / error).max() < SAME
         tried.append((float(np.square((told - measured) / error).sum()), len(tried), start))
         share, starts = share * told / quick(start), 1
@@ -152,8 +153,8 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
     start = start if settled else min(tried)[2]
     found = fitted(model, "series")
     best, lost = model(found.values), amplitude[np.isnan(curve(found.values, ways[0])[0])]
-    warned = [f"balance found no oscillation at {_listed(lost)}, where the static curve stands for it, corrected as at "
-              "the nearest amplitude"] if lost.size else []
+    warned = [f"harmonic balance found no oscillation at {_listed(lost)}; the static curve is used there, corrected as "
+              "at the nearest amplitude"] if lost.size else []
     sets = [one.assigned(value) for one, value in zip(wanted, found.values)]
     return FittedDecay(scene, Path(to), wanted, found, amplitude, measured, error, best, ways[0], sets,
                        [*scene.remarks, *warned, *remarks(found, [one.key for one in wanted])], perf_counter() - begin)
@@ -175,8 +176,9 @@ def _known(curve, tried: list) -> list:
         if len(most) == len(WAYS):
             break
     if not most:
-        raise PatchfemError(f"no curve of the scene is known within --free; {'; '.join(reasons[:len(WAYS)])}; leave "
-                            "out the rows of the largest damping, or change the ranges of --free")
+        raise PatchfemError("no backbone of the scene could be computed within --free; "
+                            f"{'; '.join(reasons[:len(WAYS)])}; leave out the rows of the largest damping, or change "
+                            "the ranges of --free")
     return most
 
 

@@ -143,7 +143,7 @@ class BenchModel:
             return np.arange(float(loop.reading.size))
         move = np.abs(np.diff(loop.displacement))
         if slide.kind in ("constant", "triangle") and move.all():
-            self.notes.append(f"{loop.path} has no time: its rows are timed by slide.speed")
+            self.notes.append(f"{loop.path} has no time: the times of its rows are computed from slide.speed")
             return np.concatenate([[0.0], np.cumsum(move / slide.speed)])
         raise PatchfemError(f"{loop.path}:1: no column time [s], which law '{law.law}' needs here (the scene sets the "
                             "speed only for a constant or triangle slide without rests)")

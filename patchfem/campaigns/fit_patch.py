@@ -190,16 +190,16 @@ def _refuse(model: Model) -> None:
                             "with [structure] and [drive]", "contact" if model.patch is None else "friction")
     named = [law for law in LAWS if has(law, "timeless") and "shear" in LAWS[law].carries.split()]
     for key, reason, holds in (
-            ("friction.law", f"'{f.law}' does not turn a patch into elements that stick or slip; "
-             f"use {' or '.join(named)}", f.law not in named),
+            ("friction.law", f"a patch with law '{f.law}' cannot be written as elements that stick or slip; use "
+                             f"{' or '.join(named)}", f.law not in named),
             ("friction.law", f"'{f.law}' is rigid, so there is no stiffness to fit: add [contact.shear] or "
              "contact.asperities.tangential_ratio", has(f.law, "set-valued") and not model.soft),
-            ("contact.grooves", "the load climbs their flanks, which no fitted law describes; leave them out here and "
-             "add [normal.grooves] to the fitted law", model.grooves is not None),
-            ("wear", "the loops are those of new pieces; leave [wear] out", model.kind != "patch" and
+            ("contact.grooves", "no fitted law describes a load that climbs grooves; leave them out here and add "
+                                "[normal.grooves] to the fitted law", model.grooves is not None),
+            ("wear", "the loops are those of unworn pieces; leave [wear] out", model.kind != "patch" and
              model.wear is not None),
-            ("structure.mode", "moves or turns the pieces out of the plane of the contact, so the load changes and the "
-             "loops with it; set normal, pitch and yaw to 0", rig is not None and
+            ("structure.mode", "moves or turns the pieces out of the plane of the contact, so the load and the loops "
+                               "change; set normal, pitch and yaw to 0", rig is not None and
              (rig.load_varies or rig.strips_slide_apart))):
         if holds:
             raise PatchfemError(reason, key)
@@ -208,5 +208,5 @@ def _refuse(model: Model) -> None:
 def slides_of(lengths) -> np.ndarray | None:
     """The slides (k,) [m] that were asked for, None for none; PatchfemError for fewer than three, which fix no law."""
     if lengths is not None and len(lengths) < 3:
-        raise PatchfemError("--amplitudes: at least three are needed, such as 0.1 um..10 um:25")
+        raise PatchfemError("--amplitudes: at least three amplitudes are needed, such as 0.1 um..10 um:25")
     return None if lengths is None else np.asarray(lengths, float)

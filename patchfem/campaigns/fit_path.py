@@ -60,8 +60,8 @@ def whole_cycles(loop: Loop) -> int:
     behind = place * way < -SAME * np.ptp(place)
     back = np.flatnonzero(behind[:-1] & ~behind[1:])
     if not back.size:
-        raise PatchfemError(f"{loop.path}: --warm-up needs a record that passes its first displacement again in "
-                            "the same direction; leave --warm-up out or record a whole cycle")
+        raise PatchfemError(f"{loop.path}: --warm-up needs a record that passes its first displacement again in the "
+                            "same direction; record a whole cycle, or leave --warm-up out")
     return int(back[-1]) + 1
 
 

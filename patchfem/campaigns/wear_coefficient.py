@@ -87,8 +87,8 @@ def _from_file(path: Path) -> Measured:
         parts = [one.get(key) for key in ("value", "low", "high")] if isinstance(one, dict) else [None]
         if all(isinstance(part, (int, float)) and math.isfinite(part) for part in parts) and parts[0] > 0:
             return Measured(name, float(parts[0]), max(float(parts[1]), 0.0), float(parts[2]), str(path))
-    raise PatchfemError(f"{path}: no worn depth above zero in it; compare gives none where both traces lack a common "
-                        "reference")
+    raise PatchfemError(f"{path}: it contains no worn depth above zero; compare gives none if both traces lack a "
+                        "common reference")
 
 
 def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
@@ -99,9 +99,9 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
     """
     bounds, target = _bounds(free), measured_of(to)
     if model.patch is None:
-        raise PatchfemError(f"--to {target.name}: one point under [normal] has no depth; use [contact]", "normal")
+        raise PatchfemError(f"--to {target.name}: a [normal] contact has no worn depth; use [contact]", "normal")
     if model.wear.start is not None:
-        raise PatchfemError(f"fit {KEY}: the depth of new pieces is fitted; leave it out", "wear.start")
+        raise PatchfemError(f"fit {KEY}: the fit needs unworn pieces at the start; leave out wear.start", "wear.start")
 
     patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]  # no coefficient changes it
     curve, most = _curve(model, patch, bounds.high, target.name, progress)
@@ -118,7 +118,8 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
             break
         value *= float(inverse(target.value) / inverse(reached))
     else:
-        raise NotConverged(f"fit {KEY}: {MOST_RUNS} runs end at {target.name} = {reached:.6g}, not {target.value:.6g}")
+        raise NotConverged(f"fit {KEY}: after {MOST_RUNS} runs the fit has reached {target.name} = {reached:.6g}, not "
+                           f"{target.value:.6g}")
     if value < bounds.low:
         raise PatchfemError(f"--free {KEY}: {target.name} = {target.value:.4g} needs {value:.4g} m^2/N, below the low "
                             f"bound {bounds.low:.4g}; lower it")

@@ -38,20 +38,21 @@ from .streams import plain
 
 
 def compare(before: Path | None = None, after: Path | None = None, /, *other: Path,
-            pairs: Annotated[Path | None, Parameter(help="a table of files or results folders instead, one pair per "
-                             "line, such as pairs.csv with the columns before and after")] = None,
-            direction: word("axis along which the traces run, x or y; an areal scan has both") = "",
+            pairs: Annotated[Path | None, Parameter(help="a table with one pair of files or results folders per line, "
+                                                         "in place of BEFORE and AFTER, such as pairs.csv with the "
+                                                         "columns before and after")] = None,
+            direction: word("axis along which the traces run, x or y; not needed for an areal scan, which has "
+                            "both") = "",
             units: Units = "",
-            shift: word("known shift, x after minus x before, such as \"0 mm\" for traces "
-                        "from one mark") = "",
+            shift: word('known shift (x after minus x before), such as "0 mm" if both traces start at one mark') = "",
             keep_spikes: flag("keep spikes, dropouts and dust, which are otherwise left out of traces") = False,
-            scene: Annotated[Path | None, Parameter(name="--scene", help="press the patch of this scene with each "
-                                                    "surface, such as rig.toml")] = None,
+            scene: Annotated[Path | None, Parameter(name="--scene", help="scene whose patch is pressed with each "
+                                                                         "surface, such as rig.toml")] = None,
             set_: Sets = (), out: Out = None, json_: Json = False, quiet: Quiet = False):
-    """Compare the surface in BEFORE with that in AFTER: registration, worn depth, ratios, a verdict, a page; of areal
-    scans the worn volume, maps and the levelled difference as X3P and text. Give two more traces to compare the
-    perpendicular direction too. A table of many pairs has mean, scatter and interval over them; two results folders,
-    the second of a run with [wear], what wore off.
+    """Compare the surface in BEFORE with that in AFTER: registration, worn depth, ratios, a verdict and a page. Areal
+    scans also give the worn volume, maps, and the levelled difference as X3P and text. Give two more traces to compare
+    the perpendicular direction too. With --pairs a table of many pairs gives mean, scatter and interval. Two results
+    folders, the second of a run with [wear], show what wore off.
 
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """
@@ -115,7 +116,7 @@ def _no_traces(asked: dict):
     """Refuse what belongs to files of traces, beside a results folder."""
     for name, value in asked.items():
         if value:
-            raise Refused(f"compare: {name} belongs to measured surfaces, not to results folders")
+            raise Refused(f"compare: {name} can only be used for measured surfaces, not for results folders")
 
 
 def _runs(before: Path, after: Path, out, json_: bool):
@@ -135,9 +136,9 @@ def _runs(before: Path, after: Path, out, json_: bool):
 def _pressed(scene: Path, sets, part, target: Path, quiet: bool):
     """The scene with each surface as its profile; the traces are written beside the page."""
     if not isinstance(part.before, profile.Profile):
-        raise Refused("compare --scene: a scene presses traces; write one row of each scan to a file")
+        raise Refused("compare --scene: only traces can be pressed; write one row of each scan to a file")
     if scene_of(scene, sets).contact is None:
-        raise Refused(f"compare --scene {scene}: no [contact] in it; a surface is pressed into a patch")
+        raise Refused(f"compare --scene {scene}: the scene has no [contact], so it has no patch to press")
     models = []
     for name, trace in zip(("before", "after"), paper.surfaces(part)):
         path = paper.write_trace(target / f"surface_{name}.csv", trace).resolve()

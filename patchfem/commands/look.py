@@ -22,24 +22,25 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
            of: word("stress that a script for ParaView colours, such as sigma_yy or tau_xy (von_mises unless given); "
                     "status shows where the interface sticks and slips",
                     "--of") = ""):
-    """Write the fields of a results folder in another format, or its histories and loops; of a fit the measured loop
-    beside the fitted one; of a scene its structure for other programs.
+    """Write the fields of a results folder in another format, or its histories and loops. For a fit, write the measured
+    and the fitted loop; for a scene, write its structure for other programs.
 
     Example: patchfem export out/rig -o histories.uff
     """
     if folder.suffix != ".toml":
         if sets:
-            raise Refused("--set: belongs to a scene; a results folder has run")
+            raise Refused("--set can only be used for a scene, not for a results folder")
         print(chosen.export(folder, out, frame, histories, of))
         return
     if frame is not None or histories or of:
-        raise Refused("--frame, --histories, --of: belong to a results folder; a scene is exported as its structure")
+        raise Refused("--frame, --histories, --of: can only be used for a results folder; of a scene only the "
+                      "structure is exported")
     print(structures.export(model_of(folder, sets), out))
 
 
 def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif, .mp4, .html: the last cycle") = None,
          frame: Frame = None,
-         magnify: Annotated[float | None, Parameter(help="factor on displacements, such as 1000")] = None):
+         magnify: Annotated[float | None, Parameter(help="magnification of displacements, such as 1000")] = None):
     """Show the pressed pieces of a results folder in a window, or draw them into a picture or a film.
 
     Example: patchfem view out/rig -o cycle.gif
@@ -48,11 +49,11 @@ def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif
         print(told)
 
 
-def report(*folders: Path, out: out_in("page.html, by default report.html here") = None,
-           measured: Annotated[Path | None, Parameter(help="measured data to plot over the runs: a file of a "
-                                                           "laboratory or the table that `import` made")] = None):
-    """Lay the results folders of several runs, or of several sweeps over the same keys, side by side on one page for a
-    browser; for a single sweep, rebuild its page.
+def report(*folders: Path, out: out_in("page to write; unless given report.html in the current folder") = None,
+           measured: Annotated[Path | None, Parameter(help="measured data to plot over the runs: a laboratory file, or "
+                                                           "a table written by `import`")] = None):
+    """Show the results folders of several runs, or of several sweeps over the same keys, side by side on one page. For
+    a single sweep, rebuild its page.
 
     Example: patchfem report out/rig out/six --measured loop.csv -o both.html
     """

@@ -16,16 +16,19 @@ def profile(file: Path, /, *more: Path,
             cutoff: word('wavelength that splits roughness from waviness (L-filter), such as "0.25 mm"') = "",
             form: word("form to subtract first: a degree from 1 (line or plane) to 9 such as 2, or cylinder") = "1",
             s_filter: word('wavelength below which waves are removed first, such as "2.5 um"') = "",
-            level: word('height over the mean line at which the material ratio is read, such as "0.5 um"') = "0 um",
-            ratios: word('material ratios whose heights are compared, such as "10,90" in percent') = "10,90",
-            window: word('the part between two cursors, such as "468 um,733 um"; for a scan '
-                         'four, those of x first') = "",
-            tip: word('radius of the stylus, against which the valleys are checked, such as "12.5 um"') = "",
+            level: word('height above the mean line at which the material ratio is computed, such as "0.5 '
+                        'um"') = "0 um",
+            ratios: word("two material ratios, in percent, whose height difference is computed, such as "
+                         '"10,90"') = "10,90",
+            window: word('part to evaluate, between two positions such as "468 um,733 um"; for a scan four positions, '
+                         "those in x first") = "",
+            tip: word('radius of the stylus tip, to check whether it reaches the valleys, such as "12.5 um"') = "",
             units: Units = "",
-            out: out_in("folder for a page, its numbers, a table of them and the levelled heights, such as "
+            out: out_in("folder for a page, a table of the parameters and the levelled heights, such as "
                         "out/trace") = None, json_: Json = False,
-            verbose: flag("the definition of each parameter", "-v", "--verbose") = False):
-    """Print roughness parameters of each FILE with the intervals that one trace allows, and of several their means.
+            verbose: flag("print the definition of each parameter", "-v", "--verbose") = False):
+    """Print roughness parameters of each FILE with the intervals that one trace allows; for several files also their
+    means.
 
     Example: patchfem profile trace.csv --cutoff "0.25 mm"
     """

@@ -29,9 +29,9 @@ from .shared import (
 
 def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False,
         resume: flag("continue an interrupted run that has [wear] or marches in time") = False,
-        fresh: flag("condense the pieces anew, without the cache") = False,
+        fresh: flag("compute the stiffness of the pieces again, without the cache") = False,
         no_page: NoPage = False, quiet: Quiet = False,
-        verbose: flag("also where the time went", "-v", "--verbose") = False):
+        verbose: flag("print also the time of each part", "-v", "--verbose") = False):
     """Run SCENE and write its results folder, by default out/<scene name>.
 
     Example: patchfem run rig.toml --set "drive.acceleration=6 g" -o out/six
@@ -58,7 +58,7 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
         if not no_page:
             _draw(written, target)
     except KeyboardInterrupt:
-        say(f"interrupted while the page was drawn; the results in {target} are whole, without report.html")
+        say(f"interrupted while the page was drawn; the results in {target} are complete except for report.html")
         raise Ended(130) from None
     if answer["outcome"] == "not_converged":
         for text in answer["warnings"] if quiet else ():  # the faults that a quiet run says
@@ -73,7 +73,7 @@ def _draw(written, target: Path) -> None:
     except (OSError, MemoryError, whole.Unwritten) as error:
         why = str(error) if isinstance(error, whole.Unwritten) else \
             f"{target / 'report.html'}: {getattr(error, 'strerror', None) or 'out of memory'}"
-        say(f"{why}; the results are whole, only their page is missing")
+        say(f"{why}; the results are complete except for the page")
         raise Ended(4) from None
 
 

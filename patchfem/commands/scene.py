@@ -20,8 +20,8 @@ from .sweep import Over
 
 
 def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
-    """Name every mistake in SCENE and in the files that it names; compute nothing. A [sweep] in which every case is
-    invalid counts as a mistake.
+    """Name every mistake in SCENE and in its files without computing. A [sweep] in which every case is invalid counts
+    as a mistake.
 
     Example: patchfem check rig.toml
     """
@@ -54,10 +54,10 @@ def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
 
 
 def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Json = False,
-         probe: flag("time this machine, and solve the static patch for its stiffness") = False,
-         verbose: flag("also the effects that the scene does not name", "-v", "--verbose") = False):
-    """Say what SCENE would run, its size, cost, stiffness chain and groups; with --over, or a table [sweep], of the
-    whole sweep.
+         probe: flag("measure the speed of this machine, and solve the static patch for its stiffness") = False,
+         verbose: flag("list also the effects that the scene does not name", "-v", "--verbose") = False):
+    """Print what SCENE would run: size, cost, stiffness chain and dimensionless groups. With --over, or a table
+    [sweep], plan the whole sweep.
 
     Example: patchfem plan rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9"
     """
@@ -65,7 +65,7 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
     read = scene_of(scene, set_) if over is None else None
     if over is not None or read.sweep:
         if probe:
-            raise Refused("--probe solves the patch of one scene; give its values by --set and leave out what is swept")
+            raise Refused("--probe works for one case; set its values with --set and leave out the sweep")
         _plan_sweep(scene, set_, over or Over(), json_, verbose)
         return
     found = plans.plan(read)
@@ -108,9 +108,9 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
              for name, link in answer["stiffness_chain"].items()]
     print("chain    " + " -> ".join(links))
     if not probe and not isinstance(answer["stiffness_chain"].get("pieces_shear", "rigid"), str):
-        print("         the shear of the pieces is an upper estimate from the layers; --probe solves it")
+        print("         the shear stiffness of the pieces is an upper estimate; use --probe to compute it")
     for one in answer.get("modes", ()):
-        held = "" if one["stuck_frequency"] is None else f", {one['stuck_frequency']:.5g} Hz while the contact holds"
+        held = "" if one["stuck_frequency"] is None else f", {one['stuck_frequency']:.5g} Hz while the contact sticks"
         print(f"mode     {one['name']} {one['free_frequency']:.5g} Hz free{held}")
     for name, value in answer["groups"].items():
         print(f"group    {_group(value, name)}")

@@ -33,12 +33,12 @@ def out_in(text: str) -> type:
     return Annotated[Path | None, Parameter(name=["-o", "--out"], help=text)]
 
 
-Sets = texts('a key of the scene with another value, such as "contact.load=30 lbf"; may be repeated', "--set")
-Json = flag("the answer as one JSON object on stdout", "--json")
+Sets = texts('change a value of the scene, such as "contact.load=30 lbf"; may be repeated', "--set")
+Json = flag("print the answer as one JSON object", "--json")
 Out = out_in("folder of the results, such as out/mine")
-Quiet = flag("nothing but faults", "-q", "--quiet")
-Units = word('units of x and z where a file names none or wrong ones, such as "mm,um"; for a matrix of heights '
-             'its pixel and the unit of z, such as "0.8 um,nm"')
+Quiet = flag("print only errors", "-q", "--quiet")
+Units = word('units of x and z if a file gives none or wrong ones, such as "mm,um"; for a matrix of heights its pixel '
+             'size and the unit of z, such as "0.8 um,nm"')
 NoPage = flag("leave out report.html", "--no-page")
 
 

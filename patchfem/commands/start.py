@@ -12,8 +12,9 @@ from .run import run
 from .shared import Json, NoPage, Out, Refused, out_in, placed, say
 
 
-def new(kind: str = "", /, *, out: out_in("mine.toml in place of the screen") = None):
-    """Print a scene of this KIND to start from; without KIND the kinds are named.
+def new(kind: str = "", /, *, out: out_in("file to write, such as mine.toml; unless given, printed on the "
+                                          "screen") = None):
+    """Print a template scene of this KIND; without KIND, list the kinds.
 
     Example: patchfem new joint -o mine.toml
     """
@@ -26,7 +27,7 @@ def new(kind: str = "", /, *, out: out_in("mine.toml in place of the screen") = 
         print(text, end="")
         return
     if out.exists():
-        raise Refused(f"{out}: is there already; choose another file with -o, or remove it")
+        raise Refused(f"{out}: already exists; choose another file with -o, or remove it")
 
     whole.write_text(out, text)
     print(f"{out}: {starting.KINDS[kind]}\nnext: patchfem {starting.NEXT.get(kind, 'run')} {out}")
@@ -38,13 +39,13 @@ def demo(*, out: Out = None, no_page: NoPage = False):
     Example: patchfem demo
     """
     scene = starting.shipped()
-    say(f"scene: {scene}; another to start from: patchfem new")
+    say(f"scene: {scene}; for another template run: patchfem new")
     run(scene, out=placed(out, "demo"), no_page=no_page)
 
 
-def schema(*, out: out_in("scene.json in place of the screen") = None):
-    """Print the JSON schema of a scene, for editors that complete keys and check units: in VS Code with Even Better
-    TOML a scene begins with the line #:schema scene.json.
+def schema(*, out: out_in("file to write, such as scene.json; unless given, printed on the screen") = None):
+    """Print the JSON schema of a scene, for editors that complete keys and check units. In VS Code with Even Better
+    TOML, begin a scene with the line #:schema scene.json.
 
     Example: patchfem schema -o scene.json
     """
@@ -53,12 +54,12 @@ def schema(*, out: out_in("scene.json in place of the screen") = None):
         print(text, end="")
         return
     whole.write_text(out, text)
-    print(f"{out}: begin a scene with the line #:schema {out}")
+    print(f"{out}: for completion in an editor, begin a scene with the line #:schema {out}")
 
 
 def doctor(*, json_: Json = False):
-    """Say what this installation has: versions, kept compiled code, pictures, threads, optional packages and the line
-    that installs each.
+    """Print what is installed: versions, kept compiled code, pictures, threads, optional packages and how to install
+    each.
 
     Example: patchfem doctor
     """

@@ -33,9 +33,10 @@ from .shared import (
 )
 
 
-def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle, shear_modes or jumps") = "",
+def cost(scene: Path, /, *, over: word("vary only one setting: element_size, steps_per_cycle, shear_modes or "
+                                       "jumps") = "",
          out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
-    """Error against CPU seconds of SCENE for a knob, or for all it has.
+    """Measure error against CPU seconds of SCENE for one accuracy setting, or for all that it has.
 
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
@@ -44,7 +45,7 @@ def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle,
         raise Refused(f"cost --over {over}: unknown key; use one of {', '.join(cost_curves.KNOBS)}")
     knobs = [over] if over else cost_curves.knobs_of(found)
     if not knobs:
-        raise Refused(f"{scene}: no knob changes what this scene computes")
+        raise Refused(f"{scene}: no accuracy setting changes the results of this scene")
     target, curves, answer = placed(out, f"{found.source.path.stem}-cost"), {}, {}
     for knob in knobs:
         runs = curves[knob] = cost_curves.curve(found, knob, None if quiet else say)
@@ -64,12 +65,12 @@ ALL = "all"  # of the ways of a backbone
 
 def backbone(scene: Path, /, *, mode: word("a mode by its name, such as axial, or with masses by its number; the "
                                            "first unless given") = "",
-             amplitudes: word('half peak-to-peak at the output, such as "1 um..1 mm:25"; around where the contact '
-                              "slips unless given") = "",
+             amplitudes: word('half peak-to-peak at the output, such as "1 um..1 mm:25"; unless given, around the '
+                              "onset of slip") = "",
              method: Annotated[Literal["balance", "decay", "quasi-static", "all"], Parameter(
-                 help="how the motion is found, such as balance; the others show what one leaves out")] = ALL,
+                 help="method, such as balance; unless given, all are used and compared")] = ALL,
              out: Out = None, set_: Sets = (), no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
-    """Frequency and damping of a mode of SCENE over its amplitude, the contact included; its drive does not act.
+    """Compute frequency and damping of a mode of SCENE against its amplitude, contact included and without the drive.
 
     Example: patchfem backbone rig.toml --mode axial --amplitudes "0.1 um..1 mm:25"
     """
@@ -99,37 +100,37 @@ EXACT = 1e-12  # of a value, below which an error is round-off
 class Rows:
     """Options of a fit of a rig to rows."""
 
-    leave_out: word("refit without each value of a column such as frequency, input or run, and score the rows left "
-                    "out") = ""
+    leave_out: word("cross-validation: refit without each value of a column such as frequency, input or run, and score "
+                    "the rows left out") = ""
     starts: Annotated[int | None, Parameter(
-        help="starts inside the ranges, such as 20, of which the best is taken; 8, or 3 for a curve over the "
-             "amplitude, unless given")] = None
+        help="number of random starts inside the ranges, such as 20; the best is used; unless given 8, or 3 for a "
+             "curve over the amplitude")] = None
     seed: Annotated[int, Parameter(help="seed seed of the random starts, such as 1")] = 0
     unstable: Annotated[Literal["bound", "out", "read"], Parameter(
-        help="how rows flagged U count in the fit: lower bounds, nothing, or as read, such as out")] = "bound"
-    placebo: texts('repeat the fit with each value, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to see '
-                   "whether the rows prefer the scene's own") = ()
-    resume: flag("continue an interrupted fit from its finished starts") = False
+        help="use of rows flagged U in the fit: as lower bounds, left out, or as read, such as out")] = "bound"
+    placebo: texts('repeat the fit with each of these values, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to '
+                   "see whether the rows prefer the value in the scene") = ()
+    resume: flag("continue an interrupted fit after the starts that it finished") = False
 
 
 def fit(scene: Path, /, *, to: word(
-            'what was measured: loop.csv of a bench ("time [s],displacement [um],force [N]", or what export '
-            'writes), rows.csv of a rig or its decay.csv (import --decay), compare.json or "worn_depth_max=2.5 '
-            'um..3.5 um" of a scene with [wear]') = "",
-        free: texts('a key to find and its range, such as "friction.static=0.1..0.6"; may be repeated') = (),
-        from_patch: flag("in place of --to and --free: fit Iwan, Bouc-Wen and elastic-plastic laws of one point to "
-                         "the loops of the scene's own patch, each with its error and as a scene") = False,
-        amplitudes: word('with --from-patch: half peak-to-peak of the slide, such as "0.1 um..10 um:25"; from where '
-                         "the patch begins to slip unless given") = "",
-        hold: texts('rows that are only predicted, such as "frequency=135 Hz,150 Hz"') = (),
-        offset: texts("for a loop, offsets to fit as well, such as force (constant over the record), displacement (of "
-                      "its first row from the unstressed place)") = (),
-        warm_up: flag("for a loop: drive its whole cycles once before it, unscored") = False,
+            'measured file: loop.csv of a bench ("time [s],displacement [um],force [N]", or what export writes), '
+            'rows.csv of a rig or its decay.csv (import --decay), compare.json or "worn_depth_max=2.5 um..3.5 um" of a '
+            "scene with [wear]") = "",
+        free: texts('a key to fit and its range, such as "friction.static=0.1..0.6"; may be repeated') = (),
+        from_patch: flag("in place of --to and --free: fit lumped Iwan, Bouc-Wen and elastic-plastic laws to the loops "
+                         "of the scene's own patch; each is written as a scene, with its error") = False,
+        amplitudes: word('with --from-patch: half peak-to-peak of the slide, such as "0.1 um..10 um:25"; unless given, '
+                         "from the onset of slip") = "",
+        hold: texts('rows held out: predicted but not fitted, such as "frequency=135 Hz,150 Hz"') = (),
+        offset: texts("for a loop: offsets to fit as well, such as force (constant over the record) or displacement "
+                      "(of the first row from the unstressed position)") = (),
+        warm_up: flag("for a loop: run its whole cycles once before the fitted record") = False,
         rows: Annotated[Rows, Parameter(name="*")] = Rows(),
         out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
-    """Find values of keys of SCENE from what was measured: a bench from a friction loop, a rig from rows of frequency,
-    input, acceleration and displacement or from frequency and damping over the amplitude, the wear coefficient from a
-    measured wear depth; or laws of one point from its own patch.
+    """Fit values of keys of SCENE to measurements: a bench to a friction loop; a rig to rows of frequency, input,
+    acceleration and displacement, or to frequency and damping over amplitude; the wear coefficient to a measured wear
+    depth; or lumped laws to the loops of the scene's own patch.
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """

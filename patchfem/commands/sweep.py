@@ -28,10 +28,12 @@ class Over:
     over: texts("table.key=v1,v2,... or table.key=1 mm..9 mm:9 (:9log, :9lin), may be repeated", "--over") = ()
     cases: Annotated[Path | None, Parameter(name="--cases", help="a file such as cases.csv with a column `table.key "
                                             "[unit]` per key, a case per row")] = None
-    random: Annotated[int, Parameter(name="--random", show_default=False, help="draw this many cases, such "
-                                            "as 200, from ranges such as 1 mm..9 mm")] = 0
-    sobol: Annotated[int, Parameter(name="--sobol", show_default=False, help="the same by Sobol's sequence, "
-                                           "best in powers of 2, such as 256")] = 0
+    random: Annotated[int, Parameter(name="--random", show_default=False, help="draw this many random cases, such as "
+                                                                               "200, from ranges such as 1 mm..9 "
+                                                                               "mm")] = 0
+    sobol: Annotated[int, Parameter(name="--sobol", show_default=False, help="draw this many cases by Sobol's "
+                                                                             "sequence, best a power of 2, such as "
+                                                                             "256")] = 0
     seed: Annotated[int, Parameter(name="--seed", help="seed seed of the draws, such as 1")] = 0
 
     def given(self) -> bool:
@@ -62,14 +64,14 @@ class By:
     jobs: Annotated[int, Parameter(name=["-j", "--jobs"], help="processes on this machine, such as 4")] = 1
     executor: word("dask (a cluster on this machine) or dask:ADDRESS, such as dask:tcp://10.0.0.2:8786",
                    "--executor") = ""
-    shard: word("one part only, such as 3/40, into a folder that all parts share", "--shard") = ""
-    collect: flag("only write the tables of a sweep whose cases are all done", "--collect") = False
-    device: word("what the lanes of a sweep run on, such as cpu (only that so far)", "--device") = "cpu"
+    shard: word("run only one part, such as 3/40, into a folder that all parts share", "--shard") = ""
+    collect: flag("only write the tables of a sweep after all its cases are done", "--collect") = False
+    device: word("processor for batches of cases, such as cpu (the only one so far)", "--device") = "cpu"
 
     def __post_init__(self):
         if self.device != "cpu":
-            raise Refused(f"--device {self.device}: the lanes of a sweep run only on processor cores so far; "
-                          "leave --device out, or share the cases among processes or machines: -j N, --executor dask")
+            raise Refused(f"--device {self.device}: batches of cases run only on cpu so far; leave --device out, or "
+                          "share the cases among processes or machines: -j N, --executor dask")
 
     def part(self) -> tuple | None:
         """(i, n) of a shard, None without one."""
@@ -82,13 +84,13 @@ class By:
 
 
 def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out: Out = None, set_: Sets = (),
-          resume: flag("continue with what the folder holds") = False,
+          resume: flag("continue an interrupted sweep in this folder") = False,
           keep: Annotated[Literal["none", "summaries", "results", "pages"] | None, Parameter(
-              help="kept of each case besides its row: summary.json (unless asked, of at most 1000 cases), results "
-                   "folder, that with report.html, or nothing, such as results")] = None,
+              help="what to keep of each case besides its row: summaries, results, pages (results with report.html) or "
+                   "none, such as results; unless given, summaries for up to 1000 cases")] = None,
           no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
-    """Run SCENE for all combinations of the values of --over, or of its table [sweep]: sweep.csv, sweep.nc and
-    report.html of them all, by default in out/<scene name>-sweep.
+    """Run SCENE for all combinations of the values in --over, or in its table [sweep]. Write sweep.csv, sweep.nc and
+    report.html, by default into out/<scene name>-sweep.
 
     Example: patchfem sweep rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9" -j 2
     """
@@ -123,7 +125,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     if part is not None:
         if json_ or not quiet:
             print(json.dumps({"cases": line.done, "folder": str(target)}) if json_ else
-                  f"shard {by.shard}: {line.done} cases in {target}; when all shards are done, repeat it with "
+                  f"shard {by.shard}: {line.done} cases are in {target}; when all shards are done, run the sweep with "
                   "--collect")
         return
     if signed and not found.messages and place.kept(len(cases)) == "none":
@@ -185,7 +187,7 @@ def _answer(number: int, messages: dict, written: dict, told: Told) -> None:
             print(f"results: {tables[0]} {tables[1]}")
         else:
             print(f"results: {target / 'sweep.json'}; sweep.csv and sweep.nc of so many cases take some "
-                  f"{1e-6 * TABLE * number:.0f} MB: the same command with --collect writes them")
+                  f"{1e-6 * TABLE * number:.0f} MB: run the same command with --collect to write them")
     sys.stdout.flush()
     alike = {}
     for case in failed:
@@ -193,7 +195,7 @@ def _answer(number: int, messages: dict, written: dict, told: Told) -> None:
     for text, numbers in list(alike.items())[:FIRST]:
         say(f"case {numbers[0]}{f' and {len(numbers) - 1} more' * (len(numbers) > 1)}: {text}")
     if len(alike) > FIRST:
-        say("sweep.csv has the messages of all failed cases")
+        say("the messages of all failed cases are in sweep.csv")
     if len(failed) == number:
         raise Refused("sweep: no case could be run")
     if failed or "not_converged" in counts:

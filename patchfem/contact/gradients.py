@@ -156,4 +156,5 @@ def descend(operator: Operator, ask: Ask, force: np.ndarray, limit: int | None =
         if over[worst] >= -ROUND:
             return polished(operator, ask, active, found), count
         active[worst] = True
-    raise NotConverged("contact: the active set did not settle; refine contact.element_size or change the load")
+    raise NotConverged("contact: the active-set iteration did not converge; refine contact.element_size or change the "
+                       "load")

@@ -34,8 +34,8 @@ from .strips_solve import (
 )
 from .unilateral import LIMIT
 
-NEGLECTED = ("the shear between the strips over the width is neglected; fields and pictures show their mean "
-             "unless they name strips, result.nc has every strip")
+NEGLECTED = ("the shear between neighbouring strips is neglected; fields and pictures show the mean of the strips "
+             "unless they name strips; result.nc has every strip")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -180,13 +180,13 @@ def _refuse(skin, x, gap, load, moment, approach) -> None:
     if (load is None) == (approach is None) or (moment is not None and load is None):
         raise PatchfemError("contact: give a load, a load and a moment, or an approach")
     if not (np.isfinite(gap).all() and np.isfinite(load if approach is None else approach) and (load or 0.0) >= 0):
-        raise PatchfemError("contact.load: the load must be >= 0, load, approach and gap finite")
+        raise PatchfemError("contact.load: the load must be >= 0, and load, approach and gap must be finite")
     if load and moment is not None and not abs(moment) < load * np.ptp(x) / 2:
-        raise PatchfemError(f"contact.load_line: the line of the load lies {moment / load:.6g} m from the middle, "
-                            f"outside the half length {np.ptp(x) / 2:.6g} m: the piece tips over")
+        raise PatchfemError(f"contact.load_line: the load line lies {moment / load:.6g} m from the middle, outside the "
+                            f"half length {np.ptp(x) / 2:.6g} m: the piece tips over")
     if load is None and isinstance(skin, ExponentialSkin) and skin.reference is None:
-        raise PatchfemError("contact.approach with contact.asperities.law = \"exponential\": the law has no first "
-                            "touch to measure from; give contact.load, or another law")
+        raise PatchfemError('contact.approach with contact.asperities.law = "exponential": this law has no first touch '
+                            "from which an approach could be measured; give contact.load, or another law")
 
 
 def _refuse_roll(offsets, load, lateral) -> None:
@@ -206,13 +206,13 @@ def _refuse_loose(skin, force, checks, free_rotation: bool, free_roll: bool) -> 
     bears = force > 1e-12 * force.max()  # less is round-off
     if free_rotation and not smooth(skin) and bears.any(axis=0).sum() < 2:
         raise NotConverged("contact.strips: the contact set does not determine the rotation; lower "
-                           "contact.element_size or name contact.holder.rotational_stiffness")
+                           "contact.element_size or set contact.holder.rotational_stiffness")
     if free_roll and not smooth(skin) and bears.any(axis=1).sum() < 2:
         raise NotConverged("contact.strips: the contact set does not determine the roll; raise contact.strips.count or "
                            "prescribe contact.strips.roll")
     if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        at, cure = ("asperities", "make the skin softer (decay length, height deviation), or leave it out") \
+        at, cure = ("asperities", "make the rough layer softer (decay length, height deviation), or leave it out") \
             if smooth(skin) else ("strips", "lower contact.strips.roll or raise the load")
         raise NotConverged(f"contact.{at}: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}; {cure}")
 

@@ -286,7 +286,7 @@ def _reach(skin, c, weight, gap) -> np.ndarray | None:
     if (diagonal > 0).all():
         s = np.maximum(s, skin.separation(np.maximum(-gap, np.abs(gap).max() * 1e-3) / (diagonal * weight)))
     if skin.log_pressure(s)[0].max() > -FLOOR:
-        raise PatchfemError("contact.approach: the pressure of the skin overflows; lower the distance")
+        raise PatchfemError("contact.approach: the pressure of the rough layer exceeds any number; lower the distance")
     return s
 
 
@@ -298,8 +298,8 @@ def _held(skin, c, weight, gap) -> tuple:
     none = np.zeros(0)
     found = _newton(skin, Slices(c), weight, gap[None], closing_alone(gap.size, 1, 0), none, s[None], none)
     if found is None:
-        raise NotConverged("contact.asperities: the skin did not settle; raise the decay length or the height "
-                           "deviation, or take law = \"linear\"")
+        raise NotConverged("contact.asperities: the iteration of the rough layer did not converge; raise the decay "
+                           'length or the height deviation, or set law = "linear"')
     return found[0][0], found[1][0], found[3]
 
 

@@ -19,9 +19,9 @@ from .active_set import ROUND, Ask, Found, Operator, factor, flaw, nested_set, r
 
 LIMIT = 1e-9  # largest relative residual of a skin that still counts as solved
 SOLVED = 1e-12  # of a contact without a skin
-INDEFINITE = ("contact: the compliance of the pieces is not positive definite to working precision, whatever presses "
-              "them; raise contact.element_size, bring the stiffnesses of coating and substrate nearer to each other, "
-              "or check the cells of contact.mesh")
+INDEFINITE = ("contact: the compliance of the pieces is not positive definite to working precision; raise "
+              "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "
+              "cells of contact.mesh")
 LEAST = 1e-200  # N or m; below it the products of the check lose their digits
 
 
@@ -153,15 +153,15 @@ def refuse(x, gap, load: float, moment: float | None, spring: float) -> None:
     if not (0 <= load <= 1 / LEAST and np.isfinite(gap).all()):
         raise PatchfemError(f"contact.load: the load ({load:.6g} N) must be >= 0 and the gap finite")
     if 0 < load < LEAST:
-        raise PatchfemError(f"contact.load: {load:.3g} N is too small to compute with; take 0 for a touch without load "
+        raise PatchfemError(f"contact.load: {load:.3g} N is too small to compute with; give 0 (touching without load) "
                             f"or at least {LEAST:.0e} N")
     if moment is not None and not (np.isfinite(moment) and np.isfinite(spring) and spring >= 0):
         raise PatchfemError(f"contact.load_line: the moment ({moment:.6g} N m) must be finite and the spring of the "
                             f"holder ({spring:.6g} N m/rad) >= 0")
     middle, half = (x[0] + x[-1]) / 2, np.ptp(x) / 2
     if load and moment is not None and spring == 0 and not abs(moment / load - middle) < half * (1 - 1e-13):
-        raise PatchfemError(f"contact.load_line: the line of the load lies {moment / load:.6g} m from the middle, "
-                            f"outside the half length {half:.6g} m: the piece tips over")
+        raise PatchfemError(f"contact.load_line: the load line lies {moment / load:.6g} m from the middle, outside the "
+                            f"half length {half:.6g} m: the piece tips over")
 
 
 def press(pieces: Compliance, gap: np.ndarray, load: float, moment: float | None = None, rotation: float = 0.0,
@@ -195,7 +195,7 @@ def press_by(pieces: Compliance, gap: np.ndarray, approach: float, rotation: flo
         return _apart(gap, approach, rotation)
     if approach - gap.min() < LEAST:
         raise PatchfemError(f"contact.approach: an overlap of {say(approach - gap.min(), 3)} is too small to compute "
-                            f"with; take {gap.min():.6g} m for a touch without load")
+                            f"with; take {gap.min():.6g} m for touching without load")
     return _pressed(pieces, Ask(pieces.interface.x, gap - approach), start, approach, rotation)
 
 
@@ -229,12 +229,11 @@ def undetermined(c, turns: bool, spring: float) -> str:
     except np.linalg.LinAlgError:
         return INDEFINITE
     if not turns:
-        return "contact: the equations of the contact set overflowed; check that load, gap and stiffnesses are " \
-               "of ordinary size"
+        return ("contact: the equations of the contact set overflowed; check that load, gap and stiffnesses have "
+                "ordinary sizes")
     holder = "raise" if spring > 0 else "name"
-    return "contact: the nodes that touch do not determine the rotation; bring contact.load_line.offset nearer to " \
-           "the middle (under contact.load_line.moment: raise contact.load) or " \
-           f"{holder} contact.holder.rotational_stiffness"
+    return ("contact: the nodes that touch do not determine the rotation; lower contact.load_line.offset (with "
+            f"contact.load_line.moment: raise contact.load) or {holder} contact.holder.rotational_stiffness")
 
 
 def checked(c, ask: Ask, out: Solved) -> tuple:

@@ -13,7 +13,7 @@ MOST_TURNS = 100  # samples of a cycle that are kept outside the last ones
 
 def thinned(rows, run) -> list:
     """Numbers of the samples worth keeping of each cycle, rows (c, k, width): its first, every reversal of the output
-    and of a slide, every stop and release (slip speed below or above 1e-2 of its peak in the cycle)."""
+    and of a slide, every stop and release (slip speed falls below or rises above 1e-2 of its peak in the cycle)."""
     n, output, (count, size), flat = run.modes.omega.size, run.modes.output, rows.shape[:2], rows.reshape(
         -1, rows.shape[2])
     speeds, slips = run.watched(flat)

@@ -185,8 +185,8 @@ def _of_mode(modes: ModalBasis, group: Group, mode: int, size: float) -> list:
     amplitudes = size * np.geomspace(LOW, HIGH, PLACES)
     few, many = (_crossings(modes, group, mode, amplitudes, harmonics) for harmonics in (FEW, 2 * FEW + 1))
     if len(few) != len(many):
-        raise NotConverged(f"flutter_amplitude: {len(few)} limit cycles with {FEW} harmonics, {len(many)} with "
-                           f"{2 * FEW + 1}")
+        raise NotConverged(f"flutter_amplitude: {len(few)} limit cycles were found with {FEW} harmonics but "
+                           f"{len(many)} with {2 * FEW + 1}")
     return [better._replace(error=2 * abs(one.amplitude - better.amplitude) + ROUND * better.amplitude)
             for one, better in zip(few, many)]
 

@@ -76,10 +76,11 @@ def mortar(lower: tuple, x_lower: np.ndarray, upper: tuple, x_upper: np.ndarray,
     best = _steadiest(grids, pair)
     if best.ripple > WORST:
         raise PatchfemError(f"contact.mesh: {best.reason}, and no other choice of nodes is better; give both pieces "
-                            "interface cells of like size that grow gradually")
+                            "interface cells of similar size that grow gradually")
     if side in (None, best.side):
         return best
-    return replace(best, reason=f"asked for on the {side} piece, but {found.reason}; instead {best.reason}")
+    return replace(best, reason=f"pressure on the {side} piece was asked for, but {found.reason}; so another choice "
+                                f"is used: {best.reason}")
 
 
 def _grids(pair) -> dict:
@@ -251,7 +252,7 @@ def _name(grids) -> str:
 
 
 def _reason(grids, name: str, ripple: float, place: float) -> str:
-    where = f"the nodes of the {name} piece" if name != "both" else "nodes of both pieces in turns"
+    where = f"the nodes of the {name} piece" if name != "both" else "nodes of both pieces alternately"
     low, high, x = (grids[key].size for key in ("lower", "upper", name))
     return f"pressure on {where} ({x} points, the lower interface has {low}, the upper one {high}) is expected to " \
            f"ripple by {100 * ripple:.2g} % near x = {say(place, 3)}"

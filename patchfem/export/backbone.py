@@ -15,9 +15,10 @@ from .summary import write_json
 
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error")
 HEAD = ("method", "amplitude [m]", "frequency [Hz]", "frequency_error [Hz]", "damping", "damping_error")
-WAYS = {"balance": "The periodic motion that a negative damping of the whole rig would sustain. It is what a slow "
-                   "decay shows, and what a test in phase resonance follows.",
-        "decay": "A release from the largest amplitude, read from turn to turn.",
+WAYS = {"balance": "The periodic motion that the rig would have without a net loss of energy. A slow decay follows "
+                   "this motion, and so does a test in phase resonance.",
+        "decay": "A release from the largest amplitude; frequency and damping are read from one turning point to the "
+                 "next.",
         "quasi-static": "One static force along the shape of the mode with the contact held, and the loops of the "
                         "friction law."}
 COLOURS = {"balance": "accent", "decay": "warm", "quasi-static": "#2f9e63"}
@@ -130,7 +131,7 @@ def _held(found: Backbone) -> str:
 def sentences(found: Backbone) -> list:
     """The answer in sentences: frequency and damping ratio at both ends of the amplitudes first."""
     held = "" if found.stuck is None else f", and {_held(found)} while the contact holds"
-    out = [f"Mode {found.mode} has {found.free:.5g} Hz without the contact{held}."]
+    out = [f"The natural frequency of mode {found.mode} is {found.free:.5g} Hz without the contact{held}."]
     best = next((found.curves[way] for way in ("balance", "quasi-static", "decay") if way in found.curves), None)
     if best is not None:
         ends = [_told(best, k) for k in sorted({0, best.amplitude.size - 1})]
@@ -145,9 +146,10 @@ def sentences(found: Backbone) -> list:
     powers = [f"to the power {value:.3g} {where}" for value, where in (
         (found.micro, f"in micro-slip{theory}"), (found.gross, "in gross slip (theory: 1)")) if value is not None]
     if powers:
-        out.append(f"The contact's loss per cycle rises with the amplitude {' and '.join(powers)}.")
+        out.append(f"The energy that the contact dissipates per cycle grows with the amplitude {' and '.join(powers)}.")
     if found.flutter is not None:
-        out.append(f"Beyond {scales.short(found.flutter, 'm', 3)} the mode gains energy: friction no longer holds it.")
+        out.append(f"Beyond {scales.short(found.flutter, 'm', 3)} the mode gains energy, because friction no longer "
+                   "dissipates enough.")
     return out
 
 

@@ -69,7 +69,7 @@ def draw(knob: str, runs: list, tolerance: float, names: list):
     """
     figure, axes = drawing(2, 4.6, sharex=True, sharey=True)
     for axis, part, title in ((axes[0], "errors", "error that the run states"),
-                              (axes[1], "distances", "distance to the best run")):
+                              (axes[1], "distances", "difference from the best run")):
         axis.set(xscale="log", yscale="log", xlabel="CPU seconds of a run", title=title)
         for number, name in enumerate(names):
             _line(axis, runs, part, name, f"C{number % 10}")

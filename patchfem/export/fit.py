@@ -43,7 +43,7 @@ def draw(displacement, measured, model, held, quantity: str):
     loop.plot(displacement * size, model * scale, color=BLUE, lw=1.0, label="fitted")
     loop.set(xlabel=f"slide [{along}]", ylabel=f"{name} [{up}]", title="Measured and fitted")
     rest.axhline(0, color="0.4", lw=0.8)
-    rest.set(xlabel="row", ylabel=f"fitted - measured [{up}]", title="What is left over")
+    rest.set(xlabel="row", ylabel=f"fitted - measured [{up}]", title="Residual")
     loop.legend(loc="center", frameon=False)
     return figure
 
@@ -58,10 +58,10 @@ def lines_of(answer: dict) -> list:
     for key, one in (answer["values"] | offsets).items():
         out.append(line_of(f"{key:<26}", one))
     share = answer["rms"] / answer["peak"]
-    out.append(f"  rms of what is left over   {short(answer['rms'], answer['unit'], 4)}, {plain(share, 2)} of the peak")
+    out.append(f"  rms of the residual   {short(answer['rms'], answer['unit'], 4)}, {plain(share, 2)} of the peak")
     if answer["held"] is not None:
         held = answer["held"]
-        out.append(f"  rms of the rows held out   {short(held['rms'], answer['unit'], 4)} ({held['rows']} rows)")
+        out.append(f"  rms of held-out rows   {short(held['rms'], answer['unit'], 4)} ({held['rows']} rows)")
     return out
 
 

@@ -47,5 +47,5 @@ def lines_of(answer: dict) -> list:
     return [f"{answer['outcome']}: {answer['rows']} amplitudes of {answer['measured']} by {answer['method']}, "
             f"{answer['evaluations']} evaluations",
             *(line_of(f"{key:<26}", one) for key, one in answer["values"].items()),
-            f"  rms of what is left over   {100 * rms['frequency']:.2g} % of the frequency, {100 * rms['damping']:.2g} "
-            "% of the damping ratio"]
+            f"  rms of the residual   {100 * rms['frequency']:.2g} % of the frequency, {100 * rms['damping']:.2g} % of "
+            "the damping ratio"]

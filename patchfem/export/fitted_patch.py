@@ -103,9 +103,9 @@ def _held(answer: dict) -> str:
 def lines_of(answer: dict) -> list:
     """The answer as lines of text; answer: the object of fit.json."""
     low, high = (short(one, "m", 3) for one in answer["amplitudes"])
-    out = [f"{answer['outcome']}: laws of one point for a patch under {short(answer['load'], 'N', 4)} that slips at "
-           f"{short(answer['slip_force'], 'N', 4)} and has {_held(answer)} while nothing slips; "
-           f"{answer['rows']} amplitudes of the slide, {low} to {high}",
+    out = [f"{answer['outcome']}: lumped laws fitted to a patch under {short(answer['load'], 'N', 4)} that slips at "
+           f"{short(answer['slip_force'], 'N', 4)} and has {_held(answer)} while nothing slips; {answer['rows']} "
+           f"amplitudes of the slide, {low} to {high}",
            f"  {'law':<16}{'stiffness off by':>22}{'loss off by':>22}   values"]
     for law, one in answer["laws"].items():
         parts = (f"{_percent(one[part]['largest'])} (rms {_percent(one[part]['rms'])})" for part in PARTS)
@@ -125,13 +125,13 @@ def sentences(law: str, answer: dict) -> list:
     """What a law costs against the patch; answer: the object of fit.json."""
     (low, high), (stiff, loss) = answer["amplitudes"], (answer["laws"][law][part] for part in PARTS)
     low, high, at, there = (short(one, "m", 3) for one in (low, high, stiff["at"], loss["at"]))
-    return [f"From {low} to {high} of slide the stiffness of '{law}' is {_percent(abs(stiff['largest']))} off at most, "
-            f"at {at}, and {_percent(stiff['rms'])} rms.",
-            f"In a cycle it loses up to {_percent(abs(loss['largest']))} {'more' if loss['largest'] > 0 else 'less'} "
-            f"than the patch, at {there}, and is {_percent(loss['rms'])} off rms; a loss below a thousandth of 4 x "
-            "force x slide counts as that much.",
-            "The frequency of a mode is off by about half of the first at most, its damping by friction by both "
-            "together."]
+    return [f"For slide amplitudes from {low} to {high} the stiffness of '{law}' differs from that of the patch by at "
+            f"most {_percent(abs(stiff['largest']))} (at {at}), {_percent(stiff['rms'])} rms.",
+            f"Its energy dissipated per cycle is up to {_percent(abs(loss['largest']))} "
+            f"{'larger' if loss['largest'] > 0 else 'smaller'} than that of the patch (at {there}), "
+            f"{_percent(loss['rms'])} rms; a loss below a thousandth of 4 x force x slide is compared as that much.",
+            "The error of a mode's frequency is then at most about half that of the stiffness; the error of its "
+            "friction damping is at most both together."]
 
 
 def _percent(share: float) -> str:

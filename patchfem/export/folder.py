@@ -48,7 +48,8 @@ def run_into(what, target: Path, say=None, progress=None, fresh: bool = False, r
             result = run(what, say, progress, fresh=fresh, kept=kept)
         except NotConverged as error:
             if error.so_far is None:
-                raise NotConverged(f"{error}; nothing was computed before it, so there is no results folder") from None
+                raise NotConverged(f"{error}; the run stopped before any result, so there is no results "
+                                   "folder") from None
             result = _marked(error)
         return write(result, folder.path)
 

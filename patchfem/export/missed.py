@@ -58,10 +58,10 @@ def sentence(measures: dict, tolerance, where) -> str:
     name = max([name for name in FIRST if name in lost] or lost, key=beyond.get)
     share = np.where(lost[name], _share(measures[name]), 0.0)
     count, case, others = int(lost[name].sum()), int(np.argmax(share)), len(lost) - 1
-    known = f"{plain(100 * share[case], 2)} % of its value" if share[case] <= ZERO else "0 within its error"
+    known = f"{plain(100 * share[case], 2)} % of its value" if share[case] <= ZERO else "larger than the value"
     more = f"; {others} other measure{'s' * (others > 1)} miss{'es' * (others == 1)} it somewhere" if others else ""
-    return (f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {label(name)}, worst at {where(case)}: "
-            f"{known}{more}.")
+    return (f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {label(name)}; the largest error is at "
+            f"{where(case)}: {known}{more}.")
 
 
 def _beyond(one: dict, tolerance) -> np.ndarray:

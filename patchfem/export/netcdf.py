@@ -100,12 +100,13 @@ def of_run(histories: dict, modal, fields: dict, x, weight, strips: tuple | None
             if name != "time":
                 data[name] = (("interface", "time")[-np.ndim(values):], values, _attributes(name, np.ndim(values)))
     if interfaces:
-        coords["interface"] = ("interface", list(interfaces), {"long_name": "the two masses of it, 0 is the base"})
+        coords["interface"] = ("interface", list(interfaces), {"long_name": "the two masses of the interface; 0 is the "
+                                                                            "base"})
     if modal is not None:
         coords["mode"] = ("mode", list(modal[0]), {"long_name": "mode"})
         data["modal_coordinate"] = (("time", "mode"), modal[1], _attributes("modal_coordinate"))
     if x is not None:
-        coords["x"] = ("x", np.asarray(x), {"units": "m", "long_name": "place along the sliding direction"})
+        coords["x"] = ("x", np.asarray(x), {"units": "m", "long_name": "position along the sliding direction"})
         data["weight"] = ("x", np.asarray(weight), _attributes("weight"))
         coords["frame_time"] = ("frame", fields["time"], {"units": "s", "long_name": "time of the frame"})
         for name, values in fields.items():
@@ -117,11 +118,12 @@ def of_run(histories: dict, modal, fields: dict, x, weight, strips: tuple | None
                 over = ("frame", "x") if np.ndim(values) == 2 else ("frame", "strip", "x")
                 data[name] = (over, values, _attributes(name))
     if strips is not None:
-        coords["strip_offset"] = ("strip", strips[0], {"units": "m", "long_name": "place of the strip over the width"})
+        coords["strip_offset"] = ("strip", strips[0], {"units": "m", "long_name": "position of the strip across the "
+                                                                                  "width"})
         data["strip_normal_stress"] = (("strip", "x"), strips[1], _attributes("strip_normal_stress"))
     for name, (unit, values) in (levels or {}).items():
         drive = "force" if unit == "N" else "acceleration of the base"
-        text = {"level_drive": drive, "level_stuck": "whether the interface held",
+        text = {"level_drive": drive, "level_stuck": "whether the interface stuck",
                 "level_outcome": "outcome of the level"}
         about = {"units": unit} if unit else {}
         data[name] = ("level", values, about | {"long_name": text.get(name, name.replace("_", " "))})
@@ -140,11 +142,11 @@ def with_events(data: Contents, time, interface, kind, slide, count: int, meanin
     return data.also({
         "event_time": ("event", time, about),
         "event_interface": ("event", np.asarray(interface, np.int32),
-                            {"units": "1", "long_name": "number of the interface (of the strip where strips yaw) "
-                                                        "from 1, 0 for a border of the drive"}),
+                            {"units": "1", "long_name": "number of the interface from 1 (of the strip, if strips yaw); "
+                                                        "0 for a change of the drive"}),
         "event_kind": ("event", np.asarray(kind, np.int8), flags),
         "event_slide": ("event", slide, {"units": "m", "long_name": "relative displacement at the event; none at a "
-                                                            "border of the drive"})})
+                                                                    "change of the drive"})})
 
 
 READ = {"amplitude": ("m", "half peak-to-peak at the output"),
@@ -160,7 +162,7 @@ def with_curve(data: Contents, curve: dict) -> Contents:
     point, meanings = "curve_point", [name.replace(" ", "_") for name in names]
     out = {"curve_frequency": (point, curve["frequency"], {"units": "Hz", "long_name": "drive frequency"}),
            "curve_level": (point, curve["level"], {"units": "m s-2", "long_name": "drive: acceleration of the base, or "
-                                                                                  "force over the modal mass"}),
+                                                                                  "force divided by the modal mass"}),
            "curve_regime": (point, number.astype(np.int8), {"flag_values": np.arange(len(names), dtype=np.int8),
                                                             "flag_meanings": " ".join(meanings),
                                                             "long_name": "regime of the steady motion"}),
@@ -198,7 +200,7 @@ def with_spectra(data: Contents, found) -> Contents:
     columns = {"base_acceleration_spectrum": ("m2 s-3", found.drive, "one-sided density of the base acceleration"),
                "relative_displacement_spectrum": ("m2 Hz-1", found.place, "one-sided density of the output"),
                "absolute_acceleration_spectrum": ("m2 s-3", found.acceleration, "one-sided density of acceleration"),
-               "gain": ("s2", np.abs(found.gain), "size of H1, output over base acceleration"),
+               "gain": ("s2", np.abs(found.gain), "magnitude of H1, output over base acceleration"),
                "phase": ("rad", np.angle(found.gain), "phase of H1"), "coherence": ("1", found.coherence, "coherence")}
     return data.also({name: ("frequency", values, {"units": unit, "long_name": text})
                       for name, (unit, values, text) in columns.items()},

@@ -57,7 +57,7 @@ def variables(path: Path, names: set | None = None) -> tuple:
 def _looked(name: str, one: Held, sizes: dict) -> None:
     """ValueError for a variable that cannot be one of results; sizes: of the dimensions so far, added to."""
     if one.values.dtype.kind not in "biufSUO" or len(one.dims) != one.values.ndim:
-        raise ValueError(f"{name} holds {one.values.ndim}-dimensional {one.values.dtype}")
+        raise ValueError(f"{name} contains {one.values.ndim}-dimensional {one.values.dtype}")
     for dim, size in zip(one.dims, one.values.shape):
         if sizes.setdefault(dim, size) != size:
             raise ValueError(f"{name} has {size} values along {dim}, others {sizes[dim]}")
@@ -65,7 +65,7 @@ def _looked(name: str, one: Held, sizes: dict) -> None:
                               and np.isfinite(one.values).all()):
         raise ValueError(f"{name} is not a row of numbers")
     if one.values.dtype.kind == "f" and np.abs(one.values[np.isfinite(one.values)]).max(initial=0.0) > HUGE:
-        raise ValueError(f"{name} holds a number beyond {HUGE:g}")
+        raise ValueError(f"{name} contains a number beyond {HUGE:g}")
 
 
 def numeric(values) -> bool:

@@ -16,8 +16,8 @@ from .pages.words import SHARP, G, headline, in_order, linked, of_records, other
 SETTLED = ("steady", "stuck", "done")
 DASH = "&ndash;"
 ROOM = 700_000  # characters that the numbers of all charts may take: with library and player below 3 MB
-FILES = (("fields.vtkhdf", "both pieces and their interface, frame by frame (ParaView 5.13 or newer)"),
-         ("summary.json", "measures, outcome, warnings, what ran"),
+FILES = (("fields.vtkhdf", "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)"),
+         ("summary.json", "measures, outcome, warnings, effects and numerics"),
          ("result.nc", "histories and fields along the interface (xarray, MATLAB, ncdump)"),
          ("scene.resolved.toml", "the scene in SI with every default"))
 
@@ -120,15 +120,16 @@ def _spectra(data: dict) -> Picture | None:
 def _decay(data: dict) -> Picture | None:
     if "decay" not in data:
         return None
-    return Picture(charts.decay, (data["decay"],), "Frequency and damping ratio of the released output against half "
-                   "its peak-to-peak, structure and friction together; bars show the errors of reading and numerics.")
+    return Picture(charts.decay, (data["decay"],), "Frequency and damping ratio (structure and friction together) "
+                   "of the released output against half its peak-to-peak motion; bars show reading and numerical "
+                   "errors.")
 
 
 def _levels(data: dict) -> Picture | None:
     if "levels" not in data:
         return None
-    return Picture(charts.levels, (data["levels"],), "Amplitude at the end of every level, the state carried from one "
-                   f"to the next; arrows show the order of the test.{_under(data)}")
+    return Picture(charts.levels, (data["levels"],), "Amplitude at the end of every level; each level starts from the "
+                   f"state of the one before; arrows show the order of the test.{_under(data)}")
 
 
 def _wear(data: dict) -> Picture | None:
@@ -139,9 +140,9 @@ def _wear(data: dict) -> Picture | None:
     mean = depth.mean(axis=1) if depth.ndim == 3 else depth
     profiles = (states["time"] / data["wear"]["period"], states["normal_stress"], mean)
     return Picture(charts.wear, (data["x"], *profiles, history),
-                   f"The patch as it wears over {history['cycle'][-1]:.6g} cycles: pressure and worn depth of both "
+                   f"Wear of the patch over {history['cycle'][-1]:.6g} cycles: pressure and worn depth of both "
                    f"pieces together{', means over the width' if depth.ndim == 3 else ''}, and measures of patch and "
-                   "motion over their values on the new patch. All other pictures show the worn patch.")
+                   "motion divided by their values on the unworn patch. All other pictures show the worn patch.")
 
 
 def _worn_map(data: dict) -> Picture | None:
@@ -160,7 +161,7 @@ def _interface(data: dict) -> Picture | None:
         caption += f"; shear stress in {len(fields['time']) - 1} frames of {span}, the largest resultant in colour"
     if charts.part_in_contact(data["x"], fields["normal_stress"][0]):
         length, scale = scales.axis_unit(data["x"], "m")
-        caption += f". Only the contact is drawn, of {(data['x'][-1] - data['x'][0]) * scale:.4g} {length} in all"
+        caption += f". Only the part in contact is drawn, of {(data['x'][-1] - data['x'][0]) * scale:.4g} {length}"
     return Picture(charts.interface, (data["x"], fields), caption + ".")
 
 
@@ -224,9 +225,9 @@ def _histories(data: dict) -> Picture | None:
     begin, swings = charts.whole_from(history["time"], period, w["time"][0]), bool(data.get("released"))
     kept = int(np.sum(history["time"] < begin))
     if kept:
-        what = "reversals were kept: a band from the lowest to the highest of each cycle." \
+        what = "reversals were kept, drawn as a band from the lowest to the highest value of each cycle." \
             if kept * period > begin else f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
-        what = "turning points and stops were kept; the line joins them." if swings else what
+        what = "turning points and stops were kept, joined by lines." if swings else what
         unit, scale = scales.axis_unit(history["time"], "s")
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
     # a swing that dies down has no band per cycle: its turns are kept, and the line through them shows it
@@ -347,8 +348,8 @@ def _measures(data: dict) -> Section:
         text = means.get(name, "") + (f"; {others_lie} over records of the drive" if others_lie else "")
         rows.append([*cells, f"<td class=soft>{escape(text)}</td>"])
     note = (f"<p class=soft>The run holds {data['cycles']:.2g} of a cycle, so measures per cycle do not cover a "
-            "whole one.</p>") if part_of_cycle(data) else ""
-    heads = ("measure", ">value", ">error (±)", "unit", "in a workshop's units", "what it is")
+            "whole cycle.</p>") if part_of_cycle(data) else ""
+    heads = ("measure", ">value", ">error (±)", "unit", "in customary units", "what it is")
     return Section("measures", "Measures", table(heads, rows, "across many")
                    + f"<p class=soft>Value and error in the same unit; {SHARP.replace('±', 'error')}. "
                    f"summary.json has all digits in SI.</p>{note}")
@@ -359,12 +360,12 @@ def _cost(data: dict) -> Section:
     summary = data["summary"]
     rows = [[escape(e["effect"]), escape(e["equations"]), f"{e['seconds']:.3f}"] for e in summary["effects"]]
     parts = ", ".join(f"{k} {v:.3f} s" for k, v in summary["seconds"].items())
-    shared = " The law and the modes share one loop, timed under the law." if summary["kind"] == "rig" else ""
+    shared = " The time loop of law and modes is listed under the law." if summary["kind"] == "rig" else ""
     absent = shown_absent(summary["not_in_scene"], summary.get("numerics", {}).get("engine"))
     text = (table(("effect", "equations", ">seconds"), rows)
             + f"<p class=soft>Wall-clock seconds: {escape(parts)}.{shared}</p>"
-            f"<details><summary>Not in the scene, so neither imported nor computed</summary><p class=soft>"
-            f"{escape(', '.join(absent))}.</p></details>")
+            "<details><summary>Effects not in the scene, which are neither imported nor computed</summary>"
+            f"<p class=soft>{escape(', '.join(absent))}.</p></details>")
     return Section("cost", "What ran and what it cost", text)
 
 
@@ -374,8 +375,8 @@ def _origin(data: dict) -> Section:
     there = FILES[1:] if data["x"] is None else FILES
     files = "".join(f"<li><a href={name}>{name}</a>: {what}</li>" for name, what in there)
     again = "" if "command" not in data else \
-        f"<p>To run it again, in the folder of its scene:</p><pre>{escape(data['command'])}</pre>"
-    return Section("origin", "Scene and files", f"{again}<p>Beside this page:</p><ul>{files}</ul>"
+        f"<p>To repeat the run, in the folder of its scene:</p><pre>{escape(data['command'])}</pre>"
+    return Section("origin", "Scene and files", f"{again}<p>Files beside this page:</p><ul>{files}</ul>"
                    f"<details><summary>Scene</summary><pre>{escape(data['scene'])}</pre></details>"
                    "<details><summary>Scene in SI, every default written out</summary><pre>"
                    f"{escape(data['resolved'])}</pre></details><details><summary>Versions</summary>"

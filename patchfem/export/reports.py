@@ -23,14 +23,14 @@ def report_of(folders: list, out: Path | None = None, measured: Path | None = No
         raise PatchfemError("report: give at least one results folder")
     many = [(folder / "sweep.csv").is_file() for folder in folders]
     if len(set(many)) > 1:
-        raise PatchfemError(f"runs and sweeps cannot be laid side by side: {folders[many.index(True)]} is a sweep, "
+        raise PatchfemError(f"runs and sweeps cannot be compared on one page: {folders[many.index(True)]} is a sweep, "
                             f"{folders[many.index(False)]} is not")
     out = out if out is not None else (folders[0] / PAGE if many[0] and len(folders) == 1 else Path(PAGE))
     if not many[0]:
         runs = [beside.read(folder) for folder in folders]
         return _written(beside.page(runs, None if measured is None else _read(measured, runs)), out)
     if measured is not None:
-        raise PatchfemError(f"--measured {measured}: is laid over runs, not over sweeps")
+        raise PatchfemError(f"--measured {measured}: can only be plotted over runs, not over sweeps")
     tables = [sweeps.seen_from(sweeps.read_table(folder), folder, out) for folder in folders]
     names = beside.distinct([folder.resolve().name for folder in folders])
     return _written(sweep.page(tables[0] if len(tables) == 1 else sweeps.joined(tables, names)), out)

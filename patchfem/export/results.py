@@ -89,8 +89,8 @@ class Folder:
         """What is said when kept states are dropped, "" where there are none."""
         if not any(is_state(part.name) for part in self.path.iterdir()):
             return ""
-        return (f"note: {self.path.name} held the state of an interrupted run, now discarded; --resume would have "
-                "continued it")
+        return (f"note: {self.path.name} held the state of an interrupted run, which is now discarded; use --resume to "
+                "continue such a run")
 
     def _abandon(self) -> None:
         """Remove everything but a kept state; the folder too where there is none."""
@@ -121,5 +121,5 @@ def refuse_others(place: Path, shown, known, kind: str, dots: bool = False) -> N
     others = sorted(one.name for one in place.iterdir() if one.name.removesuffix(".partial") not in known
                     and not (unfinished(one.name) or is_state(one.name)) and not (dots and one.name.startswith(".")))
     if others:
-        raise PatchfemError(f"{shown}: {place.name} holds files that are not {kind} ({', '.join(others[:3])}"
-                            f"{', ...' if len(others) > 3 else ''}); choose another -o")
+        raise PatchfemError(f"{shown}: {place.name} contains files that are not {kind} "
+                            f"({', '.join(others[:3])}{', ...' if len(others) > 3 else ''}); choose another -o")

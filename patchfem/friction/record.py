@@ -16,7 +16,7 @@ def law_from(friction, load: float = 1.0):
 
 
 def held_stiffness(friction, load: float) -> float:
-    """Tangential stiffness [N/m] of a law under a load [N] while nothing slips: infinite where it holds rigidly, 0
+    """Tangential stiffness [N/m] of a law under a load [N] while nothing slips: infinite where it sticks rigidly, 0
     where it creeps."""
     if has(friction.law, "creeps"):
         return 0.0

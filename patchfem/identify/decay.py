@@ -58,7 +58,7 @@ def decay(time, value) -> Decay:
             break
         poles, last, rest = better, rms, left
     if not poles.size:
-        raise PatchfemError("nothing in the record rings and decays")
+        raise PatchfemError("the record contains no decaying oscillation")
     return _described(time, value, poles, last / size)
 
 
@@ -69,8 +69,8 @@ def _described(time, value, poles, misfit) -> Decay:
     energy = np.array([np.sum((shares[:, 2 * k + 1] + shares[:, 2 * k + 2])**2) for k in range(own.size)])
     kept = (rate > 0) & (energy > FAINT**2 * energy.max())
     if not kept.any():
-        raise PatchfemError("what rings in the record grows instead of decaying; begin it after the drive has "
-                            "ended")
+        raise PatchfemError("the oscillation in the record grows instead of decaying; begin the record after the drive "
+                            "has ended")
     w = np.hypot(own, rate)
     slopes = _slopes(time, value, poles)
     spread = misfit * np.std(value) * np.sqrt(np.maximum(np.diag(np.linalg.pinv(slopes.T @ slopes)), 0))

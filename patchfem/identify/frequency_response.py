@@ -42,8 +42,8 @@ def even_step(time) -> float:
     step = (time[-1] - time[0]) / (time.size - 1)
     off = np.abs(time - time[0] - step * np.arange(time.size)).max() / step
     if off > max(UNEVEN, 1e-5 * time.size):
-        raise PatchfemError(f"the times differ from an even step of {step:.6g} s by {off:.2g} steps; an evenly sampled "
-                            "record is needed")
+        raise PatchfemError(f"the times deviate from an even step of {step:.6g} s by up to {off:.2g} steps; an evenly "
+                            "sampled record is needed")
     return float(step)
 
 

@@ -40,8 +40,8 @@ def response_of(values: dict) -> str:
     """The one response among records; PatchfemError where there is none or several."""
     found = [name for name in POWER if name in values]
     if len(found) != 1:
-        raise PatchfemError(f"one response is needed, {' or '.join(POWER)}; there are {', '.join(found) or 'none'}: "
-                            "choose by --map")
+        raise PatchfemError(f"exactly one response is needed, {' or '.join(POWER)}; the record has "
+                            f"{', '.join(found) or 'none'}: choose one with --map")
     return found[0]
 
 
@@ -51,7 +51,7 @@ def estimated(values: dict, segment: float | None = None, window: str | None = N
     response, inputs = response_of(values), [name for name in INPUTS if name in values]
     if len(inputs) != 1 or "time" not in values:
         raise PatchfemError("a frequency response needs time, a response and one input, force or base_acceleration; "
-                            "there are " + ", ".join(values) + ": choose by --map, or take a free decay by --decay")
+                            "there are " + ", ".join(values) + ": choose with --map, or read a free decay with --decay")
     step = even_step(values["time"])
     count = None if segment is None else round(segment / step)
     return h1(step, values[inputs[0]], values[response], count, window), step, inputs[0], response
@@ -79,10 +79,11 @@ def of_drive(values: dict, segment: float | None, window: str | None, band: tupl
 def _of_force(found: Modes) -> tuple:
     if found.residue[0] <= 0:
         raise PatchfemError(f"the mode at {found.frequency[0]:.5g} Hz moves against the force: force and response are "
-                            "not at one place or one has the wrong sign, so the modal mass is not known")
+                            "not at the same point or one has the wrong sign, so the modal mass is unknown")
     size = np.sqrt(np.abs(found.residue) / found.residue[0])
     turned = found.residue < 0
-    notes = [f"the mode at {f:.5g} Hz moves against the force, which is impossible at one place; its sign is ignored"
+    notes = [f"the mode at {f:.5g} Hz moves against the force, which is impossible if both are at the same point; its "
+             "sign is ignored"
              for f in found.frequency[turned]]
     return {"slide": size, "output": size}, 1 / float(found.residue[0]), notes
 
@@ -93,7 +94,7 @@ def _of_base(found: Modes) -> tuple:
     scale = max(1.0, float(np.sqrt(np.sum(size**2))))
     out = np.sign(taken) * size * scale
     return {"slide": out, "output": out, "base": size / scale}, None, \
-        ["the motion of the base gives no mass: set moving_mass"]
+        ["a response to base motion gives no modal mass: set moving_mass"]
 
 
 def _told(found: Modes) -> list:
@@ -113,7 +114,8 @@ def _noted(found: Modes, estimate: Estimate, step: float) -> list:
         k = int(np.argmax(np.where(wide, found.read / found.damping, 0)))
         notes.append(f"segments of {estimate.segment * step:.3g} s (window {estimate.window}) widen the peak at "
                      f"{found.frequency[k]:.5g} Hz: the estimate reads a damping of {found.read[k]:.4g}, the record "
-                     f"has {found.damping[k]:.4g}, which is written; a free decay (--decay) gives it without an input")
+                     f"has {found.damping[k]:.4g}, which is the value written; a free decay (--decay) gives the "
+                     "damping without an input")
     if found.misfit > LOOSE:
         notes.append(f"the modes leave {100 * found.misfit:.0f} % of the response (root mean square) unexplained: "
                      "noise, or a rig that is not linear")
@@ -124,7 +126,7 @@ def _freely(values: dict, begin: float | None) -> tuple:
     """(times, values, name) of the one response from `begin` [s] on, unless given from its largest value."""
     name = response_of(values)
     if "time" not in values:
-        raise PatchfemError("a free decay needs time; choose by --map")
+        raise PatchfemError("a free decay needs a time channel; choose it with --map")
     time, value = values["time"], values[name]
     start = int(np.argmax(np.abs(value - value[-value.size // 20:].mean()))) if begin is None else \
         int(np.searchsorted(time, begin))
@@ -149,10 +151,10 @@ def of_decay(values: dict, begin: float | None = None) -> Listed:
     found = decay(*_freely(values, begin)[:2])
     about = [f"damping {zeta:.4g} +- {error:.1g}, logarithmic decrement {fall:.4g}" for zeta, error, fall in
              zip(found.damping, found.error, found.decrement())]
-    notes = ["a free decay gives no mass and no share of each mode: set moving_mass, slide, base and output"]
+    notes = ["a free decay gives neither the modal mass nor the mode shapes: set moving_mass, slide, base and output"]
     if found.misfit > LOOSE_DECAY:
-        notes.append(f"the decay leaves {100 * found.misfit:.0f} % of the record unexplained: it is noisy or not "
-                     "exponential, as where friction damps; the damping is a mean over it")
+        notes.append(f"the decay leaves {100 * found.misfit:.0f} % of the record unexplained: the decay is noisy or "
+                     "not exponential, as with friction damping; the damping given is a mean over the record")
     size = np.where(np.arange(found.frequency.size) == np.argmax(found.amplitude), 1.0, 0.0)
     return Listed(found.frequency, found.damping, {"slide": size, "output": size}, None, about, notes)
 
@@ -165,18 +167,19 @@ def of_shapes(shapes: Shapes, places: dict) -> Listed:
     if "slide" not in places:
         if len(shapes.motion) != 1:
             first = next(iter(shapes.motion))
-            raise PatchfemError(f"the file has {len(shapes.motion)} places; say where the contact slides, such as "
-                                f"--map slide={first[0]}:+{structure_places.AXES[first[1]]}")
+            raise PatchfemError(f"the file has {len(shapes.motion)} nodes and directions; give the one that slides, "
+                                f"such as --map slide={first[0]}:+{structure_places.AXES[first[1]]}")
         node, axis = next(iter(shapes.motion))
         places = {"slide": f"{node}:+{structure_places.AXES[axis]}", **places}
     motion = {key: shapes.at(text, key) for key, text in places.items()}
     held = float(np.sum(motion.get("base", motion["slide"])**2))
     if not held > 0:
-        raise PatchfemError("no mode moves the place that slides")
+        raise PatchfemError("no mode moves the node that slides")
     order = np.argsort(shapes.frequency, kind="stable")
     rows = {key: row[order] / np.sqrt(held) for key, row in motion.items()}
     rows.setdefault("output", rows["slide"])
     rows.setdefault("base", rows["slide"])
-    mass = f"moving_mass is what these modes hold there, {1 / held:.5g} kg; a heavier one leaves some of it out"
+    mass = (f"moving_mass is set to the mass that these modes contain there, {1 / held:.5g} kg; with a larger value "
+            "part of the mass belongs to no mode")
     return Listed(shapes.frequency[order], shapes.zeta[order], rows, 1 / held, [""] * order.size,
                   [*shapes.notes, mass])

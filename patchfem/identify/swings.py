@@ -66,7 +66,7 @@ def _first(time, value) -> tuple:
     lines[:8] = 0.0
     line = int(np.argmax(lines)) / (8 * even.size * (even[1] - even[0]))
     if not line > 0 or not np.ptp(value) > 0:
-        raise PatchfemError("nothing in the record swings")
+        raise PatchfemError("the record contains no oscillation")
     best = None
     for f in line * GRID:
         part = time - time[0] <= 1 / f

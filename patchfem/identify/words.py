@@ -12,7 +12,7 @@ def remarks(found: Fit, names) -> list:
     One each for a value on a bound, without effect, known only in a combination, or open to a bound, one for
     evaluations that failed, and one for a fit that did not converge.
     """
-    out = [f"{names[i]} is at its {side} bound {found.values[i]:.6g}: widen the range or doubt the law"
+    out = [f"{names[i]} is at its {side} bound {found.values[i]:.6g}: widen the range, or try another law"
            for i, side in enumerate(found.at_bound) if side]
     told = {i for row in found.unknown for i in np.flatnonzero(row)}
     out += [_combination(row, names) for row in found.unknown]
@@ -20,17 +20,17 @@ def remarks(found: Fit, names) -> list:
         if np.isfinite(found.intervals[i]).all():
             if found.open_ends[i].any() and not found.at_bound[i]:
                 side = "low" if found.open_ends[i, 0] else "high"
-                out.append(f"{name}: the rows do not rule out its {side} bound")
+                out.append(f"{name}: the rows do not exclude its {side} bound")
         elif found.sensitivity[i] <= 1e-9 * max(float(np.max(found.sensitivity)), found.rms):
             out.append(f"{name} has no effect on the rows: it is not determined")
         elif i not in told:
-            out.append(f"{name} is not determined: the rows allow the whole of its range")
+            out.append(f"{name} is not determined: every value in its range fits the rows")
     if found.failures:
-        out.append(f"{found.failures} of {found.evaluations} evaluations failed and were skipped, the first: "
-                   f"{found.reason}")
+        out.append(f"{found.failures} of {found.evaluations} evaluations failed and were skipped; the first failed "
+                   f"because: {found.reason}")
     if found.outcome is Outcome.NOT_CONVERGED:
-        out.append(f"not converged: the best descent did not settle within {MOST} evaluations, and no other start "
-                   "ended within 1 % of its score")
+        out.append(f"not converged: the best search did not settle within {MOST} evaluations, and no other start ended "
+                   "within 1 % of its score")
     return out
 
 

@@ -35,7 +35,7 @@ def read_records(path, asked: list) -> Records:
         return of_sets(path, universal.sets_of(path), asked)
     if ending in ENDINGS:
         return chosen(path, _columns(path), asked, [])
-    raise PatchfemError(f"{path}: files that are imported end in {', '.join(ENDINGS)}")
+    raise PatchfemError(f"{path}: the name of an imported file must end in {', '.join(ENDINGS)}")
 
 
 def of_sets(path, sets: list, asked: list) -> Records:
@@ -43,8 +43,8 @@ def of_sets(path, sets: list, asked: list) -> Records:
     notes = []
     there = universal.channels(path, sets, notes)
     if not there:
-        raise PatchfemError(f"{path}: no record over time (dataset 58 of function type 1); what it holds is modes or "
-                            "frequency responses, which become a scene's modes: -o modes.toml")
+        raise PatchfemError(f"{path}: contains no record over time (dataset 58, function type 1), only modes or "
+                            "frequency responses; write these as the modes of a scene with -o modes.toml")
     return chosen(path, there, asked, notes)
 
 
@@ -106,8 +106,8 @@ def _variables(path: Path, asked: list) -> Records:
     held = ", ".join(f"{name} {'x'.join(map(str, one.shape))}" for name, one in list(arrays.items())[:20]) or \
         "no array of numbers (objects and structures of several elements are not read)"
     if not asked:
-        raise PatchfemError(f"{path}: say what its variables are, such as --map \"time=t [s]\" --map \"force=F [N]\"; "
-                            f"it holds {held}")
+        raise PatchfemError(f'{path}: assign its variables, such as --map "time=t [s]" --map "force=F [N]"; it '
+                            f"contains {held}")
     return checked(path, {one.quantity: _values(path, arrays, one, held) for one in
                           sorted(asked, key=lambda one: one.quantity != "time")}, [])
 
@@ -116,10 +116,10 @@ def _values(path, arrays: dict, one: Wanted, held: str):
     found = _COLUMN.fullmatch(one.source)
     name, column = (found[1], int(found[2]) - 1) if found else (one.source, None)
     if name not in arrays:
-        raise PatchfemError(f"{path}: no variable '{name[:40]}'; it holds {held}")
+        raise PatchfemError(f"{path}: no variable '{name[:40]}'; it contains {held}")
     if not one.unit:
-        raise PatchfemError(f"--map {one.quantity}={one.source}: a .mat file holds no units; write the unit, such as "
-                            f"\"{one.quantity}={one.source} [unit]\"")
+        raise PatchfemError(f"--map {one.quantity}={one.source}: a .mat file has no units; write the unit, such as "
+                            f'"{one.quantity}={one.source} [unit]"')
     values = arrays[name].values()
     if column is None:
         if values.ndim != 2 or min(values.shape) != 1:

@@ -40,13 +40,14 @@ class Loop:
             raise PatchfemError(f"--hold {hold}: column=value,value is needed, such as cycle=1,2")
         if name not in self.labels:
             known = ", ".join(self.labels) or "none"
-            raise PatchfemError(f"--hold {name}: no such column of labels in {self.path} (there: {known}); "
-                                "add one, such as `run`, that marks the rows: time, displacement and force do not")
+            raise PatchfemError(f"--hold {name}: {self.path} has no column of labels with this name (it "
+                                f"has: {known}); add one, such as `run`, because time, displacement and force cannot "
+                                "mark rows")
         there = [_plain(cell) for cell in self.labels[name]]
         absent = [one for one in wanted if _plain(one) not in there]
         if absent:
             known = ", ".join(dict.fromkeys(self.labels[name]))
-            raise PatchfemError(f"--hold {name}={','.join(absent)}: no row of {self.path} has it (there: "
+            raise PatchfemError(f"--hold {name}={','.join(absent)}: no row of {self.path} has this value (it has: "
                                 f"{known[:200]})")
         kept = {_plain(one) for one in wanted}
         return np.array([cell in kept for cell in there])

@@ -94,7 +94,7 @@ def _symmetric(path, values, wanted: str):
     if values.shape[0] != values.shape[1] or not values.shape[0]:
         raise PatchfemError(f"{path}: the {wanted} must be square, not of shape {values.shape}")
     if not np.isfinite(values.data).all():
-        raise PatchfemError(f"{path}: the {wanted} holds values that are not finite")
+        raise PatchfemError(f"{path}: the {wanted} contains values that are not finite")
     values = values.astype(float)
     skew, most = abs(values - values.T).max(), abs(values).max()
     if skew > SKEW * most:
@@ -113,12 +113,12 @@ def _named(path, names, wanted: str) -> str:
     other = [kind for kind, known in NAMES.items() if len(names) == 1 and
              names[0].rpartition(".")[2].lower() in known]
     if other:
-        raise PatchfemError(f"{path}: its one array, {names[0]}, is by its name the {other[0]}, not the {wanted}; name "
-                            f"the file of the {wanted}")
+        raise PatchfemError(f"{path}: its one array, {names[0]}, has the name of a {other[0]}, but the {wanted} is "
+                            f"needed; give the file of the {wanted}")
     if len(names) == 1:
         return names[0]
     held = ", ".join(names[:12]) or "none"
-    raise PatchfemError(f"{path}: holds no {wanted} by a known name ({', '.join(NAMES[wanted])}); its arrays: "
+    raise PatchfemError(f"{path}: contains no {wanted} under a known name ({', '.join(NAMES[wanted])}); its arrays: "
                         f"{held}")
 
 
@@ -130,11 +130,12 @@ def _market(path: Path, wanted: str) -> Matrix:
     first, *lines = head.decode("latin-1").split("\n")
     words = first.lower().split()
     if "pattern" in words:
-        raise PatchfemError(f"{path}: a pattern without numbers; write the matrix with its values")
+        raise PatchfemError(f"{path}: a Matrix Market pattern without numbers; write the matrix with its values")
     size = [int(word) for word in next(line for line in lines if line.strip() and line[0] != "%").split()]
     count = size[2] if len(size) > 2 else size[0] * size[1]
     if max(size[:2]) > nastran.SIDE or count > min(nastran.MOST, path.stat().st_size):
-        raise PatchfemError(f"{path}: announces {count} numbers in {size[0]} x {size[1]}, more than it can hold")
+        raise PatchfemError(f"{path}: its header announces {count} numbers in {size[0]} x {size[1]}, more than the "
+                            "file can hold")
     return Matrix(sparse.coo_array(mmread(path)))
 
 
@@ -145,8 +146,8 @@ def _abaqus(path: Path) -> Matrix:
         first = next(lines, "")
         rows = np.loadtxt(chain([first], lines), delimiter="," if "," in first else None, ndmin=2)
     if rows.shape[1] not in (3, 5) or not rows.size:
-        raise PatchfemError(f"{path}: neither Matrix Market nor lines of row, column, number or of node, direction, "
-                            "node, direction, number")
+        raise PatchfemError(f"{path}: is not a matrix: write Matrix Market, or lines of row, column, number, or of "
+                            "node, direction, node, direction, number")
     ends = rows[:, :-1].astype(int)
     if (ends != rows[:, :-1]).any():
         raise PatchfemError(f"{path}: rows, nodes and directions must be whole numbers")
@@ -202,7 +203,8 @@ def aligned(stiffness: Matrix, *others: Matrix) -> list:
         places = np.unique(np.vstack([one.places for one in every]), axis=0)
         return [Matrix(_spread(one, places), places) for one in every]
     if any(one.places is not None for one in every):
-        raise PatchfemError("one of the files names nodes and directions and another does not; export all in one way")
+        raise PatchfemError("some of the files name nodes and directions and others do not; export all files in the "
+                            "same way")
     n = max(one.values.shape[0] for one in every)
     sizes = [one.values.shape[0] if one.sized else n for one in every]
     if len(set(sizes)) > 1:

@@ -58,7 +58,7 @@ def output4(path) -> dict:
     except (ValueError, IndexError, KeyError, struct.error, UnicodeDecodeError) as error:
         raise _unreadable(path, error) from None
     if not found:
-        raise PatchfemError(f"{path}: holds no matrix")
+        raise PatchfemError(f"{path}: contains no matrix")
     return found
 
 
@@ -234,7 +234,7 @@ def punched(path) -> dict:
             except (ValueError, IndexError, KeyError) as error:
                 raise PatchfemError(f"{path}:{number}: not a readable DMIG card ({error})") from None
     if not found:
-        raise PatchfemError(f"{path}: holds no DMIG card; punch the matrices with EXTSEOUT(DMIGPCH) or a DMAP alter")
+        raise PatchfemError(f"{path}: contains no DMIG card; punch the matrices with EXTSEOUT(DMIGPCH) or a DMAP alter")
     return found
 
 
@@ -254,7 +254,7 @@ def real(text: str) -> float:
     """A Nastran number: 1.5-3, 1.5D-3 and 1.5E-3 are one; ValueError for what is none."""
     found = _NUMBER.match(text)
     if found is None:
-        raise ValueError(f"'{text}' is no number")
+        raise ValueError(f"'{text}' is not a number")
     return float(f"{found[1]}e{found[2] or 0}")
 
 

@@ -41,9 +41,9 @@ def read_path(path, units: Mapping = UNITS) -> tuple:
 def _check(path, time, *places) -> None:
     for name, column in zip(("time", "displacement", "lateral"), (time, *places)):
         if (first := column[0]) != 0:
-            raise PatchfemError(f"{path}:2: {name} starts at {first:g}: a slide must start at 0, 0, where the pieces "
-                                f"are pressed; subtract the first {name} from the column, or let `patchfem import "
-                                "--zero` count from the first row")
+            raise PatchfemError(f"{path}:2: {name} starts at {first:g}: a slide must start at time 0 and "
+                                f"displacement 0; subtract the first {name} from the column, or use `patchfem "
+                                "import --zero`")
     rising(path, time)
     if not any(column.any() for column in places):
         raise PatchfemError(f"{path}: displacement is 0 in every row, so nothing slides")

@@ -116,8 +116,8 @@ def chosen(path: Path, channels: list, asked: list, notes: list) -> Records:
         raise PatchfemError(f"{path}: {names.count(twice[0])} channels are {twice[0]}; choose with --map "
                             f"{twice[0]}=CHANNEL among {listed(channels)}")
     if not set(names) - {"time"}:
-        raise PatchfemError(f"{path}: no channel says what it is; choose with --map force=CHANNEL [N], "
-                            f"displacement=CHANNEL [mm] among {listed(channels)}")
+        raise PatchfemError(f"{path}: no channel label tells its quantity; choose channels with --map force=CHANNEL "
+                            f"[N], displacement=CHANNEL [mm] among {listed(channels)}")
     values = {name: _in_si(path, name, one, unit) for name, one, unit in picked}
     if "time" not in values:
         values = _shared_time(path, [one for _, one, _ in picked], channels, bool(asked)) | values

@@ -47,8 +47,8 @@ def read_spectrum(path) -> tuple:
     frequency, level = table.values["frequency"], table.values["level"]
     wrong = np.flatnonzero((level <= 0) | (np.diff(frequency, prepend=0.0) <= 0))
     if wrong.size:
-        raise PatchfemError(f"{path}:{wrong[0] + 2}: frequencies that rise from above 0 Hz and levels above 0 are "
-                            f"wanted, not {frequency[wrong[0]]:g} Hz with {level[wrong[0]]:g} m^2/s^3")
+        raise PatchfemError(f"{path}:{wrong[0] + 2}: frequencies must be above 0 Hz and rise, and levels must be above "
+                            f"0, but this row has {frequency[wrong[0]]:g} Hz and {level[wrong[0]]:g} m^2/s^3")
     return frequency, level
 
 

@@ -24,7 +24,8 @@ def sets_of(path, where: str = "") -> list:
     try:
         import pyuff
     except ImportError:
-        raise Missing(f"{where}universal files: the package pyuff reads them; pip install 'patchfem[lab]'") from None
+        raise Missing(f"{where}reading universal files needs the package pyuff; run pip install "
+                      "'patchfem[lab]'") from None
     path = Path(path)
     if not path.is_file():
         raise Missing(f"{where}{path}: there is no such file")
@@ -75,7 +76,7 @@ def _channel(path, number: int, one: dict, scale, notes: list) -> Channel:
         factor = 1.0 if scale is None else 1.0 / scale[1 if quantity == "force" else 0]
         if label or scale is None:
             notes.append(f"record {number} ({quantity}): " + (f"its unit '{label[:20]}' is not known" if label else
-                         "it has no unit") + ("; dataset 164 is followed" if scale is not None else
+                         "it has no unit") + ("; the unit of dataset 164 is used" if scale is not None else
                                               "; its values are taken as SI; if they are not, give the unit with "
                                               "--map"))
     direction = int(one["rsp_dir"])

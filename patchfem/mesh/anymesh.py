@@ -142,7 +142,7 @@ def pieces(raw: Tagged, where) -> PairMesh:
     lower, upper = _piece(raw, "lower", *owned["lower"], where), _piece(raw, "upper", *owned["upper"], where)
     apart = np.abs(lower.x[[0, -1]] - upper.x[[0, -1]]).max()
     if apart > CLOSE * lower.length:
-        fault = f"lengths {lower.length:.9g} and {upper.length:.9g} m, ends up to {apart:.6g} m apart"
+        fault = f"lengths {lower.length:.9g} and {upper.length:.9g} m, with ends up to {apart:.6g} m apart"
         raise PatchfemError(f"{where}: lower_interface and upper_interface do not match ({fault}); "
                             "give both the same ends (the nodes between may differ)")
     return PairMesh(_centred(lower, lower.x), _centred(upper, lower.x))
@@ -185,11 +185,12 @@ def _piece(raw: Tagged, side: str, mine, used, where) -> PieceMesh:
         nodes = np.unique(raw.nodes[f"{side}_{name}"])
         strange = int((~np.isin(nodes, used)).sum())
         if strange:
-            raise PatchfemError(f"{where}: {side}_{name} holds {strange} nodes that no cell of the {side} piece has")
+            raise PatchfemError(f"{where}: {side}_{name} contains {strange} nodes that belong to no cell of the {side} "
+                                "piece")
         ends[name] = np.searchsorted(used, nodes)
     ends["interface"] = _interface(points, ends["interface"], side, where)
     if ends["far"].size < 2 or np.isin(ends["far"], ends["interface"]).any():
-        raise PatchfemError(f"{where}: {side}_far must hold two nodes or more, none of them at the interface")
+        raise PatchfemError(f"{where}: {side}_far must contain two nodes or more, none of them at the interface")
     mesh = PieceMesh(points, triangles, quads, raw.names[mine] == f"{side}_coating", ends["interface"], ends["far"])
     _joined(mesh, side, where)
     return mesh
@@ -226,7 +227,7 @@ def _interface(points, nodes, side: str, where) -> np.ndarray:
     """
     name = f"{side}_interface"
     if nodes.size < 3:
-        raise PatchfemError(f"{where}: {name} holds {nodes.size} nodes; three or more are needed")
+        raise PatchfemError(f"{where}: {name} contains {nodes.size} nodes; three or more are needed")
     nodes = nodes[np.argsort(points[nodes, 0], kind="stable")]
     x, y = points[nodes].T
     close = CLOSE * np.ptp(x)
@@ -280,7 +281,8 @@ def _joined(mesh: PieceMesh, side: str, where) -> None:
     _hanging(mesh, border, side, where)
     within = np.setdiff1d(mesh.far, border)
     if within.size:
-        raise PatchfemError(f"{where}: {side}_far holds {within.size} nodes inside the {side} piece; tag its border")
+        raise PatchfemError(f"{where}: {side}_far contains {within.size} nodes inside the {side} piece; tag only its "
+                            "border")
     wanted = np.sort(np.stack([mesh.interface[:-1], mesh.interface[1:]], axis=1), axis=1)
     gone = ~np.isin(wanted[:, 0] * count + wanted[:, 1], key[~inner])
     if gone.any():

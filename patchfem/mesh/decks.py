@@ -200,7 +200,7 @@ def _tagged(nodes: dict, elements: dict, node_sets: dict, element_sets: dict, ho
         for number in element_sets.get(tag, ()):
             corners = elements.get(number, ())
             if len(corners) != 2:
-                raise PatchfemError(f"{tag} holds element {number}, which is not a line element")
+                raise PatchfemError(f"{tag} contains element {number}, which is not a line element")
             numbers += corners
         edges[tag] = np.array(places(tag, numbers), np.int64)
     points = np.array(list(nodes.values()), float) if nodes else np.empty((0, 2))

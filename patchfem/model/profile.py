@@ -75,8 +75,7 @@ def _levelled(path: Path, x, cell: float, material: bool) -> tuple:
     trace = level(whole)
     slope, notes = float(np.polyfit(whole.x, whole.z - trace.z, 1)[0]), trace.notes
     if abs(slope) * trace.length > 1e-2 * np.ptp(trace.z):
-        notes = (*notes, f"{trace.source}: levelled, a slope of {slope:.3g} rad is taken out; a tilt belongs in "
-                         "[contact.tilt]")
+        notes = (*notes, f"{trace.source}: the slope of {slope:.3g} rad was subtracted; give a tilt in [contact.tilt]")
     straight = bool(np.std(trace.z) <= max(NOISE, 1e-5 * np.ptp(whole.z)))
     before, after = int(trace.x[0] > x[0]), int(trace.x[-1] < x[-1])
     places = np.concatenate([x[:1][:before], trace.x, x[-1:][:after]])

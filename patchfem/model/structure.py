@@ -72,8 +72,9 @@ def own_modes(scene, joint: float | None = None) -> ModalBasis:
     try:
         return module_of("structure.bonded").freed(found, held, 0.0 if bonded is None else bonded.damping)
     except PatchfemError as error:
-        raise PatchfemError(f"{scene.where('structure.measured')}: {error}; give the frequencies of the bolted rig, a "
-                            "softer joint, or leave 'measured' out if they are those without the joint") from None
+        raise PatchfemError(f"{scene.where('structure.measured')}: {error}; give the frequencies of the bolted rig, "
+                            "give a softer joint, or leave 'measured' out if the frequencies are those without the "
+                            "joint") from None
 
 
 def of_a_patch(scene) -> bool:
@@ -99,10 +100,10 @@ def stiffness_of(one, load: float) -> float:
     held, curved = record.held_stiffness(f, load), has(f.law, "bonds") and (f.order, f.reading) != (1, "stretch")
     if 0 < held < inf and not curved:
         return held
-    why = "holds rigidly" if held == inf else "holds with no one stiffness" if curved else "holds nothing"
-    raise PatchfemError(f"{one.key}: law '{f.law}' {why} here, so its stiffness cannot be taken off the modes; add "
-                        "an elastic part ([contact.shear], or a law with a stiffness such as iwan), or give the modes "
-                        "without the joint", "structure.measured")
+    why = "sticks rigidly" if held == inf else "has no single stiffness" if curved else "has no stiffness"
+    raise PatchfemError(f"{one.key}: law '{f.law}' {why} here, so its stiffness cannot be subtracted from the modes; "
+                        "add an elastic part ([contact.shear], or a law with a stiffness such as iwan), or give the "
+                        "modes without the joint", "structure.measured")
 
 
 def _as_given(scene) -> ModalBasis:

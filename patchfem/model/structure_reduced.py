@@ -108,7 +108,7 @@ def _placed(every: list, boundary: tuple, moved: tuple | None, driven: bool) -> 
     except PatchfemError as error:
         raise PatchfemError(str(error), "structure.reduced.mass") from None
     if len(every) > 1 and not abs(every[0].values - every[1].values).nnz:
-        raise PatchfemError("holds the same numbers as the stiffness; name the file of the mass",
+        raise PatchfemError("contains the same numbers as the stiffness; give the file of the mass",
                             "structure.reduced.mass")
     n = one.values.shape[0]
     rows = np.concatenate([_rows(each, one, n, "boundary") for each in boundary])
@@ -119,8 +119,8 @@ def _placed(every: list, boundary: tuple, moved: tuple | None, driven: bool) -> 
     moving, notes = np.zeros(n), []
     if moved is None and one.places is None:
         moving[:] = 1.0
-        notes = [f"all {n} coordinates of structure.reduced move with the base, as the files name no directions; name "
-                 "those along x in structure.reduced.moved"] if n > rows.size else []
+        notes = [f"all {n} coordinates of structure.reduced move with the base, because the files name no directions; "
+                 "give the ones along x in structure.reduced.moved"] if n > rows.size else []
     for each in ("x",) if moved is None and one.places is not None else moved or ():
         moving[_rows(each, one, n, "moved")] = 1.0
     return rows, moving, notes
@@ -138,7 +138,7 @@ def _rows(text, one: matrices.Matrix, n: int, key: str) -> np.ndarray:
         count = count or last - first + 1
         step = (last - first) / max(count - 1, 1)
         if not 1 <= first <= last <= n or step != int(step) or (step == 0 and count > 1):
-            raise PatchfemError(f"'{text}' is not a range of rows from 1 to {n}; 'a..b:n' are n rows from a to b",
+            raise PatchfemError(f"'{text}' is not a range of rows from 1 to {n}; write 'a..b:n' for n rows from a to b",
                                 where)
         return np.arange(first - 1, last, max(int(step), 1))
     if one.places is None:
@@ -147,7 +147,7 @@ def _rows(text, one: matrices.Matrix, n: int, key: str) -> np.ndarray:
         return np.flatnonzero(one.places[:, 1] == AXES.index(text) + 1)
     found = _PLACE.fullmatch(text)
     if found is None:
-        raise PatchfemError(f"'{text}' is not a place; node:direction is needed, such as \"1201:x\"", where)
+        raise PatchfemError(f"'{text}' is not a node with a direction; write node:direction, such as \"1201:x\"", where)
     place = int(found[1]), AXES.index(found[2]) + 1 if found[2] else 0
     rows = np.flatnonzero((one.places == place).all(axis=1))
     if not rows.size:

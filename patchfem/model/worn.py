@@ -42,7 +42,8 @@ class WornBefore:
         if self.cycles < asked * (1 - 1e-9):
             cycles += f" of {asked:.6g}"
         return (f"continues from {self.path.parent.name}/{self.path.name}, up to {say(float(self.depth.max()), 3)} "
-                f"worn off in {cycles} cycles; cycles count from there, worn_volume and worn_depth_max from new pieces")
+                f"worn off in {cycles} cycles; cycles count from there, but worn_volume and worn_depth_max from new "
+                "pieces")
 
     def on(self, x) -> np.ndarray:
         """Worn depth (m,) [m] at x (m,) [m] of an interface; PatchfemError unless it is as long."""
@@ -67,7 +68,7 @@ class WornBefore:
 
     def _as_long(self, first: float, last: float) -> None:
         if not np.allclose(self.x[[0, -1]], (first, last), rtol=1e-6, atol=0):
-            raise PatchfemError(f"{self.path}: worn on an interface of {say(float(np.ptp(self.x)))}, and this one has "
+            raise PatchfemError(f"{self.path}: its interface is {say(float(np.ptp(self.x)))} long but this one "
                                 f"{say(last - first)}; choose a run of the same pieces", KEY)
 
 
@@ -85,9 +86,9 @@ def read(path: Path) -> WornBefore:
         found = WornBefore(path, x, depth, gap - depth, float(cycles[-1]), scene, measures)
         right = row and x.size > 1 and (np.diff(x) > 0).all() and depth.min() >= 0 and bool(found.sentence)
     except UNREADABLE:
-        raise PatchfemError(f"{path}: not the result.nc of a run with [wear] over a patch; name one", KEY) from None
+        raise PatchfemError(f"{path}: not the result.nc of a run with [wear] and [contact]; give one", KEY) from None
     if strips:
-        raise PatchfemError(f"{path}: worn strip by strip, which no run can continue yet; choose a run without "
+        raise PatchfemError(f"{path}: worn strip by strip, and such wear cannot be continued yet; choose a run without "
                             "[contact.strips]", KEY)
     if not right:
         raise PatchfemError(f"{path}: its worn depth is not a row of depths along a patch; run that scene again", KEY)

@@ -49,7 +49,7 @@ def no_onset(kind: str, length: float | None = None) -> str:
     """The reason why a run of levels has no onset; arguments as in `past_onset`."""
     what = {"slip": "slips", "gauge": f"moves the output by more than {say(length)}" if length else ""}.get(
         kind, f"distorts the acceleration (third over first harmonic) by more than {DISTORTED:g}")
-    return f"no level on the way up {what}"
+    return f"no rising level {what}"
 
 
 def bracket(levels, past: Callable[[Level], bool]) -> tuple | None:

@@ -12,11 +12,11 @@ from .rows import TABLE
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
 SHARED = 0.05  # of the slide, carried by another mode, from which no damping ratio is one of the first
 CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
-HOLDS = "the interface holds as a whole throughout the last cycles"
+HOLDS = "the whole interface sticks throughout the last cycles"
 UNBOUNDED = "no bounded motion exists at this drive"
-STILL = "the output stands still: the first harmonic of its acceleration is 0 within its floor"
-UNCLOSED = "the loop does not close: what the interface stores changes by more than it dissipates in the last " \
-           "cycles; energy_dissipated is that of the whole run"
+STILL = "the output does not move: the first harmonic of its acceleration is 0 within the computable accuracy"
+UNCLOSED = ("the friction loop does not close: in the last cycles the stored energy changes by more than the "
+            "dissipated energy; energy_dissipated is that of the whole run")
 
 
 def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dict:
@@ -75,9 +75,9 @@ def _of_phase(values, drive) -> str:
 
 def _of_cycles(name: str, values, window, drive, beside: float) -> str:
     if not sinusoidal(drive):
-        return "it needs a drive that ends as a sine"
+        return "this needs a drive that ends as a sine"
     if not whole(window.time[-1] - window.time[0], drive):
-        return "the run holds no whole cycle of the drive"
+        return "the run contains no whole cycle of the drive"
     if name in ACCELERATIONS and ACCELERATIONS[0] in values:
         return STILL
     if name in ACCELERATIONS:
@@ -85,6 +85,6 @@ def _of_cycles(name: str, values, window, drive, beside: float) -> str:
     if "equivalent_stiffness" not in values:
         return f"{HOLDS}, so its loop has no width"
     if name == "equivalent_damping":
-        return f"it is the ratio of mode 1, and another mode carries {plain(100 * beside, 2)} % of the slide" \
-            if beside > SHARED else "the first mode is rigid, or leaves the interface at rest"
-    return "none of the last cycles shows the force on both sides of its largest slides"
+        return f"it is the damping ratio of mode 1, but another mode carries {plain(100 * beside, 2)} % of the slide" \
+            if beside > SHARED else "mode 1 is a rigid-body mode, or does not move the interface"
+    return "in none of the last cycles is the force known on both sides of the largest slides"

@@ -235,7 +235,7 @@ def refusal(parts: tuple, free: float | None = None) -> str:
     text = f"about {total / 1e9:.3g} GB are needed, {max(free, 0.0) / 1e9:.2g} GB are free"
     if most is None or most.bytes < 0.1 * total:
         return f"{text}; give the process more memory"
-    return f"{text}; {most.bytes / 1e9:.3g} GB are for {most.what}: {CURES.get(most.key, f'lower {most.key}')}"
+    return f"{text}; {most.bytes / 1e9:.3g} GB of it are for {most.what}: {CURES.get(most.key, f'lower {most.key}')}"
 
 
 def refuse(parts: tuple) -> None:

@@ -22,7 +22,7 @@ from .wear import plan as of_wear
 
 LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
 GROUPS = {  # group -> (what it is, SI unit of its value)
-    "D": ("D: friction limit over the largest push of the drive", "1"),
+    "D": ("D: friction limit over the largest force of the drive", "1"),
     "knee": ("acceleration beyond which friction alone does not bound a resonance", "m s-2"),
     "drive_amplitude_over_bond_length": ("amplitude of the drive over the bond length", "1"),
     "amplitude_over_bond_length": ("amplitude of the slide over the bond length", "1"),
@@ -144,15 +144,16 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: list) -> list:
     """Sentences on what the groups say; said: those of the motion, the patch and the sum over bonds."""
     out = list(said[0])
     if text := memory.refusal(parts):
-        out.append(f"run will refuse: {text}")
+        out.append(f"`run` will refuse this scene: {text}")
     out += [*said[1], *said[2]]
     if "slip_length" in groups:
         about = f"by about {say(groups['slip_length'], 3)} before the patch slips"
         out.append(f"the pieces shear elastically {about}" if model.patch.shear else
-                   f"the pieces are rigid in shear here; elastic ones give way {about}, which [contact.shear] adds")
+                   f"the pieces are rigid in shear in this scene; elastic pieces would shear {about}: add "
+                   "[contact.shear] to include it")
     if model.kind == "rig" and model.soft and model.rig.load_varies:
-        out.append(f"{model.soft}: tangential modes of all nodes, because the load changes with the motion; half as "
-                   "many give the error")
+        out.append(f"{model.soft}is computed with the tangential modes of all nodes, because the load changes with the "
+                   "motion; a run with half as many gives the error")
     return out
 
 
@@ -200,6 +201,6 @@ def _groove_words(model: Model) -> list:
     if model.grooves is None or not load > 0:
         return []
     g, mu = model.grooves, model.friction.static
-    return [f"the grooves act as a spring N k^2 A = {g.stiffness(load):.4g} N/m at their bottom and hold up to "
-            f"{g.capacity(load, mu):.4g} N on their steepest flank, where friction alone holds mu N = {mu * load:.4g} "
-            "N"]
+    return [f"the grooves act as a spring N k^2 A = {g.stiffness(load):.4g} N/m at their bottom and resist up to "
+            f"{g.capacity(load, mu):.4g} N on their steepest flank, while friction alone resists mu N = "
+            f"{mu * load:.4g} N"]

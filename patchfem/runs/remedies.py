@@ -20,7 +20,7 @@ SIZE = "contact.element_size"  # an even mesh finds the ends of a contact at fir
 OF_PEAK = ("pressure_peak", "loaded_fraction")
 OF_SAMPLES = ("stick_fraction", "slip_start_phase")  # of a cycle of a balance, however many harmonics it has
 RINGS = "ring_"  # measures of a ring beside the motion, which an engine without steps need not have
-READ = "no setting is known to improve it; judge it by its error"
+READ = "no known setting improves it; use it with its stated error"
 # what a run answers first, named before what misses its tolerance by more
 FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_ratio_peak",
          "pressure_peak", "contact_fraction")
@@ -63,14 +63,14 @@ def _said(seen, wide: dict, remedy: str) -> str:
     """The measures that speak for `wide` (name -> error over what is allowed), and how many others there are."""
     tolerance, names = seen.model.accuracy.tolerance, _first(seen, wide)
     known, left = [_known(seen.measures[name]) for name in names], len(wide) - len(names)
-    more = "".join(f", {name} {one}" for name, one in zip(names[1:], known[1:], strict=True))
-    others = f" ({left} other measure{'s' * (left > 1)} besides {'it' if len(names) == 1 else 'them'})" if left else ""
-    return f"{names[0]} is known {known[0]}{more}, the tolerance is {tolerance:g}{others}; {remedy}"
+    more = "".join(f", {name} of {one}" for name, one in zip(names[1:], known[1:], strict=True))
+    others = f" ({left} other measure{'s exceed' if left > 1 else ' exceeds'} it too)" if left else ""
+    return f"{names[0]} has an estimated error of {known[0]}{more}; the tolerance is {tolerance:g}{others}; {remedy}"
 
 
 def _known(found) -> str:
     share = abs(found.error) < abs(found.value)
-    return f"to {abs(found.error / found.value):.2g} of its value" if share else f"no better than {found}"
+    return f"{abs(found.error / found.value):.2g} of its value" if share else f"at least its value ({found})"
 
 
 def _finer_mesh(seen, wide: dict, coarse) -> str:
@@ -82,26 +82,28 @@ def _finer_mesh(seen, wide: dict, coarse) -> str:
     times = max(wide.values())
     peak = seen.measures.get("pressure_peak")
     if "worn_depth_max" in _first(seen, wide) and peak is not None and peak.value is None:
-        return "it wears deepest where the pressure has no bound, so a finer mesh is not known to settle it; read it " \
-               "by its error"
+        return ("the wear is deepest where the pressure is unbounded, so a finer mesh may not help; use it with its "
+                "stated error")
     if times >= MOST:
         return READ  # it is 0
     if asked.mesh is not None:
         return "split the elements of contact.mesh"
     nodes, wider = seen.patch.x.size, f"accuracy.tolerance = {_up(tolerance * times):g} would be met"
     if asked.strips is not None and asked.strips[0] > 1:
-        return f"the mesh ({nodes} interface nodes) and the strips share it; {_more_strips(asked, wide)}"
+        return (f"the mesh ({nodes} interface nodes) and the number of strips both cause this; "
+                f"{_more_strips(asked, wide)}")
     if not asked.chosen:
         return f"leave out {SIZE}"
     if not wide.keys() - set(patch_rows.DECISIVE):
         return f"a mesh finer than {nodes} interface nodes would take too long; {wider}"
     if asked.chosen and _locks(seen, wide):
-        return "any mesh has this error in plane strain at this Poisson's ratio; judge it by its error"
+        return "every mesh has this error in plane strain at this Poisson's ratio; use the value with its stated error"
     tighter = _climbing(seen, coarse)
     if tighter is None:
         finer = f"points closer than {say(seen.patch.averaging, 3)}" if seen.patch.averaging and \
             seen.patch.sharper else f"a mesh finer than {nodes} interface nodes"
-        return f"{finer} would take too long; judge {'them by their errors' if len(wide) > 1 else 'it by its error'}"
+        return (f"{finer} would take too long; use "
+                f"{'these values with their stated errors' if len(wide) > 1 else 'this value with its stated error'}")
     return f"the mesh ({nodes} interface nodes) was not refined for this quantity; set accuracy.tolerance = " \
            f"{tighter:.3g} for a finer one"
 
@@ -197,14 +199,15 @@ def _to_a_sample(cycles: float, steps: int) -> str:
     """As many steps, up to twice as many, as end a run of so many cycles closest to the end that was asked for; they
     have a half and a quarter."""
     found = min(range(4 * ceil(steps / 4), 2 * steps + 4, 4), key=lambda n: abs(cycles * n - round(cycles * n)))
-    return f"the run ends between two samples; set accuracy.steps_per_cycle = {found}, which puts one closer to its end"
+    return (f"the run ends between two samples; set accuracy.steps_per_cycle = {found}, so that a sample lies closer "
+            "to its end")
 
 
 def _finer_bonds(accuracy) -> str:
     """What makes the sum over bonds finer: the tolerance, where nothing is pinned."""
     pinned = [f"accuracy.{key}" for key in ("tail", "merge") if getattr(accuracy, key) is not None]
     return f"leave out {' and leave out '.join(pinned)}" if pinned else \
-        f"accuracy.tolerance = {TIGHTER * accuracy.tolerance:.3g} refines the sum over bonds"
+        f"set accuracy.tolerance = {TIGHTER * accuracy.tolerance:.3g} to refine the sum over bonds"
 
 
 def _sharp(seen) -> float:
@@ -222,12 +225,12 @@ def _unproven(model, steps: int, name: str, wide: dict) -> str:
     """
     seen = f"the change of {name} did not fall from {steps // 4} to {steps} steps per cycle"
     if exact := _stepless(model):
-        return f"{seen}, so more steps are not known to cure it; {exact}"
+        return f"{seen}, so more steps may not help; {exact}"
     if model.kind == "rig" and model.accuracy.steps_per_cycle is not None and 2 * steps <= costs.MOST_STEPS and \
             "relative_displacement_amplitude" in wide:
-        return f"{seen}; leave out accuracy.steps_per_cycle, and they are doubled until the displacement meets the " \
-               "tolerance"
-    return f"{seen}, so more steps are not known to cure it; judge it by its error"
+        return (f"{seen}; leave out accuracy.steps_per_cycle, so that patchfem doubles them until the displacement "
+                "meets the tolerance")
+    return f"{seen}, so more steps may not help; use the value with its stated error"
 
 
 def _finer_under(seen, coarse) -> str:
@@ -239,8 +242,8 @@ def _finer_under(seen, coarse) -> str:
         return f"the mesh causes this; leave out {SIZE}"
     tighter = _climbing(seen, coarse)
     if tighter is None:
-        return f"the mesh ({nodes} interface nodes) causes this, and a finer one would take too long; read it by " \
-               "its error"
+        return (f"the mesh ({nodes} interface nodes) causes this, and a finer one would take too long; use the value "
+                "with its stated error")
     return f"the mesh ({nodes} interface nodes) causes this; set accuracy.tolerance = {tighter:.3g} for a finer one"
 
 

@@ -70,7 +70,7 @@ def read(texts: Iterable[str], sampled: bool = False) -> tuple[list[Axis | Span]
             continue
         _add(found, wrong, key, values, sampled)
     named = [one.key for one in found]
-    return found, wrong + [f"{key}: stands twice" for key in dict.fromkeys(named) if named.count(key) > 1]
+    return found, wrong + [f"{key}: is given twice" for key in dict.fromkeys(named) if named.count(key) > 1]
 
 
 def lengths(text: str, name: str) -> list[float]:
@@ -136,7 +136,7 @@ def values_of(key: str, texts: Iterable[str], distinct: bool = True) -> Axis:
             wrong.append(str(error))
     if not wrong and distinct and len(set(values)) < len(values):
         twice = next(text for place, text in enumerate(texts) if values.index(values[place]) < place)
-        wrong.append(f"{twice} stands twice")
+        wrong.append(f"{twice} is given twice")
     if wrong:
         raise ValueError("\n".join(wrong))
     model, name = owner_of(key)

@@ -74,7 +74,7 @@ class TooDeep(ValueError):
     """A key of more than DEEPEST parts; `line`: where it stands, from 1."""
 
     def __init__(self, line: int) -> None:
-        super().__init__(f"a key of more than {DEEPEST} parts; table.key is needed")
+        super().__init__(f"a key has more than {DEEPEST} parts; write table.key")
         self.line = line
 
 

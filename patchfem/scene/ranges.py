@@ -40,7 +40,7 @@ def ranges(texts: Iterable[str]) -> tuple[list[Range], list[str]]:
         except ValueError as error:
             wrong.append(f"--free {error}")
     named = [one.key for one in found]
-    wrong += [f"--free {key}: stands twice" for key in dict.fromkeys(named) if named.count(key) > 1]
+    wrong += [f"--free {key}: is given twice" for key in dict.fromkeys(named) if named.count(key) > 1]
     if not found and not wrong:
         wrong.append("--free: at least one table.key=low..high is needed, such as friction.static=0.1..0.6")
     return found, wrong

@@ -224,8 +224,8 @@ def _spectrum(tangential, limit, bond_length: float, weakening: float) -> Spectr
     values, vectors = values[::-1], vectors[:, ::-1]
     jump = values[0] / bond_length * (weakening - 1)
     if jump >= 1:
-        raise PatchfemError(f"contact.shear with friction.kinetic below static: the patch could jump by itself "
-                            f"({jump:.3g} >= 1); raise friction.bond_length or friction.kinetic")
+        raise PatchfemError("contact.shear with friction.kinetic below static: the patch may jump without a change of "
+                            f"load ({jump:.3g} >= 1); raise friction.bond_length or friction.kinetic")
     shape, values = (np.ones((index.size, 1)), tangential[:1, 0]) if even else (vectors / root[:, None], values)
     return Spectrum(frozen_array(index, np.int64), limit[index], shape, values, bond_length)
 

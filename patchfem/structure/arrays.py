@@ -55,9 +55,9 @@ def _member(file: ZipFile, key: str) -> np.ndarray:
         shape, _, kind = head(part)
     _refuse_large(key, shape)
     if kind.itemsize > (LONGEST if key == "names" else WIDEST):
-        raise PatchfemError(f"{key} holds values of {kind.itemsize} bytes each")
+        raise PatchfemError(f"{key} contains values of {kind.itemsize} bytes each")
     if key == "names" and prod(shape) > MOST_COORDINATES:
-        raise PatchfemError(f"{key} holds {prod(shape)} names; {MOST_COORDINATES} is the most")
+        raise PatchfemError(f"{key} contains {prod(shape)} names; {MOST_COORDINATES} is the limit")
     with file.open(f"{key}.npy") as part:
         return npy.read_array(part, allow_pickle=False)
 
@@ -70,7 +70,7 @@ def _refuse_long(path) -> None:
     end = tail.rfind(b"PK\x05\x06")
     size = int.from_bytes(tail[end + 12:end + 16], "little") if end >= 0 else 0
     if size > DIRECTORY:
-        raise PatchfemError(f"it lists members in {size} bytes; {DIRECTORY} is the most")
+        raise PatchfemError(f"its list of members takes {size} bytes; {DIRECTORY} is the limit")
 
 
 def _refuse_large(key: str, shape: tuple) -> None:
@@ -102,8 +102,8 @@ def basis(data: dict, pairs=(), pushed: int | None = None, forced: bool = False,
 
 
 def _lacks(data: dict, what: str, where: str):
-    held = ", ".join(data) or "none that is known here"
-    raise PatchfemError(f"{where}: lacks {what}; it holds {held}")
+    held = ", ".join(data) or "none that patchfem knows"
+    raise PatchfemError(f"{where}: lacks {what}; it contains {held}")
 
 
 def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
@@ -113,9 +113,10 @@ def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
     M, K, C = (_square(data, key, where) for key in ("M", "K", "C"))
     n = len(M)
     if n == 0:
-        raise PatchfemError(f"{where}: M holds no coordinate; a square matrix [kg] of at least one is needed")
+        raise PatchfemError(f"{where}: M has no coordinate; a square matrix [kg] of at least one coordinate is needed")
     if pairs and "slide" in data:
-        raise PatchfemError(f"{where}: holds slide, and [[structure.interface]] names interfaces as well: keep one")
+        raise PatchfemError(f"{where}: contains slide, but [[structure.interface]] gives interfaces too: keep one of "
+                            "the two")
     over = [k for pair in pairs for k in pair if k > n]
     if over or (pushed or 0) > n:
         raise PatchfemError(f"{where}: there is no coordinate {(over or [pushed])[0]}: M has {n}, counted from 1")
@@ -183,14 +184,14 @@ def _numbers(data, key, where, *shapes) -> np.ndarray:
     """Array data[key] as finite real numbers of one of the shapes (None in a shape: any length); (n,) without one."""
     value = matrices.without_phase(data[key], key)
     if value.dtype.kind not in "iufb":
-        raise PatchfemError(f"{where}: {key} does not hold real numbers")
+        raise PatchfemError(f"{where}: {key} does not contain real numbers")
     value = value.astype(float)
     if not shapes:
         value = value.ravel()
     elif value.ndim == 1 and shapes[-1] == (1, 1):
         value = value.reshape(-1)
     if not np.isfinite(value).all():
-        raise PatchfemError(f"{where}: {key} holds values that are not finite")
+        raise PatchfemError(f"{where}: {key} contains values that are not finite")
     fits = [s for s in shapes if len(s) == value.ndim and all(a in (None, b) for a, b in zip(s, value.shape))]
     if shapes and not fits:
         n = shapes[0][0]

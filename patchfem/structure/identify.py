@@ -244,7 +244,8 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     good = own > 1e-6 * np.abs(A).max(axis=1)  # the shape is A over the root of it
     notes += [f"the mode at {f / (2 * np.pi):.5g} Hz does not move {_named(ref)} and is left out" for f in w[~good]]
     if not good.any():
-        raise PatchfemError(f"structure.file: no mode moves {_named(ref)} with the force there; check its sign")
+        raise PatchfemError(f"structure.file: no mode moves {_named(ref)} in the direction of the force there; check "
+                            "its sign")
     notes += _below(fit, theta, data[:, alive], omega)
     misfit = np.linalg.norm(fit.residual(theta)) / fit.norm
     if not np.isfinite(misfit) or misfit > 0.5:
@@ -263,8 +264,8 @@ def _below(fit, theta, data, omega) -> list:
     if share < 0.2:
         return []
     return [f"motion below the band makes up {100 * min(share, 1):.0f} % of the responses at "
-            f"{omega[0] / 2 / np.pi:.4g} Hz and is left out; a rig that nothing holds needs its rigid modes: use "
-            "masses or matrices"]
+            f"{omega[0] / 2 / np.pi:.4g} Hz and is left out; an unsupported rig needs its rigid-body modes: use masses "
+            "or matrices"]
 
 
 def _named(place) -> str:
@@ -276,6 +277,6 @@ def _reference(measured):
     driven = [ref for place, ref in measured if place == ref]
     if not driven:
         refs = ", ".join(_named(ref) for ref in sorted({ref for _, ref in measured}))
-        raise PatchfemError(f"structure.file: no response at the driven place itself ({refs}); without one the shapes "
-                            "have no scale")
+        raise PatchfemError(f"structure.file: no response at the driven point itself ({refs}), without which the mode "
+                            "shapes have no scale; measure one")
     return max(driven, key=lambda ref: sum(at == ref for _, at in measured))

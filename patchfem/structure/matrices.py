@@ -91,15 +91,15 @@ def _modes(root, K, stretch) -> tuple:
     square, turned = eigh((unit + unit.T) / 2)
     least = len(K) * ROUND * np.abs(square).max(initial=0.0)
     if square[0] < -least:
-        raise PatchfemError(f"structure: K is not positive semidefinite: the stiffness of one shape is "
-                            f"{square[0]:.3g} 1/s^2 over its mass, {square[0] / square[-1]:.2g} of the largest; give "
-                            "symmetric springs >= 0 and the matrix with all its digits")
+        raise PatchfemError(f"structure: K is not positive semidefinite: one motion has the stiffness {square[0]:.3g} "
+                            f"1/s^2 per unit of mass, {square[0] / square[-1]:.2g} of the largest; make the springs "
+                            "symmetric and >= 0, and write the matrix with all its digits")
     return np.sqrt(np.where(square <= least, 0.0, square)), turned
 
 
 def _numbers(unit) -> np.ndarray:
     if not np.isfinite(unit).all():
-        raise PatchfemError("structure: K over M is too large for a number; are both in SI units?")
+        raise PatchfemError("structure: K/M exceeds any number; check that both are in SI units")
     return unit
 
 
@@ -115,8 +115,8 @@ def _root(M):
     if root is None or np.any((root if alone else np.diag(root)) <= least):
         bare = np.flatnonzero(np.diag(M) <= 0)
         which = f" (coordinate {bare[0] + 1} has none)" if bare.size else ""
-        raise PatchfemError(f"structure: M is not positive definite: every coordinate needs mass{which}; condense the "
-                            "others out or give them their mass")
+        raise PatchfemError(f"structure: M is not positive definite: every coordinate needs mass{which}; condense out "
+                            "the coordinates without mass, or give them a mass")
     return root
 
 
@@ -142,8 +142,8 @@ def without_phase(values, name):
         return values.real
     remedy = ""
     if name == "K":
-        remedy = f"; for a loss factor eta (here about {share:.3g}) give K without it, and C = eta K/omega [N s/m] " \
-            "at the frequency of the drive"
+        remedy = (f"; for a loss factor eta (here about {share:.3g}) give K without it and the damping matrix C = eta "
+                  "K/omega [N s/m] at the frequency of the drive")
     raise PatchfemError(f"structure: {name} is complex, imaginary parts up to {share:.2g} of the real ones; motion in "
                         f"time needs real matrices{remedy}")
 
@@ -161,7 +161,7 @@ def _symmetric(matrix, name, shape=None) -> np.ndarray:
         raise PatchfemError(f"structure: {name} is {matrix.shape[0]} x {matrix.shape[0]} but M is "
                             f"{shape[0]} x {shape[0]}")
     if not np.isfinite(matrix).all():
-        raise PatchfemError(f"structure: {name} holds values that are not finite")
+        raise PatchfemError(f"structure: {name} contains values that are not finite")
     skew, most = np.abs(matrix - matrix.T).max(), np.abs(matrix).max()
     if skew > SKEW * most:
         raise PatchfemError(f"structure: {name} is not symmetric: entries differ from the transpose by {skew:.3g}, "
@@ -173,8 +173,8 @@ def _damper(phi, C):
     D = trimmed(phi.T @ C @ phi, np.abs(phi).T @ np.abs(C) @ np.abs(phi))
     least = eigh(D, eigvals_only=True)
     if least[0] < -1e-9 * max(abs(least[-1]), abs(least[0])):  # round-off of a singular C
-        raise PatchfemError(f"structure: C adds energy: the damping of one shape is {least[0]:.3g} 1/s over its "
-                            "mass; dampers >= 0 are needed")
+        raise PatchfemError(f"structure: C adds energy: the damping of one motion is {least[0]:.3g} 1/s over its mass; "
+                            "dampers >= 0 are needed")
     return D
 
 
@@ -204,13 +204,13 @@ def _row(row, n, name) -> np.ndarray:
     try:
         row = np.asarray(without_phase(row, name), float)
     except (TypeError, ValueError):
-        raise PatchfemError(f"structure: {name} does not hold real numbers") from None
+        raise PatchfemError(f"structure: {name} does not contain real numbers") from None
     if row.ndim == 2 and 1 in row.shape and name != "slide":
         row = row.ravel()
     if row.shape[-1:] != (n,) or row.ndim > (2 if name == "slide" else 1):
         raise PatchfemError(f"structure: {name} has shape {row.shape}, but M has {n} coordinates")
     if not np.isfinite(row).all():
-        raise PatchfemError(f"structure: {name} holds values that are not finite")
+        raise PatchfemError(f"structure: {name} contains values that are not finite")
     return row
 
 

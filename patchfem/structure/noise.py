@@ -41,8 +41,9 @@ def noise(frequency, level, duration: float, seed: int, period: float) -> Random
     step = duration / count
     lines = np.arange(int(np.ceil(low * duration - 1e-9)), int(high * duration + 1e-9) + 1)
     if lines.size < FEWEST:
-        raise PatchfemError(f"{duration:g} s are too short for a band of {high - low:g} Hz, in which {lines.size} "
-                            f"lines lie; at least {FEWEST / (high - low):.3g} s are needed", "drive.duration")
+        raise PatchfemError(f"{duration:g} s are too short for a band of {high - low:g} Hz, which then has only "
+                            f"{lines.size} spectral lines; at least {FEWEST / (high - low):.3g} s are "
+                            "needed", "drive.duration")
     f = np.clip(lines / duration, low, high)
     density = np.exp(np.interp(np.log(f), np.log(frequency), np.log(level)))
     a, b = np.random.default_rng(seed).standard_normal((2, lines.size)) * np.sqrt(density / duration)

@@ -63,8 +63,8 @@ class Reduction(NamedTuple):
         own = self.boundary @ out[:, modes:modes + b]
         scale = np.sqrt(np.abs(np.diag(own)))
         if not scale.all() or np.linalg.cond(own / np.outer(scale, scale)) > 1 / RESIDUAL:
-            raise PatchfemError("the modes leave nothing of the flexibility at the boundary to its attachment modes; "
-                                "lower structure.reduced.modes, or use method = 'craig-bampton'",
+            raise PatchfemError("the modes already contain all flexibility at the boundary, so nothing is left for "
+                                "attachment modes; lower structure.reduced.modes, or use method = 'craig-bampton'",
                                 "structure.reduced.modes")
         return out
 
@@ -103,15 +103,16 @@ def _refuse_indefinite(matrix, name: str) -> None:
     own = matrix.diagonal()
     if (own < 0).any():
         k = int(np.argmin(own))
-        raise PatchfemError(f"the {name} is not positive: coordinate {k + 1} has {own[k]:.4g} by itself",
+        raise PatchfemError(f"the {name} is not positive: the diagonal entry of coordinate {k + 1} is {own[k]:.4g}",
                             f"structure.reduced.{name}")
     beside = matrix.tocoo()
     i, j = beside.coords
     over = np.abs(beside.data) > np.sqrt(own[i]) * np.sqrt(own[j]) * (1 + 1e-9)
     if over.any():
         k = int(np.argmax(over))
-        raise PatchfemError(f"the {name} is not positive: coordinates {i[k] + 1} and {j[k] + 1} have {own[i[k]]:.4g} "
-                            f"and {own[j[k]]:.4g} by themselves and {beside.data[k]:.4g} between them",
+        raise PatchfemError(f"the {name} is not positive: coordinates {i[k] + 1} and {j[k] + 1} have the diagonal "
+                            f"entries {own[i[k]]:.4g} and {own[j[k]]:.4g} but the entry {beside.data[k]:.4g} between "
+                            "them",
                             f"structure.reduced.{name}")
 
 
@@ -122,7 +123,8 @@ def _factor(K):
     except Strainless:
         return None
     except NotConverged:
-        raise PatchfemError("the stiffness is not positive: a motion of the coordinates gives energy back",
+        raise PatchfemError("the stiffness is not positive: one motion of the coordinates has negative energy; check "
+                            "the matrix",
                             "structure.reduced.stiffness") from None
 
 
@@ -135,7 +137,8 @@ def _lowest(K, M, count: int, factor, shift: float) -> tuple:
         return np.zeros(0), np.zeros((n, 0))
     if n <= FULL or count > n // 4:
         if n > MOST_COORDINATES:
-            raise PatchfemError(f"{count} modes are most of {n}; keep fewer", "structure.reduced.modes")
+            raise PatchfemError(f"{count} modes were asked for out of {n}, which is too many for the solver; keep "
+                                "fewer", "structure.reduced.modes")
         held = (K + shift * M).toarray()
         inverse, shapes = eigh(M.toarray(), (held + held.T) / 2)  # M may have no mass somewhere, K holds everywhere
         there = np.flatnonzero(inverse > 1e-14 * inverse.max(initial=0.0))[::-1][:count]
@@ -161,8 +164,8 @@ def _constrained(K, M, boundary, count: int, load) -> tuple:
     K_i, M_i = (matrix[inside][:, inside].tocsc() for matrix in (K, M))
     factor = _factor(K_i)
     if factor is None:
-        raise PatchfemError("with the boundary held, a part of the structure still moves without strain; name a "
-                            "coordinate of each loose part in structure.reduced.boundary, or use method = "
+        raise PatchfemError("with the boundary held, a part of the structure still moves without strain; add a "
+                            "coordinate of each loose part to structure.reduced.boundary, or use method = "
                             "'free-interface'", "structure.reduced.boundary")
     omega, modes = _lowest(K_i, M_i, count, factor, 0.0)
     whole = omega.size < count or count == inside.size
@@ -259,10 +262,10 @@ def _strained(stiffness, mass) -> tuple:
     try:
         square, shapes = eigh((stiffness + stiffness.T) / 2, mass)
     except np.linalg.LinAlgError:
-        raise PatchfemError("the mass is not positive: a motion of the boundary or a mode moves none; give every "
-                            "coordinate of the boundary its mass", "structure.reduced.mass") from None
+        raise PatchfemError("the mass is not positive: one motion of the boundary moves no mass; give every boundary "
+                            "coordinate a mass", "structure.reduced.mass") from None
     least = LOOSE * square[-1] * len(square)
     if square[0] < -least:
-        raise PatchfemError(f"the stiffness is not positive: one shape has {square[0]:.3g} 1/s^2 per mass, "
-                            f"{square[0] / square[-1]:.2g} of the largest", "structure.reduced.stiffness")
+        raise PatchfemError(f"the stiffness is not positive: one motion has the stiffness {square[0]:.3g} 1/s^2 per "
+                            f"unit of mass, {square[0] / square[-1]:.2g} of the largest", "structure.reduced.stiffness")
     return square[square > least], shapes[:, square > least]

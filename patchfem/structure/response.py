@@ -30,5 +30,5 @@ def receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarray:
 
 
 def _infinite(omega: float):
-    raise PatchfemError(f"structure: the response at {omega / (2 * np.pi):.9g} Hz is infinite: nothing damps or holds "
-                        "a mode there")
+    raise PatchfemError(f"structure: the response at {omega / (2 * np.pi):.9g} Hz is infinite, because a mode has "
+                        "neither damping nor stiffness there")

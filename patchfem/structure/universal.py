@@ -42,7 +42,7 @@ def _modes(sets, factors) -> Shapes:
             f, d, m = one["freq"], one["modal_damp_vis"], one["modal_m"] * length / force
             if not d and one["modal_damp_his"]:
                 d = one["modal_damp_his"] / 2
-                notes.append(f"mode {number}: half its hysteretic damping is taken as viscous")
+                notes.append(f"mode {number}: half its hysteretic damping is used as its viscous damping ratio")
             values = np.array(list(shape.values()))
             if np.iscomplexobj(values):
                 values, _ = _rotated(values)
@@ -52,14 +52,15 @@ def _modes(sets, factors) -> Shapes:
             f, d = abs(eig) / (2 * np.pi), -eig.real / abs(eig) if eig else 0.0
             m = abs(one["modal_a"]) / max(2 * abs(eig.imag), 1e-300) * length / force
             left = np.linalg.norm(turn.imag) / max(np.linalg.norm(turn), 1e-300)
-            notes.append(f"mode {number} is complex; its real part after turning the phase is taken, "
-                         f"{100 * left:.2g} % of the shape is left out")
+            notes.append(f"mode {number} is complex; its phase is rotated and the real part used, which leaves out "
+                         f"{100 * left:.2g} % of the shape")
             if not eig.imag:
                 raise PatchfemError(f"structure.file: mode {number} has the real eigenvalue {eig.real:.5g} 1/s; only "
-                                    "modes that vibrate can be taken as real ones")
+                                    "vibrating modes can be converted to real ones")
         if not m > 0:
             raise PatchfemError(f"structure.file: mode {number} ({f:.5g} Hz) has no modal mass, so its shape has no "
-                                "scale; write modal mass (55: record 8; complex modes: modal A) or frequency responses")
+                                "scale; export the modal mass (dataset 55: record 8; complex modes: modal A), or "
+                                "frequency responses")
         if d < 0 or f < 0:
             raise PatchfemError(f"structure.file: mode {number} has frequency {f:.5g} Hz and damping {d:.3g}; both "
                                 "must be >= 0")
@@ -82,7 +83,7 @@ def _responses(sets, factors) -> Shapes:
     wrong = [s for s in sets if s["func_type"] != FRF]
     sets = [s for s in sets if s["func_type"] == FRF]
     if not sets:
-        raise PatchfemError("structure.file: dataset 58 holds no frequency response function (function type 4); its "
+        raise PatchfemError("structure.file: dataset 58 contains no frequency response function (function type 4); its "
                             f"types: {', '.join(sorted({str(s['func_type']) for s in wrong}))}")
     notes, x, measured = [], np.asarray(sets[0]["x"], float), {}
     for one in sets:
@@ -94,7 +95,7 @@ def _responses(sets, factors) -> Shapes:
         if len(one["x"]) != x.size or not np.allclose(one["x"], x, rtol=1e-6, atol=0):
             raise PatchfemError(f"structure.file: {what} has other frequencies than the first; all must share them")
         if not np.isfinite(one["data"]).all() or not np.iscomplexobj(one["data"]):
-            raise PatchfemError(f"structure.file: {what} holds values that are not finite or not complex")
+            raise PatchfemError(f"structure.file: {what} contains values that are not finite or not complex")
         sign_out, place = _place(one["rsp_node"], one["rsp_dir"])
         sign_in, ref = _place(one["ref_node"], one["ref_dir"])
         unit = _unit(one["ordinate_axis_units_lab"], notes) / _unit(one["orddenom_axis_units_lab"], notes)
@@ -107,7 +108,7 @@ def _unit(label, notes) -> float:
     label = (label or "").strip()
     known = {"", "none", "n", "m", "m/s", "m/s^2", "m/s2", "m/s**2", "mps2"}
     if label.lower() not in known and label not in UNITS:
-        note = f"structure.file: the unit label '{label}' is not known; the values are taken as SI"
+        note = f"structure.file: the unit label '{label}' is not known; the values are read as SI"
         notes += [note] if note not in notes else []
     return UNITS.get(label, 1.0)
 

@@ -48,8 +48,8 @@ def too_fine(profile: Profile, element: float, limit: float = LIMIT) -> str | No
     if share <= limit:
         return None
     most, nearly = (_two_digits(element_for(waves, power, kept)) for kept in (1 - limit, 1 - limit / 10))
-    return (f"{profile.source} holds {100 * share:.0f} % of its height below {ELEMENTS} elements "
-            f'({say(ELEMENTS * element)}): add [contact.asperities] or set element_size = "{say(most)}" '
+    return (f"{profile.source} holds {100 * share:.0f} % of its height in waves shorter than {ELEMENTS} elements "
+            f'({say(ELEMENTS * element)}): add [contact.asperities], or set element_size = "{say(most)}" '
             f'({100 - 100 * limit:g} % kept; "{say(nearly)}" keeps {100 - 10 * limit:g} %)')
 
 

@@ -36,8 +36,8 @@ def placed(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
     keep = (moved >= there[first]) & (moved <= there[last])
     apart, element = float(np.median(np.diff(moved[keep]))), float(np.diff(x).max())
     if apart > 1.5 * element:
-        notes += (f"{profile.source}: samples lie {say(apart)} apart, elements are {say(element)}: between samples the "
-                  "surface is taken as straight",)
+        notes += (f"{profile.source}: samples lie {say(apart)} apart but elements are {say(element)} long, so the "
+                  "surface is taken as straight between samples",)
     return replace(profile, x=frozen_array(moved[keep]), z=frozen_array(profile.z[keep]), notes=notes)
 
 

@@ -184,7 +184,7 @@ def despiked(profile: Profile) -> Profile:
     heights = np.array(profile.z)
     heights[there[out]] = np.nan
     note = (f"{profile.source}: {out.sum()} of {z.size} heights are spikes, dropouts or dust (the first at x = "
-            f"{say(profile.x[there[np.argmax(out)]])}) and are left out; --keep-spikes keeps them")
+            f"{say(profile.x[there[np.argmax(out)]])}) and are left out; use --keep-spikes to keep them")
     return replace(profile, z=frozen_array(heights), notes=(*profile.notes, note))
 
 

@@ -9,7 +9,7 @@ LONGEST = 10.0  # [m] beyond which a unit must be wrong
 SHORTEST = 1e-9  # [m]
 ATOM = 1e-10  # [m], the width of one: heights that span less were not measured
 TRIMMED = 10, 100  # heights from which on, and of how many, the highest and the lowest may stand out
-METRES, GIVEN = "the file gives both in metres", "taken in the units that were given for it"  # who says the units
+METRES, GIVEN = "the file gives both in metres", "read in the units that were given"  # who says the units
 
 
 def checked(path, x, z, at, factors: tuple, stated: str = "") -> Profile:
@@ -70,7 +70,7 @@ def evened(path, x, factor: float, name: str = "x") -> tuple:
     digit = next((one for one in digits if np.abs(x / one - np.rint(x / one)).max() < 1e-4), 0.0)
     if off > 0.75 * digit:  # half a digit about the true line, a little more about the fitted one
         return x, ()
-    return even, (f"{path}: {name} is printed to {say(digit * factor)}; taken as evenly spaced at "
+    return even, (f"{path}: {name} is printed to {say(digit * factor)}; it is read as evenly spaced at "
                   f"{say(step * factor)}",)
 
 
@@ -83,8 +83,9 @@ def _single(path, x, z, at, factor: float) -> tuple:
         one, other = back, back + 1
         if at is not None and at[one] > at[other]:
             one, other = other, one
-        raise PatchfemError(f"{_where(path, at, other)}: x turns back, {say(x[one] * factor)} and then "
-                            f"{say(x[other] * factor)}; a trace runs one way: keep one trace per file")
+        raise PatchfemError(f"{_where(path, at, other)}: x reverses: {say(x[one] * factor)} and then "
+                            f"{say(x[other] * factor)}; x of a trace must only rise or only fall, so keep one trace "
+                            "per file")
     if x[-1] == x[0]:
         raise PatchfemError(f"{path}: every sample lies at x = {say(x[0] * factor)}; a trace needs at least two places")
     if (step > same).all():
@@ -95,7 +96,7 @@ def _single(path, x, z, at, factor: float) -> tuple:
         mean = np.bincount(group, np.nan_to_num(z)) / heights
     first = int(np.argmax(step <= same)) + 1
     place = f"sample {first + 1}" if at is None else f"line {at[first]}"
-    note = f"{path}: {x.size - mean.size} samples share a place with another (the first in {place}): mean used"
+    note = f"{path}: {x.size - mean.size} samples have the same x as another (the first in {place}); the mean is used"
     return np.bincount(group, x) / np.bincount(group), mean, (note,)
 
 

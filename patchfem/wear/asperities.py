@@ -55,8 +55,8 @@ def rub(lower: np.ndarray, upper: np.ndarray, step: float, stroke: float, worn: 
     cycles = int(np.ceil(worn / (visits * bite)))
     depth = worn / (cycles * visits)
     if depth < FINEST * max(np.abs(low).max(), np.abs(up).max()):
-        raise PatchfemError(f"a depth of {say(depth, 3)} at a time is lost in the round-off of the heights; use a "
-                            "larger bite, or surfaces about zero")
+        raise PatchfemError(f"a depth of {say(depth, 3)} at a time is below the round-off of the heights; use a larger "
+                            "bite, or shift the surfaces to a mean height near zero")
     pair = _Pair(low, up, upper_share)
     for _ in range(cycles):
         for place in places:
@@ -136,8 +136,8 @@ def _shifted_sum(moved, fixed, by: int, out) -> None:
 def _surfaces(lower, upper) -> tuple:
     low, up = np.array(lower, float, order="C"), np.array(upper, float, order="C")
     if low.ndim != 2 or low.shape != up.shape or not low.size or not np.isfinite([low, up]).all():
-        raise PatchfemError("two rough surfaces need finite heights on one and the same raster, "
-                            f"not {low.shape} and {up.shape}")
+        raise PatchfemError(f"two rough surfaces need finite heights on the same raster, not {low.shape} and "
+                            f"{up.shape}")
     return low, up
 
 
@@ -147,8 +147,8 @@ def _reach(stroke: float, step: float, points: int) -> int:
         raise PatchfemError(f"a stroke of zero or more and a step above zero are needed, not {stroke:g} and {step:g} m")
     reach = round(stroke / step)
     if abs(stroke - reach * step) > 1e-6 * step or 2 * reach > points:
-        raise PatchfemError(f"a stroke of {stroke:g} m on a raster of {points} steps of {step:g} m: it is made of "
-                            f"whole steps, the nearest {reach * step:g} m, and at most half a period")
+        raise PatchfemError(f"a stroke of {stroke:g} m on a raster of {points} steps of {step:g} m: the stroke must be "
+                            f"a whole number of steps, the nearest is {reach * step:g} m, and at most half a period")
     return reach
 
 

@@ -68,6 +68,7 @@ def critical_jump(compliance, rate, active, held: str = "load", places=None) -> 
 def refuse_explicit(cycles: float, critical: float) -> None:
     """Raise PatchfemError for an explicit jump [cycles] longer than the critical one, with the remedy."""
     if cycles > critical:
-        raise PatchfemError(f"an explicit jump of {cycles:.4g} cycles is longer than the critical {critical:.4g}, "
-                            "beyond which every second node lifts off; leave wear.scheme out, or raise wear.jumps",
+        raise PatchfemError(f"an explicit jump of {cycles:.4g} cycles is longer than the stability limit of "
+                            f"{critical:.4g}, beyond which every second node lifts off; leave wear.scheme out, or "
+                            "raise wear.jumps",
                             "wear.scheme")

@@ -113,7 +113,7 @@ def draw(rows: list, path: Path) -> None:
             left.plot(loop.displacement * 1e3, row.fitted.model / 1e3, lw=1, label=row.law)
             right.plot(loop.time, (row.fitted.model - loop.reading) / 1e3, lw=0.8)
         left.set(xlabel="slide [mm]", ylabel="force [kN]", title="Measured and fitted")
-        right.set(xlabel="time [s]", ylabel="fitted - measured [kN]", title="What is left over")
+        right.set(xlabel="time [s]", ylabel="fitted - measured [kN]", title="Residual")
         left.legend(frameon=False)
 
 

@@ -12,7 +12,7 @@ elastic-plastic bonds, exact from yield to yield, 200 cycles at 143 Hz, at 26 lb
   sliding freely (10 g): loop energy       mJ            1343       1343       1343
   onset (distortion of 3 %)                g             4.11       4.11       4.08 ± 0.02
 
-How much tilt may be allowed? By the criterion of `patchfem sweep`, 5 % of anything that moves, the rig as shipped
+How much tilt may be allowed? By the criterion of `patchfem sweep`, 5 % in any measure of the motion, the rig as shipped
 allows a tilt of 0.17 mrad (2.2 um over the patch). With elastic-plastic bonds it is 0.11 mrad, slip and loop energy
 first; where that rig sticks, at 3 g, 0.054 mrad, the amplitude first; where it slides freely, at 10 g or under 13 lbf,
 any tilt up to 10 mrad. The stuck stiffness is off by 8 to 10 % at 0.1 mrad and by 24 to 35 % at 10 mrad, the energy of

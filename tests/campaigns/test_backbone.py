@@ -115,7 +115,7 @@ def test_refuses_what_has_no_backbone():
 
 @pytest.mark.parametrize("scene, said", [
     (shaken(PLASTIC).replace("100 N", "0 N") + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n',
-     "leave out the tables of the contact"),
+     r"leave out \[friction\] and its load"),
     (shaken(PLASTIC).replace("slide = 1.0", "slide = 1.0\noutput = 0.0"), "does not move the output"),
     (shaken('law = "coulomb"').replace('frequency = "100 Hz"\ndamping', 'frequency = "0 Hz"\ndamping'),
      "no natural frequency")])

@@ -347,7 +347,7 @@ def test_exact_time_is_made_up_only_where_no_law_feels_it(tmp_path):
     loop.write_text("displacement [um],force [N]\n" + "\n".join(f"{q},{31 * s}" for q, s in zip(where, both)))
     found = fit_loop(scene_of(tmp_path, "tanh", "friction.static=0.31", slide=pace), loop,
                      free_of("friction.reference_speed"))
-    assert found.found.values == pytest.approx([1.7e-3], rel=1e-6) and "are timed by" in found.warnings[0]
+    assert found.found.values == pytest.approx([1.7e-3], rel=1e-6) and "computed from slide" in found.warnings[0]
 
 
 # ---- the verb
@@ -401,7 +401,7 @@ def test_always_a_fit_cut_short_ends_with_3(asked, monkeypatch, tmp_path):
     ("friction=0..1", "is not a number that can vary"), ("contact.pairs=1..3", "is not a number that can "
                                                                                "vary"), ("x=1..2", "not a key of a "
                                                                                                    "scene"),
-    ("friction.static=0..1,friction.static=0..2", "friction.static: stands twice"),
+    ("friction.static=0..1,friction.static=0..2", "friction.static: is given twice"),
     ("friction.bond_length=1 um..1e999 um", "too large"), ("contact.load=1 N..2 N", "[contact] and [normal] exclude"),
 ])  # fmt: skip
 def test_refuses_a_bad_range(asked, free, says, tmp_path):
@@ -453,14 +453,14 @@ def test_refuses_a_faulty_slide_file_as_check_does(tmp_path, table, says):
 def test_refuses_other_requests(asked, tmp_path):
     free = ["--free", "friction.static=0.1..0.7"]
     for words, code, says in (
-            (["--hold", "cycle=3"], 2, "no row of"), (["--hold", "run=3"], 2, "no such column of labels"),
-            (["--hold", "cycle"], 2, "column=value,value is needed"), (["--hold", "cycle=1,2"], 2, "0 rows that are")):
+            (["--hold", "cycle=3"], 2, "no row of"), (["--hold", "run=3"], 2, "has no column of labels"),
+            (["--hold", "cycle"], 2, "column=value,value is needed"), (["--hold", "cycle=1,2"], 2, "0 rows are not")):
         answer = cli(*asked, *free, *words)
         assert answer.code == code and says in answer.err, answer.err
     assert cli(*asked[:3], tmp_path / "none.csv", *free).code == 4
     (tmp_path / "scene.toml").write_text(POINT + LAWS["coulomb"].replace("0.5", "-1") + SINE, "utf-8")
     assert "friction.static: must be >= 0" in cli(*asked, *free).err
-    with pytest.raises(SceneError, match="a patch scene; only loops of"):
+    with pytest.raises(SceneError, match="but this is a patch scene"):
         text = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
                 '"Ti-8Al-1Mo-1V"\n')
         fit_loop(loads(text), tmp_path / "loop.csv", ["contact.load=1 N..2 N"])

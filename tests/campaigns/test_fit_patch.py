@@ -106,10 +106,10 @@ def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
     assert answer.code == 0, answer.err
     told = json.loads((tmp_path / "out/fit.json").read_text())
     sizes = [told["laws"][told["law"]][part] for part in ("stiffness", "dissipation")]
-    for one, words in zip(sizes, ("is {} off at most, at {}, and {} rms", "loses up to {} ")):
+    for one, words in zip(sizes, ("by at most {} (at {}), {} rms", "dissipated per cycle is up to {} ")):
         largest, rms = (f"{plain(100 * abs(one[name]), 2)} %" for name in ("largest", "rms"))
         assert words.format(largest, short(one["at"], "m", 3), rms) in answer.out
-    for word in ("9 amplitudes of the slide, 10 nm to 200 nm", "iwan", "bouc-wen", "elastic-plastic", "% off at most",
+    for word in ("9 amplitudes of the slide, 10 nm to 200 nm", "iwan", "bouc-wen", "elastic-plastic", "by at most",
                  "A mesh coarser than its"):
         assert word in answer.out
     assert sorted(one.name for one in (tmp_path / "out").iterdir()) == [

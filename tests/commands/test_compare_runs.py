@@ -134,9 +134,9 @@ def test_always_the_story_of_the_guide_runs_and_says_its_verdict(tmp_path, monke
 
 
 @pytest.mark.parametrize("names, told", [
-    (("worn", "half"), "half: the less worn one comes first"),
-    (("half", "new"), "new: a run without [wear], which wore nothing; the worn one comes second"),
-    (("other", "worn"), "worn: two patches, not one before and after: contact.tilt differ"),
+    (("worn", "half"), "half; give the less worn run first"),
+    (("half", "new"), "new: this run has no [wear], so nothing was worn; give the worn run second"),
+    (("other", "worn"), "worn: these are two different patches: contact.tilt differ"),
     (("new", "point"), "point: a run without [contact] has no surfaces to compare"),
     (("new", "nowhere"), "nowhere: there is no such folder"), (("empty", "worn"), "empty: not a results folder"),
     (("file.csv", "worn"), "file.csv: a file, while")])
@@ -151,7 +151,7 @@ def test_refuses_bad_folders_by_name(runs, tmp_path, names, told):
 def test_refuses_what_belongs_to_traces_and_damaged_results(runs, tmp_path):
     for words in (("--shift", "1 mm"), ("--direction", "x"), ("--keep-spikes",), ("--units", "um,um")):
         answer = cli("compare", runs / "new", runs / "worn", *words, "-o", tmp_path / "out")
-        assert answer.code == 2 and f"{words[0]} belongs to measured surfaces" in answer.err
+        assert answer.code == 2 and f"{words[0]} can only be used for measured surfaces" in answer.err
     (tmp_path / "bad").mkdir()
     for name in ("summary.json", "scene.resolved.toml", "result.nc"):
         (tmp_path / "bad" / name).write_bytes((runs / "worn" / name).read_bytes())
@@ -174,7 +174,7 @@ def test_exact_a_table_of_results_folders_beside_traces(runs, tmp_path):
         alone = json.loads(json.dumps(pf.compare(runs / before, runs / after)))
         assert {name: row[name] for name in alone if name not in ("before", "after")} == \
             {name: one for name, one in alone.items() if name not in ("before", "after")}
-    says = ("without [wear]", "a direction belongs to traces", "a file, while")
+    says = ("has no [wear]", "a direction can only be given for traces", "a file, while")
     assert all(text in row["message"] for text, row in zip(says, found[2:5]))
     means = json.loads((tmp_path / "out" / "pairs.json").read_text())["means"]
     assert len(means) == 2 and means[0]["kind"] == "run" and means[0]["pairs"] == 2

@@ -157,7 +157,7 @@ def test_refuses_a_scene_without_a_patch(files, tmp_path):
     (tmp_path / "point.toml").write_text('[normal]\nload = "10 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\n'
                                          'kind = "sine"\namplitude = "1 um"\nfrequency = "10 Hz"\n')
     answer = cli("compare", *files[:2], "--scene", tmp_path / "point.toml", "-o", tmp_path / "out")
-    assert answer.code == 2 and "no [contact] in it" in answer.err
+    assert answer.code == 2 and "the scene has no [contact]" in answer.err
 
 
 @pytest.mark.parametrize("words, says", [

@@ -54,7 +54,8 @@ def test_exact_the_numbers_are_those_of_the_summary(tmp_path):
     assert lines[0] == "A rubbing block on flexures, shaken at one frequency"
     assert lines[1] == f"steady: {Outcome.STEADY.sentence}"
     amplitude = pair("relative_displacement_amplitude", measures["relative_displacement_amplitude"])
-    assert lines[2].startswith(f"The output moves {amplitude} half peak-to-peak; peak acceleration ")
+    assert lines[2].startswith(f"Displacement amplitude at the output {amplitude} (half peak-to-peak); peak "
+                               "acceleration ")
     assert lines[3] == f"Every measure with an error meets the tolerance 0.001; {SHARP}."
     shown = dict(line.split(None, 1) for line in lines if line.startswith("  "))
     assert set(shown) == set(measures)
@@ -124,7 +125,7 @@ def test_always_a_plan_says_what_does_not_run_where_it_is_asked(tmp_path):
     path.write_text(text_of("rig"), "utf-8")
     short, long = cli("plan", path).out, cli("plan", path, "-v").out
     assert "not on" not in short and long.startswith(short) and "friction.law=iwan" in long[len(short):]
-    assert "N/mm -> " in short and "friction limit over the largest push" in short and "e+0" not in short
+    assert "N/mm -> " in short and "friction limit over the largest force" in short and "e+0" not in short
 
 
 def test_exact_a_run_that_compiles_tells_no_pace_at_its_first_share(capsys):
@@ -161,11 +162,11 @@ def test_exact_a_level_between_two_others_does_not_claim_the_tolerance():
         return least_known(SimpleNamespace(plan=SimpleNamespace(model=model), measures=measures))
 
     jump, fine = Measure(5 * 9.80665, "m s-2", 9.80665, 9.80665), Measure(2.0, "J", 1e-2)
-    between = "jump_level, 5.0 ± 1.0 g, is known to the step between drive levels"
-    assert said(jump_level=jump, loop_area=fine) == "Every measure with an error meets the tolerance 0.01; worst: " \
-        f"loop_area, 2.000 ± 0.010 J; {between}, which the scene sets."
+    between = "jump_level, 5.0 ± 1.0 g, has an error of the step between drive levels"
+    assert said(jump_level=jump, loop_area=fine) == "Every measure with an error meets the tolerance 0.01; " \
+        f"closest to it is loop_area, 2.000 ± 0.010 J; {between}, which the scene sets."
     assert said(jump_level=jump) == f"{between}."
-    assert said(loop_area=fine).endswith("worst: loop_area, 2.000 ± 0.010 J.")
+    assert said(loop_area=fine).endswith("closest to it is loop_area, 2.000 ± 0.010 J.")
     assert said(jump_level=jump, loop_area=Measure(2.0, "J", 1.0)) == ""
 
 
@@ -180,14 +181,14 @@ def test_always_what_slips_while_the_interface_holds_is_said(more, part):
             name: {"value": value, "error": error, "unit": unit, "floor": 1e-10}
             for name, (value, error, unit) in found.items()}})
 
-    holds = "The interface holds: no slip in the last cycles."
+    holds = "The interface sticks: no slip in the last cycles."
     assert said((1.6583e-6, 1.6e-9), (1e-9, 1e-12)) == \
-        f"The interface holds as a whole; {part} (1.6583 ± 0.0016 uJ per cycle)."
-    assert said((1e-9, 2e-9), (1e-9, 1e-12)) == f"The interface holds as a whole; {part} (by 1.0000 ± 0.0010 nm)."
+        f"The interface as a whole sticks, but {part} (1.6583 ± 0.0016 uJ per cycle)."
+    assert said((1e-9, 2e-9), (1e-9, 1e-12)) == f"The interface as a whole sticks, but {part} (by 1.0000 ± 0.0010 nm)."
     assert said((1e-9, 2e-9), (1e-9, 2e-9)) == holds
     assert said((1e-18, 0.0), (0.0, 0.0)) == holds  # round-off of 100 N over 400 nm
     assert said((-3e-12, 1e-12), (None, None)) == holds
-    assert said((1e-9, None), (0.0, None)) == f"The interface holds as a whole; {part} (1 nJ per cycle)."
+    assert said((1e-9, None), (0.0, None)) == f"The interface as a whole sticks, but {part} (1 nJ per cycle)."
 
 
 def test_always_a_joint_that_slips_in_part_does_not_say_that_it_holds(tmp_path):
@@ -196,13 +197,14 @@ def test_always_a_joint_that_slips_in_part_does_not_say_that_it_holds(tmp_path):
     scene.write_text(JOINT_SHAKEN + '[contact.tilt]\nangle = "10 mrad"\n', "utf-8")
     answer = cli("run", scene, "-o", tmp_path / "out", "--no-page", "--set", "accuracy.tolerance=1e-2")
     lines = answer.out.splitlines()
-    assert re.match(r"stuck: The interface holds as a whole; part of the patch slips \(1\.6\S+ ± \S+ uJ per cycle\)\.",
+    assert re.match(r"stuck: The interface as a whole sticks, .* the patch slips \(1\.6\S+ ± \S+ uJ per "
+                    r"cycle\)\.",
                     lines[0])
     shown = dict(line.split(None, 1) for line in lines if line.startswith("  "))
     assert shown["stick_fraction"].endswith("of the interface as a whole")
     assert shown["loop_area"].endswith("uJ, per cycle")
     assert shown["energy_dissipated"].endswith("uJ, over the whole run")
-    assert "as a whole" in shown["slip_start_phase"]
+    assert "the whole interface sticks" in shown["slip_start_phase"]
 
 
 def test_always_a_bench_says_whether_it_slipped():
@@ -215,7 +217,7 @@ def test_always_a_bench_says_whether_it_slipped():
     assert said(1.5e-6, 1e-9) == \
         f"{done} Slip amplitude 1.5000 ± 0.0010 um, half peak-to-peak, averaged over the interface."
     for holds in ((1e-12, 2e-12), (1e-23, 1e-33), (1e-11, None)):
-        assert said(*holds) == f"{done} The interface holds: no slip in the last cycle."
+        assert said(*holds) == f"{done} The interface sticks: no slip in the last cycle."
     assert verdict({"outcome": "done", "kind": "bench", "measures": {}}) == done
 
 

@@ -120,7 +120,7 @@ def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
              "freq": HERTZ[k], "modal_damp_vis": ZETA[k], "modal_damp_his": 0.0} for k in range(2)]
     path = written(tmp_path / "shapes.uff", [SI, *sets])
     answer = cli("import", path, "-o", tmp_path / "modes.toml")
-    assert answer.code == 2 and "say where the contact slides, such as --map slide=11:+x" in answer.err
+    assert answer.code == 2 and "give the one that slides, such as --map slide=11:+x" in answer.err
     answer = cli("import", path, "-o", tmp_path / "modes.toml", "--map", "slide=12:+x,output=11:+x")
     assert answer.code == 0, answer.err
     modes = build(loads(SHAKEN + (tmp_path / "modes.toml").read_text())).rig.modes
@@ -130,8 +130,9 @@ def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
 
 
 @pytest.mark.parametrize("words, says", [
-    (["-o", "a.xlsx"], "modes as .toml"), (["-o", "a.csv", "--segment", "2 s"], "belong to modes"),
-    (["-o", "a.toml", "--zero"], "--zero belongs to a table"), (["-o", "a.uff", "--decay"], "belong to modes"),
+    (["-o", "a.xlsx"], "modes as .toml"), (["-o", "a.csv", "--segment", "2 s"], "can only be used for modes"),
+    (["-o", "a.toml", "--zero"], "--zero can only be used for a table"), (["-o", "a.uff", "--decay"], "can only be "
+                                                                                                      "used for modes"),
     (["-o", "a.toml", "--segment", "2"], "--segment 2:"), (["-o", "a.toml", "--window", "flat"], "hann or none"),
     (["-o", "a.toml", "--band", "20 Hz"], "two rising frequencies"),
     (["-o", "a.toml", "--segment", "9 s"], "a segment"),

@@ -91,4 +91,4 @@ def test_refuses_what_cannot_stand_side_by_side(swept, tmp_path):
     answer = cli("sweep", swept / "rig.toml", "--over", "normal.load=10 N,20 N", "-o", other, "-q")
     assert (answer.code, answer.out, answer.err) == (0, "", ""), "quiet, it says nothing but faults"
     answer = cli("report", swept / "first", other)
-    assert answer.code == 2 and "over other keys" in answer.err
+    assert answer.code == 2 and "over different keys" in answer.err

@@ -168,10 +168,10 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
     assert told["answer"].startswith(f"{6 - held} of 6 cases have no answer yet; what follows covers the others.")
     assert (out / "report.html").is_file()
     monkeypatch.setattr(many, "answers", real)
-    text = "cases have an answer from an interrupted sweep"
+    text = "cases already have an answer from an interrupted sweep"
     copied = tmp_path / "copied"
     shutil.copytree(out, copied)
-    assert f"note: {held} of 6 {text} and are run again" in cli("sweep", scene, *OVER, "-o", copied).err
+    assert f"note: {held} of 6 {text} but are run again" in cli("sweep", scene, *OVER, "-o", copied).err
     assert text not in cli("sweep", scene, *OVER, "-o", copied).err  # it is whole now
     answer = cli("sweep", scene, *OVER, "-o", out, "--resume")
     assert answer.code == 3 and text not in answer.err
@@ -222,8 +222,9 @@ def test_exact_one_object_on_stdout(scene, tmp_path):
     (["--over", "normal.load=-1 N,-2 N"], ["-1 N", "-2 N"]),
     (["--set", "drive.cycles=0", "--over", "normal.load=1 N,2 N"], ["drive.cycles: must be > 0"]),
     ([], ["nothing to sweep over"]),
-    (["--over", "normal.load=1 N,2 N", "--device", "cuda"], ["--device cuda: the lanes of a sweep run only on"]),
-    (["--over", "friction.static=0.1..0.2:4000", "--over", "normal.load=1 N..2 N:4000"], ["16000000 cases exceed"]),
+    (["--over", "normal.load=1 N,2 N", "--device", "cuda"], ["--device cuda: batches of cases run only on"]),
+    (["--over", "friction.static=0.1..0.2:4000", "--over", "normal.load=1 N..2 N:4000"], ["16000000 cases are more "
+                                                                                          "than"]),
 ])
 def test_refuses_before_anything_runs(scene, tmp_path, words, says):
     answer = cli("sweep", scene, *words, "-o", tmp_path / "a")
@@ -243,7 +244,7 @@ def test_refuses_a_table_whose_cases_are_all_refused(tmp_path):
 
 def test_refuses_to_probe_many_cases(scene):
     answer = cli("plan", scene, *OVER, "--probe")
-    assert answer.code == 2 and "--probe solves the patch of one scene" in answer.err
+    assert answer.code == 2 and "--probe works for one case" in answer.err
 
 
 def test_refuses_a_folder_of_others(scene, tmp_path):
@@ -292,7 +293,7 @@ def test_exact_tables_of_many_cases_are_written_where_they_are_asked_for(swept, 
         many.setattr("patchfem.export.sweeps.run.TABLED", 5)
         said = cli("sweep", scene, *OVER, "-o", out)
         assert not (out / "sweep.csv").exists() and not (out / "sweep.nc").exists()
-        assert "the same command with --collect writes them" in said.out
+        assert "run the same command with --collect to write them" in said.out
         assert "with --collect" in (out / "report.html").read_text("utf-8")
         assert cli("sweep", scene, *OVER, "-o", out, "--collect").code == said.code
     for name in ("sweep.csv", "sweep.nc"):

@@ -392,7 +392,7 @@ def test_refuses_an_answer_that_did_not_settle(monkeypatch):
 def test_refuses_an_answer_whose_residual_is_too_large_with_a_remedy(monkeypatch):
     c, x, weight = bodies(40)
     monkeypatch.setattr("patchfem.contact.strips.LIMIT", -1.0)  # below any residual
-    with pytest.raises(NotConverged, match=r"contact\.asperities: .* exceeds .*; make the skin softer"):
+    with pytest.raises(NotConverged, match=r"contact\.asperities: .* exceeds .*; make the rough layer softer"):
         solve(PEAKS, c, x, weight, 1e-4 * x, LOAD)
 
 

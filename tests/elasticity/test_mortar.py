@@ -291,7 +291,8 @@ def test_exact_a_wrong_side_ripples_as_foretold_and_is_swapped_with_its_reason(f
     joined = mortar.mortar(soft, x_low, hard, x_high, "upper")
     assert joined.side != "upper" and np.array_equal(joined.x, mortar.mortar(soft, x_low, hard, x_high).x)
     foretold = float(joined.reason.split("expected to ripple by ")[1].split(" %")[0]) / 100
-    assert joined.reason.startswith("asked for on the upper piece, but pressure on the nodes of the upper piece")
+    assert joined.reason.startswith("pressure on the upper piece was asked for, but pressure on the nodes of the "
+                                    "upper piece")
     assert 0.3 <= measured / foretold <= 1.3
     assert hertz(joined.x, joined.nn, YOUNG, stiff * YOUNG)[0] <= 3e-3
 
@@ -366,5 +367,5 @@ def test_refuses_by_name_what_cannot_be_joined():
 def test_refuses_meshes_on_which_every_choice_ripples():
     rng = np.random.default_rng(2)
     x, other = (nodes(50.0 ** -rng.uniform(0, 1, count)) for count in (40, 30))
-    with pytest.raises(PatchfemError, match=r"expected to ripple by \d+ % near .* cells of like size that grow"):
+    with pytest.raises(PatchfemError, match=r"expected to ripple by \d+ % near .* cells of similar size that grow"):
         mortar.mortar(column(x, HEIGHT, YOUNG), x, column(other, HEIGHT, YOUNG), other)

@@ -83,8 +83,8 @@ def test_exact_a_curve_over_the_level_with_no_bounded_motion_at_its_end():
 
 def test_exact_the_regime_in_words():
     assert charts.regime(None) == ""
-    assert "dies out" in charts.regime({"regime": "2 stops", "multiplier": 0.2})
-    assert "does not die out" in charts.regime({"regime": "unstable", "multiplier": 1.2})
+    assert "decays" in charts.regime({"regime": "2 stops", "multiplier": 0.2})
+    assert "grows or persists" in charts.regime({"regime": "unstable", "multiplier": 1.2})
     assert charts.regime({"regime": "stuck", "multiplier": 0.0}) == \
         " Regime: stuck; largest Floquet multiplier 0."
 

@@ -279,7 +279,7 @@ def test_exact_bond_line_of_a_run_carries_load_and_friction_in_every_frame(bench
         assert np.isnan(error[frame.cell_data["part"] == 2]).all()
         assert 0.01 < np.sqrt(np.nansum(error.astype(float)**2)) < 0.5
         meaning = series.root["lower/CellData/stress_error"].attrs["long_name"]
-        assert "strain energy of both pieces" in meaning and "not a bound" in meaning
+        assert "strain energy of the difference" in meaning and "not a bound" in meaning
 
 
 def test_always_every_number_of_a_block_is_finite(bench):

@@ -131,7 +131,7 @@ def test_exact_a_full_disk_leaves_no_part_of_a_page(scene, tmp_path, monkeypatch
 
     monkeypatch.setattr(results_folder.Path, "write_bytes", full)
     answer = cli("run", scene, "-o", tmp_path / "out")
-    assert "No space left on device" in answer.err and "only their page is missing" in answer.err
+    assert "No space left on device" in answer.err and "complete except for the page" in answer.err
     assert answer.code == 4 and {path.name for path in (tmp_path / "out").iterdir()} == WHOLE
 
 

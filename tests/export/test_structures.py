@@ -121,7 +121,7 @@ def test_always_the_line_says_what_the_file_has_not(tmp_path, text, says):
 
 @pytest.mark.parametrize("text, ending, says", [
     (POINT + friction_of("coulomb") + STRUCTURE, ".mat", "law 'coulomb'"),
-    (POINT + friction_of("bouc-wen") + STRUCTURE, ".npz", "law 'bouc-wen' is not a set of elements"),
+    (POINT + friction_of("bouc-wen") + STRUCTURE, ".npz", "law 'bouc-wen' cannot be written as friction elements"),
     (POINT + friction_of("tanh") + STRUCTURE.replace("[drive]", CUBIC + "[drive]"),
      ".mat", "cannot be written with [structure.stiffening]"),
     (STRUCTURE.replace("[drive]", CUBIC + "[drive]"), ".npz", "cannot be written with [structure.stiffening]"),
@@ -130,7 +130,8 @@ def test_always_the_line_says_what_the_file_has_not(tmp_path, text, says):
     (POINT + "[normal.grooves]\nwavelength = \"80 um\"\namplitude = \"1 um\"\n" + friction_of("tanh") + STRUCTURE,
      ".npz", "cannot be written with [normal.grooves]"),
     (RUB, ".csv", "a structure is exported as .mat or .npz"),
-    (POINT + PLASTIC + '[slide]\nkind = "triangle"\namplitude = "8 um"\nspeed = "1 mm/s"\n', ".mat", "which it lacks"),
+    (POINT + PLASTIC + '[slide]\nkind = "triangle"\namplitude = "8 um"\nspeed = "1 mm/s"\n', ".mat", "this scene "
+                                                                                                     "has none"),
 ])
 def test_refuses_what_has_no_such_form(tmp_path, text, ending, says):
     (tmp_path / "rig.toml").write_text(text)

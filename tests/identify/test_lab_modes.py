@@ -97,7 +97,7 @@ def test_always_a_decay_by_dry_friction_is_said_not_to_be_exponential():
     time = TIME[:2000]
     value = np.maximum(1 - time / 0.6, 0) * np.cos(OMEGA[0] * time)
     found = of_decay({"time": time, "displacement": value}, 0.0)
-    assert any("exponential, as where friction damps" in note for note in found.notes)
+    assert any("exponential, as with friction damping" in note for note in found.notes)
     assert found.frequency == pytest.approx(HERTZ[:1], rel=1e-3)  # one mode, not the several that would make the line
     clean = of_decay(dict(zip(("time", "displacement"), free())), 0.0)
     assert len(clean.notes) == 1 and "logarithmic decrement" in clean.about[0]
@@ -108,7 +108,7 @@ def test_exact_modal_mass_and_shares_of_a_force_at_its_own_place():
     found = of_drive({"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf))
     assert found.mass == pytest.approx(1 / 1.2, rel=1e-6)
     np.testing.assert_allclose(found.rows["output"], [1, np.sqrt(0.5)], rtol=1e-6)
-    assert "widen the peak at 143 Hz" in found.notes[0] and "0.004, which is written" in found.notes[0]
+    assert "widen the peak at 143 Hz" in found.notes[0] and "0.004, which is the value written" in found.notes[0]
 
 
 def test_exact_the_base_tells_shares_and_no_mass():
@@ -118,7 +118,7 @@ def test_exact_the_base_tells_shares_and_no_mass():
                      (0, np.inf))
     np.testing.assert_allclose(found.rows["base"]**2, RESIDUE / 2, rtol=1e-6)
     np.testing.assert_allclose(found.rows["output"] * found.rows["base"], RESIDUE / 2, rtol=1e-6)
-    assert found.mass is None and "gives no mass" in found.notes[-1]
+    assert found.mass is None and "gives no modal mass" in found.notes[-1]
     found = of_drive({"time": TIME, "base_acceleration": base, "acceleration": base - relative}, None, None,
                      (0, np.inf))
     assert np.sum(found.rows["base"]**2) == pytest.approx(1, rel=1e-9)  # more is not possible, the output grows
@@ -143,7 +143,7 @@ def test_refuses_records_by_name():
         even_step(TIME**1.01)
     with pytest.raises(PatchfemError, match="grows instead of decaying"):
         decay(TIME[:500], np.exp(3 * TIME[:500]) * np.cos(OMEGA[0] * TIME[:500]))
-    with pytest.raises(PatchfemError, match="rings and decays"):
+    with pytest.raises(PatchfemError, match="no decaying oscillation"):
         decay(TIME[:500], np.ones(500))
 
 

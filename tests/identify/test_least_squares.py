@@ -64,7 +64,7 @@ def test_exact_a_value_pressed_on_its_bound_has_the_profile_of_the_plane():
     assert found.values[1] == 0.3 and found.at_bound == ("", "low") and found.methods[1] == "profile"
     assert found.values[0] == pytest.approx((data - 0.3 * LINE).mean(), abs=1e-7)
     assert found.intervals[1] == pytest.approx([0.3, end], rel=2e-3) and found.open_ends[1].tolist() == [True, False]
-    assert remarks(found, ["a", "b"]) == ["b is at its low bound 0.3: widen the range or doubt the law"]
+    assert remarks(found, ["a", "b"]) == ["b is at its low bound 0.3: widen the range, or try another law"]
 
 
 def test_exact_the_profile_of_a_bent_value_is_that_of_what_it_stands_for():
@@ -108,7 +108,7 @@ def test_exact_a_value_that_the_rows_do_not_rule_out_anywhere_has_no_interval():
     alone = fit(lambda v: v[0] - data + 1e-3 * v[1] * LINE[:20], [-5, 0], [5, 1])
     assert "cannot be told apart" in remarks(found, "ab")[0]
     assert np.isnan(alone.intervals[1]).all() and alone.methods[1] == "none"
-    assert "b is not determined: the rows allow the whole of its range" in remarks(alone, "ab")
+    assert "b is not determined: every value in its range fits the rows" in remarks(alone, "ab")
 
 
 def test_exact_the_best_of_several_valleys_is_found_from_a_bad_start():

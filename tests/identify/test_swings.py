@@ -69,7 +69,7 @@ def test_refuses_what_holds_no_decay():
         half_swings(t, rng.normal(size=t.size))
     with pytest.raises(PatchfemError, match="rows of a free decay"):
         half_swings(t[:9], t[:9])
-    with pytest.raises(PatchfemError, match="nothing in the record swings"):
+    with pytest.raises(PatchfemError, match="the record contains no oscillation"):
         half_swings(t, 0 * t)
     with pytest.raises(PatchfemError, match="samples of a cycle"):
         half_swings(t, np.cos(2 * np.pi * 300 * t))

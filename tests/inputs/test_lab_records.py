@@ -40,7 +40,7 @@ def test_exact_units_of_dataset_164_and_of_labels(tmp_path):
     assert found.values["force"] == pytest.approx(FORCE, rel=1e-14)
     assert np.array_equal(found.values["acceleration"], SLIDE * 9.80665)
     assert found.values["velocity"] == pytest.approx(SLIDE * 0.0254, rel=1e-14)
-    assert len(found.notes) == 1 and "'?' is not known; dataset 164 is followed" in found.notes[0]
+    assert len(found.notes) == 1 and "'?' is not known; the unit of dataset 164 is used" in found.notes[0]
     bare = read_records(written(tmp_path / "b.uff", [record(TIME, FORCE, 13)]), [])
     assert np.array_equal(bare.values["force"], FORCE) and "taken as SI" in bare.notes[0]
 
@@ -105,7 +105,7 @@ def spoilt(values, at=3, to=np.nan):
     ([SI], "no record over time"),
     ([record(spoilt(TIME, to=0.0), FORCE, 13)], "of sample 4 does not follow"),
     ([record(TIME, FORCE, 13), record(TIME + 1, SLIDE, 8)], "has other times than"),
-    ([record(TIME, FORCE + 1j, 13)], "complex"), ([record(TIME, FORCE, 0)], "no channel says what it is"),
+    ([record(TIME, FORCE + 1j, 13)], "complex"), ([record(TIME, FORCE, 0)], "no channel label tells its quantity"),
     ([SI | {"length": 0.0}, record(TIME, FORCE, 13)], "must be > 0")])
 def test_refuses_universal_files_by_name(tmp_path, sets, says):
     answer = cli("import", written(tmp_path / "a.uff", sets), "-o", tmp_path / "o.csv")
@@ -125,7 +125,7 @@ def test_refuses_values_that_are_not_finite(tmp_path):
     ("time [s];force [N]\n0;1\n1;2,5\n", ":3: force [N]: '2,5' has a decimal comma".replace(" [N]", "")),
     ("time [s],force [N]\n0,1\n1,nan\n", ":3: force: 'nan' is not a finite number"),
     ("time [s],force [lb]\n0,1\n1,2\n", "force [lb]: unknown unit"),
-    ("time [s],force\n0,1\n1,2\n", "'force' has no unit"), ("time [s],A\n0,1\n1,2\n", "no channel says what it is")])
+    ("time [s],force\n0,1\n1,2\n", "'force' has no unit"), ("time [s],A\n0,1\n1,2\n", "no channel label tells")])
 def test_refuses_tables_by_line(tmp_path, text, says):
     (tmp_path / "a.csv").write_text(text)
     answer = cli("import", tmp_path / "a.csv", "-o", tmp_path / "o.csv")
@@ -137,8 +137,8 @@ def test_refuses_other_files_and_spoilt_ones(tmp_path):
     (tmp_path / "b.uff").write_bytes(b"    -1\n    58\nnothing\n    -1\n")
     (tmp_path / "c.tdms").write_bytes(b"")
     for words, code, says in (
-            (["a.mat"], 2, "say what its variables are"), (["a.mat", "--map", "force=F [N]"], 2, "no variable 'F'"),
-            (["a.mat", "--map", "force=t"], 2, "holds no units"),
+            (["a.mat"], 2, "assign its variables"), (["a.mat", "--map", "force=F [N]"], 2, "no variable 'F'"),
+            (["a.mat", "--map", "force=t"], 2, "has no units"),
             (["a.mat", "--map", "force=wide [N]"], 2, "wide(:,1)"),
             (["a.mat", "--map", "force=wide(:,4) [N]"], 2, "no column 4"), (["b.uff"], 2, "cannot be read"),
             (["a.mat", "--map", "force=s [N]"], 2, "no variable 's'"),

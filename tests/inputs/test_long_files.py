@@ -93,7 +93,7 @@ def test_refuses_a_matrix_of_matlab_by_its_head(tmp_path):
 
 def test_refuses_matrices_of_nothing():
     nothing = np.zeros((0, 0))
-    with pytest.raises(PatchfemError, match="M holds no coordinate"):
+    with pytest.raises(PatchfemError, match="M has no coordinate"):
         arrays.basis({"M": nothing, "K": nothing, "slide": np.zeros(0), "output": np.zeros(0)})
 
 
@@ -103,7 +103,7 @@ def test_exact_arrays_of_a_file_are_those_that_were_saved(tmp_path):
     np.savez_compressed(tmp_path / "a.npz", **saved)
     found = arrays.read(tmp_path / "a.npz")
     assert set(found) == {"M", "K", "names"} and all(np.array_equal(found[key], saved[key]) for key in found)
-    with pytest.raises(PatchfemError, match="holds values of 4000 bytes"):
+    with pytest.raises(PatchfemError, match="contains values of 4000 bytes"):
         np.savez(tmp_path / "b.npz", names=np.array(["a" * 1000]))
         arrays.read(tmp_path / "b.npz")
 

@@ -184,20 +184,20 @@ def test_exact_rows_of_places_that_files_order_in_their_own_way():
 
 
 HEAD = "%%MatrixMarket matrix coordinate real "
-BAD = {"a.mtx": ("hello\n", "cannot be read"), "b.mtx": ("1 2\n3 4\n", "neither Matrix Market nor lines of row"),
+BAD = {"a.mtx": ("hello\n", "cannot be read"), "b.mtx": ("1 2\n3 4\n", "is not a matrix: write Matrix Market"),
        "c.mtx": (HEAD + "general\n9 9 99999999999\n1 1 1\n", "announces 99999999999 numbers"),
        "d.mtx": (HEAD + "general\n2 3 1\n1 1 1\n", "must be square, not of shape (2, 3)"),
        "e.mtx": (HEAD + "general\n2 2 3\n1 1 1\n2 2 1\n1 2 0.5\n", "not symmetric: entries differ from the transpose "
                  "by 0.5"),
        "f.mtx": (HEAD + "general\n1 1 1\n1 1 nan\n", "not finite"),
-       "g.mtx": ("%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "a pattern without numbers"),
+       "g.mtx": ("%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "a Matrix Market pattern without"),
        "h.mtx": ("%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 0.02\n", "is complex; motion in time"),
        "i.mtx": ("0 1 2.0\n", "count from 1"), "j.mtx": ("1.5 1 2.0\n", "must be whole numbers"),
-       "a.pch": ("$ nothing\n", "holds no DMIG card"),
+       "a.pch": ("$ nothing\n", "contains no DMIG card"),
        "b.pch": ("DMIG    KAAX    X\n", "b.pch:1: not a readable DMIG card"),
        "c.pch": (f"DMIG    KAAX    {0:8d}{6:8d}{4:8d}\n", "it is complex"),
        "d.pch": (punched("KAAX", K, True).replace("4.0", "4.x"), "not a readable DMIG card ('4.x"),
-       "a.op4": ("nothing\n", "not a readable OUTPUT4 file"), "b.op4": ("", "holds no matrix"),
+       "a.op4": ("nothing\n", "not a readable OUTPUT4 file"), "b.op4": ("", "contains no matrix"),
        "c.op4": (output4_text("KAAX", K, False, False).replace("       6       2KAAX", "       6       4KAAX"),
                  "a matrix is complex"),
        "d.op4": (output4_text("KAAX", K, False, False)[:150], "not a readable OUTPUT4 file"),
@@ -227,15 +227,15 @@ def test_always_refuses_damaged_binary_matrices_by_a_sentence(tmp_path):
 
 def test_refuses_names_that_are_not_known_and_sizes_that_differ(tmp_path):
     np.savez(tmp_path / "a.npz", A=K, B=M)
-    with pytest.raises(PatchfemError, match=r"holds no stiffness by a known name .* its arrays: A, B"):
+    with pytest.raises(PatchfemError, match=r"contains no stiffness under a known name .* its arrays: A, B"):
         matrices.read(tmp_path / "a.npz", "stiffness")
     np.savez(tmp_path / "k.npz", K=K)
     for wanted in ("mass", "damping"):
-        with pytest.raises(PatchfemError, match=rf"its one array, K, is by its name the stiffness, not the {wanted}"):
+        with pytest.raises(PatchfemError, match=rf"its one array, K, has the name of a stiffness, but the {wanted}"):
             matrices.read(tmp_path / "k.npz", wanted)
     one, small = (matrices.Matrix(sparse.csr_array(part)) for part in (K, M[:2, :2]))
     with pytest.raises(PatchfemError, match="differ in size: 4 x 4 and 2 x 2"):
         matrices.aligned(one, small)
     named = matrices.Matrix(sparse.csr_array(K), np.array(PLACES))
-    with pytest.raises(PatchfemError, match="names nodes and directions and another does not"):
+    with pytest.raises(PatchfemError, match="name nodes and directions and others do not"):
         matrices.aligned(one, named)

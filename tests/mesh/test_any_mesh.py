@@ -199,11 +199,12 @@ SPOILT = {
     "no interface": (lambda m: drop_edge(m, "lower_interface"), r"nothing is tagged lower_interface \("),
     "hole in the interface": (lambda m: drop_edge(m, "lower_interface", 2), "lower_interface has a hole .* make it"),
     "far at the interface": (lambda m: m.edges.__setitem__(m.edge_tags == EDGE_TAGS["lower_far"], interface_node(
-        m, "lower")), "lower_far must hold two nodes or more"),
+        m, "lower")), "lower_far must contain two nodes or more"),
     "foreign far": (lambda m: m.edge_tags.__setitem__(m.edge_tags == EDGE_TAGS["lower_far"], EDGE_TAGS["upper_far"]),
                     "nothing is tagged lower_far"),
     "foreign node": (lambda m: m.edges.__setitem__((np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])[0], 0),
-                                                   interface_node(m)), "lower_far holds 1 nodes that no cell"),
+                                                   interface_node(m)), "lower_far contains 1 nodes that belong to no "
+                                                                       "cell"),
     "doubled cell": (lambda m: m.quads.__setitem__(3, m.quads[4]), "overlap|has a hole|far holds"),
     "twisted": (lambda m: m.quads.__setitem__((5, [1, 2]), m.quads[5, [2, 1]]), "1 cells are twisted"),
     "no area": (lambda m: m.quads.__setitem__((5, 1), m.quads[5, 0]), "1 cells are twisted or have no area"),

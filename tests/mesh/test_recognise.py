@@ -51,11 +51,11 @@ def test_exact_a_far_face_held_in_part_is_no_grid_in_any_format(form, tmp_path):
 def test_refuses_twin_nodes_and_tags_of_the_wrong_piece_or_inside_it_in_every_format(form, tmp_path):
     m = drawn("quads")
     m.edges[far_edges(m)[3]] = m.edges[far_edges(m, "upper")[3]]
-    with pytest.raises(PatchfemError, match="lower_far holds 2 nodes that no cell of the lower piece has"):
+    with pytest.raises(PatchfemError, match="lower_far contains 2 nodes that belong to no cell of the lower piece"):
         bodies(m, tmp_path, form)
     m = drawn("quads")
     m.edges[far_edges(m)[3]] -= 1  # one row above the far face
-    with pytest.raises(PatchfemError, match="lower_far holds 2 nodes inside the lower piece"):
+    with pytest.raises(PatchfemError, match="lower_far contains 2 nodes inside the lower piece"):
         bodies(m, tmp_path, form)
     m = drawn("quads")
     m.points = np.append(m.points, m.points[m.quads[3, 2]][None], axis=0)

@@ -182,7 +182,7 @@ STILL = STRUCTURE.replace("slide = 1.0", "slide = 1.0\nbase = 0.0")
 
 
 @pytest.mark.parametrize("text, key, line, says", [
-    (STILL, "drive.kind", 'kind = "base"', "the drive pushes no mode"),
+    (STILL, "drive.kind", 'kind = "base"', "the drive excites no mode"),
     (TINY, "", "", "GB are needed"),
 ], ids=["a key of a run", "a size"])
 def test_refuses_with_file_and_line_once_whoever_asks(text, key, line, says):
@@ -210,7 +210,7 @@ def test_refuses_what_no_model_can_be_made_of_with_file_and_line_once():
 
 def test_refuses_a_key_of_a_set_with_the_file_alone():
     sets = ["drive.kind=base", "drive.frequency=143 Hz", "drive.acceleration=5 g", "drive.cycles=20"]
-    with pytest.raises(PatchfemError, match=r"^a\.toml: drive\.kind: the drive pushes no mode") as caught:
+    with pytest.raises(PatchfemError, match=r"^a\.toml: drive\.kind: the drive excites no mode") as caught:
         run(loads(STILL.partition("[drive]")[0], "a.toml", sets))
     assert str(caught.value).count("a.toml") == 1
 

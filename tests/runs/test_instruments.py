@@ -92,8 +92,8 @@ def test_always_instruments_that_move_as_the_output_change_nothing():
 
 
 @pytest.mark.parametrize("more, said", [
-    (("structure.travel=5 mm",), "beside structure.travel"),
-    (("structure.stiffening.cubic=1e12 N/m^3",), "beside structure.stiffening"),
+    (("structure.travel=5 mm",), "with structure.travel"),
+    (("structure.stiffening.cubic=1e12 N/m^3",), "with structure.stiffening"),
     (("drive.waveform=levels",), "waveform = 'levels'")])
 def test_refuses_instruments_where_the_output_is_judged(more, said):
     with pytest.raises(SceneError, match=said):

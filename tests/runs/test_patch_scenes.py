@@ -218,15 +218,15 @@ def test_exact_a_slope_of_a_profile_is_taken_out_and_said(tmp_path):
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 2001)
     patch, found = solved(profile(tmp_path, x, 1e-3 * x), path=tmp_path / "scene.toml")
     flat = solved()[1]
-    assert any("levelled, a slope of 0.001 rad is taken out" in note for note in patch.notes)
+    assert any("the slope of 0.001 rad was subtracted" in note for note in patch.notes)
     assert found["pressure_peak"] == pytest.approx(flat["pressure_peak"], rel=1e-3)
 
 
 def test_refuses_a_profile_finer_than_the_mesh_and_leaves_it_to_the_asperities(tmp_path):
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
     tables = profile(tmp_path, x, 1e-7 * np.sin(2 * np.pi * x / 50e-6))
-    with pytest.raises(PatchfemError, match=r"scene\.toml:9: contact\.profile\.file: .* % of its height below 2 "
-                                            "elem.*element_size"):
+    with pytest.raises(PatchfemError, match=r"scene\.toml:9: contact\.profile\.file: .* % of its height in waves "
+                                            r"shorter than 2 elem.*element_size"):
         run(scene(tables, path=tmp_path / "scene.toml"))
     patch, _ = solved(tables + SKINS["linear"], path=tmp_path / "scene.toml")
     assert any("left to [contact.asperities]" in note for note in patch.notes)

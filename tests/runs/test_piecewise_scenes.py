@@ -132,7 +132,7 @@ def test_exact_a_level_of_a_patch_carries_the_error_of_its_mesh():
     assert all(1 / 4 < first.errors[name] / alone[name].error < 4 for name in first.values)
     a, b = (one.measures["onset_level"] for one in (coarse, fine))
     assert abs(a.value - b.value) <= a.error + b.error and a.error < 0.05 * a.value
-    assert any("onset_level: a slip amplitude counts from" in note for note in coarse.extra["notes"])
+    assert any("onset_level: slip counts from an amplitude" in note for note in coarse.extra["notes"])
 
 
 def test_always_auto_takes_the_cheaper_engine():
@@ -166,9 +166,9 @@ def test_refuses_an_exact_run_without_end():
 def test_refuses_exact_where_a_spring_bends_or_the_load_changes():
     exact = '[accuracy]\nmethod = "exact"\n'
     bends = POINT + PLASTIC + MODE + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n' + DRIVE + exact
-    assert "no exact solution exists beside [structure.stiffening]" in only(bends)
+    assert "no exact solution exists with [structure.stiffening]" in only(bends)
     varies = POINT + 'amplitude = "10 N"\nfrequency = "20 Hz"\n' + PLASTIC + MODE + DRIVE + exact
-    assert "no exact solution exists beside normal.amplitude" in only(varies)
+    assert "no exact solution exists with normal.amplitude" in only(varies)
     assert "no exact solution exists for law 'tanh'" in only(
         POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n' + MODE + DRIVE + exact)
 

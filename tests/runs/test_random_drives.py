@@ -67,7 +67,7 @@ def test_exact_a_table_of_one_level_is_the_spectrum_of_that_level(tmp_path):
     drive = {name: one for name, one in RIG["drive"].items() if name != "spectrum"} | {"file": str(path)}
     one, other = (pf.build(RIG | {"drive": each}).rig.drive for each in (RIG["drive"], drive))
     assert other.value == pytest.approx(one.value, rel=1e-9) and other.band == one.band
-    for text, said in (("frequency [Hz],level [g^2/Hz]\n10,0.01\n5,0.01\n", r"csv:3: frequencies that rise"),
+    for text, said in (("frequency [Hz],level [g^2/Hz]\n10,0.01\n5,0.01\n", r"csv:3: frequencies must be above"),
                        ("frequency [Hz],level [g]\n10,0.01\n50,0.01\n", "unknown unit"),
                        ("frequency [Hz],level [g^2/Hz]\n50,0.01\n100,0.01\n", "reach beyond the spectrum")):
         path.write_text(text, "utf-8")

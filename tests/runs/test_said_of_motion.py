@@ -77,7 +77,7 @@ def test_exact_a_drift_of_a_steady_motion_is_said_whatever_the_breakaway(outcome
     assert bool(found) == said and "breakaway" not in "".join(found)
 
 
-@pytest.mark.parametrize(("length", "said"), [(4e-5, "gives way elastically: bonds 1e+05 N/m"),
+@pytest.mark.parametrize(("length", "said"), [(4e-5, "the interface is elastic: bonds 1e+05 N/m"),
                                               (3e-7, "the block should stick")])
 def test_exact_a_block_on_bonds_as_soft_as_its_mode_is_not_said_to_stick(length, said):
     """The mode has 1.916e5 N/m, the bonds mu N over their length: 4 N over 40 and 0.3 um."""

@@ -77,7 +77,7 @@ def test_exact_what_a_run_has_not_is_null_with_the_reason(drive, reason):
         assert found[name].value is None and found[name].error is None and reason in found[name].reason, name
 
 
-@pytest.mark.parametrize("load, reason", [("0.8 N", "never sticks"), ("8 N", "holds as a whole throughout")])
+@pytest.mark.parametrize("load, reason", [("0.8 N", "never sticks"), ("8 N", "the whole interface sticks throughout")])
 def test_exact_a_phase_wants_a_slip_out_of_a_stick(load, reason):
     """Far above the limit it slides through; below it nothing slips, and the loop has no width."""
     scene = text('law = "coulomb"', 1.0).replace("0.8 N", load).replace('"1 N"', '"4 N"')

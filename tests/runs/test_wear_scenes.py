@@ -366,7 +366,7 @@ def test_exact_a_run_that_begins_anew_says_once_that_a_kept_state_is_dropped(tmp
         (tmp_path / "out.partial" / state).write_bytes(b"kept")
     answer = cli("run", scene, "-o", tmp_path / "out", "--no-page", *quiet)
     assert answer.code == 0, answer.err
-    assert answer.err.count("out.partial held the state of an interrupted run, now discarded") == told
+    assert answer.err.count("out.partial held the state of an interrupted run, which is now discarded") == told
     assert not (tmp_path / "out.partial").exists() and not (tmp_path / "out" / "wear.npz").exists()
 
 

@@ -94,7 +94,7 @@ def test_exact_the_bond_length_changes_with_wear():
 def test_always_wear_beyond_the_table_is_told():
     found = ran('wear.friction.depth=["0 um","1 um"]', "wear.friction.coefficient_factor=[1,0.9]")
     assert found.measures["static_coefficient"].value == pytest.approx(0.9 * MU, rel=1e-12)
-    assert [one for one in found.warnings if "is beyond the last of wear.friction.depth, 1 um" in one]
+    assert [one for one in found.warnings if "is larger than the last value of wear.friction.depth, 1 um" in one]
 
 
 def test_exact_a_resumed_run_has_the_same_bits():

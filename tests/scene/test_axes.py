@@ -76,7 +76,7 @@ def test_exact_a_text_gives_the_value_beside_it():
     ("friction.static=0.1..0.1:3", "both ends are the same"),
     ("friction.static=0.1,,0.2", "an empty value"),
     ("contact.pairs=1..4:3", "a whole number is needed"),
-    ("contact.tilt.angle=1 mrad,0.001 rad", "stands twice"),
+    ("contact.tilt.angle=1 mrad,0.001 rad", "is given twice"),
     ("contact.tilt.angle", "table.key=v1,v2"),
 ])
 def test_refuses_what_is_no_list_of_values(text, says):
@@ -139,5 +139,5 @@ def test_refuses_mistakes_of_the_table_with_their_lines():
 
 
 def test_refuses_one_run_of_many_cases():
-    with pytest.raises(PatchfemError, match=r"sweep: one run cannot hold its 12 cases; use `patchfem sweep`"):
+    with pytest.raises(PatchfemError, match=r"sweep: one run cannot compute its 12 cases; use `patchfem sweep`"):
         pf.run(SWEPT)

@@ -49,13 +49,14 @@ def test_refuses_numbers_that_overflow_what_is_made_of_them(text, sets, says):
 
 def test_refuses_signs_that_no_file_can_hold():
     found = mistakes('title = "a\\u0000b"\n' + POINT + COULOMB + STRUCTURE.replace("axial", "ax\\u0007ial"))
-    assert [one.split(", which")[0] for one in found] == ["a.toml:1: title: holds the sign U+0000",
-                                                          "a.toml:10: structure.mode[1].name: holds the sign U+0007"]
+    assert [one.split(", which")[0] for one in found] == ["a.toml:1: title: contains the character U+0000",
+                                                          "a.toml:10: structure.mode[1].name: contains the character "
+                                                          "U+0007"]
 
 
 def test_refuses_words_of_set_that_are_no_text():
     assert mistakes(PATCH, "contact.load=26 lbf\udcff") == [
-        "--set: contact.load=26 lbf\\udcff: holds bytes that are not UTF-8 text; save it as UTF-8"]
+        "--set: contact.load=26 lbf\\udcff: contains bytes that are not UTF-8 text; save it as UTF-8"]
 
 
 @pytest.mark.parametrize("word", ["x" * 3000 + " = 1\n", "[" + "x" * 3000 + "]\n"])
@@ -69,7 +70,7 @@ def test_exact_a_long_name_is_cut(word):
     (POINT + "b = {" + ".".join("a" * 20_000) + " = 1}\n", 3)])
 def test_refuses_a_key_of_many_parts_at_once(text, line):
     begin = time.process_time()
-    assert mistakes(text) == [f"a.toml:{line}: a key of more than 50 parts; table.key is needed"]
+    assert mistakes(text) == [f"a.toml:{line}: a key has more than 50 parts; write table.key"]
     assert time.process_time() - begin < 1  # the square of the parts: 30 s
 
 

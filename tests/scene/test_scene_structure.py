@@ -278,7 +278,7 @@ def test_refuses_files_at_the_line_of_the_scene(tmp_path):
         write_scene(tmp_path, FILE.replace("rig.npz", "other.npz"))
     for text, says in ((FILE.replace("rig.npz", "rig.uff"), "structure.moving_mass: missing"),
                        (FILE.replace("rig.npz", "rig.uff"), "structure.slide_at: missing"),
-                       (FILE.replace("[drive]", 'slide_at = "1:x"\n[drive]'), "holds the array slide"),
+                       (FILE.replace("[drive]", 'slide_at = "1:x"\n[drive]'), "contains the array slide"),
                        (RUB + FILE.replace("rig.npz", "rig.uff"), "a universal file has nodes")):
         with pytest.raises(SceneError) as caught:
             loads(text)

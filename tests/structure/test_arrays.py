@@ -71,9 +71,9 @@ def test_exact_modal_file(tmp_path):
 
 
 @pytest.mark.parametrize("change, says", [
-    ({"K": None}, "lacks the matrix K; it holds M, C, slide"), ({"M": None, "K": None}, "lacks M and K, or omega"),
+    ({"K": None}, "lacks the matrix K; it contains M, C, slide"), ({"M": None, "K": None}, "lacks M and K, or omega"),
     ({"slide": None}, "lacks output"), ({"slide": np.ones(3)}, "slide has shape (3,), but M has 2"),
-    ({"slide": np.array(["a", "b"])}, "slide does not hold real numbers"),
+    ({"slide": np.array(["a", "b"])}, "slide does not contain real numbers"),
     ({"base": np.ones(5)}, "base has shape (5,)"),
     ({"K": np.ones((2, 3))}, "K must be square"), ({"K": np.ones(4)}, "K must be square, not of shape (4,)"),
     ({"names": np.array(["a", "a"])}, "names must be 2 different texts"), ({"C": -C}, "C adds energy"),
@@ -86,12 +86,12 @@ def test_refuses_matrices_that_lack_something(change, says):
 
 
 @pytest.mark.parametrize("change, says", [
-    ({"damping": None}, "lacks damping of the modes; it holds frequency, slide"), ({"base": None}, "lacks base of the"),
+    ({"damping": None}, "lacks damping of the modes; it contains frequency"), ({"base": None}, "lacks base of the"),
     ({"moving_mass": None}, "lacks moving_mass > 0"), ({"slide": np.ones(3)}, "slide has shape (3,), but there are 2"),
     ({"frequency": np.array([-1.0, 2.0])}, "frequencies must be >= 0"), ({"base": np.ones(2)}, "the sum of base^2"),
     ({"damping": np.array([-0.1, 0.1])}, "damping must be >= 0"), ({"output": np.array([np.nan, 0])}, "not finite"),
     ({"damping": -np.eye(2)}, "damping adds energy"), ({"damping": np.full(2, 0.1j)}, "damping is complex"),
-    ({"slide": np.array(["a", "b"])}, "does not hold real numbers"),
+    ({"slide": np.array(["a", "b"])}, "does not contain real numbers"),
 ])  # fmt: skip
 def test_refuses_modes_that_lack_something(change, says):
     data = {key: value for key, value in (MODAL | change).items() if value is not None}
@@ -103,7 +103,7 @@ def test_refuses_modes_that_lack_something(change, says):
 def test_refuses_interfaces_that_are_not_there():
     bare = {key: FULL[key] for key in "MK"} | {"output": np.ones(2)}
     for data, pairs, pushed, says in ((bare, [(3, 0)], None, "there is no coordinate 3: M has 2"),
-                                      (FULL, [(1, 0)], None, "holds slide, and"),
+                                      (FULL, [(1, 0)], None, "contains slide, but"),
                                       (FULL, [], 9, "no coordinate 9"), (MODAL, [(1, 0)], None, "no numbered masses")):
         with pytest.raises(PatchfemError) as caught:
             arrays.basis(data, pairs, pushed, forced=pushed is not None)
@@ -130,7 +130,7 @@ def test_refuses_numbers_of_many_bytes_by_the_header_alone(tmp_path):
     behind this header, so that who reads on finds its end."""
     head = io.BytesIO()
     npy.write_array_header_1_0(head, {"descr": "|S1024", "fortran_order": False, "shape": (2000, 2000)})
-    for key, said in ("M", "M holds values of 1024 bytes each"), ("names", "holds 4000000 names; 2000 is the most"):
+    for key, said in ("M", "contains values of 1024 bytes"), ("names", "contains 4000000 names; 2000 is the limit"):
         with zipfile.ZipFile(tmp_path / "a.npz", "w") as file:
             file.writestr(f"{key}.npy", head.getvalue())
         with pytest.raises(PatchfemError, match=said):
@@ -141,5 +141,5 @@ def test_refuses_a_list_of_members_that_is_too_long(tmp_path):
     with zipfile.ZipFile(tmp_path / "a.npz", "w") as file:
         for number in range(40):
             file.writestr(f"{number}" * 30_000, b"")
-    with pytest.raises(PatchfemError, match=r"lists members in \d+ bytes"):
+    with pytest.raises(PatchfemError, match=r"its list of members takes \d+ bytes"):
         arrays.read(tmp_path / "a.npz")

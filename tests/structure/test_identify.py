@@ -109,13 +109,13 @@ def test_always_a_free_rig_is_told_that_its_rigid_mode_is_missing():
     found = modes_from_responses(BAND, {((k, 0), (0, 0)): (H[:, k], 0) for k in range(2)}, notes)
     np.testing.assert_allclose(2 * np.pi * found.frequency, rig.omega[1:], rtol=1e-9)
     np.testing.assert_allclose(found.motion[0, 0], np.sqrt(0.5), rtol=1e-6)
-    assert len(notes) == 1 and "rigid modes" in notes[0]
+    assert len(notes) == 1 and "rigid-body modes" in notes[0]
 
 
 def test_refuses_responses_without_scale_or_modes():
     H = responses([143], [0.003], np.ones((2, 1)))
     flat = np.random.default_rng(0).normal(size=(BAND.size, 2)) @ [1, 1j]
-    for measured, says in (({((2, 0), (1, 0)): (H[:, 1], 0)}, "no response at the driven place itself (1:x)"),
+    for measured, says in (({((2, 0), (1, 0)): (H[:, 1], 0)}, "no response at the driven point itself (1:x)"),
                            ({((1, 0), (1, 0)): (flat, 0)}, "no mode is visible"),
                            ({((1, 0), (1, 0)): (0 * flat, 0)}, "the response at 1:x itself is zero"),
                            ({((1, 0), (1, 0)): (-H[:, 0], 0)}, "check its sign"),

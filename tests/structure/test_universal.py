@@ -79,7 +79,7 @@ def test_exact_complex_modes_are_turned_and_said(tmp_path):
     assert len(found.notes) == 3 and "mode 1 is complex" in found.notes[0]
     sets = complex_modes()
     sets[1]["r2"] = sets[1]["r2"] * np.array([1, np.exp(0.1j), 1])
-    assert "left out" in universal.read(write(tmp_path / "b.uff", sets)).notes[1]
+    assert "leaves out" in universal.read(write(tmp_path / "b.uff", sets)).notes[1]
 
 
 def test_exact_units_of_dataset_164(tmp_path):
@@ -126,7 +126,7 @@ def test_exact_places_give_the_basis(tmp_path):
     np.testing.assert_allclose(found.slide, np.sqrt(2) * (RIG.shapes[2] - RIG.shapes[0]) * sign, atol=2 * SIX)
     np.testing.assert_allclose(found.output, np.sqrt(2) * RIG.shapes[1] * sign, atol=2 * SIX)
     np.testing.assert_allclose(found.base, found.output, rtol=0, atol=0)
-    assert np.sum(found.base**2) == pytest.approx(1, abs=1e-4), "node 12 carries 2 kg: the modes hold all of it"
+    assert np.sum(found.base**2) == pytest.approx(1, abs=1e-4), "node 12 carries 2 kg: the modes contain all of it"
     forced = places.basis(shapes, 2.0, {"slide_at": "13:+y", "force_at": "11:-y"}, True)
     np.testing.assert_allclose(forced.base * forced.slide, 2 * RIG.shapes[0] * RIG.shapes[2], atol=3 * SIX)
     # the modes answer a force as the rig itself does
@@ -134,16 +134,16 @@ def test_exact_places_give_the_basis(tmp_path):
     ours = receptance(found, w, found.output, found.slide)
     np.testing.assert_allclose(ours, receptance(damped(), w, RIG.shapes[1], RIG.shapes[2] - RIG.shapes[0]), rtol=1e-3)
     assert not places.held_note(found)
-    assert "hold" in places.held_note(places.basis(shapes, 0.5, {"slide_at": "12:+y"}, False))[0]
+    assert "contain" in places.held_note(places.basis(shapes, 0.5, {"slide_at": "12:+y"}, False))[0]
 
 
 @pytest.mark.parametrize("where, says", [
     ({"slide_at": "99:+y"}, "structure.slide_at: the file has no motion of 99:y; it has 11:x, 11:y, 11:z"),
-    ({"slide_at": "twelve"}, "structure.slide_at: 'twelve' is not a place; node:direction is needed"),
+    ({"slide_at": "twelve"}, "structure.slide_at: 'twelve' is not a node with a direction; write node:direction"),
     ({"slide_at": "12:+x"}, "structure.slide_at: no mode of the file moves '12:+x'"),
     ({"slide_at": "12:+y", "output_at": "11:+z"}, "structure.output_at: no mode of the file moves"),
     ({"slide_at": "12:+ry"}, "structure.slide_at: the file has no motion of 12:ry"),
-    ({"slide_at": "12:+y", "base_at": "13:y"}, "structure.base_at: the modes hold 4 of moving_mass"),
+    ({"slide_at": "12:+y", "base_at": "13:y"}, "structure.base_at: the modes contain 4 of moving_mass"),
 ])  # fmt: skip
 def test_refuses_places_that_are_not_there(tmp_path, where, says):
     shapes = universal.read(write(tmp_path / "a.uff", normal_modes()))
@@ -156,8 +156,8 @@ def test_refuses_places_that_are_not_there(tmp_path, where, says):
     (normal_modes((1.0, 0.0, 1.0)), "mode 2 ("), (normal_modes(modal_m=0.0), "has no modal mass"),
     (normal_modes(modal_damp_vis=-0.01), "both must be >= 0"),
     (responses(12, orddenom_spec_data_type=12), "is type 12 over 12; displacement (8), velocity (11)"),
-    (responses(8, func_type=1), "dataset 58 holds no frequency response function"),
-    (responses(12, ref_node=99), "no response at the driven place itself (99:y)"),
+    (responses(8, func_type=1), "dataset 58 contains no frequency response function"),
+    (responses(12, ref_node=99), "no response at the driven point itself (99:y)"),
     (responses(12)[:2] + responses(12, every=0.25)[2:], "has other frequencies than the first"),
     ([{"type": 164, "units_code": 1, "units_description": "SI", "temp_mode": 1, "length": 1.0, "force": 1.0,
        "temp": 1.0, "temp_offset": 0.0}], "has neither mode shapes (dataset 55"),

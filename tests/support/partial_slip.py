@@ -184,8 +184,8 @@ def _meant(step: Step, operators: Operators, friction: float) -> None:
         raise PatchfemError(f"contact: the gap must be {operators.x.shape} finite heights")
     if step.moment is not None and step.spring == 0 and step.load > 0 and \
             not abs(step.moment) < step.load * np.ptp(operators.x) / 2:
-        raise PatchfemError(f"contact.load_line: the line of the load lies {step.moment / step.load:.6g} m from the "
-                            "middle, outside the patch: the piece tips over")
+        raise PatchfemError(f"contact.load_line: the load line lies {step.moment / step.load:.6g} m from the middle, "
+                            "outside the patch: the piece tips over")
 
 
 def _held(shear: float | None, most: float) -> None:

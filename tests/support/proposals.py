@@ -48,7 +48,7 @@ def tries(tables: dict, key: str, message: str) -> list:
     out = [{key: literal_eval(found)} for found in SUCH.findall(message)]
     count = len(tables["structure"].get("interface", ())) if isinstance(tables.get("structure"), dict) else 0
     laws = [f"structure.interface[{k + 1}]" for k in range(count)] or ["friction"]
-    beside = re.search(r"beside (accuracy\.\w+) '", message)
+    beside = re.search(r"with (accuracy\.\w+) '", message)
     for kind, words in USE.findall(message):
         at = {"law": [f"{one}.law" for one in laws], "waveform": ["drive.waveform"], "kind": ["drive.kind"]}.get(
             kind, [beside[1]] if beside else [key] if key.startswith("accuracy.") else [])

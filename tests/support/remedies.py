@@ -178,16 +178,16 @@ def _judged(before, after, remedy: Remedy, sets: dict) -> str:
         return "failed" if one is None or one.value is not None else "gone"
     if _over(one, asked) <= 1:
         return "gone"
-    share = REFINED if "refines" in sentence else BETTER
+    share = REFINED if "to refine" in sentence else BETTER
     return "better" if one.error <= share * before.measures[worst].error else "failed"
 
 
 def _named(found, sentence: str) -> list:
     """The measures that a sentence on bars names, in its order; none of another sentence."""
-    if ", the tolerance is " not in sentence:
+    if "; the tolerance is " not in sentence:
         return []
-    said = sentence.partition(", the tolerance is ")[0]
-    words = re.findall(r"(?:^|, )(\w+) (?:is known )?(?:to|no better than) ", said)
+    said = sentence.partition("; the tolerance is ")[0]
+    words = re.findall(r"(?:^|, )(\w+) (?:has an estimated error )?of ", said)
     return [one for one in words if one in found.measures]
 
 

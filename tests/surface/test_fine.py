@@ -97,8 +97,8 @@ def test_exact_uneven_samples_give_the_same_share():
 def test_refuses_fine_waves_with_the_numbers_and_the_remedy():
     profile = Profile(X, cosines([20, 500], [2.0, 1.0]).z, "profile.csv")
     assert too_fine(profile, 100e-6) == (
-        'profile.csv holds 45 % of its height below 2 elements (200 um): add [contact.asperities] or set element_size '
-        '= "25 um" (90 % kept; "25 um" keeps 99 %)')
+        'profile.csv holds 45 % of its height in waves shorter than 2 elements (200 um): add [contact.asperities], '
+        'or set element_size = "25 um" (90 % kept; "25 um" keeps 99 %)')
     assert too_fine(profile, 25e-6) is None
     assert too_fine(cosines([20, 500], [2.0, 0.1]), 100e-6) is None
     assert too_fine(Profile(X, 0 * X, "flat.csv"), 1.0) is None

@@ -134,8 +134,8 @@ def test_exact_spectrum_of_a_rough_trace_by_its_filtered_height(data, truth):
                             (800e-6, "own_gauss_lc800", 0.05)):
         rough = np.sqrt((power * (1 - 2.0 ** -((cut / waves) ** 2)) ** 2).sum())
         assert rough == pytest.approx(known[name]["Rq"] * 1e-6, rel=near)
-    assert "% of its height below 2 elements (200 um): add [contact.asperities] or set element_size = \"20 um\"" in str(
-        too_fine(profile, 100e-6))
+    assert ('% of its height in waves shorter than 2 elements (200 um): add [contact.asperities], or set '
+            'element_size = "20 um"') in str(too_fine(profile, 100e-6))
 
 
 def test_exact_a_measured_trace_on_the_nodes_of_a_patch(data):

@@ -120,8 +120,8 @@ def test_exact_centred_where_it_does_not_and_said():
 
 def test_exact_coarse_samples_are_said():
     profile = placed(trace(np.linspace(-HALF, HALF, 51), np.zeros(51)), EVEN)
-    assert profile.notes == ("before.csv: samples lie 254 um apart, elements are 63.5 um: between samples the surface "
-                             "is taken as straight",)
+    assert profile.notes == ("before.csv: samples lie 254 um apart but elements are 63.5 um long, so the surface "
+                             "is taken as straight between samples",)
 
 
 def test_exact_half_an_element_goes_on_flat():

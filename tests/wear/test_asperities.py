@@ -200,14 +200,15 @@ def test_exact_band_of_a_sine():
 
 
 @pytest.mark.parametrize("change, message", [
-    ({"upper": np.zeros((40, 61))}, "two rough surfaces need finite heights on one and the same raster"),
-    ({"stroke": 5e-6}, "it is made of whole steps, the nearest 6.4e-06 m, and at most half a period"),
+    ({"upper": np.zeros((40, 61))}, "two rough surfaces need finite heights on the same raster"),
+    ({"stroke": 5e-6}, "the stroke must be a whole number of steps, the nearest is 6.4e-06 m, and at most half a "
+                       "period"),
     ({"stroke": 31 * STEP}, "at most half a period"),
     ({"stroke": -STEP}, "a stroke of zero or more"),
     ({"worn": np.nan}, "worn is a depth of zero or more"),
     ({"upper_share": 1.1}, "upper_share lies between 0 and 1"),
     ({"bite": 0.0}, "bite is above zero"),
-    ({"worn": 1e-20}, "is lost in the round-off of the heights"),
+    ({"worn": 1e-20}, "is below the round-off of the heights"),
 ])  # fmt: skip
 def test_refuses(change, message):
     lower, upper = surfaces()

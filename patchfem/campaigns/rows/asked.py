@@ -61,7 +61,7 @@ class Asked:
             raise PatchfemError(f"{where}[wear] cannot be fitted; leave [wear] out")
         for one in self.wanted:
             if one.key.startswith("drive.") or one.key == "measured.reading_cutoff":
-                raise PatchfemError(f"--free {one.key}: it is not a value of the rig; the rows give the drive")
+                raise PatchfemError(f"--free {one.key}: the drive is given by the rows; choose a key of the rig")
 
     def _settle(self) -> None:
         """Ask for steady motions where the scene allows them."""

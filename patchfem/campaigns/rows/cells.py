@@ -46,7 +46,8 @@ class Cells:
         if name == "run":
             return [self.runs[k] for k in self.row]
         if name not in ("frequency", "input", "flag"):
-            raise PatchfemError(f"{self.path}: no column {name} to hold or leave out; use frequency, input, flag, run")
+            raise PatchfemError(f"{self.path}: no column {name} to hold out or leave out; use frequency, input, flag, "
+                                "run")
         return [getattr(self.rows[k], name) for k in self.row]
 
     def chosen(self, one: str) -> np.ndarray:

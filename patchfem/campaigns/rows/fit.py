@@ -113,8 +113,8 @@ def fit_rows(question: Question, options: RowsOptions, say: Callable | None = No
     computed = Computed(asked, say)
     parts = cells.parts(options.leave_out, ~held) if options.leave_out else []
     if len(parts) == 1:
-        raise PatchfemError(f"--leave-out {options.leave_out}: all rows that are not held out have the same value, "
-                            "so nothing would be left")
+        raise PatchfemError(f"--leave-out {options.leave_out}: all rows that are not held out have the same value in "
+                            "this column, so no rows would be left to fit")
     for _, part in parts:
         _enough(cells, ~held & ~part, count, how)
     placebos = [(text, question.asked(cells.conditions, text)) for one in options.placebos
@@ -138,8 +138,8 @@ def fit_rows(question: Question, options: RowsOptions, say: Callable | None = No
 def _enough(cells: Cells, training, count: int, how: Search) -> None:
     used = int((training & ~cells.unstable).sum() if how.unstable == "out" else training.sum())
     if used <= count:
-        raise PatchfemError(f"{cells.path}: {used} readings that are not held or left out cannot determine {count} "
-                            "values and their intervals")
+        raise PatchfemError(f"{cells.path}: {used} readings are neither held out nor left out, too few to determine "
+                            f"{count} values and their intervals")
 
 
 def _predicted(computed: Computed, values, conditions) -> np.ndarray:
@@ -167,10 +167,10 @@ def _texts(one: str, wanted) -> list:
         raise PatchfemError(f"--placebo {one}: table.key=value,value is needed, such as "
                             "structure.mode.yaw.frequency=110 Hz,138 Hz")
     if key in ("drive.frequency", "drive.acceleration"):
-        raise PatchfemError(f"--placebo {one}: the rows give the drive; choose a value of the rig")
+        raise PatchfemError(f"--placebo {one}: the drive is given by the rows; choose a key of the rig")
     if any(key == each.key for each in wanted):
-        raise PatchfemError(f"--placebo {one}: the key is free, so every fit would find its own value; leave it "
-                            "out of --free, or use another key")
+        raise PatchfemError(f"--placebo {one}: this key is free, so every fit would find its own value; leave it out "
+                            "of --free, or choose another key")
     return [f"{key}={value.strip()}" for value in values.split(",")]
 
 
@@ -200,7 +200,7 @@ def _said(cells: Cells, asked: Asked, found: Found, logs, how: Search) -> list:
     count = int(cells.unstable.sum())
     if count:
         means = {"bound": "count in the fit as lower bounds", "out": "are left out of the fit",
-                 "read": "count in the fit as any other"}[how.unstable]
+                 "read": "count in the fit like all others"}[how.unstable]
         out.append(f"{count} readings flagged U {means}; scores_stable are without them")
     lost = sorted({f"{cells.rows[k].frequency:.6g} Hz, {cells.rows[k].input:.4g} m/s^2"
                    for k, log in zip(cells.row, logs) if abs(log) >= MOST})

@@ -75,7 +75,7 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         raise SceneError([*asked.mistakes(first), *wrong])
     count = prod([*map(len, parts), *([request.count] if request.count else [len(axis.texts) for axis in axes])])
     if count > MOST:
-        raise SceneError([f"{asked.path}: {count} cases exceed the limit of one sweep ({MOST}); sweep parts of the "
+        raise SceneError([f"{asked.path}: {count} cases are more than one sweep may have ({MOST}); sweep parts of the "
                           "ranges, or draw from them with --sobol N"])
     if request.count and axes:
         parts.append(samples.drawn(axes, request.count, request.sobol, request.seed))

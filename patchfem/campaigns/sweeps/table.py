@@ -32,7 +32,7 @@ def read(path: Path) -> tuple[Cases | None, list[str]]:
     wrong = [f"{path}:{number}: {len(heads)} cells are needed, not {len(row)}" for number, row in lines[1:]
              if len(row) != len(heads)]
     keys = [head[1] for head in heads]
-    wrong += [f"{path}:{lines[0][0]}: {key}: stands twice" for key in dict.fromkeys(keys) if keys.count(key) > 1]
+    wrong += [f"{path}:{lines[0][0]}: {key}: is given twice" for key in dict.fromkeys(keys) if keys.count(key) > 1]
     if wrong:
         return None, wrong
     axes = []
@@ -50,7 +50,7 @@ def _column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[
         if cell in known:
             continue
         if unit is not None and not NUMBER.fullmatch(cell):
-            wrong.append((number, f"'{cell[:60]}' is not a number; the unit belongs in the header"))
+            wrong.append((number, f"'{cell[:60]}' is not a number; write the unit in the header"))
             continue
         try:
             known[cell] = values_of(key, [f"{cell} {unit}" if unit else cell])

@@ -90,14 +90,15 @@ def grid(modes: ModalBasis, drive, laws, over: tuple, start: Start | None, stick
                             f"{most:.3g} are possible: change drive.cycles or accuracy.steps_per_cycle")
     idle = np.flatnonzero(~np.any(modes.interfaces, axis=1))
     if idle.size:
-        raise PatchfemError(f"interface {idle[0] + 1} slides in no mode: give it a mode with slide, or leave it out")
+        raise PatchfemError(f"interface {idle[0] + 1} slides in no mode: give slide for a mode, or leave the interface "
+                            "out")
     count = round(duration / h) + 1
     filled = *(np.zeros((count, size)) for size in (n, n, i, i)), np.zeros(count, np.int64)
     if start is not None:
         if np.shape(start.z) != (n,) or np.shape(start.v) != (n,):
-            raise PatchfemError(f"a start needs {n} coordinates and {n} rates, one of each per mode")
+            raise PatchfemError(f"a start needs {n} displacements and {n} velocities, one of each per mode")
         if not np.all(np.isfinite([start.z, start.v])):
-            raise PatchfemError("a start needs finite coordinates and rates")
+            raise PatchfemError("a start needs finite displacements and velocities")
         filled[0][0], filled[1][0] = start.z, start.v
     values = np.array(drive.values(np.arange(count) * h), float, order="C")
     # arrays of their own: numba compiles a loop anew for one that is read-only or lies otherwise in memory
@@ -143,8 +144,8 @@ def finish(modes: ModalBasis, run: Grid, failures: int, warnings: list) -> Compa
         step = int(np.argmax(~np.isfinite(v).all(axis=1)))
         warnings = [*warnings, f"the motion is not finite from step {step} on; raise accuracy.steps_per_cycle"]
     elif abs(error) > 1e-3 * flow:
-        warnings = [*warnings, f"the energy does not balance: {abs(error) / flow:.1%} of what passed through is "
-                               f"{'missing' if error > 0 else 'made by the method'}"]
+        warnings = [*warnings, f"the energy does not balance: {abs(error) / flow:.1%} of the energy that passed "
+                               f"through is {'missing' if error > 0 else 'created by the method'}"]
     kept = np.arange(len(z)) * run.h, z, v, force.T, residual.T, iterations
     for array in (*kept, run.drive):
         array.setflags(write=False)

@@ -77,10 +77,10 @@ def _warnings(modes, laws, found: Grid, failures, steps: int) -> list:
     out, (*_, residual, iterations) = [], found.filled
     left = np.abs(residual) / found.laws[:, 1]
     if left.max(initial=0.0) > ADMITTED:
-        out.append(f"accepted steps left up to {left.max():.3g} and on average {left[1:].mean():.3g} of the "
-                   "friction limit between the law and the force used")
+        out.append(f"in accepted steps the force used differs from the friction law by up to {left.max():.3g} of the "
+                   f"friction limit, on average by {left[1:].mean():.3g}")
     if failures:
-        out.append(f"{failures} of {iterations.size - 1} steps ended without convergence after the last iteration")
+        out.append(f"{failures} of {iterations.size - 1} steps did not converge within the allowed iterations")
     turn = found.h * max(elastic_rates(modes, laws), default=0.0)
     if turn > TURN:
         out.append(f"the elastic friction oscillates through {turn:.2g} rad in a step (limit {TURN:g}); set "

@@ -133,7 +133,8 @@ class PeriodMap:
         """Set the clock to a sine; it is made once for each of the last drives."""
         if id(drive) not in self.clocks:
             if len(drive.segments) != 1:
-                raise PatchfemError("drive: a periodic motion needs one sine that goes on; march this one")
+                raise PatchfemError("drive: a periodic motion needs a single sine without end; use accuracy.method = "
+                                    '"march" for this drive')
             if len(self.clocks) >= DRIVES:
                 self.clocks.clear()
             stiff = max(float(one.stiffness.sum()) for one in self.groups)

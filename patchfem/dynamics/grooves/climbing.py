@@ -26,9 +26,9 @@ def refuse_heavy(grooves: Grooves, static: float, modes) -> None:
     own = modes.mass / float(modes.slide @ modes.slide)
     taken = -grooves.lifted_mass * grooves.least_mass(static)
     if taken >= own:
-        raise PatchfemError(f"{grooves.lifted_mass:.6g} kg press so hard on the way down a flank that friction exceeds "
-                            f"the inertia of the {own:.6g} kg that slide, so the forces determine no motion; less "
-                            f"than {own / -grooves.least_mass(static):.6g} kg is needed", f"{grooves.key}.lifted_mass")
+        raise PatchfemError(f"{grooves.lifted_mass:.6g} kg press so hard on the downward flank that friction exceeds "
+                            f"the inertia of the sliding {own:.6g} kg, so that the motion is not determined; less than "
+                            f"{own / -grooves.least_mass(static):.6g} kg is needed", f"{grooves.key}.lifted_mass")
 
 
 def lifts(grooves: Grooves, time: float) -> str:

@@ -147,8 +147,8 @@ class SampledRun(GroovesRun):
         """Mark the run not_converged when steps did not meet their error; what was computed is kept."""
         if self.ledger[7]:
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"{int(self.ledger[7])} of {self.done} steps did not converge over the grooves; "
-                            "raise accuracy.steps_per_cycle")
+            self.message = (f"{int(self.ledger[7])} of {self.done} steps did not converge on the grooves; raise "
+                            "accuracy.steps_per_cycle")
 
     def strained(self) -> float:
         """Energy of the height of the load, or done against one that swings, and of the speed of what rises [J]."""

@@ -92,8 +92,8 @@ def _curve(modes, drives, group, parameter, how: How) -> Branch:
         if harmonics or above <= tolerance / 4:
             return Branch(points, parameter, tuple(f / scale for f in path.folds),
                           tuple(f / scale for f in path.crossings), path.ended)
-    raise NotConverged(f"accuracy.tolerance: {LADDER[-1]} harmonics leave {above:.1e} of the motion above them on the "
-                       f"branch, more than {tolerance / 4:g}; loosen it")
+    raise NotConverged(f"accuracy.tolerance: {LADDER[-1]} harmonics leave {above:.1e} of the motion on the branch, "
+                       f"more than the limit of {tolerance / 4:g}; raise the tolerance")
 
 
 def _followed(modes, drives, group, parameter, h, first, longest) -> tuple:

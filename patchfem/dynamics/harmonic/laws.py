@@ -323,5 +323,5 @@ def law_of_model(model):
     if model.set_valued:
         raise PatchfemError("accuracy.method: \"harmonic\" cannot balance set-valued friction; use the event map, or "
                             "law = \"elastic-plastic\" with a short bond_length")
-    raise PatchfemError("accuracy.method: \"harmonic\" takes the stretch reading with order = 1, a constant bond "
-                        "length, friction.breakaway = 0 and a rigid slide; use method = \"march\"")
+    raise PatchfemError('accuracy.method: "harmonic" works only with reading = "stretch", order = 1, a constant bond '
+                        'length, friction.breakaway = 0 and a rigid slide; use method = "march"')

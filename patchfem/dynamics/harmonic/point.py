@@ -131,7 +131,8 @@ def point(modes, drive, group, harmonics: int | None = None, tolerance: float = 
         x = cut(balance_of(modes, group, 0), found.coefficients, found.unknowns, h, _next(h))
     if found is None or found.error > tolerance:
         raise NotConverged(f"accuracy.tolerance: {LADDER[-1]} harmonics leave an error of "
-                           f"{found.error if found else np.inf:.1e}, more than {tolerance:g}; loosen it or march")
+                           f"{found.error if found else np.inf:.1e}, more than {tolerance:g}; raise the tolerance, or "
+                           'use accuracy.method = "march"')
     return found
 
 
@@ -226,8 +227,8 @@ def _along_levels(balance, omega, level, h: int) -> np.ndarray:
                   (0.0, level), True, 0.05, 0.5, 1000, 1e-6)
     if path.ended != "end":
         bare = any(k for k, *_ in balance.linear(omega, h).free)
-        why = "; an undamped mode driven at its own frequency has a bounded motion only where friction can hold it: " \
-            "give it damping" if bare else ", neither from the held contact nor along weaker drives"
+        why = ("; an undamped mode driven at its natural frequency stays bounded only if friction can hold it: give it "
+               "damping") if bare else ", neither from the sticking contact nor by raising the drive from zero"
         raise (_Unbounded if bare else NotConverged)(
             f"accuracy.harmonics: no balance with {h} harmonics was found at {omega / (2 * np.pi):.6g} Hz{why}")
     return path.x[-1]

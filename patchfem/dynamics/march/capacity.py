@@ -50,7 +50,7 @@ def lengthened(contact, kept: Kept, place: str, *others):
     """
     rows, have = contact.bondlist.shape
     if have >= MOST_STRIPS:
-        raise Missing(f"the bond list outgrew {have} entries ({have * ENTRY / 1e6:.0f} MB) {place}; {CURE}", "")
+        raise Missing(f"the bond list grew beyond {have} entries ({have * ENTRY / 1e6:.0f} MB) {place}; {CURE}", "")
     for array, old in zip(others, kept.others):
         array[...] = old
     found = contact._replace(**{name: array.copy() for name, array in kept.fields.items()})

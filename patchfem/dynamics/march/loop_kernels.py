@@ -43,7 +43,7 @@ def seen(i, last, drive, motion, plant, row, c, j, n):
 
 @njit(error_model="numpy", cache=True, **LEAN)
 def march(first, steps, motion, plant, table, c, j, n, travel, ledger, rows):
-    """March `steps` steps, the first by row `first` of the table (in turns); 0.1-0.3 us per step, a few ns per point.
+    """March `steps` steps, the first by row `first` of the table (in turns); 0.1-0.3 us a step, a few ns per point.
 
     motion (2, n): coordinates and rates; table: of `propagator.Propagator`; c: the contact on port 0; j: Faces, or
     Single; n: Pressing, or Steady (all of `contacts.arrays`);

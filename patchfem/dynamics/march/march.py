@@ -453,9 +453,8 @@ class Run:
                 for array, old in zip((*self.contact, *self._moving()), begin):
                     array[...] = old
                 did, status = self._steps(did - 1, rows)[0], 1
-                self.message = (f"a step from {say(self._out(rows[did]), 3)} on throws the motion out of bounds: "
-                                "nothing holds it beyond the barrier of a softening spring; the run ended before that "
-                                "step")
+                self.message = (f"from {say(self._out(rows[did]), 3)} on the motion diverges, because nothing holds it "
+                                "beyond the barrier of the softening spring; the run ended there")
             self.done += did
             parts.append(rows[:did + 1])
             self._judge(status)
@@ -569,8 +568,8 @@ class Run:
         """Mark the run not_converged when a step missed its residual; what was computed is kept."""
         if self.ledger[7]:
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"{int(self.ledger[7])} of {self.done} steps missed the force residual {GOAL:.0e} of the "
-                            "friction limit; raise accuracy.steps_per_cycle")
+            self.message = (f"{int(self.ledger[7])} of {self.done} steps did not reach the force residual {GOAL:.0e} "
+                            "of the friction limit; raise accuracy.steps_per_cycle")
 
     def watched(self, rows) -> tuple:
         """Slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in booked rows."""

@@ -232,7 +232,8 @@ def model_of(modes: ModalBasis, law: Rubbing, sets: ContactSets | None, load=Non
     """The model of a basis on contact sets, or under a prescribed load on one point, which no heave or pitch can move.
     shear: ShearModes of an elastic-plastic law or of bonds; PatchfemError beside any other."""
     if shear is not None and law.kind not in (PLASTIC, POINTS, LISTS):
-        raise PatchfemError(unbuilt("friction.law: this law with a load that changes and [contact.shear]", "stiff"))
+        raise PatchfemError(unbuilt("friction.law: this law together with a changing load and "
+                                    "[contact.shear]", "stiff"))
     if shear is not None and shear.points.size != sets.x.size:
         raise PatchfemError("contact.shear: under a load that changes the shear modes must span every node")
     if load is not None and any(part is not None and np.any(part) for part in (modes.normal, modes.pitch)):

@@ -312,15 +312,15 @@ def regime(steady: dict | None) -> str:
     text = f" Regime: {steady['regime']}; largest Floquet multiplier {size:.4g}"
     if steady["regime"] in ("stuck", "unbounded") or size == 0:
         return text + "."
-    return text + (", so a disturbance dies out." if size < 1 else ", so a disturbance does not die out.")
+    return text + (", so a disturbance decays." if size < 1 else ", so a disturbance grows or persists.")
 
 
 def caption(found: dict) -> str:
     """Caption of the picture of a curve of steady motions: what it shows, its regimes, folds and gaps."""
     what, parts = axis_of(found)[1], [regime for regime, _, _ in spans(found)]
     count, folds = np.asarray(found["amplitude"]).size, len(found.get("folds", ()))
-    text = f"Half peak-to-peak of the steady motion over the {what}, {count} points; "
-    text += "colour and line show the regime: " + ", ".join(dict.fromkeys(parts)) + "."
+    text = f"Half peak-to-peak of the steady motion against the {what}, {count} points; "
+    text += "colour and line style show the regime: " + ", ".join(dict.fromkeys(parts)) + "."
     if folds:
         text += f" The curve turns back at {folds} fold{'s' if folds > 1 else ''}."
     return text + (" Shaded: no bounded motion." if not np.all(np.isfinite(found["amplitude"])) else "")
@@ -390,7 +390,8 @@ def decay(found) -> list:
         error, y = getattr(found, f"{name}_error"), getattr(found, name)
         known = np.isfinite(error)
         x = found.amplitude[known] * scale
-        out.append(chart(f"{label.capitalize()} of the decay", axis("half of a swing", unit, True), axis(label, of), [
+        out.append(chart(f"{label.capitalize()} of the decay", axis("half of an "
+                                                                    "oscillation", unit, True), axis(label, of), [
             line(x, y[known], "accent"),
             mark("dots", "accent", "", x=x, y=y[known], errors=error[known], shape="circle")] * bool(known.any())))
     return out

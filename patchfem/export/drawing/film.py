@@ -61,7 +61,8 @@ def film_of(series: Series, magnify: float | None = None) -> Film:
     """
     numbers = moving(series.times)
     if len(numbers) < 2:
-        raise PatchfemError(f"{series.path}: holds one frame, in which nothing moves; write a picture with -o FILE.png")
+        raise PatchfemError(f"{series.path}: contains only one frame, so there is no motion to show; write a picture "
+                            "with -o FILE.png")
     seen, windows, slides, reach = [], [], [], {"normal_stress": [], "shear_stress": []}
     for number in numbers:
         one = series.frame(number)

@@ -34,7 +34,7 @@ class Panel:
     def title(self, scaled: bool = True) -> str:
         """Head of the panel: how much its motion is magnified, and where `scaled` which stress the top colour stands
         for."""
-        text = "drawn as meshed" if self.factor == 0 else f"motion and gap {self.factor:g} times as large"
+        text = "drawn to scale" if self.factor == 0 else f"motion and gap {self.factor:g} times as large"
         unit, scale = axis_unit([self.top], "Pa")
         text += f", top colour {self.top * scale:.3g} {unit} and more" if self.over and scaled else ""
         if self.aside != 1:

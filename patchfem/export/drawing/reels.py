@@ -58,8 +58,8 @@ def _ffmpeg(path: Path) -> str:
 
         program = get_ffmpeg_exe()
     if program is None:
-        raise Missing(f"{path}: .mp4 is written by ffmpeg, which is not there; pip install imageio-ffmpeg, or use a "
-                      ".gif or .html")
+        raise Missing(f"{path}: writing .mp4 needs ffmpeg, which is not installed; run pip install imageio-ffmpeg, or "
+                      "write .gif or .html")
     return program
 
 

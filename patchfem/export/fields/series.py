@@ -109,7 +109,7 @@ class Series:
             for one, rows in group[kind].items():
                 first = group[f"Steps/{kind}Offsets/{one}"][:]
                 wanted(rows.dtype.kind in "iuf" and rows.shape[1:] == TAILS.get(one, ()),
-                       f"{name}/{kind}/{one} holds {rows.ndim}-dimensional {rows.dtype}")
+                       f"{name}/{kind}/{one} contains {rows.ndim}-dimensional {rows.dtype}")
                 wanted(first.shape == self.times.shape and first.dtype.kind in "iu" and first.min() >= 0
                        and first.max() + size <= len(rows), f"{name}/{kind}/{one} does not reach the last frame")
 

@@ -40,4 +40,4 @@ def _told(name: str, highest: tuple, pieces: int) -> str:
     both = ", which the other piece exceeds too" * (pieces > 1)
     return (f"the von Mises stress reaches {stress / 1e6:.4g} MPa in the {name} of the {side} piece, at x = {say(x)} "
             f"and {say(abs(y))} from the interface; the yield strength is {known.strength / 1e6:g} MPa "
-            f"({known.source[:-1]}){both}; the run is elastic and neglects plastic flow")
+            f"({known.source[:-1]}){both}; the run is elastic and neglects yielding")

@@ -41,7 +41,7 @@ def export(folder: Path, out: Path, frame: int | None = None) -> str:
         raise PatchfemError(f"{out}: fields are exported as {', '.join(ENDINGS)}, the last cycle with a script "
                             "for ParaView as .py; histories and loops as .uff, .mat, .csv --histories")
     if frame is not None and out.suffix in (".pvd", ".vtkhdf"):
-        raise PatchfemError(f"--frame: {out.suffix} holds the whole series; use a .vtu or .csv for one frame")
+        raise PatchfemError(f"--frame: {out.suffix} contains the whole series; use a .vtu or .csv for one frame")
     with Series(folder) as series:
         return _export(series, out, -1 if frame is None else frame)
 
@@ -79,7 +79,7 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
     old = list(folder.iterdir()) if folder.is_dir() else []
     strange = sorted(one.name for one in old if not FRAME.fullmatch(one.name) and not unfinished(one.name))
     if strange:
-        raise PatchfemError(f"{folder}: holds files that are not frames of patchfem ({', '.join(strange[:3])}); "
+        raise PatchfemError(f"{folder}: contains files that are not frames of patchfem ({', '.join(strange[:3])}); "
                             "choose another -o")
     try:
         folder.mkdir(exist_ok=True)

@@ -37,12 +37,12 @@ def imported(file: Path, out: Path, asked: Iterable[str], zero: bool, how: Estim
     if ending not in (".csv", ".toml", ".uff", ".unv"):
         raise PatchfemError(f"{out}: records are written as .csv, modes as .toml, a frequency response as .uff")
     if ending == ".csv" and how != Estimate(decay=how.decay, begin=how.begin if how.decay else ""):
-        raise PatchfemError("--segment, --window, --band and, without --decay, --begin belong to modes (-o modes.toml) "
-                            "and responses (-o response.uff)")
+        raise PatchfemError("--segment, --window, --band and, without --decay, --begin can only be used for modes (-o "
+                            "modes.toml) and responses (-o response.uff)")
     if zero and how.decay:
-        raise PatchfemError("--zero belongs to a table of records, not to what --decay reads off it")
+        raise PatchfemError("--zero can only be used for a table of records, not with --decay")
     if zero and ending != ".csv":
-        raise PatchfemError("--zero belongs to a table of records (-o table.csv)")
+        raise PatchfemError("--zero can only be used for a table of records (-o table.csv)")
     if ending == ".csv":
         return _decay(file, out, asked, how.begin) if how.decay else _table(file, out, asked, zero)
     return (_modes if ending == ".toml" else _response)(file, out, asked, how)
@@ -56,8 +56,8 @@ def _table(file: Path, out: Path, asked, zero: bool) -> dict:
     rows = len(next(iter(values.values())))
     moved = [f"{name} starts at {values[name][0]:g} {records.SI[name]}" for name in ("time", "displacement", "lateral")
              if "displacement" in values and name in values and values[name][0] != 0]
-    notes = [*found.notes, *([f"{', '.join(moved)}: slide.file needs a table that starts at 0; --zero counts from the "
-                              "first row"] if moved else [])]
+    notes = [*found.notes, *([f"{', '.join(moved)}: slide.file needs a table that starts at 0; use --zero to subtract "
+                              "the first row"] if moved else [])]
     return {"rows": rows, "units": units, "notes": notes, "told": f"{rows} rows of {', '.join(values)}"}
 
 
@@ -90,7 +90,7 @@ def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
 
 def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
     if how.decay or how.begin or how.band:
-        raise PatchfemError("--decay, --begin and --band belong to modes (-o modes.toml)")
+        raise PatchfemError("--decay, --begin and --band can only be used for modes (-o modes.toml)")
     values, notes = _records(file, asked)
     found, step, drive, response = measured.estimated(values, _segment(how.segment), _window(how.window))
     write.write_response(out, found, drive, response)

@@ -68,7 +68,7 @@ def histories_of(folder: Path) -> Histories:
         return _of_run(folder / "result.nc")
     if (folder / "fit.csv").is_file():
         return _of_fit(folder / "fit.csv")
-    raise Missing(f"{folder}: it has neither result.nc of a run nor fit.csv of a fit")
+    raise Missing(f"{folder}: it contains neither result.nc of a run nor fit.csv of a fit")
 
 
 def _of_run(path: Path) -> Histories:

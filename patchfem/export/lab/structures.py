@@ -48,7 +48,8 @@ def export(model: Model, out: Path) -> str:
         raise PatchfemError(f"{out}: a structure is exported as {' or '.join(ENDINGS)}")
     with placed(model.source):
         if model.rig is None:
-            raise PatchfemError("a scene is exported as its structure, which it lacks; export a results folder",
+            raise PatchfemError("only the structure of a scene can be exported, and this scene has none; export a "
+                                "results folder",
                                 "structure")
         _refuse(model)
         arrays, found = matrices_of(model), elements_of(model)
@@ -106,8 +107,8 @@ def _refuse(model: Model) -> None:
     rig = model.rig
     why = (engines.ENGINES["newmark"] if _speeds(rig) else engines.PIECES).lacks(model, steady=True)
     if why.startswith("for law"):
-        raise PatchfemError(f"{why.removeprefix('for ')} is not a set of elements that stretch and slip; use law "
-                            "'elastic-plastic', 'iwan' or 'tanh', or law 'coulomb' with [contact.shear]",
+        raise PatchfemError(f"{why.removeprefix('for ')} cannot be written as friction elements that stretch and slip; "
+                            "use law 'elastic-plastic', 'iwan' or 'tanh', or law 'coulomb' with [contact.shear]",
                             f"{rig.interfaces[0].key}.law")
     if why:
         raise PatchfemError(f"matrices and friction elements cannot be written {why}; leave that out of the scene",

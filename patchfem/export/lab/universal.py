@@ -35,7 +35,7 @@ def write(path: Path, found: Histories) -> int:
     sets += [_function(f"{force.label} over {slide.label}", slide, force, LOOP, found.title)
              for slide, force in found.loops()]
     if not sets:
-        raise PatchfemError(f"{path}: no time and no loop to write")
+        raise PatchfemError(f"{path}: contains neither times nor a loop to write")
     write_sets(path, [SI, *sets])
     return len(sets)
 
@@ -48,7 +48,7 @@ def write_sets(path: Path, sets: list) -> None:
     try:
         import pyuff
     except ImportError:
-        raise Missing("universal files: the package pyuff writes them; pip install 'patchfem[lab]'") from None
+        raise Missing("writing universal files needs the package pyuff; run pip install 'patchfem[lab]'") from None
     path = Path(path)
     path.write_bytes(b"")
     file = pyuff.UFF(str(path))

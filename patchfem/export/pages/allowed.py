@@ -1,4 +1,4 @@
-"""How far a swept key may go: until anything that moves changes by 5 %, and until the largest pressure doubles.
+"""How far a swept key may go: until any measure of the motion changes by 5 %, and until the largest pressure doubles.
 
 A limit stands between two cases, the last one surely within and the first one surely beyond; where these are
 neighbours, a straight line between them (over the logarithm of a key that grows by factors) says about where, unless a
@@ -157,7 +157,7 @@ def sentence(limits: Limits) -> str:
 
 
 def _moving(limits: Limits) -> str:
-    """How far the key may go before anything that moves changes; "" where the cases do not show it."""
+    """How far the key may go before any measure of the motion changes; "" where the cases do not show it."""
     moving = [one for one in limits.found if one.name in MOVES]
     if not moving or not all(one.resolved() for one in moving):
         return ""
@@ -167,11 +167,11 @@ def _moving(limits: Limits) -> str:
         far = _at(limits, moving[0], limits.most) + _brackets(_gap(limits, moving[0], limits.most))
         return "" if limits.lost else f"{name} may reach {far}: no measure of the motion changes by {100 * WITHIN:g} %"
     least, *_, last = *ends, ends[-1]
-    what = "anything that moves" if not limits.lost else "the " + " or the ".join(label(one.name) for one in moving)
+    what = "the " + " or the ".join(label(one.name) for one in moving) if limits.lost else "any measure of the motion"
     held = f"before {what} changes by {100 * WITHIN:g} %"
     if least.beyond is None:
         far = _at(limits, least) + _brackets(_gap(limits, least))
-        return f"{name} may reach at least {far} {held}: the cases after it are open"
+        return f"{name} may reach at least {far} {held}; the limit lies beyond, where no case decides it"
     between = f"between cases at {_between(limits, least)}"
     later = "" if last is least or last.beyond is None else f"; {label(last.name)} {_where(limits, last)}"
     return (f"{name} may reach {_at(limits, least)}{_brackets(_gap(limits, least), between)} {held} "
@@ -244,16 +244,18 @@ def table(limits: Limits, measures: dict) -> str:
             far = f"between {bare(at(one.inside), at(one.beyond))} and {at(one.beyond)}" + (
                 f", at about {_at(limits, one)}" if isfinite(one.about) else "")
         else:
-            far = "in no case" if one.whole else f"not up to {at(one.inside)}; cases after it are open"
+            far = "in no case" if one.whole else f"not up to {at(one.inside)}; no case beyond decides it"
         by = f"{100 * WITHIN:g} %" if abs(one.change) < 1 else "double"
         first = short(one.first, measures[one.name][2], 4, zero_below(one.name))
         rows.append([linked(label(one.name), one.name), escape(first), _change(one.changed), by, escape(far)])
     several = int(np.sum(np.asarray(key["values"], float) == np.min(np.asarray(key["values"], float)))) > 1
-    least = " For the other keys the values that allow least are given." if several else ""
-    return (f"<p class=soft>{escape(key['name'])} grows from {escape(at(limits.found[0].start))}. A measure has left "
-            "its first value if it differs from it by this much and by more than both numerical errors. Cases that "
-            f"miss their tolerance do not count, nor do unsettled cases if settled ones have the measure.{least}</p>"
-            + document.table(("measure", ">first case", ">change up to the last", "leaves by", "where"), rows, "wide"))
+    least = " The values of the other keys are those that allow the least." if several else ""
+    return (f"<p class=soft>{escape(key['name'])} grows from {escape(at(limits.found[0].start))}. A measure counts as "
+            "changed if it differs from its value in the first case by this much and by more than both numerical "
+            "errors. Cases that miss their tolerance do not count, nor do unsettled cases if settled ones have the "
+            f"measure.{least}</p>"
+            + document.table(("measure", ">first case", ">change up to the last "
+                                                        "case", "changed by", "where"), rows, "wide"))
 
 
 def _change(share: float) -> str:

@@ -71,7 +71,7 @@ def _arrays(path: Path) -> dict:
     for name, one in variables(path, shown)[1].items():
         with readable(path, "results of a run"):
             wanted(numeric(one.values) and one.values.ndim in (1, 2) and one.values.size > 0,
-                   f"{name} holds {one.values.ndim}-dimensional {one.values.dtype}")
+                   f"{name} contains {one.values.ndim}-dimensional {one.values.dtype}")
         values = one.values[0] if one.values.ndim == 2 else one.values
         if np.isfinite(values).any():
             out[name] = (values.astype(float), one.unit)
@@ -227,9 +227,10 @@ def _measures(runs: list, names: list) -> str:
         found = [run.summary["measures"].get(name) for run in runs]
         rows.append([linked(label(name), name),
                      *(_cell(name, one, found[0] if number else None) for number, one in enumerate(found))])
-    return ("<p class=soft>Value and estimated numerical error. Bold with its change in per cent: differs from the "
-            "first run by more than both errors together; a factor from ten times on, a dash where the first is 0 "
-            "within its error.</p>" + table(("measure", *(f">{escape(name)}" for name in names)), rows, "across side"))
+    return ("<p class=soft>Value and estimated numerical error. Bold values differ from the first run by more than "
+            "both errors together; the change is in per cent, from ten times on as a factor, and a dash if the first "
+            "value is smaller than its error.</p>"
+            + table(("measure", *(f">{escape(name)}" for name in names)), rows, "across side"))
 
 
 def _cell(name: str, one: dict | None, first: dict | None) -> str:

@@ -11,11 +11,11 @@ from .words import NO_SLIP
 MOST, WORDS = 3, 40  # changes in the sentence, and words, which the later changes give way to
 WHOLE = 1 - 1e-12  # a contact fraction of 1 but for round-off
 ENDS = {
-    "done": "the run ends as asked", "steady": "the motion settles", "stuck": "the interface holds as a whole",
+    "done": "the run ends as asked", "steady": "the motion settles", "stuck": "the whole interface sticks",
     "transient": "the run ends before the motion settles", "grows": "the motion grows",
-    "exceeds_travel": "the motion passes the stop", "leaves_contact": "the slide passes the end of the piece",
+    "exceeds_travel": "the motion exceeds the travel", "leaves_contact": "the slide passes the end of the piece",
     "leaves_grooves": "the lifted mass leaves its grooves", "worn_through": "a coating is worn through",
-    "no_contact": "the pieces do not touch", "not_converged": "a solve does not converge"}
+    "no_contact": "the pieces do not touch", "not_converged": "a numerical method does not converge"}
 SLIPS = "the interface slips as a whole"  # from "stuck" to "steady"
 STATES = {  # measure: what its state is called once it has it, and once it has it no longer
     "contact_fraction": ("the contact fraction is below 1", "the whole length is in contact"),

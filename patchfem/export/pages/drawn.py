@@ -39,8 +39,8 @@ def _of_rows(table: dict, most: int) -> Drawn:
     kinds = np.unique(np.asarray(table["outcome"], str), return_index=True)[1]
     ends = np.array(sorted({*ends, *kinds.tolist()}), int)
     cases = np.union1d(_evenly(number, max(most - ends.size, FEWEST)), ends)
-    return Drawn(cases, f"{cases.size} of {number} cases are drawn: evenly spread ones, and those at which a measure "
-                        "or a key is largest or smallest.")
+    return Drawn(cases, f"{cases.size} of {number} cases are drawn: evenly spaced ones, and those with the largest or "
+                        "smallest value of a measure or a key.")
 
 
 def _of_grid(table: dict, first: str | None, most: int) -> Drawn:

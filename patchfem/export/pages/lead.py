@@ -111,7 +111,7 @@ def span(measures: dict, trusted: dict, settled: np.ndarray) -> str:
         ran = f"is {high} throughout" if low == high else f"runs from {low} to {high}"
         known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))  # 0 is known absolutely
         share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
-        band = f", known to {plain(100 * share, 1)} % or better" if share > EXACT else ""
+        band = f", with errors of at most {plain(100 * share, 1)} %" if share > EXACT else ""
         counts, ended = there.sum(), (every & settled).sum()
         whose = "" if counts == every.sum() else " of the settled cases" if counts == ended else \
             " in the cases that meet the tolerance"

@@ -139,8 +139,8 @@ def _lost(peaks: list, others: bool) -> str:
     more = f" and {len(peaks) - 1} other{'s' * (len(peaks) > 2)}" if len(peaks) > 1 else ""
     held = f" with {peaks[0].held}{more}" if peaks[0].held else ""
     what = "it" if others else label(peaks[0].name)
-    return (f"Where {what} peaks{held} is not known: cases beside the largest have not settled or miss the "
-            "tolerance; more drive.cycles may cure that.")
+    return (f"Where {what} peaks{held} is not known: cases beside the largest have not settled or miss the tolerance; "
+            "raise drive.cycles to let them settle.")
 
 
 def _known(peaks: list) -> str:
@@ -174,9 +174,9 @@ def table(peaks: list) -> str:
             for one in peaks]
     rows = [[escape(one.held), *cells, told(*one.width, unit="Hz") if np.isfinite(one.width[0]) else "&ndash;"]
             for one, cells in zip(peaks, cells_of)]
-    return (f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve, by a parabola "
-            "of 1/y&sup2; over f&sup2; through the largest case and its neighbours. Its errors are those of the cases "
-            "and what polynomials through more of them tell otherwise. An unsettled case counts by "
-            "its steady estimate if that is known to 1 %, else it is left out. "
-            "A width is given where the curve falls to its peak/&radic;2 on both sides within the swept range.</p>"
+    return (f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve, by a parabola of "
+            "1/y&sup2; over f&sup2; through the largest case and its neighbours. The errors combine those of the cases "
+            "and the differences to polynomials through more of them. For an unsettled case the steady estimate is "
+            "used if the error of that is at most 1 %; otherwise it is left out. A half-power width is given if the "
+            "curve falls to its peak/&radic;2 on both sides within the swept range.</p>"
             + document.table(("", ">at", ">height", ">half-power width"), rows, "wide"))

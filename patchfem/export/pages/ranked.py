@@ -50,11 +50,11 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True) -> str:
     if name is None:
         return ""
     first, *others = ranks[name]
-    said = [f"depends most on {first.key}, which takes part in {percent(first)} of its variance{_between(first)}"]
+    said = [f"depends most on {first.key}, which contributes to {percent(first)} of its variance{_between(first)}"]
     said += [f"then on {one.key} ({percent(one)})" for one in others[:NAMED - 1]]
     if len(others) >= NAMED:
         said.append(f"least on {others[-1].key} ({percent(others[-1])})")
-    why = "have not settled count as they ended" if moves else "miss the tolerance count with their values"
+    why = "have not settled are included as they ended" if moves else "miss the tolerance are included"
     ended = f"; {left} cases that {why}" if left else ""
     return f"{label(name).capitalize()} {', '.join(said)}{ended}."
 

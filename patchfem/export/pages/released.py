@@ -36,15 +36,15 @@ def swung(time, output) -> str:
     end = 0.0 if abs(end) < NOTHING * np.abs(output).max() else end
     far = np.abs(output - end)
     if not np.isfinite(far).all() or not far.max() > 0:
-        return f"released at {say(begin, 3)}, the output stays there"
+        return f"released at {say(begin, 3)}, the output does not move"
     turns = 1 + np.flatnonzero(np.diff(np.sign(np.diff(output))) != 0)
     turns = turns[far[turns] > RESTS * far.max()]
-    way = f"swings to {say(float(output[turns[0]]), 3)} first" if turns.size else f"goes to {say(end, 3)}"
+    way = f"first swings to {say(float(output[turns[0]]), 3)}" if turns.size else f"goes to {say(end, 3)}"
     first = f"released at {say(begin, 3)}, the output {way}"
     beyond = int(np.flatnonzero(far > RESTS * far.max())[-1])
     last = np.ptp(output[time >= time[-1] - 0.1 * (time[-1] - time[0])]) / 2
     if last > RESTS * far.max():
         at = short(float(time[-1]), "s", 3)
-        return f"{first} and still by {say(float(last), 3)} half peak-to-peak at the end, {at}"
+        return f"{first} and still moves by {say(float(last), 3)} half peak-to-peak at the end, after {at}"
     rests = f"comes to rest at {say(end, 3)} after {short(float(time[beyond + 1]), 's', 3)}"
-    return f"{first}, turns {turns.size} times and {rests}" if turns.size else f"{first} and {rests}"
+    return f"{first}, reverses {turns.size} times and {rests}" if turns.size else f"{first} and {rests}"

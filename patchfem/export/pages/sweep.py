@@ -34,12 +34,12 @@ def page(table: dict, told: Lead | None = None) -> str:
                   and np.isfinite(table["measures"][name]["values"]).any()), None)
     told, part = told or lead_of(table), drawn(table, first, lambda cases, whole: _data(table, first, cases, whole))
     data = _data(table, first, part.cases, not part.said)
-    sections = [Section("answers", "What came out", _explorer(part.said) if data["measures"] else
+    sections = [Section("answers", "Results", _explorer(part.said) if data["measures"] else
                         "<p>No case has a value to draw.</p>"),
                 *_change(table, told.limits),
-                *(Section(*one) for one in (("peaks", "Where the peaks are", peaks.table(told.peaks)),
+                *(Section(*one) for one in (("peaks", "Peaks", peaks.table(told.peaks)),
                                             ("ranking", "What matters most", ranked.picture(told.ranks)),
-                                            ("scatter", "How far the answers scatter", ranked.spread(told.spread)))
+                                            ("scatter", "Scatter of the answers", ranked.spread(told.spread)))
                   if one[2]),
                 Section("cases", "Cases", _cases(table)),
                 Section("measures", "What the measures mean", _meanings(table)),
@@ -103,15 +103,15 @@ def _explorer(said: str) -> str:
             "<span id=held class=choices style='padding:0'></span></div>"
             "<div id=chart class=chart role=img></div><p id=means class=soft aria-live=polite></p>"
             "<p class=soft>Bands show the numerical error. Hollow points (dots in a map) miss the tolerance. Crosses, "
-            "shading and hatching mark cases that did not "
-            f"settle. A click on a case opens it.</p>{thinned}<noscript><p class=verdict>The pictures need "
-            "JavaScript; the numbers are in sweep.csv.</p></noscript>")
+            "shading and hatching mark cases that did not settle. Click on a case to open "
+            f"it.</p>{thinned}<noscript><p class=verdict>The pictures need JavaScript; the numbers are in "
+            "sweep.csv.</p></noscript>")
 
 
 def _change(table: dict, limits: allowed.Limits) -> list:
     """The section on what each main measure has changed by since the first case; none where no key grows alone."""
     text = allowed.table(limits, columns(table))
-    return [Section("change", "Change against the first case", text)] if text else []
+    return [Section("change", "Change relative to the first case", text)] if text else []
 
 
 def _lead(table: dict, said: Lead) -> str:
@@ -152,7 +152,7 @@ def _cases(table: dict) -> str:
     number = len(table["outcome"])
     more = f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv has all.</p>" if number > LISTED else ""
     named = "<a href=sweep.csv>sweep.csv</a>, <a href=sweep.nc>sweep.nc</a>" if table.get("tabled", True) else \
-        "sweep.csv and sweep.nc, which the same command writes with --collect"
+        "sweep.csv and sweep.nc (run the same command with --collect to write them)"
     files = f"<p class=soft>Every case with every measure and its error: {named}.</p>" if table.get("own", True) else ""
     return f"{files}{document.table(heads, rows, 'wide')}{more}"
 
@@ -177,5 +177,5 @@ def _meanings(table: dict) -> str:
 
 
 def _again(table: dict) -> str:
-    return (f"<p>This line made the sweep:</p><pre>{escape(table['command'])}</pre>"
+    return (f"<p>The sweep was run with this command:</p><pre>{escape(table['command'])}</pre>"
             f"<details><summary>Scene</summary><pre>{escape(table['scene'])}</pre></details>")

@@ -34,7 +34,7 @@ BETWEEN = ("jump_level",)  # known to lie between two levels of the drive, whate
 ROUND = 1e-12  # of the friction force times the motion: work that is round-off
 NONE = MappingProxyType({})
 UNKNOWN = " (error unknown)"
-SHARP = "what has no ± is known to its last digit"
+SHARP = "values without ± are exact to the last digit shown"
 
 
 def units(name: str, value: float, unit: str, error: float | None = None) -> list:
@@ -110,8 +110,8 @@ def verdict(summary: dict) -> str:
         found = {name: one for name, one in measures.items() if re.sub(r"_\d+$", "", name) == first and one["value"]}
         name = max(found, key=lambda each: found[each]["value"], default="")
         if name and found[name]["value"] > max(_open(found[name]), least):
-            return f"The interface holds as a whole; {part} ({form.format(pair(name, found[name]))})."
-    return "The interface holds: no slip in the last cycles."
+            return f"The interface as a whole sticks, but {part} ({form.format(pair(name, found[name]))})."
+    return "The interface sticks: no slip in the last cycles."
 
 
 def _slid(slip: dict | None, done: str) -> str:
@@ -119,7 +119,7 @@ def _slid(slip: dict | None, done: str) -> str:
     if slip is None or slip["value"] is None:
         return done
     if slip["value"] <= max(_open(slip), NO_SLIP):
-        return f"{done} The interface holds: no slip in the last cycle."
+        return f"{done} The interface sticks: no slip in the last cycle."
     return f"{done} Slip amplitude {pair('slip_amplitude', slip)}, half peak-to-peak, averaged over the interface."
 
 
@@ -152,12 +152,12 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
         said(worn, "{} worn off at the deepest place" if worn == "worn_depth_max" else "{} worn off")
         if released:
             parts.append(released)
-            said("friction_work", "friction takes {} in all")
+            said("friction_work", "friction dissipates {} in all")
         else:
             for name, text in SHAKEN.items():
                 said(name, text)
             said("relative_displacement_amplitude", "the largest swing is {} half peak-to-peak"
-                 if next(iter(SHAKEN)) in measures else "the output moves {} half peak-to-peak")
+                 if next(iter(SHAKEN)) in measures else "displacement amplitude at the output {} (half peak-to-peak)")
             said("relative_displacement_amplitude_steady", "it would settle at {}")
             said("absolute_acceleration_peak", "peak acceleration {}")
         if "relative_displacement_amplitude" not in measures:
@@ -187,11 +187,11 @@ def least_known(result: Result) -> str:
 
     steps = [name for name in wide if name in BETWEEN]
     name = max(wide.keys() - set(steps), key=lambda one: ("±" in told[one], wide[one], one), default="")
-    of_steps = f"{', '.join(map(known, steps))}, is known to the step between drive levels"
+    of_steps = f"{', '.join(map(known, steps))}, has an error of the step between drive levels"
     if not name:
         return f"{of_steps}."
     but = f"; {of_steps}, which the scene sets" if steps else ""
-    least = f"; worst: {known(name)}" if "±" in told[name] else ""
+    least = f"; closest to it is {known(name)}" if "±" in told[name] else ""
     sharp = "" if all("±" in one for one in told.values()) else f"; {SHARP}"
     return f"Every measure with an error meets the tolerance {tolerance:g}{least}{but}{sharp}."
 

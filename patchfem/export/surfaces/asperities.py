@@ -35,21 +35,21 @@ def lines_of(told: Told | None, cutoff: float | None) -> list:
     if one is None:
         return []
     if "reason" in one:
-        return [f"  no [contact.asperities] of it: {one['reason']}"]
+        return [f"  it gives no [contact.asperities]: {one['reason']}"]
     fine = told.fine
     soft, stiff = (1 / (share * fine.height) for share in reversed(PERSSON))
     decay = sum(PERSSON) / 2 * fine.height
     half = one["stiffness_half_sampled"]
-    sampled = "every second sample describes no such surface" if half is None else \
+    sampled = "every second sample alone describes no such surface" if half is None else \
         f"every second sample of the trace gives {_per(half)}, {100 * (half / one['stiffness'] - 1):+.2g} %"
-    return ["  to paste into a scene, if the other face is smooth (peaks of Greenwood and Williamson, radius "
+    return ["  paste this into a scene if the other face is smooth (Greenwood-Williamson peaks, radius "
             f"{short(one['radius'], 'm', 3)}, {one['density']:.3g} 1/m^2):",
             "    [contact.asperities]", '    law = "hertz"', f'    rms_height = "{fine.height * 1e6:.5g} um"',
             f"    rms_slope = {fine.slope:.5g}", f'    rms_curvature = "{fine.curvature:.5g} 1/m"',
             *([f'    cutoff = "{say(cutoff)}"'] if cutoff else []),
-            f"  Under {LIGHT:g} of the modulus of the pair their stiffness over the pressure is "
-            f"{_per(one['stiffness'])}; {sampled}. Waves shorter than the sampling are missing.",
-            f"  Persson's theory of waves of all lengths gives {_per(soft)} to {_per(stiff)}, as does "
+            f"  At a pressure of {LIGHT:g} of the combined modulus the ratio of stiffness to pressure is "
+            f"{_per(one['stiffness'])}; {sampled}. Waves shorter than two samples are not included.",
+            f"  Persson's theory, which includes waves of all lengths, gives {_per(soft)} to {_per(stiff)}, as does "
             f'law = "exponential" with decay_length = "{decay * 1e6:.3g} um".', f"  {_split(cutoff)}",
             *([f"  Not Gaussian: {told.doubt}."] if told.doubt else [])]
 
@@ -57,10 +57,10 @@ def lines_of(told: Told | None, cutoff: float | None) -> list:
 def _split(cutoff: float | None) -> str:
     """Which waves of a trace its peaks are, and which are left to the profile."""
     if cutoff is None:
-        return ("All waves of the trace are in it. If [contact.profile] takes the same trace, split it by --cutoff, or "
-                "the long waves count twice.")
-    return (f"Only waves below the cut-off of {say(cutoff)} are in it; beside [contact.profile] of the same trace the "
-            "longer ones shape the gap, so that none counts twice.")
+        return ("It contains all waves of the trace. If [contact.profile] takes the same trace, split the trace with "
+                "--cutoff; otherwise the long waves count twice.")
+    return (f"It contains only waves below the cut-off of {say(cutoff)}. If [contact.profile] takes the same trace, "
+            "the longer waves shape the gap, so that no wave counts twice.")
 
 
 def _steep(one) -> float:

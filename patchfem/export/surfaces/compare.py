@@ -28,7 +28,7 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "worn_depth_mean": "worn depth, mean", "worn_area": "worn area", "amplitude_ratio": "amplitude ratio",
          "slope_ratio": "slope ratio", "worn_from_before": "worn from, x before", "worn_to_before": "worn to, x before",
          "worn_from_after": "worn from, x after", "worn_to_after": "worn to, x after",
-         "worn_depth_within": "worn depth, mean from there to there",
+         "worn_depth_within": "worn depth, mean over the worn part",
          "track_from": "track from", "track_to": "track to", "track_direction": "track, direction",
          "track_length": "track length", "track_volume": "track, area times length",
          "track_width": "track width", "track_depth": "track depth, mean", "track_step": "track, step height",
@@ -40,9 +40,9 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "shift_x": "shift along x", "shift_y": "shift along y", "rotation": "rotation",
          "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
 DRAWN = 1_000_000  # heights that a histogram and an Abbott curve are drawn from, spread over a larger scan
-NOTE = ("Interval: 95 %. Shift, depth and area: of this place, from the noise of the unworn heights. Ratios: of the "
-        "surface, from one trace before and one after, for Gaussian heights with the same statistics everywhere; "
-        "traces of one place vary together, so their intervals are narrower.")
+NOTE = ("Interval: 95 %. The intervals of shift, depth and area hold for this place and come from the noise of the "
+        "unworn heights. Those of ratios hold for the whole surface and assume Gaussian heights with the same "
+        "statistics everywhere; if both traces are of one place they vary together, and the intervals are narrower.")
 
 
 def shown(one: Quantity) -> tuple:
@@ -178,7 +178,7 @@ def write_difference(folder: Path, one: Comparison) -> None:
     if one.change is None or one.change.found is None:
         return
     place = one.change.before.x, one.change.before.y, one.change.found.depth
-    write_x3p(folder / "difference.x3p", *place, "worn depth: height before less height after, laid on each other")
+    write_x3p(folder / "difference.x3p", *place, "worn depth: height before minus height after, once registered")
     write_columns(folder / "difference.csv", *place)
 
 
@@ -228,10 +228,10 @@ def figures(one: Comparison) -> list:
         worn = np.where(found.rest > 3 * found.noise, found.rest, 0.0)
         out.append((pictures.overlay(found.x, found.first - tilt, second - tilt, worn, _closer(found.x, worn)),
                     "The trace after, moved by shift, tilt and offset, on the trace before.",
-                    f"Both traces over each other: mean worn depth {' '.join(shown(one.worn.mean)[::2])}"))
+                    f"Both traces, registered: mean worn depth {' '.join(shown(one.worn.mean)[::2])}"))
         out.append((pictures.difference(found.x, found.rest, found.used, found.noise, None),
-                    "Depth of the trace after below the trace before; blue: the unworn heights that shift, tilt and "
-                    "offset were fitted to.",
+                    "Depth of the trace after below the trace before. Blue: the unworn heights to which shift, tilt "
+                    "and offset were fitted.",
                     f"Worn depth along the trace: largest {' '.join(shown(one.worn.largest)[::2])}"))
     elif one.change is not None and one.change.found is not None:
         out += _maps(one.change)
@@ -257,9 +257,11 @@ def _maps(one: Change) -> list:
     """Pictures of two scans that lie on each other."""
     x, y, (first, second, depth) = one.before.x, one.before.y, line.laid(one)
     worn = one.volumes.values["worn_volume"]
-    out = [(pictures.maps(x, y, (first, second, depth)), "Left and middle: the scan before and, laid on it, "
-            "the scan after, about the plane of the scan before; white: no height. Right: depth of the scan after "
-            "below the scan before, missing ones from their neighbours; white: beyond the scan after.",
+    out = [(pictures.maps(x, y, (first, second, depth)), "Left and middle: the scan before and, registered to it, the "
+                                                         "scan after, both about the plane of the scan before; white: "
+                                                         "no height. Right: depth of the scan after below the scan "
+                                                         "before, missing ones from their neighbours; white: beyond "
+                                                         "the scan after.",
             f"Maps of both scans and of the worn depth: worn volume {' '.join(shown(worn)[::2])}")]
     known = np.isfinite(depth)
     there = np.flatnonzero(known & np.isfinite(first))
@@ -317,8 +319,9 @@ def _pressing(found: Pressed) -> str:
     if sides:
         peaks = ", ".join(f"{name} {_said('pressure_peak', one.measures.get('pressure_peak'))}" for name, one in
                           (("before", found.before), ("after", found.after)) if one is not None)
-        parts.append(figure("p", pictures.pressures(sides), "Normal stress of the pressed patch; all else in "
-                                   "the scene is the same.", f"Pressure along the patch, largest: {peaks}"))
+        parts.append(figure("p", pictures.pressures(sides), "Normal stress of the pressed patch; all other settings of "
+                                                            "the scene are the "
+                                                            "same.", f"Pressure along the patch, largest: {peaks}"))
         rows = [[escape(words), *(escape(_said(name, one)) for one in measures), _times(*measures)]
                 for name, words, *measures in found.rows()]
         parts.append(table(("measure", ">before", ">after", ">after / before"), rows))

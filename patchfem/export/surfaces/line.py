@@ -41,8 +41,8 @@ def _wide(depth) -> np.ndarray:
 def section(one: Change) -> Section:
     """The part of the page in which the line stands."""
     every = [-(-count // MOST) for count in one.volumes.filled.shape[::-1]]
-    sample = "" if max(every) == 1 else f" The page holds one of {every[0]} x {every[1]} heights."
-    text = ("A drag on the map draws a line, a click moves it through a place; the sliders move it across itself "
-            "and turn it. Heights are about the plane of the scan before; the scan after is laid on it. Worn depth is "
-            "positive where material went; missing ones are those of the nearest neighbour." + sample)
+    sample = "" if max(every) == 1 else f" The page contains one of every {every[0]} x {every[1]} heights."
+    text = ("Drag on the map to draw a line, or click to move it through a point; the sliders shift and turn it. "
+            "Heights are about the plane of the scan before; the scan after is registered to it. Worn depth is "
+            "positive where material was lost; missing depths are taken from the nearest neighbour." + sample)
     return Section("line", "Heights along a line", own("line.html").replace("CAPTION", text))

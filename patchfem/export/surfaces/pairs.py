@@ -13,7 +13,7 @@ from ..pages.document import Section, document, figure, table, warned
 from . import compare, pictures, worn
 
 TRACES, SCANS = ("worn_depth_mean", "amplitude_ratio"), ("worn_volume", "worn_depth_mean")  # the main numbers
-ABOUT = ("Mean over the pairs that have the number, each with equal weight. Interval: 95 % of the mean, by Student's t "
+ABOUT = ("Mean over the pairs that have a value, each with equal weight. Interval: 95 % of the mean, by Student's t "
          "from the scatter of the pairs, or from their own intervals where that is wider; an error that all pairs "
          "share, such as calibration, is not included. Scatter: standard deviation of one pair.")
 
@@ -25,7 +25,8 @@ def answers(asked: list, direction: str = "", done=None, **how) -> list[dict]:
         if not any(one.is_dir() for one in paths):
             return compare.data_of(*verdict.judged(paths, own or direction, **how))
         if own or how.get("shift") is not None:
-            raise PatchfemError(f"{'a direction' if own else 'a shift'} belongs to traces, not to results folders")
+            raise PatchfemError(f"{'a direction' if own else 'a shift'} can only be given for traces, not for results "
+                                "folders")
         lost = worn.lost(*paths)
         return worn.data_of(lost, worn.verdict(lost))
 
@@ -49,13 +50,13 @@ def notes(rows: list) -> list:
     done, out = [row for row in rows if row["outcome"] == "done"], []
     firsts = [(pairs.group_of(row), row["before"]) for row in done]
     if len(set(firsts)) < len(firsts):
-        out.append("some pairs share the surface before: its errors are in all of them, and the intervals of the means "
-                   "do not include this")
+        out.append("some pairs have the same surface before; its errors are then common to them, and the intervals of "
+                   "the means do not include this")
     for group, count, found in pairs.means_of(rows):
         less = [f"{words(name)} ({one.count})" for name, one in found.items() if one.count < count]
         if less:
-            out.append(f"{title(*group)}: fewer than all {count} have {', '.join(less)}; such a mean says nothing "
-                       "about the other pairs")
+            out.append(f"{title(*group)}: not all {count} pairs have {', '.join(less)}; such a mean says nothing about "
+                       "the other pairs")
     return out
 
 
@@ -165,8 +166,8 @@ def _means(number: int, group: tuple, rows: list, found: dict) -> str:
     of = [row for row in rows if row["outcome"] == "done" and pairs.group_of(row) == group]
     panels = [(words(name), [(row["line"], pairs.quantity(row[name])) for row in of], found[name].mean)
               for name in _leading(of[0]) if name in found]
-    drawn = [figure(f"m{number}", pictures.each_and_mean(panels), "Each pair with its interval, by its line of the "
-                    "table; the band: the mean with its interval.",
+    drawn = [figure(f"m{number}", pictures.each_and_mean(panels), "Each pair with its interval, against its line in "
+                                                                  "the table. The band is the mean with its interval.",
                     "; ".join(f"{name}: mean {' '.join(compare.shown(mean)[::2])}" for name, _, mean in panels))
              ] if panels else []
     cells = []

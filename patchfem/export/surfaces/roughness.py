@@ -17,13 +17,13 @@ from . import asperities, pictures
 from .areal import write_columns, write_profile, write_x3p
 
 ALONG = ("PSm", "RSm", "dominant_wavelength", "Sal")  # lengths along the surface; all others are heights
-AREAL = ("Interval: 5 to 95 %, of the mean over all scans of this size on a surface with Gaussian heights and the "
-         "spectrum of this scan, wider where the kurtosis is above 3. It does not cover a surface that differs "
-         "from place to place, nor waves longer than the scan.")
+AREAL = ("Interval: 5 to 95 % for the mean over all scans of this size, on a surface with Gaussian heights and the "
+         "spectrum of this scan; it is wider if the kurtosis is above 3. It does not cover a surface that differs from "
+         "place to place, nor waves longer than the scan.")
 MEANS = ("Interval: 95 % of the mean, by Student's t from the scatter of the files, each with equal weight; an error "
-         "that all share, such as calibration, is not included. Scatter: standard deviation of one file.")
-INTERVAL = ("Interval: 5 to 95 %, of the mean over all traces of this length on a surface with Gaussian heights and "
-            "the spectrum of this trace, wider where the kurtosis is above 3. It does not cover a surface that "
+         "common to all, such as calibration, is not included. Scatter: standard deviation of one file.")
+INTERVAL = ("Interval: 5 to 95 % for the mean over all traces of this length, on a surface with Gaussian heights and "
+            "the spectrum of this trace; it is wider if the kurtosis is above 3. It does not cover a surface that "
             "differs from place to place.")
 
 
@@ -76,7 +76,7 @@ def _areal_filters(short: float | None, cutoff: float | None, holes: bool) -> st
         return "; no filter"
     surface = " (the S-L surface)" if short and cutoff else " (the S-F surface)" if short else ""
     return (f"; Gaussian {' and '.join(parts)}{surface}, half of {'each' if parts[1:] else 'it'} trimmed at each border"
-            + ("; near a hole the weights on measured heights are scaled to a sum of one" if holes else ""))
+            + ("; near a hole the filter weights of the measured heights are scaled to a sum of one" if holes else ""))
 
 
 def lines_of(report: RoughnessReport, verbose: bool = False) -> list:
@@ -112,7 +112,7 @@ def means_lines(reports: list) -> list:
     out = []
     if len(reports) == 2 and all(one.kind == "profile" for one in reports):
         one, other = map(_told, reports)
-        out = ["", "Both as the two faces of one contact:",
+        out = ["", "Both surfaces as the two faces of one contact:",
                *asperities.lines_of(one and other and one.beside(other), reports[0].cutoff)]
     for each in means.means_of(reports):
         out += ["", _of_many(each), f"  {'':<20} {'mean':>10}  {'95 %: from .. to':<20} {'scatter':<10} unit"]
@@ -263,20 +263,21 @@ def figures(report: RoughnessReport) -> list:
     """Pictures [(svg, caption, alternative text)] of a report."""
     if report.kind == "areal":
         flat = report.scan
-        return [(pictures.scan(flat.x, flat.y, flat.z), "Heights that the parameters are read from and their "
-                 "distribution; colours cover all but the outermost 0.2 % of the points.",
+        return [(pictures.scan(flat.x, flat.y, flat.z), "Heights from which the parameters are computed, and their "
+                                                        "distribution; the colours leave out the outermost 0.2 % of "
+                                                        "the points.",
                  f"Map and histogram of the heights of {report.source}: {_said(report['Sq'])} root mean square"),
                 (pictures.draw([pictures.bearing(report.abbott, report.core, ("Smr1", "Smr2"))]),
                  "Abbott curve of these heights; dashed: the straight line of its core.",
                  f"Abbott curve of {report.source}: core height {_said(report['Sk'])}")]
-    lines = "the waviness on it" if report.waviness is not None else "no cut-off was given"
+    lines = "the waviness drawn on it" if report.waviness is not None else "no cut-off was given"
     height = report["Pt"]
     out = [(pictures.trace(report.primary, report.waviness), f"Trace about the least-squares {report.form}; {lines}.",
             f"Heights of {report.source} along x: {_said(height)} from the deepest valley to the highest peak")]
     if report.roughness is not None:
         out.append((pictures.rough(report.roughness, (report.primary.x[0], report.primary.x[-1]), report.cutoff),
-                    f"Roughness: the trace less the waviness, with its sections of {say(report.cutoff)}. The half "
-                    "section missing at each end is trimmed.", f"Roughness profile: Rq {_said(report['Rq'])}"))
+                    f"Roughness: the trace minus the waviness, in sections of {say(report.cutoff)}; half a section is "
+                    "trimmed at each end.", f"Roughness profile: Rq {_said(report['Rq'])}"))
     kind = "roughness profile" if report.roughness is not None else "levelled trace"
     count, wave = report.spectrum.tapers, report["dominant_wavelength"]
     out.append((pictures.statistics(report.abbott, report.core, report.spectrum, report.band, report.cutoff),
@@ -308,7 +309,7 @@ def _printed(report: RoughnessReport) -> str:
         unit, scale = ("", 1.0) if one.unit == "1" else step_of(LADDERS[one.unit], one.printed)
         rows.append([escape(one.name), f"{one.printed * scale:.6g}", f"{one.here * scale:.6g}", escape(unit)])
     return ("<h3>What the instrument printed</h3>" + table(("result", ">printed", ">from its heights", "unit"), rows)
-            + "<p class=soft>Between the cursors of the file, about the least-squares line, nothing filtered.</p>")
+            + "<p class=soft>Between the cursors of the file, about the least-squares line, without a filter.</p>")
 
 
 def _definitions(report: RoughnessReport) -> str:

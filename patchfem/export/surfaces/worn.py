@@ -31,13 +31,14 @@ NEEDED = {"x": (1,), "weight": (1,), "unloaded_gap": (1, 2), "normal_stress": (2
 FLOOR = 5  # parts of a track, the deepest of which is its floor
 FLAT = 1e-12  # m, below which a new surface has no waves
 TEXTS = {"worn_volume": ("m3", "material lost over the whole patch, both pieces together"),
-         "worn_depth_max": ("m", "largest worn depth"), "worn_depth_mean": ("m", "worn volume over the area"),
-         "worn_area": ("m2", "worn volume over the width"),
+         "worn_depth_max": ("m", "largest worn depth"), "worn_depth_mean": ("m", "mean worn depth: worn volume over "
+                                                                                 "the area"),
+         "worn_area": ("m2", "worn area of the section: worn volume over the width"),
          "worn_share": ("1", "share of the patch that lost more than the error of the depth"),
-         "hidden_wear": ("m", "mean of the highest straight line below all worn depths: even wear and a wedge, which "
-                              "a trace of this part alone could not show")}
-PLANE = "mean of the highest plane below all worn depths: even wear and wedges, which a scan of this part alone " \
-    "could not show"
+         "hidden_wear": ("m", "mean of the highest straight line below all worn depths: even and wedge-shaped wear, "
+                              "which a trace of this part alone could not show")}
+PLANE = ("mean of the highest plane below all worn depths: even and wedge-shaped wear, which a scan of this part alone "
+         "could not show")
 
 
 class Worn(NamedTuple):
@@ -94,7 +95,7 @@ def lost(before: Path, after: Path) -> Lost:
                                 "folders are needed")
     first, second = read(before), read(after)
     if not second.wears:
-        raise PatchfemError(f"{after}: a run without [wear], which wore nothing; the worn one comes second")
+        raise PatchfemError(f"{after}: this run has no [wear], so nothing was worn; give the worn run second")
     _one_patch(first, second)
     return _between(first, second)
 
@@ -146,16 +147,16 @@ def _one_patch(first: Worn, second: Worn) -> None:
               for each in (first, second)]
     unlike = [key for key in {**tables[0], **tables[1]} if tables[0].get(key) != tables[1].get(key)]
     if unlike:
-        raise PatchfemError(f"{first.path} and {second.path}: two patches, not one before and after: "
+        raise PatchfemError(f"{first.path} and {second.path}: these are two different patches: "
                             f"{', '.join(f'contact.{key}' for key in unlike)} differ")
     news = [_at(second.x, each.x, each.gap - each.depth) for each in (first, second)]
     off = float(np.abs(news[0] - news[1]).max())
     if off > SAME * float(np.ptp(news[1])) + FLAT:
-        raise PatchfemError(f"{first.path} and {second.path}: two patches, not one before and after: their new "
-                            f"surfaces differ by {say(off, 3)}")
+        raise PatchfemError(f"{first.path} and {second.path}: these are two different patches: their new surfaces "
+                            f"differ by {say(off, 3)}")
     volumes = [0.0 if (one := each.measure("worn_volume")) is None else one["value"] for each in (first, second)]
     if volumes[1] < volumes[0]:
-        raise PatchfemError(f"{first.path} is worn more than {second.path}: the less worn one comes first")
+        raise PatchfemError(f"{first.path} is worn more than {second.path}; give the less worn run first")
 
 
 def _at(x, own, values) -> np.ndarray:
@@ -185,8 +186,8 @@ def _between(first: Worn, second: Worn) -> Lost:
     notes = [f"{name}: {text}" for name, one in (("before", first), ("after", second))
              for text in one.run.summary.get("warnings", ())]
     if float(depth.min()) < -off:
-        notes.append(f"at {place_of(second, np.argmin(depth))} the later run is worn less by "
-                     f"{say(-float(depth.min()), 3)}: it does not continue the earlier one")
+        notes.append(f"at {place_of(second, np.argmin(depth))} the later run is worn by {say(-float(depth.min()), 3)} "
+                     "less, so it does not continue the earlier one")
     track = _track(x, depth, off, length * volume / area) if second.y is None else {}  # strips have a map
     return Lost(first, second, gaps, depth, values, track, notes)
 
@@ -304,9 +305,9 @@ def _track(x, depth, off: float, area: float) -> dict:
     return {"from": ends[0], "to": ends[1], "hidden_wear": _with(under, off, *TEXTS["hidden_wear"]),
             "depth_mean": _with(area / width, off + area / width * sum(cells) / width, "m", "lost area over its width"),
             "depth_floor": _with(floor, off, "m", "mean over the deepest fifth of its width"),
-            "area_net": _with(area, off * width, "m2", "lost area less pile-up, of which wear makes none"),
+            "area_net": _with(area, off * width, "m2", "lost area less pile-up, which is zero in a computed run"),
             "area_gross": _with(area, off * width, "m2", "lost area"),
-            "pile_up": Quantity(0.0, 0.0, 0.0, "m2", "wear takes material and piles none up")}
+            "pile_up": Quantity(0.0, 0.0, 0.0, "m2", "computed wear makes no pile-up")}
 
 
 def verdict(one: Lost) -> tuple:
@@ -322,7 +323,7 @@ def verdict(one: Lost) -> tuple:
         ends = hidden_line(x[inside], one.depth[inside])
         head += f", by {say(mean.value, 3)} from x = {say(track['from'].value, 3)} to {say(track['to'].value, 3)}"
     if unseen.value > 0.01 * mean.value:
-        head += f", of which {say(unseen.value, 3)} is {_kind(ends)} that a {seen} alone could not show"
+        head += f"; {say(unseen.value, 3)} of this is {_kind(ends)} that a {seen} alone could not show"
     place, volume = place_of(one.after, np.argmax(one.depth)), one.values["worn_volume"]
     told = [f"Worn volume {' '.join(shown(volume)[::2])}; {say(float(one.depth.max()), 3)} at the deepest place, "
             f"{place}; both pieces together; {one.after.cycles:.6g} cycles of wear"
@@ -351,7 +352,7 @@ def _kind(ends: tuple) -> str:
 
 def data_of(one: Lost, found: tuple) -> dict:
     """The answer as plain data in SI, by the names that traces have."""
-    zero = Quantity(0.0, 0.0, 0.0, "m", "the places of one patch are known")
+    zero = Quantity(0.0, 0.0, 0.0, "m", "positions are known, because both runs are of the same patch")
     return {"patchfem": __version__, "verdict": found[0], "sentences": found[1], "confidence": LEVEL,
             "before": one.before.path, "after": one.after.path, "direction": "x", "reference": "run",
             "shift": plain_of(zero), **{name: plain_of(each) for name, each in one.values.items()},
@@ -430,8 +431,10 @@ def _figures(one: Lost) -> list:
     """Pictures (svg, caption, alternative text): the surfaces with the wear on, and the worn depth."""
     if one.after.y is not None:
         return [(maps(one.after.x, one.after.y, (*one.gaps, one.depth)), "Left and middle: gap between the unloaded "
-                 "surfaces before and after, with the wear on. Right: depth that both pieces lost together between the "
-                 "two runs; each strip at its middle.",
+                                                                         "surfaces before and after, wear included. "
+                                                                         "Right: depth that both pieces lost together "
+                                                                         "between the two runs; each strip at its "
+                                                                         "middle.",
                  f"Maps of the gaps and of the worn depth: mean {say(one.values['worn_depth_mean'].value, 3)}")]
     x, under = one.after.x, hidden_line(one.after.x, one.depth)
     (along, mm), (up, um) = axis_unit(x, "m"), axis_unit(np.concatenate(one.gaps), "m")
@@ -446,7 +449,8 @@ def _figures(one: Lost) -> list:
     down = axis("worn depth", deep) | {"range": [(max(ends) + 0.05 * np.ptp(ends)) * scale,
                                                  (min(ends) - 0.05 * np.ptp(ends)) * scale]}
     return [(draw([chart("", place, axis("gap of the unloaded surfaces", up), marks)], height=2.9),
-             "Gap between the unloaded surfaces, with the wear on.", "Gap of the surfaces before and after"),
-            (draw([chart("", place, down, depths)], height=2.5), "Depth that both pieces lost together between the two "
-             "runs; dashed: the straight line that a trace alone could not show.",
+             "Gap between the unloaded surfaces, wear included.", "Gap of the surfaces before and after"),
+            (draw([chart("", place, down, depths)], height=2.5), "Depth that both pieces together lost between the two "
+                                                                 "runs. Dashed: the part that a trace alone could not "
+                                                                 "show.",
              f"Worn depth: mean {say(one.values['worn_depth_mean'].value, 3)}")]

@@ -134,7 +134,7 @@ def _whole(table: dict) -> dict:
     parts += [(name, one[part]) for name, one in table["measures"].items() for part in ("values", "errors", "floors")]
     for name, values in parts:
         wanted(np.shape(values) == (count,), f"{name} has {np.size(values)} values for {count} cases")
-        wanted(np.abs(values[np.isfinite(values)]).max(initial=0.0) < HUGE, f"{name} holds a number beyond {HUGE:g}")
+        wanted(np.abs(values[np.isfinite(values)]).max(initial=0.0) < HUGE, f"{name} contains a number beyond {HUGE:g}")
     return table
 
 
@@ -180,7 +180,7 @@ def joined(tables: list, names: list) -> dict:
     """
     keys = [[one["name"] for one in table["keys"]] for table in tables]
     if any(sorted(one) != sorted(keys[0]) for one in keys):
-        raise PatchfemError("sweeps over other keys cannot be laid side by side: " + "; ".join(
+        raise PatchfemError("sweeps over different keys cannot be compared on one page: " + "; ".join(
             f"{name}: {', '.join(one)}" for name, one in zip(names, keys)))
     counts = [len(table["outcome"]) for table in tables]
     columns = [{"name": "sweep", "unit": "1", "log": False, "values": np.repeat(np.arange(len(tables)), counts) * 1.0,

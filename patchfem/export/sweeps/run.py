@@ -61,8 +61,8 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
         there = folder.there(wanted, keep)
         if not (place.resume or shared):
             if there.size and not folder.whole() and say is not None:
-                say(f"note: {there.size} of {len(cases)} cases have an answer from an interrupted sweep and are run "
-                    "again; --resume keeps them")
+                say(f"note: {there.size} of {len(cases)} cases already have an answer from an interrupted sweep but "
+                    "are run again; use --resume to keep such answers")
             there = there[:0]
         left = np.setdiff1d(wanted, there)
         if left.size:

@@ -80,7 +80,8 @@ def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (
         data[f"{name}_error"] = (dims, found.errors[name].reshape(cases.shape), error)
         if np.nan_to_num(found.floors[name]).any():
             data[f"{name}_floor"] = (dims, found.floors[name].reshape(cases.shape), {
-                "units": found.units[name], "long_name": f"error of {name} that is allowed besides the tolerance"})
+                "units": found.units[name], "long_name": f"error of {name} that is allowed in addition to the "
+                                                         "tolerance"})
     texts = {"outcome": (found.outcome, "how the case ended")}
     if found.messages:
         messages = [found.messages.get(number, "") for number in range(len(cases))]

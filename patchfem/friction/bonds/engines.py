@@ -40,8 +40,8 @@ class Choice:
     def said(self) -> str:
         """One line for a plan: engine, length of the list, cost per step, settings and bound of the error."""
         if self.engine == "recursion":
-            return f"recursion, exact, {1e6 * self.seconds:.2g} us per step"
-        parts = [f"{self.engine}: about {self.strips:.0f} strips of bonds, {1e6 * self.seconds:.2g} us per step"]
+            return f"recursion, exact, {1e6 * self.seconds:.2g} us a step"
+        parts = [f"{self.engine}: about {self.strips:.0f} list entries, {1e6 * self.seconds:.2g} us a step"]
         if self.tail > 0:
             parts.append(f"tail {self.tail:.1g}")
         if self.merge > 0:

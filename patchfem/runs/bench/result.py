@@ -21,8 +21,8 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     if has(f.law, "bonds"):
         warnings = [*warnings, *unbounded_bonds(model.bonds), *unripe(model.bonds, model.speed)]
         if f.reading == "report" and model.load_varies:
-            warnings = [*warnings, "as printed a bond keeps the pressure it formed under: while the load falls the "
-                        "friction may exceed mu_s N; reading = \"stretch\" never does"]
+            warnings = [*warnings, "in the law as printed a bond keeps the pressure at which it formed, so friction "
+                                   'may exceed mu_s N while the load falls; set reading = "stretch" to avoid this']
     steps = steps_of(model)
     frames = FRAMES if patch is not None else 0
     fine = bench.run(model, patch, steps, frames, watch=Watch(None, say, progress))
@@ -34,7 +34,7 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     fields, created, power = {}, fine.values["energy_created"], np.abs(np.diff(fine.ledger[0])).sum()
     if f.reading == "report" and created > 1e-6 * power:
         warnings = [*warnings, f"the law as printed created {created:.3g} J, {100 * created / power:.2g} % of the work "
-                    "that went to and fro: reading = \"stretch\" creates none"]
+                               'exchanged; reading = "stretch" creates none']
     warnings = [*warnings, *warming(model, patch, fine), *work_check_warning(found, steps)]
     if patch is not None:
         warnings = [*warnings, *_overhang(model.patch, patch, fine)]
@@ -56,8 +56,9 @@ def _overhang(asked, patch, fine) -> list:
     """Warnings of a bench whose slide leaves the patch."""
     out = []
     if fine.lateral is not None and (aside := largest_slide(fine.lateral) / asked.width) > FAR:
-        out.append(f"the slide across is {aside:.2g} of the width; the overhang is not modelled")
+        out.append(f"the slide across is {aside:.2g} of the width, but the overhang is not modelled")
     lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
     if lost > 0.01:
-        out.append(f"the upper piece slides off the pressure: {100 * lost:.0f} % of the load is not carried at the end")
+        out.append(f"the upper piece slides off the pressed area: {100 * lost:.0f} % of the load is not carried at the "
+                   "end")
     return [*out, *travelled(patch, fine.slide)]

@@ -50,8 +50,9 @@ def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple
         reached = [one[1].approach for one in tried]
         below, above = max(a for a in reached if a < distance), min(a for a in reached if a > distance)
         raise NotConverged(f"{distance:.6g} m is passed in a jump from {below:.6g} m to {above:.6g} m, where the load "
-                           "line passes one of the few nodes that touch; lower contact.element_size or give "
-                           "contact.load in place of the approach", "contact.approach.distance")
+                           "line passes one of the few nodes that touch, so it cannot be reached; lower "
+                           "contact.element_size or give contact.load in place of the "
+                           "approach", "contact.approach.distance")
     return best
 
 
@@ -83,8 +84,8 @@ def refuse_opening(asked, pieces: Compliance) -> None:
 
     limit = brentq(closing, 0.0, asked.offset, xtol=1e-4 * abs(asked.offset))
     holder = "raise" if asked.spring > 0 else "name"
-    raise PatchfemError(f"the load line lies {say(asked.offset, 6)} off the middle; beyond {say(limit, 3)} the "
-                        f"middle of the piece opens as the load grows, so no single load closes it by "
-                        f"{say(asked.approach, 6)}; bring contact.load_line.offset nearer, {holder} "
-                        "contact.holder.rotational_stiffness or give "
-                        "contact.load in place of the approach", "contact.approach.distance")
+    raise PatchfemError(f"the load line lies {say(asked.offset, 6)} off the middle; beyond {say(limit, 3)} the middle "
+                        "of the piece opens as the load grows, so more than one load or none gives an approach of "
+                        f"{say(asked.approach, 6)}; lower contact.load_line.offset, {holder} "
+                        "contact.holder.rotational_stiffness or give contact.load in place of the "
+                        "approach", "contact.approach.distance")

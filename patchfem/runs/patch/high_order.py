@@ -155,7 +155,7 @@ def level_of(asked, edges: tuple, breaks, depths: list) -> CellLevel:
     with one_thread():
         pieces, closing, rounding = condensed_cells(asked, breaks, depths)
         if rounding > ROUGH:
-            raise NotConverged(f"the compliance of the pieces is known to {rounding:.1e} only")
+            raise NotConverged(f"the compliance of the pieces has a rounding error of {rounding:.1e}")
         x = pieces.interface.x
         pressure = pressure_on(asked, pieces, asked.gap.at(x)[0])
         if pressure.outcome is Outcome.NO_CONTACT:

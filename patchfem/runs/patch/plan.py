@@ -65,9 +65,10 @@ def groups(model: Model) -> dict:
 def assembled(asked) -> str:
     """The sentence on what assembles the stiffness of the pieces of a `PatchModel`."""
     if asked.mesh is not None:
-        return "scikit-fem's forms assemble the pieces of contact.mesh, or a stencil those that are a tensor grid"
-    return "scikit-fem's forms assemble the pieces, whose ends are not a tensor grid" if asked.outlined else \
-        "the stencil of a tensor grid assembles the pieces"
+        return ("the stiffness of contact.mesh is assembled by scikit-fem, or by a stencil for a piece that is a "
+                "tensor grid")
+    return "the stiffness is assembled by scikit-fem, as the shaped ends are not a tensor grid" if asked.outlined else \
+        "the stiffness is assembled by the stencil of a tensor grid"
 
 
 def verdict(found: dict, asked) -> list:
@@ -86,9 +87,10 @@ def _of_tilt(found: dict, asked) -> list:
     if tilt is None:
         return []
     if gap.profile is not None or asked.strips is not None or len(gap.shapes) > 1:
-        return [f"tilt is {tilt:.3g} of the first-opening tilt of flat pieces, which these are not"]
+        return [f"tilt is {tilt:.3g} of the tilt at which flat pieces would start to open, but these pieces are not "
+                "flat"]
     if tilt <= 1:
         part = "full contact" if tilt <= FULL else "full contact, or all but an edge"
     else:
         part = f"partial contact, roughly {100 / sqrt(tilt):.0f} % or less"
-    return [f"tilt is {tilt:.3g} of the first-opening tilt: {part}"]
+    return [f"tilt is {tilt:.3g} of the tilt at which an edge starts to open: {part}"]

@@ -81,8 +81,8 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
 
 def strained(asked, patch) -> list:
     """Warnings where the answer leaves small strains, or where cells of a given size lock."""
-    beyond = ["the contact reaches the slope of 0.097 of a rounded end, beyond which contact is not computed; "
-              "lower the tilt or the load"] if beyond_gentle(patch) else []
+    beyond = ["the contact reaches the point of a rounded end where the slope is 0.097, beyond which no contact is "
+              "computed; lower the tilt or the load"] if beyond_gentle(patch) else []
     return strained_by(asked, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond)
 
 
@@ -97,8 +97,8 @@ def strained_by(asked, top: float, approach: float, beyond=()) -> list:
     stiff = max(m.poisson for m in stuff)
     if asked.plane == "strain" and stiff > LOCKS and not asked.chosen:
         cure = "split the elements of contact.mesh" if asked.mesh is not None else "leave out contact.element_size"
-        out.append(f"Poisson's ratio {stiff:g} in plane strain (limit {LOCKS:g}): cells of a given size lock towards "
-                   f"0.5, so errors reach up to twice their bars; {cure}")
+        out.append(f"Poisson's ratio {stiff:g} in plane strain (limit {LOCKS:g}): the elements lock as Poisson's ratio "
+                   f"nears 0.5, so errors may be up to twice the estimates; {cure}")
     return out
 
 
@@ -126,26 +126,26 @@ def left_out(model, patch, coarse) -> list:
     asked = model.patch
     by_forms = [side for side, body in (("lower", patch.pair.grid), ("upper", patch.pair.upper_grid))
                 if not isinstance(body, TensorGrid)]
-    out = [f"scikit-fem's forms assemble the {' and the '.join(by_forms)} piece"] if by_forms else []
+    out = [f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece"] if by_forms else []
     out += [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
     if patch.sharper and patch.averaging is not None:
-        out.append(f"static measures come from points {say(patch.averaging, 3)} apart (short waves as in endless "
-                   "layers), where these have the smaller errors; the mesh of "
-                   f"{patch.x.size} interface points gives fields and motion")
+        out.append(f"static measures with a smaller error that way are computed on points {say(patch.averaging, 3)} "
+                   f"apart (short waves as in infinite layers); fields and motion come from the mesh of {patch.x.size} "
+                   "interface points")
     elif patch.sharper:
-        out.append("static measures come from Gauss-Lobatto cells of order 4 where these have the smaller errors; the "
-                   f"bilinear mesh of {patch.x.size} interface points gives fields and motion")
+        out.append("static measures with a smaller error that way are computed on Gauss-Lobatto cells of order 4; "
+                   f"fields and motion come from the bilinear mesh of {patch.x.size} interface points")
     elif patch.averaging is not None and not asked.gap.rough:
-        out.append(f"the profile is averaged over {say(patch.averaging, 3)} where it carries load; the errors "
-                   "include the effect of another length")
+        out.append(f"the profile is averaged over {say(patch.averaging, 3)} where it carries load; the errors include "
+                   "the effect of the choice of this length")
     if asked.skin is not None and patch.pressure.load > 0:
         bears = patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0)
         out += skin.ranged(asked, float(patch.pressure.load / bears))
     if patch.strips is not None:
         out.append(patch.strips.note)
     if patch.pair.coupling > COUPLED and model.kind != "patch":
-        out.append("the pieces differ: the coupling between shear and normal closing is left out; it is "
-                   f"{patch.pair.coupling:.2g} of the tangential compliance")
+        out.append(f"the pieces differ: the coupling between shear and normal motion, {patch.pair.coupling:.2g} of the "
+                   "tangential compliance, is neglected")
     if model.kind == "patch":
         out += frictionless(asked, patch)
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
@@ -168,9 +168,9 @@ def frictionless(asked, patch) -> list:
     stuck = normal - cross @ np.linalg.solve(patch.pieces.tangential[here], cross.T)
     more = one @ np.linalg.solve(stuck, one) / (one @ np.linalg.solve(normal, one)) - 1
     beta = abs(_dundurs(asked))
-    return [f"the pieces differ (Dundurs' beta {beta:.2g} at the interface) and the pressure is that of a "
-            "frictionless contact, whose faces slide on each other as they are pressed; perfect stick would raise "
-            f"normal_stiffness by {100 * more:.2g} %, friction by less"]
+    return [f"the pieces differ (Dundurs' beta {beta:.2g} at the interface) and the pressure is that of a frictionless "
+            f"contact; with perfect stick normal_stiffness would be {100 * more:.2g} % larger, with friction it lies "
+            "in between"]
 
 
 def _dundurs(asked) -> float:
@@ -197,8 +197,8 @@ def drawn_otherwise(pair) -> list:
                        "all; fill any that is not intended")
         held, whole = recognise.held_share(body)
         if held < WHOLE * whole:
-            out.append(f"contact.mesh: {side}_far holds {held:.6g} m of a face of {whole:.6g} m, {held / whole:.3g} of "
-                       "its length; the rest of it is free")
+            out.append(f"contact.mesh: {side}_far covers {held:.6g} m of a face of {whole:.6g} m, {held / whole:.3g} "
+                       "of its length; the rest of that face is free")
     return out
 
 
@@ -217,7 +217,7 @@ def slender(asked, mean: float) -> list:
         stiff = young / (1 - nu**2) if asked.plane == "strain" else young
         share = mean / (np.pi**2 * stiff * asked.length**2 / (48 * piece.height**2))
         if piece.height > asked.length and share > BENT:
-            out.append(f"the {side} piece is {piece.height / asked.length:.3g} times as tall as long and bears "
-                       f"{share:.2g} of the load under which it buckles sideways (limit {BENT:g}); the lever arm that "
-                       "grows with bending is neglected")
+            out.append(f"the {side} piece is {piece.height / asked.length:.3g} times as tall as long and carries "
+                       f"{share:.2g} of its sideways buckling load (limit {BENT:g}); the growth of the lever arm by "
+                       "bending is neglected")
     return out

@@ -46,16 +46,17 @@ def ranged(asked, pressure: float) -> list:
     waves = f" of the waves below {short(part.cutoff, 'm', 3)}" if part.cutoff else ""
     if part.from_ is not None:
         found = traces.of_trace(Path(part.from_), part.cutoff)
-        half = ", those of every second sample " + _half(asked, found.coarse, pressure)
+        half = f" (from every second sample: {_half(asked, found.coarse, pressure)})"
         told = [f"contact.asperities: {found.doubt}"] if found.doubt else []
     elif asked.gap.profile is not None and part.cutoff is None:
-        told = [f"contact.asperities.rms_height: the profile has the waves longer than {say(2 * asked.gap.average)}; "
-                "where it is the same trace, take the rms of the shorter ones (patchfem profile --cutoff, whose table "
-                "has a cutoff)"]
+        told = [f"contact.asperities.rms_height: the profile contains the waves longer than "
+                f"{say(2 * asked.gap.average)}; if both are of one trace, give the rms values of the shorter waves "
+                "(from patchfem profile --cutoff)"]
     return [f"contact.asperities: under the mean pressure of {short(pressure, 'Pa', 3)} the peaks{waves} have "
-            f"{mean_stiffness(asked, pressure):.3g} Pa/m{half}; Persson's theory of waves of all lengths gives "
-            f'{soft:.3g} to {stiff:.3g} Pa/m, which law = "exponential" with decay_length = '
-            f'"{sum(peaks.PERSSON) / 2 * part.rms_height * 1e6:.3g} um" has', *told]
+            f"a stiffness of {mean_stiffness(asked, pressure):.3g} Pa/m{half}; Persson's theory, which includes "
+            "waves of all lengths, "
+            f'gives {soft:.3g} to {stiff:.3g} Pa/m, which law = "exponential" with decay_length = '
+            f'"{sum(peaks.PERSSON) / 2 * part.rms_height * 1e6:.3g} um" gives as well', *told]
 
 
 def _half(asked, coarse, pressure: float) -> str:
@@ -65,7 +66,7 @@ def _half(asked, coarse, pressure: float) -> str:
     except PatchfemError:
         one = None
     if one is None:
-        return "are those of no such surface"
+        return "no such surface"
     new = {"radius": one.radius, "density": one.density, "height_deviation": one.deviation}
     return f"{mean_stiffness(replace(asked, skin=asked.skin.model_copy(update=new)), pressure):.3g} Pa/m"
 

@@ -108,7 +108,7 @@ class Together(NamedTuple):
 def not_together(asked) -> str:
     """Why a `PatchModel` is not pressed together with others; "" where it may be."""
     if asked.meshes is None:
-        return "its mesh is its own"
+        return "it has a mesh of its own"
     if not all(isinstance(body, TensorGrid) or body is None for level in asked.meshes.levels for body in level):
         return "its pieces are not plain grids"
     if asked.gap.profile is not None:

@@ -22,9 +22,10 @@ def climbing_as_one(model, patch) -> list:
         return []
     limit = model.friction.static * patch.pressure.sigma_n * patch.pieces.interface.weight
     apart = float((patch.giving @ limit).max())
-    return [f"{model.soft} over grooves: the pieces climb together, by height and slope at the slide of the "
-            f"holders; a point at its limit is off by up to {say(apart, 3)}, {apart / model.grooves.wavelength:.2g} of "
-            "the wavelength; the points share the normal force like the load"]
+    return [f"{model.soft} with grooves: all points climb together, with the height and slope at the slide of the "
+            f"holders; for a point at its friction limit this slide is wrong by up to {say(apart, 3)}, "
+            f"{apart / model.grooves.wavelength:.2g} of the wavelength; the normal force is shared among the points "
+            "like the load"]
 
 
 def warming(model, patch, response, work: float | None = None) -> list:
@@ -44,9 +45,9 @@ def unripe(law, speed: float) -> list:
     if a <= RIPE:
         return []
     least = law.ratio / (1 / (RIPE * law.length) - law.rest_growth / speed**2)  # ripening(law, speed) = RIPE with it
-    return [f"bonds take {a:.2g} of their length to form at the peak speed {speed:.3g} m/s (limit {RIPE:g}), so "
-            "friction by the printed law falls below eqs. 2.18-2.21; set friction.slip_growth = "
-            f"\"{0.95e6 * least:.2g} um\", or friction.reading = \"stretch\""]
+    return [f"at the peak speed of {speed:.3g} m/s bonds need {a:.2g} of their length to form (limit {RIPE:g}), so the "
+            f'printed law gives less friction than eqs. 2.18-2.21; set friction.slip_growth = "{0.95e6 * least:.2g} '
+            'um", or friction.reading = "stretch"']
 
 
 def creeping(law, outcome, found) -> list:
@@ -56,8 +57,8 @@ def creeping(law, outcome, found) -> list:
         return []
     if law.reading != "stretch" or abs(drift.value) <= drift.error + 1e-2 * law.length:
         return []
-    return [f"the motion creeps by {drift.value / law.length:.2g} bond lengths a cycle: bonds damaged in each "
-            "cycle creep under a biased load"]
+    return [f"the mean position creeps by {drift.value / law.length:.2g} bond lengths per cycle, because bonds damaged "
+            "in each cycle creep under a biased load"]
 
 
 def unbounded_bonds(law) -> list:
@@ -68,7 +69,7 @@ def unbounded_bonds(law) -> list:
     if law.order >= 0 or law.initial == 0:
         return []
     return ["friction.order below 0 with friction.initial_bonds: the traction is infinite at the first instant, so "
-            "friction peaks depend on the step; set initial_bonds = 0"]
+            "friction peaks depend on the time step; set initial_bonds = 0"]
 
 
 def of_growth(law, peak: float | None) -> list:
@@ -80,15 +81,14 @@ def of_growth(law, peak: float | None) -> list:
         return []
     if law.reading == "report":
         return [] if law.initial == 0 else [
-            "as printed the initial bonds keep the bond length eps_0, whatever the growth of all that form later"]
+            "in the law as printed the initial bonds keep the bond length eps_0, while bonds that form later grow"]
     out = []
     if law.order > 1:
-        out.append(f"order = {law.order:g} with growth does not limit friction: a bond that formed short pulls harder "
-                   "and breaks later as the bond length grows; order "
-                   "<= 1 stays near mu_s N")
+        out.append(f"order = {law.order:g} with growth does not limit friction: a bond that formed while short pulls "
+                   "harder and breaks later as the bond length grows; set order <= 1 to stay near mu_s N")
     if peak is not None and peak > 1 + BOUND:
-        out.append(f"friction reaches {peak:.3g} mu_s N, because bonds that formed short keep holding while the length "
-                   "grows; reading = \"report\" with order <= 0 stays within mu_s N")
+        out.append(f"friction reaches {peak:.3g} mu_s N, because bonds that formed while short persist as the bond "
+                   'length grows; set reading = "report" with order <= 0 to stay within mu_s N')
     return out
 
 
@@ -106,12 +106,12 @@ def work_check_warning(values: dict, steps: int | None, harmonics: int | None = 
     if harmonics:
         remedy = more_harmonics(harmonics)
     elif steps and halvings > FARTHEST:
-        remedy = f"{steps} steps per cycle do not follow this motion by this method"
+        remedy = f"{steps} steps per cycle do not resolve this motion with this method"
     else:
         remedy = f"set accuracy.steps_per_cycle = {steps * 2**halvings}" if steps else \
             "compare with accuracy.method = \"march\""
     return [f"work_check is {found.value:.2g} (limit {BOOKS:g}): friction work by the trapezoidal rule on the samples "
-            f"differs from that of the energy ledger; {remedy}"]
+            f"differs from the energy ledger of the run; {remedy}"]
 
 
 def more_harmonics(found: int, sharp: float = 0.0) -> str:
@@ -133,8 +133,8 @@ def heating(model, patch, work: float, duration: float) -> list:
     kind = model.patch.substrate
     known = materials.THERMAL.get(kind.name) if kind.name in materials.MATERIALS else None
     if known is None:
-        return ["the warming by friction is not estimated: the conductivity of contact.substrate is not known; name a "
-                f"material of the table ({', '.join(materials.THERMAL)})"]
+        return ["the warming by friction is not estimated: the conductivity of contact.substrate is not known; choose "
+                f"a material of the table ({', '.join(materials.THERMAL)})"]
 
     area = float(patch.pieces.interface.weight[patch.active].sum())
     if not (area > 0 and duration > 0 and np.isfinite(work)):
@@ -144,8 +144,8 @@ def heating(model, patch, work: float, duration: float) -> list:
     rises = [f"{temperature.surface_rise(flux, duration, *stuff):.2g} K after {duration:.3g} s"]
     if period is not None:
         rises.insert(0, f"{temperature.surface_rise(flux, period, *stuff):.2g} K in a cycle")
-    return [f"friction of {work / duration:.2g} W on {1e6 * area:.3g} mm2 warms the face of one half-space that takes "
-            f"it all by {', '.join(rises)}; friction.temperature.surface stays as given"]
+    return [f"friction of {work / duration:.2g} W on {1e6 * area:.3g} mm2 would warm the face of one half-space that "
+            f"takes all the heat by {', '.join(rises)}; the run keeps friction.temperature.surface as given"]
 
 
 def _cycle(model) -> float | None:

@@ -30,7 +30,7 @@ def travelled(patch, slide) -> list:
     if not contact > 0 or largest < FAR * contact:
         return []
     return [f"slide amplitude {say(largest, 3)} is {largest / contact:.2g} of the contact length {say(contact)}: the "
-            f"pressure is taken as fixed and the overhang of the pieces is not modelled (limit {FAR:g})"]
+            f"pressure is taken as unchanged and the overhang of the pieces is not modelled (limit {FAR:g})"]
 
 
 def outcome_on_piece(outcome, asked, patch, slide, lateral=None):

@@ -159,10 +159,10 @@ def refuse_endless(model: Model, numerics=None) -> None:
     """Raise Missing when a run from event to event would take longer than LONGEST seconds."""
     seconds = seconds_of_pieces(model)
     if seconds > LONGEST:
-        raise Missing(f"the exact motion (about {pieces_per_cycle(model):.2g} pieces per cycle, between events, rows "
-                      f"of the drive and the fastest ringing) would take about {seconds:.0f} s, more than "
+        raise Missing(f"the exact motion (about {pieces_per_cycle(model):.2g} pieces per cycle, set by events, rows of "
+                      f"the drive and the fastest free vibration) would take about {seconds:.0f} s, more than "
                       f"{LONGEST:.0f} s; lower drive.cycles or the stiffness of modes and elements, or use "
-                      "accuracy.method = \"march\"", "")
+                      'accuracy.method = "march"', "")
 
 
 def exact_cost(model: Model, numerics, unknowns: dict) -> tuple:
@@ -173,8 +173,8 @@ def exact_cost(model: Model, numerics, unknowns: dict) -> tuple:
 def exact_words(model: Model, engine: str) -> list:
     """The sentence of a plan on which engine takes the elements, and why."""
     count, exact, march = expected_elements(model)[0], expected_seconds(model), seconds_of_steps(model)
-    return [f"{count} element{'s' * (count > 1)} by engine {engine}: about {exact:.2g} s from yield to yield, exact, "
-            f"about {march:.2g} s by time steps at this tolerance"]
+    return [f"{count} element{'s' * (count > 1)} by engine {engine}: about {exact:.2g} s by exact solution from yield "
+            f"to yield, about {march:.2g} s by time steps at this tolerance"]
 
 
 def not_smooth(model: Model) -> str:
@@ -185,7 +185,7 @@ def not_smooth(model: Model) -> str:
     if pinned or accuracy.quadrature not in ("auto", "recursion"):
         return f"with {pinned or 'accuracy.quadrature'}"
     if len(rig.modes.interfaces) > 1:
-        return "beside other forces"
+        return "with other forces"
     if model.side == "lower" and has(model.friction.law, "bonds"):
         return "under a pressure that stays"
     element = smooth_element(model)

@@ -138,7 +138,7 @@ class Finder(NamedTuple):
 FINDERS = {one.name: one for one in (
     Finder("events", "the map from event to event, exact", "steady.maps EventFinder", "exact"),
     Finder("yields", "the map from yield to yield, exact", "steady.maps YieldFinder", "piecewise"),
-    Finder("march", "a march that is brought to repeat", "steady.marched MarchFinder", "march"),
+    Finder("march", "a march whose start is corrected until the motion repeats", "steady.marched MarchFinder", "march"),
     Finder("balance", "harmonic balance", "steady.balance BalanceFinder", "harmonic"))}
 
 

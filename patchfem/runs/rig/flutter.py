@@ -10,9 +10,9 @@ from .interface import contact_model
 from .steady.balance import BalanceFinder
 
 NAME = "flutter_amplitude"
-ALONE = "a mode that gains energy moves no interface, so friction takes none of it"
-NONE = (f"no unstable limit cycle was found between {limit_cycles.LOW:g} and {limit_cycles.HIGH:g} times the "
-        "4 F/(pi |c| omega) of friction F and damping c")
+ALONE = "no mode that gains energy moves an interface, so friction cannot dissipate it"
+NONE = (f"no unstable limit cycle was found at amplitudes of {limit_cycles.LOW:g} to {limit_cycles.HIGH:g} times 4 "
+        "F/(pi |c| omega), where F is the friction force and c the damping")
 UNBALANCED = ("limit cycles of bonds are known only for the stretch reading of order 1 with constant length, no "
               "breakaway and pieces rigid in shear")
 SLIDES = "no motion was found in which the interface always slides and friction dissipates what the mode gains"
@@ -33,9 +33,9 @@ def flutter_of(run) -> tuple:
     alone = has(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1  # nothing rings in a stick
     falls = f" to the limit cycle of {say(below[-1].amplitude, 3)}, which is stable" if below else " to rest" * alone
     return {NAME: Measure(edge.amplitude, unit, edge.error, floor)}, [
-        f"a mode of damping below 0 gains energy: without a drive an oscillation of {say(edge.amplitude, 4)} at the "
-        f"output repeats at {edge.omega / 6.283185307179586:.4g} Hz but is unstable; a smaller free oscillation of "
-        f"this mode decays{falls}, a larger one grows", *far]
+        "a mode of negative damping gains energy: without a drive it has an unstable oscillation of "
+        f"{say(edge.amplitude, 4)} at the output at {edge.omega / 6.283185307179586:.4g} Hz; a smaller free "
+        f"oscillation of this mode decays{falls}, a larger one grows", *far]
 
 
 def _cycles(model, numerics, patch) -> tuple:

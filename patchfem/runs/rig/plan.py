@@ -121,7 +121,7 @@ def _of_modes(numerics, points: int, unknowns: dict, load_varies: bool) -> float
 def groups(model: Model) -> dict:
     """Dimensionless groups of the motion by name, those without a meaning left out.
 
-    D: friction limit over the largest push of the drive, which is D of 2.3 at resonance; knee [m s-2]: input beyond
+    D: friction limit over the largest force of the drive, which is D of 2.3 at resonance; knee [m s-2]: input beyond
     which friction alone does not bound a motion at resonance.
     """
     out, f, rig = {}, model.friction, model.rig
@@ -157,8 +157,8 @@ def first_words(rig, found: dict, chain: dict) -> list:
     soft = [name for name, link in chain.items() if name != "mode" and not isinstance(link, str)
             and link < STIFF * rig.stiffness]
     if d >= 1 and soft:
-        return [f"D = {d:.3g} >= 1, but the interface gives way elastically: {soft[-1]} {chain[soft[-1]]:.4g} N/m "
-                f"against {rig.stiffness:.4g} N/m of the mode"]
+        return [f"D = {d:.3g} >= 1, but the block still moves, because the interface is elastic: {soft[-1]} "
+                f"{chain[soft[-1]]:.4g} N/m against {rig.stiffness:.4g} N/m of the mode"]
     if d >= 1:
         return [f"D = {d:.3g} >= 1: the block should stick"]
     if d > pi / 4:
@@ -176,7 +176,7 @@ def sum_words(model: Model) -> list:
 
 def steady_words(model: Model, numerics) -> list:
     """The sentence on how a steady motion is found."""
-    return [f"steady motion by {steady_by(model).words}"]
+    return [f"the steady motion is found by {steady_by(model).words}"]
 
 
 def summed_words(model: Model, numerics) -> list:
@@ -184,28 +184,30 @@ def summed_words(model: Model, numerics) -> list:
     if not has(model.friction.law, "bonds"):
         return [] if PIECES.lacks(model) else exact_words(model, numerics.engine)
     found = lists.quadrature_of(model, numerics)
-    out = ["sum over bonds by " + found.said()]
+    out = ["the sum over bonds is by " + found.said()]
     if found.engine == "recursion":
         return out
     if lists.lists_grow(model):
         stiff = "an order above 0 gives it one" if lists.limp(model) else "reading = \"stretch\" gives it a stiffness"
         out.append(f"{_held_words(model)}; {stiff}")
     if (seconds := lists.bonds_cost(model, numerics)[1]) > parameters.LONGEST:
-        out.append(f"run will refuse: the bond list would take about {seconds:.0f} s, more than "
+        out.append(f"`run` will refuse this scene: the bond list would take about {seconds:.0f} s, more than "
                    f"{parameters.LONGEST:.0f} s")
     return out
 
 
 def _held_words(model: Model) -> str:
     """How bonds hold the block whose list of them grows."""
-    turns = "it turns back in almost every step, and the list grows by a strip with each"
+    turns = "it reverses in almost every step, and each reversal makes the list of bonds longer"
     if lists.stalls(model):
-        return "the printed law holds the block from its release on: it vibrates on bonds, or turns back in almost " \
-            "every step, which takes longest and is counted here"
+        return ("the printed law keeps the block from sliding from its release on, so that it vibrates on its bonds or "
+                "reverses in almost every step; the estimate is for the slowest case")
     if lists.limp(model):
-        return f"bonds of order 0 hold the block, but give it no stiffness: {turns}"
-    return f"the printed law holds the block, however small its stroke: {turns}" if lists.chatters(model) else \
-        "the printed law holds the block at some level, or just: the list grows with every step"
+        return f"bonds of order 0 keep the block from sliding but give it no stiffness: {turns}"
+    if lists.chatters(model):
+        return f"the printed law keeps the block from sliding, however small its stroke: {turns}"
+    return ("the printed law keeps the block from sliding at some level, or nearly so: the list of bonds grows with "
+            "every step")
 
 
 def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:

@@ -40,14 +40,14 @@ def notes_of(run) -> list:
     model, raw, rig = run.model, run.raw, run.model.rig
     ended = [*_across(run), *([raw.message] if raw.message and raw.outcome is Outcome.LEAVES_GROOVES else [])]
     if run.patch is not None and run.patch.strips is not None and model.soft:
-        return ["strips that slip part by part have no common shear stress: the fields hold the pressure",
+        return ["strips that slip part by part have no common shear stress, so the fields contain only the pressure",
                 *run.rings.notes, *ended]
     out, f = [*_of_bonds(model, run.patch, raw), *climbing_as_one(model, run.patch)], model.friction
     if len(rig.interfaces):
         out += ENGINES[run.numerics.engine].call("notes", model, run.numerics, run.patch, raw) or []
     if raw.levels and rig.onset[0] == "slip" and raw.held > 0:
-        out.append(f"onset_level: a slip amplitude counts from {length(raw.held)} on, a thousandth of the slide over "
-                   "which the interface gives way; below it a part of the interface may slip already")
+        out.append(f"onset_level: slip counts from an amplitude of {length(raw.held)}, a thousandth of the elastic "
+                   "range of the interface; below it a part of the interface may already slip")
     return [*rig.kept, *out, *creeping_note(f), *run.rings.notes, *ended]
 
 
@@ -56,16 +56,16 @@ def _across(run) -> list:
     if not run.model.rig.strips_slide_apart or run.patch.strips.offsets.size < 2 or not run.patch.strips.load:
         return []
     swing, share = strips.across(run.patch, run.raw.window, run.drive.period)
-    return [f"the yaw moves the ends of the patch by up to {length(swing)} across x, which friction"
-            f"{' and wear leave' if run.model.wear is not None else ' leaves'} out: the path of the slide in the last "
-            f"cycle is {100 * share:.2g} % longer with it, on average under the pressure"] if swing > 0 else []
+    return [f"the yaw moves the ends of the patch by up to {length(swing)} across x, which "
+            f"friction{' and wear leave' if run.model.wear is not None else ' leaves'} out: with the yaw the slide "
+            f"path in the last cycle would be {100 * share:.2g} % longer, averaged by pressure"] if swing > 0 else []
 
 
 def creeping_note(friction) -> list:
     """The sentence on a law that never holds."""
     if friction is None or not has(friction.law, "creeps"):
         return []
-    return [f"law '{friction.law}' never holds: under a constant force of half its limit it creeps at "
+    return [f"law '{friction.law}' never sticks: under a constant force of half its friction limit it creeps at "
             f"{1e3 * 0.5493 * friction.reference_speed:.3g} mm/s"]
 
 
@@ -74,8 +74,9 @@ def _as_one_point(model, patch, numerics) -> list:
     f, moves = model.friction, model.rig.load_varies or model.rig.strips_slide_apart
     if patch is None or f is None or has(f.law, "averaged") or model.soft or numerics.per_point or moves:
         return []
-    return ["nothing spatial acts on the motion: with a rigid slide, constant load and the pressure on the upper piece "
-            "the patch moves exactly as one point under the same load; to slip part by part it needs [contact.shear]"]
+    return ["the shape of the patch does not affect the motion: with a rigid slide, constant load and the pressure on "
+            "the upper piece the patch moves exactly as one point under the same load; add [contact.shear] to let it "
+            "slip part by part"]
 
 
 def _of_bonds(model, patch, raw) -> list:
@@ -93,8 +94,8 @@ def marched_elements(model, numerics, patch, raw) -> list:
     if PIECES.lacks(model) or model.accuracy.method != "auto" or "steps_per_cycle" in numerics.pinned:
         return []
     pinned = patch is not None and not model.patch.chosen
-    return [f"the motion is marched in steps, as {dear_elements(model)}; {'on a coarser mesh, or ' * pinned}by "
-            "accuracy.method = \"exact\" it is exact"]
+    return [f"the motion is computed in time steps, because {dear_elements(model)}; "
+            f"{'on a coarser mesh, or ' * pinned}with accuracy.method = \"exact\" it is exact"]
 
 
 def unmoved_elements(model, numerics, patch, raw) -> list:
@@ -107,8 +108,9 @@ def unmoved_elements(model, numerics, patch, raw) -> list:
         most, half = float(group.yield_slide.max(initial=0.0)), float(np.ptp(slide)) / 2
         if most > half:
             return [f"part of the joint yields only at {length(most)} and never slips in this motion of "
-                    f"{length(half)}: it keeps whatever force it was left with, so the steady motion is not unique; "
-                    "this one has no mean force, accuracy.method = \"auto\" gives the one that is reached from rest"]
+                    f"{length(half)}: it keeps any force that it was left with, so the steady motion is not unique; "
+                    'the one given has no mean force; set accuracy.method = "auto" for the one that is reached from '
+                    "rest"]
     return []
 
 
@@ -127,7 +129,7 @@ def created_warning(model, book: dict, cycles: float) -> list:
     if made <= 1e-9 * work or made <= 0:
         return []
     return [f"the printed law created {made / cycles:.3g} J per cycle, {100 * made / max(work, 1e-300):.3g} % of what "
-            "it dissipated; reading = \"stretch\" creates none"]
+            'it dissipated; set reading = "stretch", which creates none']
 
 
 def modes_note(model, kept: int, nodes: int) -> list:

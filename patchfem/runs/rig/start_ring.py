@@ -42,12 +42,12 @@ def start_ring(outcome, measures: dict, window, drive, cycles: float, tolerance:
     if not missed:
         return StartRing(measures | wide, {}, [])
     until = max(_until(one, measures, drive, cycles) for one in missed.values())
-    remedy = f"drive.cycles = {until:g} lets the ringing of the start decay" if until else \
-        "the start rings on; give the modes of [[structure.mode]] more damping"
+    remedy = f"set drive.cycles = {until:g} to let the free vibration from the start decay" if until else \
+        "the free vibration from the start has not decayed; give the modes in [[structure.mode]] more damping"
     ring = measures.get("ring_frequency")
     pitch = f" at {ring.value:.5g} Hz (damping {measures['ring_damping'].value:.2g})" if ring is not None else ""
-    note = f"the start still rings{pitch}: loop_area holds what the interface stores and gives back, not what it " \
-           f"dissipates; {remedy}"
+    note = (f"the free vibration from the start has not decayed{pitch}: loop_area contains energy that the interface "
+            f"stores and gives back, not only what it dissipates; {remedy}")
     return StartRing(measures | wide, dict.fromkeys(missed, remedy), [note])
 
 

@@ -139,7 +139,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         try:
             state = _jumped(model, asked, state)
         except _Unbounded as why:
-            stopped = f"wear was followed to cycle {state.cycle:.6g} of {wear.cycles:.6g}: {why}"
+            stopped = f"wear was computed up to cycle {state.cycle:.6g} of {wear.cycles:.6g}: {why}"
             break
         patch = pressed(model.patch, patch.pair, frozen_array(state.depth))
         moments = (*moments, _moment(patch, state, motion))

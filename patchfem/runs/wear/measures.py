@@ -105,8 +105,8 @@ def _deep(model, found) -> list:
                                (1 - model.wear.upper_share, asked.lower, "lower")):
         if share * depth > 0.2 * (piece.thickness or piece.height):
             out.append(f"the {name} piece lost up to {say(share * depth, 3)}, more than 0.2 of its "
-                       f"{'coating' if piece.coating is not None else 'height'}: its stiffness is still that of the "
-                       "unworn piece")
+                       f"{'coating' if piece.coating is not None else 'height'}, but the stiffness of the unworn piece "
+                       "is still used")
     return out
 
 
@@ -177,13 +177,13 @@ def _beyond_table(model, found) -> list:
         return []
     deep, out = [mean_depth(found.patch, one.depth) for one in found.moments], []
     if deep[-1] > change.depth[-1]:
-        out.append(f"the mean worn depth, {say(deep[-1], 3)}, is beyond the last of wear.friction.depth, "
-                   f"{say(change.depth[-1], 3)}, beyond which friction is held constant; add a row at "
+        out.append(f"the mean worn depth, {say(deep[-1], 3)}, is larger than the last value of wear.friction.depth, "
+                   f"{say(change.depth[-1], 3)}, and friction stays constant from there; add a depth of at least "
                    f"{say(deep[-1], 3)}")
     past = max(sum(one < row < two for row in change.depth) for one, two in pairwise(deep)) if len(deep) > 1 else 0
     if model.wear.jumps and past > 1:
-        out.append(f"a jump passes {past} rows of wear.friction and so misses the values between them; leave "
-                   "wear.jumps out")
+        out.append(f"one jump of the wear passes {past} rows of wear.friction and misses the values between them; "
+                   "leave out wear.jumps")
     return out
 
 

@@ -19,9 +19,9 @@ def _contact(draft: Draft) -> None:
         draft.lacks("contact.load", "or [contact.approach] instead")
     outlines(draft)
     if contact.height and contact.length and contact.height > TALLEST * contact.length:
-        draft.say("contact.height", f"{contact.height:g} m is more than {TALLEST} times contact.length, but the "
-                                    f"stress reaches only a few lengths deep; use at most "
-                                    f"{TALLEST * contact.length:.3g} m, and a spring of the structure for the rest")
+        draft.say("contact.height", f"{contact.height:g} m is more than {TALLEST} times contact.length, but the stress "
+                                    f"reaches only a few lengths deep; use at most {TALLEST * contact.length:.3g} m, "
+                                    "and represent the rest by a spring of the structure")
     flat = flat_of(contact)
     if contact.element_size and flat and contact.element_size > flat:
         name = "contact.length" if flat == contact.length else "the interface,"

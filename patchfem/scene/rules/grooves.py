@@ -25,7 +25,7 @@ def check_grooves(draft: Draft, kind: str) -> None:
         return
     _locks(draft, at, grooves, law)
     if kind == "bench" and grooves.lifted_mass:
-        draft.remark(f"{at}.lifted_mass has no meaning with [slide], which has no inertia, and is not used")
+        draft.remark(f"{at}.lifted_mass has no meaning with [slide], because a bench has no inertia, and is not used")
     if grooves.amplitude:
         _beside(draft, at, grooves, law)
 
@@ -81,7 +81,7 @@ def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
         if contact.holder is not None and contact.holder.tangential_stiffness is not None:
             draft.say("contact.holder.tangential_stiffness", unbuilt(beside, "out"))
     if contact is not None and contact.strips is not None and (turning(draft.tables) or contact.gives_way):
-        draft.say(at, unbuilt("with strips that yaw or give way", "either"))
+        draft.say(at, unbuilt("with strips that yaw or are elastic", "either"))
     _under_changing_load(draft, beside)
     lower = [f"contact.{name}.on" for name, one in (contact.shapes if contact is not None else {}).items()
              if one.on == "lower"]

@@ -199,7 +199,7 @@ def _file(draft: Draft, structure: Any) -> None:
     measured = ending in MEASURED
     for key in PLACES:
         if not measured and draft.given(f"structure.{key}"):
-            draft.say(f"structure.{key}", f"names a place in a universal file; a {ending} file holds the array "
+            draft.say(f"structure.{key}", f"names a place in a universal file; a {ending} file contains the array "
                                           f"{key.removesuffix('_at')}")  # fmt: skip
     if measured and not draft.given("structure.moving_mass"):
         draft.lacks("structure.moving_mass", "the modes of a universal file are scaled to this mass")

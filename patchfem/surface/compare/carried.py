@@ -94,7 +94,7 @@ def hidden_wear(found: Registration | None, by: Carried | None) -> Quantity:
     tilt times the length. Even wear adds any depth, as does a mounting that turns a wedge back: there is no limit.
     """
     if found is None:
-        return refused("m", HIDDEN, "the traces are not laid on each other")
+        return refused("m", HIDDEN, "the traces are not registered to each other")
     if by.by:
         return refused("m", HIDDEN, f"{_what(by)} carry the registration")
     length = float(found.x[-1] - found.x[0])
@@ -109,21 +109,22 @@ def told(by: Carried) -> str:
     """What the worn depths count from, as a sentence."""
     if by.by == "valleys":
         return (f"Depths are measured from the valleys between the worn tops, {100 * by.share:.0f} % of the heights, "
-                "which agree and are taken as unworn; any even wear of these would add to them.")
+                "which agree in both traces and are taken as unworn; if they wore evenly too, all depths are larger "
+                "by that wear.")
     spans = ", ".join(f"{say(a, 4)} to {say(b, 4)}" for a, b in by.parts[:4])
     more = f" and {len(by.parts) - 4} more" if len(by.parts) > 4 else ""
     return (f"Depths are measured from the parts that agree, x = {spans}{more} of the trace after, which are taken as "
-            "unworn; any even or wedge-shaped wear of these would add to them.")
+            "unworn; if they wore evenly or as a wedge too, all depths are larger by that wear.")
 
 
 def may_hide(found: Registration, hidden: Quantity) -> str:
     """What may hide where nothing carries the registration, and what would settle it, as a sentence."""
-    bow = f" A bow of {say(abs(found.bend), 3)}, taken out, may be a bent datum or wear as well." if found.bend else ""
+    bow = f" A bow of {say(abs(found.bend), 3)}, now subtracted, may be a bent datum or wear." if found.bend else ""
     tilt, most = (plain(1e6 * one, 3) for one in (abs(found.slope), 2 * hidden.value / float(found.x[-1] - found.x[0])))
-    return ("Even wear of any depth would look the same, and so would a wedge levelled out by the mounting. The tilt "
-            f"of {tilt} urad between the traces, up to {most} urad by its interval, may be up to "
-            f"{say(hidden.value, 3)} of mean wear: half the tilt times the length.{bow} Only an unworn flank "
-            "beside the rubbed part, or a reference mark, in both traces would settle it.")
+    return ("Even wear of any depth would look the same, and so would wedge-shaped wear that the mounting levelled "
+            f"out. The tilt of {tilt} urad between the traces, up to {most} urad by its interval, may hide "
+            f"up to {say(hidden.value, 3)} of mean wear: half the tilt times the length.{bow} To settle it, "
+            "measure an unworn flank beside the rubbed part, or a reference mark, in both traces.")
 
 
 def median_of_five(rest) -> np.ndarray:

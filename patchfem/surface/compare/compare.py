@@ -25,7 +25,7 @@ from .tracks import Tracks, beside_flanks, of_flanks, pieces_of, tracks_of
 SHIFT = "a place at x of the trace before is at x + shift of the trace after"
 STRETCH = "length of the trace after over that of the trace before, from their unworn valleys"
 TILT = "slope of the trace after against the trace before"
-AMPLITUDE = "amplitude of the sine with the mean square of the waves of 60 um to 110 um, after over before"
+AMPLITUDE = "amplitude of a sine with the same mean square as the waves of 60 um to 110 um, after over before"
 SLOPE = "root mean square slope between neighbouring samples, after over before"
 
 
@@ -149,8 +149,8 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
     if by.by:
         tracks = tracks_of(found, worn_depth.neighbours(found), band[1])
     else:
-        worn = worn_depth.nowhere("no part of the traces is surely unworn: even wear, a wedge and a bow look like no "
-                                  "wear", worn.deposited if raised(found) else 0.0)
+        worn = worn_depth.nowhere("no part of the traces is known to be unworn, so even, wedge-shaped or bow-shaped "
+                                  "wear cannot be told from no wear", worn.deposited if raised(found) else 0.0)
     pieces = pieces_of(found, tracks, band[1])
     flat = pieces_of(found, tracks, band[1], True)
     ratios, sizes = [], [tuple(_pooled(side, step, band) for side in zip(*one)) for one in (flat, pieces)]
@@ -172,13 +172,13 @@ def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Compari
     before, after, why = place.before, place.after, place.why
     notes, step = _steps(before, after)
     if place.order:
-        notes.append("with the two traces exchanged they show a common place where nothing "
-                     "grew: material grew between them, or the two files are in the wrong order")
+        notes.append("the two traces match only in exchanged order: material grew between "
+                     "the measurements, or the two files are in the wrong order")
     flanks = flanks_of(before, after)
     abbott = None if flanks is not None else worn_depth.abbott_estimate(before, after)
     sides = [[before], [after] if flanks is None else beside_flanks(after, flanks, band[1])]
     worn = worn_depth.of_flanks(flanks) if flanks is not None else worn_depth.nowhere(
-        why + ", and there are no unworn flanks beside a track; a worn depth needs one or the other")
+        why + ", and there are no unworn flanks beside a track; a worn depth needs one of the two")
     sizes = tuple(_pooled(side, step, band) for side in sides)
     freedom = [[scattered(one, step, band) for one in side] for side in sides]
     sizes = tuple(one._replace(freedom=tuple(min(a, b) for a, b in zip(one.freedom, np.sum(each, axis=0))))
@@ -196,7 +196,7 @@ def _steps(before: Profile, after: Profile) -> tuple:
     notes = list(before.notes + after.notes)
     if max(steps) > 1.01 * min(steps):
         notes.append(f"samples lie {say(steps[0])} apart before and {say(steps[1])} after; slopes and amplitudes are "
-                     f"read every {say(max(steps))}")
+                     f"computed at a step of {say(max(steps))}")
     return notes, max(steps)
 
 
@@ -225,8 +225,9 @@ def _told(found: Registration) -> list:
     value, error, out = found.stretch
     if not np.isfinite(value) or abs(value) < max(SIDE * 2 * error, 1e-4):
         return []
-    text = f"the trace after is {1 + value:.5g} times as long as the same place before (+- {SIDE * error:.1g})"
-    return [text + ("; this is taken out" if out else "; calibrate x of the instrument")]
+    text = (f"the trace after is {1 + value:.5g} times as long as the same place in the trace before (+- "
+            f"{SIDE * error:.1g})")
+    return [text + ("; the difference is corrected" if out else "; calibrate x of the instrument")]
 
 
 def compared_scans(before: Areal, after: Areal, first: str = "x", keep_spikes: bool = False) -> list[Comparison]:
@@ -285,11 +286,11 @@ def compared_files(paths: tuple, direction: str = "", units: tuple | None = None
     files = [read_surface(path, units) for path in paths]
     scans = {isinstance(one, Areal) for one in files}
     if shift is not None and len(files) != 2:
-        raise PatchfemError("compare: a shift is that of two traces; compare each direction by itself")
+        raise PatchfemError("compare: a shift needs exactly two traces; compare each direction separately")
     if len(scans) > 1 or (True in scans and len(files) == 4):
         raise PatchfemError("compare: two or four traces are needed, or two areal scans")
     if shift is not None and True in scans:
-        raise PatchfemError("compare: a shift is given for traces; areal scans are laid on each other by themselves")
+        raise PatchfemError("compare: a shift can be given only for traces; areal scans are registered automatically")
     if True in scans:
         return compared_scans(*files, direction or "x", keep_spikes)
     if len(files) == 2:

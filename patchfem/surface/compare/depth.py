@@ -88,7 +88,7 @@ def extent_of(found: Registration, together: float) -> Extent | None:
         return None
     x, last = found.x, rest.size - 1
     places = [tuple(float(x[k]) for k in ends[0]), tuple(float(x[last - k]) for k in (ends[1][0], *ends[1][:0:-1]))]
-    after = tuple(Quantity(*place, "m", f"{text}, in the x of the trace after")
+    after = tuple(Quantity(*place, "m", f"{text}, as x of the trace after")
                   for place, text in zip(places, (FROM, TO)))
     scale = 1 + (found.stretch[0] if found.stretch[2] else 0.0)
     moved = SIDE * found.errors[2]
@@ -96,7 +96,7 @@ def extent_of(found: Registration, together: float) -> Extent | None:
     def back(place: float) -> float:
         return found.middle + (place - found.middle) / scale - found.shift
 
-    before = tuple(Quantity(back(place), back(low) - moved, back(high) + moved, "m", f"{text}, in the x of the trace "
+    before = tuple(Quantity(back(place), back(low) - moved, back(high) + moved, "m", f"{text}, as x of the trace "
                             "before") for (place, low, high), text in zip(places, (FROM, TO)))
     return Extent(before, after)
 
@@ -174,7 +174,7 @@ def abbott_estimate(before: Profile, after: Profile) -> Quantity:
     share = np.linspace(*TAIL, 24)
     found = float((np.quantile(other.z, share) - np.quantile(one.z, share)).mean())
     spectrum = spectrum_of(one.z, one.length / (one.x.size - 1))
-    text = "mean worn depth guessed from the valley tails of both Abbott curves"
+    text = "mean worn depth estimated from the valley tails of both Abbott curves"
     if not spectrum.density.any():
         return refused("m", text, "the trace before is flat")
     tails = []

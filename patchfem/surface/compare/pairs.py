@@ -9,7 +9,7 @@ from ...inputs.cells import cells_of, header_of, text_of
 from ..quantity import Quantity, mean_of
 
 HEADER = "before,after"
-KINDS = {"scans": "areal scans", "run": "results folders", "place": "traces laid on each other",
+KINDS = {"scans": "areal scans", "run": "results folders", "place": "registered traces",
          "flanks": "traces with a track below its flanks", "nothing": "traces without a common place"}
 AVERAGED = ("worn_volume", "grown_volume", "worn_share", "worn_depth_mean", "worn_depth_within", "worn_depth_max",
             "worn_area", "track_width", "track_depth", "track_depth_floor", "track_step", "track_area_gross",

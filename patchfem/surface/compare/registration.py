@@ -128,7 +128,7 @@ def register(before: Profile, after: Profile, shift: float, lowest: float = LOWE
             best = other
     if best is None:
         raise PatchfemError(f"{after.source}: fewer than {FEWEST} of its heights lie on the valleys of "
-                            f"{before.source}; no common reference")
+                            f"{before.source}, so there is no common reference")
     return best
 
 

@@ -19,7 +19,7 @@ WHITE, NEIGHBOURS = 0.3, 1.5  # noise up to which white noise passes for that of
 TOLD = 0.5  # white noise up to which a shift that was told is believed
 NOTHING_GREW = 0.9  # balance of what is missing and what grew, beyond which wear alone stands in a registration
 SHARE = 0.15  # of the heights, at least, unworn
-MARK = "where both traces were measured from the same mark, give it with --shift '0 mm'"
+MARK = "if both traces were measured from the same mark, use --shift '0 mm'"
 
 
 class Place(NamedTuple):
@@ -126,11 +126,11 @@ def _told(before: Profile, after: Profile, shift: float) -> Place:
     try:
         found = register(before, after, shift)
     except PatchfemError:
-        return Place(None, None, why + "hardly any heights of the traces agree; is it the right one?")
+        return Place(None, None, why + "hardly any heights of the traces agree; is the shift right?")
     if abs(found.shift - shift) > alone(first) * step:
-        return Place(None, None, why + f"the traces do not agree; the fit moves away to {say(found.shift)}")
+        return Place(None, None, why + f"the traces do not match; the fit moves the shift to {say(found.shift)}")
     if not (_quiet(found, TOLD) and found.used.mean() > SHARE):
-        return Place(None, None, why + _apart(found) + ": no better than chance; is it the right one?")
+        return Place(None, None, why + _apart(found) + ": no better than chance; is the shift right?")
     return Place(None, found)
 
 
@@ -187,18 +187,19 @@ def _apart(found: Registration) -> str:
 def _why(before: Profile, after: Profile, match: Match, valleys: Match) -> str:
     """Why no place was found, in words to act on."""
     if valleys.repeats and valleys.clear > CLEAR and match is valleys:
-        return (f"the surface repeats itself, every {say(_period(before, after))}: distant shifts fit equally "
-                f"well, {valleys.likeness:.3f} and {valleys.second:.3f}; {MARK}")
+        return (f"the surface is periodic, with a period of {say(_period(before, after))}, so distant shifts "
+                f"match equally well (correlations {valleys.likeness:.3f} and {valleys.second:.3f}); {MARK}")
     if match.clear > CLEAR and not match.repeats:
         try:
             found = register(before, after, match.shift)
         except PatchfemError:
             return f"at the most likely shift, {say(match.shift)}, hardly any heights are unworn"
-        return (f"the traces show no common place that is unworn: at the most likely shift, {say(match.shift)}, "
-                f"{_apart(found)}; {MARK}")
+        return ("no common place was found in the traces that is unworn: at the most likely shift, "
+                f"{say(match.shift)}, {_apart(found)}; {MARK}")
     mean, scatter = valleys.chance
-    return (f"the traces show no common place: the best correlation of their valleys is {valleys.likeness:.2f}, and "
-            f"only above {np.tanh(mean + CLEAR * scatter):.2f} is it significant; {MARK}")
+    return ("no common place was found in the traces: the best correlation of their valleys is "
+            f"{valleys.likeness:.2f}, but only values above {np.tanh(mean + CLEAR * scatter):.2f} are significant; "
+            f"{MARK}")
 
 
 def _period(before: Profile, after: Profile) -> float:

@@ -23,14 +23,14 @@ NEW = 10.0  # noises that a new valley is deeper than the trace before, and 3 be
 FORM = 2.5  # longest waves, from which the shape of the depth is the form of a track
 FROM, TO = ("x of the trace after where the longest track begins",
             "x of the trace after where the longest track ends")
-DEPTH, BOTTOM = ("lost area of the longest track over its width",
+DEPTH, BOTTOM = ("mean depth: lost area of the longest track over its width",
                  "floor of the longest track: bottom of the parabola through the deepest fifth of its width")
 WIDTH, STEP = ("width of the longest track",
                "step: mean depth over the middle third of the longest track, as of a groove in ISO 5436-1, type A1")
-LEFT, RIGHT = (f"area that stands above the trace before {side} the longest track, to within its width" for side in
+LEFT, RIGHT = (f"pile-up: area above the trace before, within one track width {side} the longest track" for side in
                ("before", "behind"))
-GROSS, PILED, NET = ("area lost in the longest track", "area that stands above the trace before, to within a width of "
-                     "the longest track on both sides together", "lost area less pile-up")
+GROSS, PILED, NET = ("area lost in the longest track", "pile-up: area above the trace before, within one track width "
+                     "of the longest track, both sides together", "lost area less pile-up")
 
 
 class Valley(NamedTuple):

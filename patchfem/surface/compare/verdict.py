@@ -52,7 +52,7 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     elif areal == ELSEWHERE or any(_elsewhere(one) for one in parts):
         headline = f"{ELSEWHERE}; {headline}"
     if any(_gain(one, "") and word != "no change shown" for one, word in zip(parts, words)):
-        headline += " by a factor of all heights, like the gain of an instrument"
+        headline += ", all heights by the same factor, as by an instrument's gain"
     over = _over(parts) if parts[0].change is None else scans.over(parts[0].change)
     headline = f"{headline}; {over}" if over else headline
     out = [] if parts[0].change is None else scans.sentences(parts[0].change)
@@ -103,7 +103,7 @@ def _amplitude(ratio: Quantity, word: str, name: str) -> str:
         return f"Amplitude{name}: {ratio.reason}."
     start = f"The waves of the band{name} have {_range(ratio)} of the amplitude before: "
     if word == "no change shown":
-        return start + "the interval holds 1, no change is shown."
+        return start + "the interval contains 1, so no change is shown."
     return start + f"{word}, at {sure(ratio)}."
 
 
@@ -120,8 +120,8 @@ def _gain(one: Comparison, name: str) -> list:
     """That waves or slopes changed by one factor of all heights, as a sentence."""
     if one.gain is None or {changed(one.amplitude_ratio), changed(one.slope_ratio)} == {"no change shown"}:
         return []
-    return [f"All heights{name} after are {one.gain:.4g} times those before: a gain of the instrument does that and "
-            "wear does not; calibrate z of both measurements."]
+    return [f"All heights{name} after are {one.gain:.4g} times those before: an instrument's gain does that, wear "
+            "does not; calibrate z of both measurements."]
 
 
 def _sure(mean: Quantity) -> bool:
@@ -148,10 +148,11 @@ def _variant(one: Comparison, name: str) -> list:
     """What was turned for the comparison, as a sentence."""
     out = []
     if one.mirrored:
-        out.append(f"The trace after{name} runs the other way: it was mirrored, and its x counts from the other end.")
+        out.append(f"The trace after{name} was measured in the opposite direction: it was mirrored, so its x counts "
+                   "from the other end.")
     if one.turned:
-        out.append(f"The heights of both traces{name} count opposite ways: one was turned over so that wear is missing "
-                   "material; check which file counts into the material.")
+        out.append(f"The heights of both traces{name} have opposite signs: one was inverted so that wear is missing "
+                   "material; check in which file heights point into the material.")
     return out
 
 
@@ -161,9 +162,9 @@ def _worn(one: Comparison, name: str) -> str:
     mean = one.worn.mean
     above = ""
     if one.worn.deposited > DEPOSITED * (one.worn.area.value or 0.0) and one.worn.deposited > 0:
-        above = (f" {1e12 * one.worn.deposited:.3g} um^2 stand above the trace before: deposits, or the two files are "
-                 "in the wrong order." if one.exchanged else
-                 f" {1e12 * one.worn.deposited:.3g} um^2 stand above the trace before: deposits or pile-up.")
+        above = (f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the trace before: deposits, or the two "
+                 "files are in the wrong order." if one.exchanged else
+                 f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the trace before: deposits or pile-up.")
     if one.reference == "place" and not one.carried.by:
         return f"Worn depth{name}: none shown.{above} {may_hide(one.registration, one.hidden)}"
     if mean.value is None:
@@ -191,8 +192,8 @@ def _reference(one: Comparison) -> list:
         return []
     out, bend = [told(one.carried)], one.registration.bend
     if bend:
-        out.append(f"A bow of {say(abs(bend), 3)} over the common length is taken out: a bent datum and wear of that "
-                   "shape look alike.")
+        out.append(f"A bow of {say(abs(bend), 3)} over the common length is subtracted, because a bent datum and "
+                   "wear of that shape look alike.")
     return out
 
 

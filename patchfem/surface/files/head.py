@@ -91,8 +91,8 @@ class Head(NamedTuple):
                     value = _VALUE.match(said["is"])
                     if _THOUSANDS.fullmatch(value[1] or "") and not _GERMAN.search(said[0]) \
                             and not any("," in cell for cell in self.row):
-                        raise PatchfemError(f"{path}:{at}: '{shown(line)}': {value[1]} may be a decimal number or one "
-                                            "of thousands; write it with a point, or without a comma")
+                        raise PatchfemError(f"{path}:{at}: '{shown(line)}': {value[1]} may have a decimal comma or a "
+                                            "thousands separator; write it with a point, or without the comma")
                     number = value[1] and float(value[1].replace(",", "."))
                     found[name] = number, said["of"] or value[2]
         return found

@@ -93,8 +93,8 @@ def _step(path, axis: str, count: int, facts: dict, given: tuple | None) -> tupl
         step = "step_x"  # square pixels by a size of one number
     number, unit = facts.get(step, facts.get(size, (None, "")))
     if number is None or not 0 < number < np.inf:
-        raise PatchfemError(f"{path}: rows of more than three numbers, or those of a map, are a matrix of heights, and "
-                            f"its {'width' if axis == 'x' else 'height'} is not given; {ABOVE}")
+        raise PatchfemError(f"{path}: the rows are a matrix of heights (a map, or more than three numbers in a row), "
+                            f"but its {'width' if axis == 'x' else 'height'} is not given; {ABOVE}")
     unit = unit or next((facts[name][1] for name in ("unit_y", "lateral") if axis == "y" or name == "lateral"
                          if name in facts), None)
     if not unit and facts.get("format", ("", ""))[1].lower() == "ascii":
@@ -110,7 +110,7 @@ def _overruled(path, what: str, told: str | None, asked: str | None) -> tuple:
     """The unit that counts, and a note where the one given overrules the one of the file."""
     if asked is None or told is None or factor_of(asked) == factor_of(told):
         return asked or told, ()
-    return asked, (f"{path}: its header gives {what} in {shown(told)}; {asked} is used, as the given units say",)
+    return asked, (f"{path}: its header gives {what} in {shown(told)}; {asked} is used, as given by --units",)
 
 
 def _table(path, head: Head, body: str) -> np.ndarray:
@@ -147,6 +147,6 @@ def _row(at: str, line: str, delimiter: str | None, count: int) -> list:
                             "a missing height, and one row of the scan per line")
     bad = next((cell for cell in cells if not is_number(cell, delimiter)), None)
     if bad is not None:
-        raise PatchfemError(f"{at}: '{shown(bad)}' is not a height; a missing one is empty, nan, bad or ***")
+        raise PatchfemError(f"{at}: '{shown(bad)}' is not a height; write a missing height as nan")
     return [np.nan if VOID.fullmatch(cell) else float(cell.replace(",", ".") if COMMA.fullmatch(cell) else cell)
             for cell in cells]

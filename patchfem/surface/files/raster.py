@@ -56,7 +56,7 @@ def areal(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal
             values, z = values[::-1], np.flip(z, axis)
         values, more = evened(path, values, 1.0, name)
         if not (np.diff(values) > 0).all():
-            raise PatchfemError(f"{path}: {name} turns back; each coordinate of a scan must run one way")
+            raise PatchfemError(f"{path}: {name} reverses; each coordinate of a scan must only rise or only fall")
         axes.append(values)
         notes += more
     bounded(path, (z.ravel(),), ("z",), None, (1.0,))

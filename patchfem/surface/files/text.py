@@ -152,7 +152,7 @@ def _factors(at: str, place: dict, cells: tuple, facts: dict, given: tuple | Non
         if factor_of(unit) is None:
             raise PatchfemError(f"{at}: unknown unit '{shown(unit)}' of {name}; use one of {LISTED}")
         if told is not None and factor_of(told) != factor_of(unit):
-            notes += (f"{at}: the header gives {name} in {shown(told)}; {unit} is used, as the given units say",)
+            notes += (f"{at}: the header gives {name} in {shown(told)}; {unit} is used, as given by --units",)
         factors.append(factor_of(unit))
     return tuple(factors), notes
 
@@ -251,5 +251,5 @@ def _value(at: str, name: str, cell: str) -> float:
     if NUMBER.fullmatch(cell) or re.fullmatch(r"[+-]?(?:nan|inf)", cell, re.IGNORECASE):
         return float(cell)
     if name == "z":
-        raise PatchfemError(f"{at}: '{shown(cell)}' is not a height; a missing one is empty, nan or ***")
+        raise PatchfemError(f"{at}: '{shown(cell)}' is not a height; write a missing height as nan")
     raise PatchfemError(f"{at}: '{shown(cell)}' is not a number for {name}; correct the line or leave it out")

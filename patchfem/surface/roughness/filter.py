@@ -32,7 +32,7 @@ def filtered(profile: Profile, cutoff: float, ends: str = "trimmed", stages: int
     edge = int(np.ceil(cutoff / 2 / step * (1 - 1e-9))) if ends == "trimmed" else 0
     if 2 * edge > flat.x.size - 2 or cutoff > 2 * flat.length:
         raise PatchfemError(f"{profile.source}: the trace is {say(flat.length)} long; half a cut-off of {say(cutoff)} "
-                            "goes off at each end, so the cut-off must be shorter than the trace")
+                            "is trimmed at each end, so the cut-off must be shorter than the trace")
     line = mean_line(flat.z, cutoff / step, ends == "whole")
     if stages == 2:
         line = mean_line(np.maximum(flat.z, line), cutoff / step, ends == "whole")
@@ -62,7 +62,7 @@ def filtered_scan(scan: Areal, cutoff: float) -> tuple:
     if any(2 * edge > count - 2 for edge, count in zip(edges, scan.z.shape)):
         short = min(float(axis[-1] - axis[0]) for axis in (scan.y, scan.x))
         raise PatchfemError(f"{scan.source}: the shorter side is {say(short)} long; half a cut-off of {say(cutoff)} "
-                            "goes off at each border, so the cut-off must be shorter than that side")
+                            "is trimmed at each border, so the cut-off must be shorter than that side")
     waves = mean_surface(scan.z, tuple(cutoff / step for step in steps))
     rows, columns = (slice(edge, count - edge) for edge, count in zip(edges, scan.z.shape))
     inner = replace(scan, x=frozen_array(scan.x[columns]), y=frozen_array(scan.y[rows]))

@@ -50,4 +50,4 @@ def _doubt(reports: list) -> str:
                                       ("spacings", [one.step for one in reports]))
              if max(sizes) > (1 + ALIKE) * min(sizes)]
     return (f"the {KINDS[reports[0].kind]} differ in their {' and '.join(parts)}, on which extremes and slopes "
-            "depend: their means mix different things") if parts else ""
+            "depend, so their means mix different quantities") if parts else ""

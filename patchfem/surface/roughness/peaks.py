@@ -125,8 +125,8 @@ def peaks_of(moments: Moments) -> Peaks:
     """The Peaks of a surface whose traces have some Moments; PatchfemError where no surface alike in all directions has
     them."""
     if not moments.alpha >= NARROWEST * (1 - 1e-9):
-        raise PatchfemError(f"rms_height x rms_curvature/rms_slope^2 is {np.sqrt(moments.alpha):.3g}, and at least "
-                            f"{np.sqrt(NARROWEST):.3g} on an isotropic surface of Gaussian "
+        raise PatchfemError(f"rms_height x rms_curvature/rms_slope^2 is {np.sqrt(moments.alpha):.3g}, but it is at "
+                            f"least {np.sqrt(NARROWEST):.3g} on an isotropic surface of Gaussian "
                             "heights; take all three from one trace across the lay, or give radius, density and "
                             "height_deviation of the peaks")
     m0, m2, m4 = (one**2 for one in moments)

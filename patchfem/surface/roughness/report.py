@@ -21,7 +21,7 @@ from .spectrum import BAND, amplitude_of, refuse_band, spectrum_of
 from .tip import Tip, tip_check
 
 FEWEST = 16  # samples of a trace with a report
-UNTOLD = "one trace does not give its interval"
+UNTOLD = "one trace gives no interval for it"
 UNEVEN = "the heights are not Gaussian, which intervals of one trace assume; use the scatter of several traces"
 CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)  # [m] of ISO 21920-3, and one more at each end
 SECTIONS = 6  # cut-offs in a trace: five that count and one that the filter takes
@@ -229,7 +229,7 @@ def _value(row, value, found: Intervals) -> Quantity:
     if value is None:
         flat = found.heights.power == 0
         reason = "the trace is flat" if flat else "the trace is shorter than one cut-off" \
-            if found.heights.section is not None and not len(found.heights.sections) else "the trace holds none"
+            if found.heights.section is not None and not len(found.heights.sections) else "the trace has none"
     elif row.kind == "wave" and low is not None and not (
             found.heights.step <= low <= value <= high <= found.heights.length):
         low, high, reason = None, None, UNTOLD

@@ -75,15 +75,17 @@ _BASE = (  # name without its letter
     ("Sm", "m", "mean length of a hill with its neighbouring dale; those lower than 10 % of the height from valley to "
      "peak or, with a cut-off, narrower than 1 % of it do not count", mean_spacing, "ratio"),
     ("dq", "1", "root mean square of the slope between neighbouring samples (two points)", _slope, "slope"),
-    ("k", "m", "core height: fall of the straight line through the flattest 40 % of the Abbott curve, over all of it",
+    ("k", "m", "core height: drop, from 0 to 100 %, of the straight line through the flattest 40 % of the Abbott curve",
      _core("core"), "ratio"),
-    ("pk", "m", "reduced peak height: a triangle over Mr1 with the area of the peaks above the core",
+    ("pk", "m", "reduced peak height: height of a triangle on the base Mr1 with the area of the peaks above the core",
      _core("peaks"), "ratio"),
-    ("vk", "m", "reduced valley depth: a triangle over 1 - Mr2 with the area of the valleys below the core",
+    ("vk", "m", "reduced valley depth: height of a triangle on the base 1 - Mr2 with the area of the valleys below "
+                "the core",
      _core("valleys"), "ratio"),
     ("Mr1", "1", "share of the length above the core", _core("first"), "share"),
     ("Mr2", "1", "share of the length above the bottom of the core", _core("second"), "share"),
-    ("c", "m", "mean height of a hill with its neighbouring dale, those that count for the spacing", mean_element,
+    ("c", "m", "mean height from a hill to its neighbouring dale, for the hills and dales that count for the "
+               "spacing", mean_element,
      "ratio"),
     ("mr", "1", "material ratio: share of the length above the height {level} over the mean line", material_ratio,
      "share"),
@@ -100,9 +102,9 @@ TWO_STAGE = tuple(Parameter(f"{row.name}_13565", row.unit, row.text.replace("rou
                             "two-stage filter of ISO 13565-1, which cuts the valleys off before its second mean line"),
                             row.of, "") for row in ROUGH if row.name in ("Rk", "Rpk", "Rvk", "Mr1", "Mr2"))
 WAVES = (
-    Parameter("dominant_wavelength", "m", "wavelength at which an octave of frequencies holds most height, of the "
+    Parameter("dominant_wavelength", "m", "wavelength of the octave with the largest mean square height, of the "
               "levelled trace", lambda heights: spectrum_of(heights.z, heights.step).dominant, "wave"),
-    Parameter("band_amplitude", "m", "amplitude of the sine with the mean square of the waves of the band, of the "
+    Parameter("band_amplitude", "m", "amplitude of a sine with the same mean square as the waves of the band, of the "
               "levelled trace", None, "band"),
 )
 WINDOW = (
@@ -143,13 +145,14 @@ AREAL = (
     Parameter("Str", "1", "texture aspect ratio: Sal over the longest distance of the same kind, 1 if "
               "isotropic", aspect, ""),
     Parameter("Std", "rad", "texture direction: angle from x, anticlockwise, of the waves with the most power; the lay "
-              "runs at right angles to it", direction, ""),
-    Parameter("Sk", "m", "core height: fall of the least-squares line through the flattest 40 % of the Abbott curve, "
-              "over all of it", _all(_core("core")), ""),
-    Parameter("Spk", "m", "reduced peak height: a triangle over Smr1 with the volume of the peaks above the core",
+                            "is at right angles to it", direction, ""),
+    Parameter("Sk", "m", "core height: drop, from 0 to 100 %, of the least-squares line through the flattest 40 % of "
+              "the Abbott curve", _all(_core("core")), ""),
+    Parameter("Spk", "m", "reduced peak height: height of a triangle on the base Smr1 with the volume of the peaks "
+                          "above the core",
               _all(_core("peaks")), ""),
-    Parameter("Svk", "m", "reduced valley depth: a triangle over 1 - Smr2 with the volume of the valleys below the "
-              "core", _all(_core("valleys")), ""),
+    Parameter("Svk", "m", "reduced valley depth: height of a triangle on the base 1 - Smr2 with the volume of the "
+              "valleys below the core", _all(_core("valleys")), ""),
     Parameter("Smr1", "1", "share of the area above the core", _all(_core("first")), ""),
     Parameter("Smr2", "1", "share of the area above the bottom of the core", _all(_core("second")), ""),
     Parameter("Vmp", "m", "volume of the peaks per area: material above the material ratio 10 %",

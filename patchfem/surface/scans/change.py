@@ -13,8 +13,8 @@ from .search import CLEAR, variant
 from .track import ScanTrack, track_of
 from .volumes import Volumes, measured, nothing
 
-SHIFT = "a place of the scan before, turned about its middle, stands so far along {} in the scan after"
-ROTATION = "of the scan after against the scan before, anticlockwise"
+SHIFT = "shift along {}: position in the scan after less position in the scan before, turned about its middle"
+ROTATION = "rotation of the scan after against the scan before, anticlockwise"
 ALIKE = 0.95  # correlation of the unworn heights of both scans, from which on they show the same place
 LIKELY = 0.98  # the same where the search is no clearer than chance, as on a lay that repeats itself
 SPECK = 12.0, 48.0, 192.0  # noises that a speck of the depths jumps by
@@ -23,11 +23,11 @@ DIGITS = 4
 WORN, NONE = "worn", "no wear shown"
 GREW = "material grew, or the files are in the wrong order"
 ELSEWHERE = "not comparable place by place"
-HIDDEN = "mean depth that even wear or a wedge may hide"
+HIDDEN = "mean depth of even or wedge-shaped wear that the scans cannot show"
 OPEN = "changed: worn on one part or grown on another"
 EITHER = "two parts of the scans each agree up to a plane, and either may be unworn"
-UNSURE = "the scans agree up to a plane: even wear and a wedge would look the same"
-GROWN = "but for what grew, the scans agree up to a plane: even wear and a wedge would look the same"
+UNSURE = "the scans agree up to a plane: even or wedge-shaped wear would look the same"
+GROWN = "apart from what grew, the scans agree up to a plane: even or wedge-shaped wear would look the same"
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +88,9 @@ def _laid(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
     found = laid(before, after)
     least = ALIKE if found.guess.clear > CLEAR else LIKELY
     if found.like <= least:
-        raise PatchfemError("the scans show no common place: the heights that agree up to a plane have a correlation "
-                            f"of {found.like:.3f}, and only above {least:g} is it significant; scan the same place, "
-                            "with unworn parts beside the rubbed one")
+        raise PatchfemError("no common place was found in the scans: the heights that agree up to a plane have a "
+                            f"correlation of {found.like:.3f}, and only above {least:g} is it significant; scan the "
+                            "same place, including unworn parts beside the rubbed one")
     found, specks = (found, 0) if keep_spikes else without_specks(found)
     return found, measured(found, before.x, before.y), specks
 
@@ -129,7 +129,7 @@ def without_spikes(scan: Areal) -> tuple:
         return scan, 0
     z = np.where(spikes, np.nan, scan.z)
     note = (f"{scan.source}: {spikes.sum()} of {(~missing).sum()} heights are spikes or dropouts and are left out; "
-            "--keep-spikes keeps them")
+            "use --keep-spikes to keep them")
     return replace(scan, z=frozen_array(z), notes=(*scan.notes, note)), int(spikes.sum())
 
 
@@ -170,19 +170,20 @@ def sentences(one: Change) -> list:
                    f"{_length(values['worn_depth_max'])} at the deepest place.")
         out += _unseen(one)
     elif one.volumes.open:
-        out.append(f"It is open which part is unworn: {EITHER}. If it is one of them, up to {_most(worn)} wore off the "
-                   f"other; if it is the other, up to {_most(grown)} grew on the first. A scan that reaches farther "
-                   "beyond the rubbed part would settle it.")
+        out.append(f"It is not known which part is unworn: {EITHER}. If the first is unworn, up to {_most(worn)} "
+                   f"wore off the second; if the second is unworn, up to {_most(grown)} grew on the first. To "
+                   "settle it, scan farther beyond the rubbed part.")
     else:
-        out.append("Worn volume: none shown. Even wear of any depth, and a wedge that the mounting turned back, would "
-                   "look the same; only an unworn part beside the rubbed one, in both scans, would settle it.")
+        out.append("Worn volume: none shown. Even wear of any depth, and wedge-shaped wear that the mounting levelled "
+                   "out, would look the same; to settle it, scan an unworn part beside the rubbed one both times.")
     out += [] if one.track is None or one.track.why else [_track(one.track)]
     if grown.low > 0:
-        out.append(f"{_volume(grown)} stand above the scan before: pile-up or deposits"
+        out.append(f"{_volume(grown)} of material lie above the scan before: pile-up or deposits"
                    + (", or the two files are in the wrong order." if headline(one) == GREW else "."))
     share = 100 * float(one.found.used.sum()) / max(float(np.isfinite(one.found.depth).sum()), 1.0)
     out.append(f"Depths are measured from the {share:.0f} % of the heights that agree up to a plane within "
-               f"{say(REACH * one.found.noise, 3)}; any even or wedge-shaped wear of these would add to them.")
+               f"{say(REACH * one.found.noise, 3)}; if these wore evenly or as a wedge too, all depths are larger "
+               "by that wear.")
     if one.found.other is not None and not one.volumes.open:
         out.append("Another part of the scans may be unworn instead, as where two planes meet in an edge; the "
                    "intervals cover both.")
@@ -194,15 +195,15 @@ def _unseen(one: Change) -> list:
     worn = one.volumes.worn
     share = float((worn & ~np.isfinite(one.found.depth)).sum()) / max(float(worn.sum()), 1.0)
     return [f"{100 * share:.0f} % of the worn part has no heights in one scan or lies next to a hole: its depth "
-            "there is that of the nearest ones, and a deeper place may be among them."] if share > SEEN else []
+            "there is taken from the nearest heights, so a deeper place may be missed."] if share > SEEN else []
 
 
 def _track(one: ScanTrack) -> str:
     """The wear track as a sentence."""
     found = one.values
-    text = (f"A track at {np.degrees(found['direction'].value):.1f} degrees from x: over {one.sections} sections "
-            f"across it on average {_length(found['width'])} wide, {_length(found['depth_mean'])} deep, its floor "
-            f"{_length(found['depth_floor'])}; ")
+    text = (f"A track at {np.degrees(found['direction'].value):.1f} degrees from x: on average over "
+            f"{one.sections} sections it is {_length(found['width'])} wide and {_length(found['depth_mean'])} deep, "
+            f"with its floor at {_length(found['depth_floor'])}; ")
     if found["volume"].value is None:
         return text + f"its volume is not known: {found['volume'].reason}."
     return text + f"{_length(found['length'])} long, so that area times length is {_volume(found['volume'])}."
@@ -213,10 +214,10 @@ def _ways(one: Change) -> list:
     if guess.mirrored:
         out.append(f"The scan after is mirrored: its {guess.mirrored} counts from the other end.")
     if abs(abs(one.registration["rotation"].value) - np.pi) < 0.2:
-        out.append("The scan after is turned half round.")
+        out.append("The scan after is turned by 180 degrees.")
     if guess.turned:
-        out.append("The heights of both scans count opposite ways: one was turned over so that more wears than "
-                   "grows; check which file counts into the material.")
+        out.append("The heights of both scans have opposite signs: one was inverted so that more wears than "
+                   "grows; check in which file heights point into the material.")
     return out
 
 

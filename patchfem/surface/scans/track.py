@@ -23,15 +23,16 @@ TOGETHER = 3.0  # neighbouring depths of a section that err alike, as between sa
 ENDS = 0.5  # of the median lost area, where a track ends along its direction
 TEXTS = {  # name: (unit, definition)
     "direction": ("rad", "of the track, against x anticlockwise, from the gradients of the depths"),
-    "from": ("m", "where the track begins across its direction, from the middle of the scan before to larger x or y"),
-    "to": ("m", "where the track ends across its direction"),
+    "from": ("m", "position across the track at which it begins, from the middle of the scan before, positive to "
+                  "larger x or y"),
+    "to": ("m", "position across the track at which it ends"),
     "width": ("m", "width of the track"),
     "depth_mean": ("m", "lost area of a section over its width"),
     "depth_floor": ("m", "floor: bottom of the parabola through the deepest fifth of a section"),
     "step": ("m", "step: mean depth over the middle third of the width, as of a groove in ISO 5436-1, type A1"),
     "area_net": ("m2", "lost area less pile-up"),
     "area_gross": ("m2", "area lost in a section"),
-    "pile_up": ("m2", "area that stands above the scan before, to within a width on both sides together"),
+    "pile_up": ("m2", "pile-up: area above the scan before, within one track width of the track, both sides together"),
     "pile_up_left": ("m2", "pile-up at the side of smaller x or y"),
     "pile_up_right": ("m2", "pile-up at the side of larger x or y"),
     "length": ("m", "length of the track, between the places at which the lost area is half of its median"),
@@ -85,13 +86,13 @@ def track_of(found: Laid, depth, worn, axes: tuple, error: float) -> ScanTrack:
     """
     angle, coherence = direction_of(depth, worn, *axes)
     if coherence < COHERENT:
-        return _none("what wore has no one direction, as a track has")
+        return _none("the worn part has no single direction, so it is no track")
     turned = _turned(depth, *axes, angle)
     many = np.isfinite(turned.depth).sum(axis=0)
     section = _mean(turned.depth, KNOWN)
     span = _span(section, found.noise / np.sqrt(max(many.max(), 1)))
     if span is None:
-        return _none("what wore is not one strip with an unworn part at each side")
+        return _none("the worn part is not one strip with unworn surface on both sides")
     whole = np.isfinite(turned.depth[:, span[0]:span[1] + 1]).all(axis=1)
     first, last, open_ended, lengths = _length(turned, span, whole)
     cut = INNER * (last - first) * (not open_ended)
@@ -100,7 +101,7 @@ def track_of(found: Laid, depth, worn, axes: tuple, error: float) -> ScanTrack:
     measured = [_measured(turned, one, span, found.noise) for one in groups if one.size]
     measured = [one for one in measured if one is not None]
     if len(measured) < LEAST:
-        return _none(f"{len(measured)} groups of whole sections lie across what wore; {LEAST} are needed")
+        return _none(f"{len(measured)} groups of complete sections cross the worn part; {LEAST} are needed")
     middles = measured, [float(turned.along[one].mean()) for one in groups if one.size]
     values, scatter = _values(measured, error, turned.step)
     inner, section = turned.depth[rows], _mean(turned.depth[rows], KNOWN)
@@ -263,7 +264,7 @@ def _direction(angle: float, measured: list, along: list, cell: float) -> Quanti
 def _volume(area: Quantity, length: tuple, open_ended: bool) -> dict:
     """Length and volume of the track, refused where it runs over the edge of the scans."""
     if open_ended:
-        why = "the track runs over the edge of what both scans show; its lost area times the stroke is the volume"
+        why = "the track leaves the region that both scans show; its volume is its lost area times the stroke"
         return {name: refused(*TEXTS[name], why) for name in ("length", "volume")}
     off = float(np.hypot((area.high - area.value) / area.value, (length[2] - length[1]) / 2 / length[0]))
     volume = area.value * length[0]

@@ -26,7 +26,7 @@ WORN = {"worn_volume": "volume lost, over the region that both scans show",
         "grown_volume": "volume that stands above the scan before: pile-up, deposits",
         "worn_share": "share of the common region that wore",
         "worn_depth_mean": "worn volume over the common region",
-        "worn_depth_max": "largest worn depth, of the median of 3 x 3 heights, where any were measured"}
+        "worn_depth_max": "largest worn depth, as the median of 3 x 3 measured heights"}
 BOTH = "worn_volume", "grown_volume"
 
 

@@ -255,7 +255,7 @@ def test_a_motion_without_a_bound_counts_as_a_thousand(tmp_path, wanted):
 
 @pytest.mark.parametrize("sets, wanted, match", [
     (["drive.waveform=step"], LINEAR_FREE, "one sine of the base"),
-    ([], ("drive.cycles=10..20",), "the rows give the drive"),
+    ([], ("drive.cycles=10..20",), "the drive is given by the rows"),
     ([], (*LINEAR_FREE, "structure.moving_mass=1 kg..2 kg"), "cannot determine 3 values")])
 def test_refuses_what_rows_do_not_speak_of(tmp_path, sets, wanted, match):
     path = table(tmp_path, [(143.0, 20.0, 30.0, "", ""), (150.0, 20.0, 30.0, "", ""),
@@ -349,10 +349,10 @@ def test_placebos_are_whole_fits_of_their_own(tmp_path):
 @pytest.mark.parametrize("words, said", [
     (["--offset", "force"], "belongs to a loop"), (["--starts", "0"], "at least one"),
     (["--placebo", "friction.static"], "table.key=value,value"), (["--leave-out", "displacement"], "no column"),
-    (["--placebo", "structure.mode.axial.damping=0.01,0.2"], "the key is free"),
-    (["--placebo", "drive.frequency=140 Hz"], "the rows give the drive"),
+    (["--placebo", "structure.mode.axial.damping=0.01,0.2"], "this key is free"),
+    (["--placebo", "drive.frequency=140 Hz"], "the drive is given by the rows"),
     (["--placebo", "structure.mode.axial.slide=1,x"], "a plain number is needed"),
-    (["--leave-out", "input"], "nothing would be left"), (["--unstable", "maybe"], "unstable")])
+    (["--leave-out", "input"], "no rows would be left"), (["--unstable", "maybe"], "unstable")])
 def test_refuses_options_that_rows_do_not_have(tmp_path, words, said):
     given = ["fit", str(scene_of(tmp_path, LINEAR).path), "--to", str(table(tmp_path, linear_rows())), "--free",
              *LINEAR_FREE, "-o", str(tmp_path / "out"), *words]

@@ -33,7 +33,7 @@ def test_exact_items_stand_in_the_header_as_they_are_printed(tmp_path):
     ("contact.load [N],friction.static\n1 N,0.3\n2,a\n", ["cases.csv:2: contact.load: '1 N' is not a number",
                                                         "cases.csv:3: friction.static: a plain number"]),
     ("contact.lod [N]\n1\n2\n", ["cases.csv:1: contact.lod: not a key of a scene; did you mean 'load'"]),
-    ("contact.load [N],contact.load\n1,2 N\n", ["cases.csv:1: contact.load: stands twice"]),
+    ("contact.load [N],contact.load\n1,2 N\n", ["cases.csv:1: contact.load: is given twice"]),
     ("contact.load [N]\n1,2\n", ["cases.csv:2: 1 cells are needed, not 2"]),
     ("contact.load [N]\n", ["a header like"]),
 ])

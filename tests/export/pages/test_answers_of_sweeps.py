@@ -87,7 +87,7 @@ def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
                for one in shares)
     assert "depends most on" in told["answer"] and "Nine in ten of the 128 drawn cases have" in told["answer"]
     page = (out / "report.html").read_text("utf-8")
-    assert "What matters most" in page and "How far the answers scatter" in page and "<svg viewBox" in page
+    assert "What matters most" in page and "Scatter of the answers" in page and "<svg viewBox" in page
     from patchfem.export.sweeps.page import read_table
 
     again = lead_of(read_table(out))  # what `patchfem report` draws from the files
@@ -136,5 +136,5 @@ def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
 def test_static_cases_are_not_said_to_move():
     """Of patches that only miss the tolerance nothing has to settle."""
     ranks = {"pressure_peak": [Share("contact.load", 0.8, 0.9, 0.8, 1.0)]}
-    assert ranked.sentence(ranks, 3, False).endswith("; 3 cases that miss the tolerance count with their values.")
-    assert ranked.sentence(ranks, 3).endswith("; 3 cases that have not settled count as they ended.")
+    assert ranked.sentence(ranks, 3, False).endswith("; 3 cases that miss the tolerance are included.")
+    assert ranked.sentence(ranks, 3).endswith("; 3 cases that have not settled are included as they ended.")

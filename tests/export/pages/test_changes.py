@@ -70,7 +70,7 @@ def test_exact_slip_is_told_once_by_what_says_most():
 def test_exact_that_slip_ends_is_told_once():
     stick = np.array([0.5, 0.8, 1, 1, 1]), np.zeros(5)
     assert said([1] * 5, outcome=["steady", "steady", "stuck", "stuck", "stuck"], stick_fraction=stick) == \
-        "As contact.tilt.angle grows: from 0.2 mrad on (not yet at 0.1) the interface holds as a whole."
+        "As contact.tilt.angle grows: from 0.2 mrad on (not yet at 0.1) the whole interface sticks."
 
 
 def test_exact_failed_cases_are_passed_over():

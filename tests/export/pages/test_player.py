@@ -147,7 +147,7 @@ def test_exact_numbers_and_places_are_those_of_the_fields(bench, film, monkeypat
 def test_always_a_page_holds_what_it_can(film):
     assert len(film["times"]) <= player.FRAMES and film["cells"][0] <= film["cells"][1]
     told = player.section(film).html
-    assert "frames from" in told and "Motion and gap are drawn with one factor" in told
+    assert "frames from" in told and "Motion and gap are magnified by one factor" in told
 
 
 def test_exact_results_without_fields_have_no_player(tmp_path):

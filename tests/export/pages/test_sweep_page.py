@@ -268,16 +268,16 @@ def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_relati
                 "pressure_peak": ([2e6, 3.1415926e6, 9e9], [5e3, lost, 1e9], "Pa")}
     trusted = dict.fromkeys(("loop_area", "pressure_peak", "relative_displacement_amplitude"), settled)
     assert span(measures, trusted, settled) == "Pressure peak of the settled cases runs from 2 MPa to 3.142 MPa, " \
-        "known to 0.2 % or better."
+        "with errors of at most 0.2 %."
     measures["loop_area"] = ([1e-3, lost, lost], [lost] * 3, "J")
     assert span(measures, trusted, settled) == "Loop area is 1 mJ throughout."
     both = np.ones(2, bool)
     amplitude = {"relative_displacement_amplitude": ([2.939e-8, 8.2614e-3], [1e-9, 8e-8], "m")}
     start = "Relative displacement amplitude"
     assert span(amplitude, {"relative_displacement_amplitude": both}, both) == \
-        f"{start} runs from 29.39 nm to 8.261 mm, known to 3 % or better."
+        f"{start} runs from 29.39 nm to 8.261 mm, with errors of at most 3 %."
     assert span(amplitude, {"relative_displacement_amplitude": np.array([False, True])}, both) == \
-        f"{start} in the cases that meet the tolerance is 8.261 mm throughout, known to 0.001 % or better."
+        f"{start} in the cases that meet the tolerance is 8.261 mm throughout, with errors of at most 0.001 %."
     amplitude["relative_displacement_amplitude"] = ([0.0, 1.963e-5], [1e-13, 2e-14], "m")
     assert span(amplitude, {"relative_displacement_amplitude": both}, both) == f"{start} runs from 0 to 19.63 um."
     assert span({"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}, {}, both[:1]) == ""
@@ -321,7 +321,7 @@ def test_exact_round_off_is_zero_in_the_span_and_known_absolutely():
     """A joint that holds in its first cases: -1.4e-19 J ± 1e-11 J was known to 2e11 % of its value."""
     loop = np.array([4.2e-21, -1.4e-19, 3.7e-2]), np.array([1e-11, 1e-11, 7.4e-5]), "J"
     text = span({"loop_area": loop}, {"loop_area": np.ones(3, bool)}, np.ones(3, bool))
-    assert text == "Loop area runs from 0 to 37 mJ, known to 0.2 % or better."
+    assert text == "Loop area runs from 0 to 37 mJ, with errors of at most 0.2 %."
 
 
 def swept(heights, known=1e-9, beside=()) -> str:

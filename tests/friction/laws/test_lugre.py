@@ -138,6 +138,6 @@ def test_refuses_what_the_law_cannot_do():
     assert "larger than static" in only(scene, "friction.kinetic=0.4")
     assert "10 N s/m" in only(scene, "friction.viscous=3")
     assert "friction.viscous" in only(scene, "friction.viscous=-1 N s/m")
-    assert "'lugre' beside [contact.shear]" in only(COATED + "[contact.shear]\n[friction]\n" + DAHL + MODE + DRIVE)
-    assert "'lugre' beside normal.amplitude" in mistakes(scene, "normal.amplitude=1 N", "normal.frequency=3 Hz")[0]
+    assert "'lugre' with [contact.shear]" in only(COATED + "[contact.shear]\n[friction]\n" + DAHL + MODE + DRIVE)
+    assert "'lugre' with normal.amplitude" in mistakes(scene, "normal.amplitude=1 N", "normal.frequency=3 Hz")[0]
     assert loads('[normal]\nload = "100 N"\n[friction]\n' + DAHL + MODE + DRIVE).friction.kinetic == 0.31

@@ -94,7 +94,7 @@ def turned() -> tuple:
 def test_exact_a_told_shift_places_a_surface_that_repeats_itself():
     before, after, worn = turned()
     blind, found = compared(before, after), compared(before, after, shift=1 * UM)
-    assert "repeats itself, every 80 um" in blind.shift.reason and "--shift '0 mm'" in blind.shift.reason
+    assert "periodic, with a period of 80 um" in blind.shift.reason and "--shift '0 mm'" in blind.shift.reason
     assert found.reference == "place" and found.shift.low <= 0 <= found.shift.high < 0.1 * UM
     assert found.worn.mean.low <= worn.mean() <= found.worn.mean.high
 
@@ -102,7 +102,7 @@ def test_exact_a_told_shift_places_a_surface_that_repeats_itself():
 def test_refuses_a_shift_of_four_files(tmp_path):
     path = tmp_path / "one.csv"
     path.write_text("x [um],z [um]\n" + "".join(f"{k},{k % 7}\n" for k in range(40)))
-    with pytest.raises(PatchfemError, match="each direction by itself"):
+    with pytest.raises(PatchfemError, match="compare each direction separately"):
         compared_files((path,) * 4, shift=0.0)
 
 

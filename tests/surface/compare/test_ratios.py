@@ -103,7 +103,7 @@ def test_always_a_coarser_trace_is_compared_at_its_own_step():
     p = pair(30003)
     fine = compared(p.before, p.after)
     coarse = compared(p.before, Profile(frozen_array(p.after.x[::2]), frozen_array(p.after.z[::2]), "coarse"))
-    assert any("every 2 um" in text for text in coarse.notes)
+    assert any("at a step of 2 um" in text for text in coarse.notes)
     assert coarse.amplitude_ratio.value == pytest.approx(fine.amplitude_ratio.value, rel=0.01)
     assert coarse.worn.mean.value == pytest.approx(fine.worn.mean.value, abs=0.01 * UM)
 

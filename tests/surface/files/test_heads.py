@@ -159,12 +159,12 @@ def test_exact_units_that_are_given_overrule_the_header_and_it_is_told(tmp_path)
     found = read(tmp_path, f"x [um]\tz [um]\n{PAIRS}", ("mm", "um"))
     assert found.x == pytest.approx(X * 1e-3) and found.z == pytest.approx(H * 1e-6)
     path = tmp_path / "scan.txt"
-    assert found.notes == (f"{path}:1: the header gives x in um; mm is used, as the given units say",)
+    assert found.notes == (f"{path}:1: the header gives x in um; mm is used, as given by --units",)
     scan = read(tmp_path, f"# Width: 4 um\n# Height: 3 um\n# Value units: V\n{ROWS}", ("mm", "um"))
     is_scan(scan, (1e-3, 1e-3), Z * 1e-6)
-    assert scan.notes == (f"{path}: its header gives places along x in um; mm is used, as the given units say",
-                          f"{path}: its header gives places along y in um; mm is used, as the given units say",
-                          f"{path}: its header gives the heights in V; um is used, as the given units say")
+    assert scan.notes == (f"{path}: its header gives places along x in um; mm is used, as given by --units",
+                          f"{path}: its header gives places along y in um; mm is used, as given by --units",
+                          f"{path}: its header gives the heights in V; um is used, as given by --units")
     named = read(tmp_path, f"Kanal A\tKanal B\n{PAIRS}", ("mm", "um"))
     assert named.notes == (f"{path}:1: columns 'Kanal A', 'Kanal B' are taken as x, z in this order",)
     sdf = read(tmp_path, "aISO-1.0\nNumPoints = 3\nNumProfiles = 1\nXscale = 1e-6\nYscale = 1e-6\nZscale = 1e-9\n*\n"
@@ -211,10 +211,10 @@ CURES = {  # what is refused, what is said, the same text after the remedy, the 
     "rows cut off": ("# w = 4, h = 4\n# pixel size = 1 um\n# Value units: nm\n" + ROWS, "3 rows where its header says",
                      "# w = 4, h = 3\n# pixel size = 1 um\n# Value units: nm\n" + ROWS, None),
     "a word": ("# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS.replace("7", "lost"), ":5: 'lost' is not a "
-               "height; a missing one is empty, nan, bad or",
+               "height; write a missing height as nan",
                "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS.replace("7", "nan"), None),
     "thousands": ("# Width: 4,000 um\n# Height: 3,000 um\n# Value units: nm\n" + ROWS, ":1: 'Width: 4,000 um': 4,000 "
-                  "may be a decimal number or one of thousands; write it with a point, or without a comma",
+                  "may have a decimal comma or a thousands separator; write it with a point, or without the comma",
                   "# Width: 4000 um\n# Height: 3000 um\n# Value units: nm\n" + ROWS, None),
     "axes": ("# Width: 4 um\n# Height: 4 um\n# Value units: nm\n0 0 1 2 3\n0 3 1 4 1\n1 5 9 2 6\n2 5 3 5 8\n"
              "3 9 7 9 3\n", "the first row and the first column of its matrix grow evenly, like coordinates and not "

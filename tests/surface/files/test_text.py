@@ -94,7 +94,7 @@ def test_exact_samples_at_one_place_become_their_mean(tmp_path):
     assert profile.x == pytest.approx(np.array([0, 1, 4, 9]) * UM) and profile.z == pytest.approx(
         np.array([1, 1.5, 3, 3]) * UM)
     path = tmp_path / "before.csv"
-    assert profile.notes == (f"{path}: 3 samples share a place with another (the first in line 5): mean used",)
+    assert profile.notes == (f"{path}: 3 samples have the same x as another (the first in line 5); the mean is used",)
 
 
 @pytest.mark.parametrize("step", [0.15625, 0.052, 0.0999, 0.1003, 0.37137, 7.3])
@@ -105,7 +105,7 @@ def test_exact_rounded_x_is_evened(tmp_path, step):
     if step < 7:
         assert np.ptp(np.diff(profile.x)) < 1e-9 * step * UM
         assert profile.length == pytest.approx(x[-1] * UM, abs=0.1 * UM)
-        assert "x is printed to 100 nm; taken as evenly spaced at" in profile.notes[0]
+        assert "x is printed to 100 nm; it is read as evenly spaced at" in profile.notes[0]
     else:
         assert profile.notes == ()
 
@@ -135,14 +135,14 @@ REFUSED = {
                                             "point here; use only one",
     "x [um];z [um]\n0;1\n1;1.234,5\n": "{path}:3: '1;1.234,5': the decimal sign is a comma elsewhere in the file and "
                                          "a point here; use only one",
-    "x [um];z [um]\n999,5;1\n1,000;2\n1500,5;2\n": "{path}:3: x turns back, 999.5 um and then 1 um; a trace runs one "
-                                                  "way: keep one trace per file",
+    "x [um];z [um]\n999,5;1\n1,000;2\n1500,5;2\n": "{path}:3: x reverses: 999.5 um and then 1 um; x of a trace "
+                                                  "must only rise or only fall, so keep one trace per file",
     "x [um],z [um]\n0,0,1,5\n": "{path}:2: '0,0,1,5': two numbers are needed; with a decimal comma, separate the "
                                  "columns by semicolons or tabs",
     "x [um],z [um]\n0,1\n,2\n": "{path}:3: '' is not a number for x; correct the line or leave it out",
-    "x [um],z [um]\n0,1\n1,bad\n": "{path}:3: 'bad' is not a height; a missing one is empty, nan or ***",
-    "x [um],z [um]\n0,1\n1,1_0\n": "{path}:3: '1_0' is not a height; a missing one is empty, nan or ***",
-    "x [um],z [um]\n0,1\n1,\u0663\n": "{path}:3: '\u0663' is not a height; a missing one is empty, nan or ***",
+    "x [um],z [um]\n0,1\n1,bad\n": "{path}:3: 'bad' is not a height; write a missing height as nan",
+    "x [um],z [um]\n0,1\n1,1_0\n": "{path}:3: '1_0' is not a height; write a missing height as nan",
+    "x [um],z [um]\n0,1\n1,\u0663\n": "{path}:3: '\u0663' is not a height; write a missing height as nan",
     "x [um],z [um]\n0,1\nnan,2\n3,1\n": "{path}:3: x is nan; finite numbers are needed",
     "x [um],z [um]\n0,1\n1,2\n2,-inf\n": "{path}:4: z is -inf; finite numbers are needed",
     "x [um],z [um]\n0,1\n1,2\n2,1e999\n": "{path}:4: z is inf; finite numbers are needed",
@@ -152,10 +152,10 @@ REFUSED = {
                                        "write a missing height as nan; --units of profile and compare overrides the "
                                        "header",
     "x [nm],z [nm]\n0,0\n0.1,0\n": "{path}: the profile is 0.1 nm long; is the unit of x right?",
-    "x [um],z [um]\n0,1\n1,2\n3,1\n2,2\n4,1\n": "{path}:5: x turns back, 3 um and then 2 um; a trace runs one way: "
-                                                  "keep one trace per file",
-    "x [um],z [um]\n4,1\n1,2\n2,1\n0,2\n": "{path}:4: x turns back, 1 um and then 2 um; a trace runs one way: keep one "
-                                           "trace per file",
+    "x [um],z [um]\n0,1\n1,2\n3,1\n2,2\n4,1\n": "{path}:5: x reverses: 3 um and then 2 um; x of a trace must "
+                                                  "only rise or only fall, so keep one trace per file",
+    "x [um],z [um]\n4,1\n1,2\n2,1\n0,2\n": "{path}:4: x reverses: 1 um and then 2 um; x of a trace must only rise or "
+                                           "only fall, so keep one trace per file",
     "x [um],z [um]\n5,1\n5,2\n": "{path}: every sample lies at x = 5 um; a trace needs at least two places",
     "x [um],z [um]\n" + "1" * 2000: "{path}:2: a line of 2000 characters; two numbers are needed",
     "a" * 2000: "{path}:1: a line of 2000 characters; two columns are needed, write the header as `x [um],z [um]`",

@@ -100,8 +100,8 @@ def test_always_a_finer_reading_of_an_uneven_sine_gives_its_roughness():
 
 @pytest.mark.parametrize("cutoff, says", [
     (3 * UM, "1 sines: a cut-off of 3 um is shorter than 4 steps of 1 um; the shortest here is 4 um"),
-    (1000 * UM, "1 sines: the trace is 999 um long; half a cut-off of 1 mm goes off at each end, so the cut-off must "
-     "be shorter than the trace"),
+    (1000 * UM, "1 sines: the trace is 999 um long; half a cut-off of 1 mm is trimmed at each end, so the cut-off "
+     "must be shorter than the trace"),
     (np.nan, "a cut-off of"),
 ])
 def test_refuses_a_cutoff_that_does_not_fit(cutoff, says):

@@ -120,7 +120,7 @@ def test_exact_the_three_ways_to_tell_peaks_are_one(tmp_path, monkeypatch):
     """A file, its root mean squares as `profile` prints them, and the peaks of these: one patch."""
     monkeypatch.chdir(tmp_path)
     one = cli("profile", written(tmp_path))
-    block = one.out[one.out.index("[contact.asperities]"):].split("  Under")[0]
+    block = one.out[one.out.index("[contact.asperities]"):].split("  At a pressure")[0]
     found = tomllib.loads("\n".join(line.strip() for line in block.splitlines()))["contact"]["asperities"]
     rms = Moments(float(found["rms_height"].split()[0]) * 1e-6, found["rms_slope"],
                   float(found["rms_curvature"].split()[0]))
@@ -173,7 +173,7 @@ def test_a_short_trace_has_peaks_though_half_of_it_tells_none(tmp_path):
     z = 2 * np.sin(0.5 * x) + 0.3 * np.random.default_rng(3).normal(size=24)
     (tmp_path / "short.csv").write_text("x [um],z [um]\n" + "".join(f"{a},{b!r}\n" for a, b in zip(x, z.tolist())))
     (tmp_path / "scene.toml").write_text(PATCH + 'from = "short.csv"\n')
-    assert any("every second sample are those of no such surface" in text for text in
+    assert any("from every second sample: no such surface" in text for text in
                pf.plan(tmp_path / "scene.toml").verdict)
 
 
@@ -234,11 +234,11 @@ def test_profile_prints_the_peaks_below_its_cutoff_and_they_paste_to_the_same_pa
     said = cli("profile", "trace.csv", "--cutoff", "0.4 mm")
     told = pf.profile("trace.csv", cutoff="0.4 mm")["profiles"][0]
     assert told["asperities"]["rms_height"] == pytest.approx(told["measures"]["Rq"]["value"], rel=1e-9)
-    assert told["asperities"]["cutoff"] == 0.4e-3 and "Only waves below the cut-off of 400 um" in said.out
+    assert told["asperities"]["cutoff"] == 0.4e-3 and "only waves below the cut-off of 400 um" in said.out
     assert told["asperities"]["rms_height"] == pytest.approx(skin.rms_height, rel=1e-9)
     bare = cli("profile", "trace.csv").out
-    assert "cutoff =" not in bare and "or the long waves count twice" in bare
-    block = said.out[said.out.index("[contact.asperities]"):].split("  Under")[0]
+    assert "cutoff =" not in bare and "otherwise the long waves count twice" in bare
+    block = said.out[said.out.index("[contact.asperities]"):].split("  At a pressure")[0]
     pasted = text.replace('from = "trace.csv"\ncutoff = "0.4 mm"\n', "".join(
         f"{line.strip()}\n" for line in block.splitlines()[2:]))
     again = build(loads(pasted, tmp_path / "scene.toml")).patch.skin

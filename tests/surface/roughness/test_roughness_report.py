@@ -77,7 +77,7 @@ def test_exact_spikes_are_told_and_count():
     assert report.notes[0] == ("made.csv: 1 of 4001 heights is a spike (at x = 1 mm); it counts in every parameter")
     z[1000] += 950 * UM  # its interval was 4 nm to 68 um on a step of 1 um
     wave = report_of(Profile(trace.x, z, "made.csv"))["dominant_wavelength"]
-    assert wave.value > 0 and wave.low is wave.high is None and "does not give" in wave.reason
+    assert wave.value > 0 and wave.low is wave.high is None and "gives no interval" in wave.reason
     assert report["Pt"].value > 50 * UM
 
 
@@ -148,11 +148,11 @@ def test_exact_areal_parameters_of_white_noise(lost):
     (made(10), {}, "made.csv: 10 samples; parameters need at least 16"),
     (made(), {"window": (20 * UM, 10 * UM)}, "a window from 20 um to 10 um; the trace runs from 0 um to 4 mm"),
     (made(), {"window": (20 * UM, 5e-3)}, "a window from 20 um to 5 mm"),
-    (made(), {"cutoff": 5e-3}, "the trace is 4 mm long; half a cut-off of 5 mm goes off at each end"),
+    (made(), {"cutoff": 5e-3}, "the trace is 4 mm long; half a cut-off of 5 mm is trimmed at each end"),
     (scan(), {"window": (0.0, 1e-4)}, "a window of an areal scan needs four places"),
     (scan(), {"window": (0.0, 1e-5, 2e-5, 1e-3)}, "the scan runs in y from 0 um to 79 um"),
     (made(), {"window": (0.0, 1e-5, 2e-5, 1e-3)}, "a window of a trace is two places"),
-    (scan(), {"cutoff": 1e-4}, "scan.txt: the shorter side is 79 um long; half a cut-off of 100 um goes off"),
+    (scan(), {"cutoff": 1e-4}, "scan.txt: the shorter side is 79 um long; half a cut-off of 100 um is trimmed"),
 ])
 def test_refuses(surface, more, says):
     with pytest.raises(PatchfemError, match=says):

@@ -56,7 +56,7 @@ def test_exact_a_track_has_its_direction_section_and_volume(angle, length, ridge
     if length:  # with the round ends, half a paraboloid each
         assert volume.value == pytest.approx(area * length + np.pi * DEPTH * (WIDTH / 2)**2 / 2, rel=0.02)
     else:
-        assert volume.value is None and "over the edge" in volume.reason
+        assert volume.value is None and "leaves the region" in volume.reason
 
 
 def test_always_a_track_that_widens_scatters_along():
@@ -100,4 +100,4 @@ def test_always_two_scans_tell_their_track():
     found = change.changed(before, after)
     assert found.track.values["width"].value == pytest.approx(WIDTH, rel=0.02)
     assert found.track.values["direction"].value == pytest.approx(0.35, abs=0.01)
-    assert any(text.startswith("A track at") and "over the edge" in text for text in change.sentences(found))
+    assert any(text.startswith("A track at") and "leaves the region" in text for text in change.sentences(found))

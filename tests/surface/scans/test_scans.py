@@ -215,7 +215,7 @@ def test_exact_a_scan_beside_itself_shows_no_change(grooved, tmp_path):
     assert "Another part" not in answer.out and "<title>scan.x3p and scan.x3p" in \
         (tmp_path / "out" / "report.html").read_text()
     assert {one.name for one in (tmp_path / "out").iterdir()} <= set(FILES)
-    assert "a shift is given for traces" in cli("compare", file, file, "--shift", "0 mm").err
+    assert "a shift can be given only for traces" in cli("compare", file, file, "--shift", "0 mm").err
     (tmp_path / "trace.csv").write_text("x [um],z [um]\n" + "".join(f"{k},{k % 7}\n" for k in range(400)))
     assert "two or four traces are needed, or two areal scans" in cli("compare", file, tmp_path / "trace.csv").err
 

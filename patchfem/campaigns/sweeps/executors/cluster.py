@@ -101,8 +101,8 @@ class Cluster:
         there, here = (", ".join(f"{name} {one[name]}" for name in names) for one in (found, want))
         if names:
             return Missing(f"{self.name}: a worker has {there}; here it is {here}: install the same version there")
-        return Missing(f"{self.name}: a worker finds different files under the names in the scene; put them where "
-                       "both read them")
+        return Missing(f"{self.name}: a worker reads different files under the names in the scene; put the files where "
+                       "all machines read them")
 
     def _died(self, future) -> tuple:
         """(0 s, Died) of a chunk whose worker died or failed; Missing where the scheduler did."""

@@ -73,7 +73,8 @@ RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a 
 
 def refuses(model: Model) -> str:
     """Why lanes do not take a model; "" where they do."""
-    return no_lanes(model) or ("" if steps_of([model])[0] else "it rings too fast for its drive")
+    return no_lanes(model) or ("" if steps_of([model])[0] else "its free vibration is too fast for the time steps of "
+                                                               "its drive")
 
 
 def no_lanes(model: Model) -> str:
@@ -81,16 +82,16 @@ def no_lanes(model: Model) -> str:
     if why := lumped.not_one_point(model):
         return why
     if not SHORTEST <= model.rig.cycles <= LONGEST or not model.friction.static > 0:
-        return "its cycles are too few or too many, or nothing rubs"
+        return "its cycles are too few or too many, or it has no friction"
     if model.friction.law not in KINDS:
-        return "its law does not march in lanes"
+        return "its law has no batch form"
     return _manifold(model.friction) or asks_more(model)
 
 
 def asks_more(model: Model) -> str:
     """Why the accuracy that a model asks for is not that of lanes; "" where it is."""
     if model.accuracy.method != "auto" or pinned(model.accuracy) or model.accuracy.tolerance < TIGHTEST:
-        return "it asks for another method, or for more than lanes state"
+        return "it asks for another method, or for an accuracy beyond that of a batch"
     return ""
 
 
@@ -237,7 +238,8 @@ def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) ->
         wrong = contradicted(found, ones, looked, exact, times)
     if wrong:
         exact[:] = True
-        note = f"lanes said {wrong} otherwise than the exact engine in a check of {len(looked)} cases, so all are exact"
+        note = (f"in a check of {len(looked)} cases the fast engine differed from the exact one in {wrong}, so all "
+                "cases were computed by the exact engine")
     if (places := np.flatnonzero(exact)).size:
         lumped.take_out(found, places)
         found.place(places, exactly(places.tolist(), False))

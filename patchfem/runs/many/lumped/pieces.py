@@ -44,7 +44,7 @@ def refuses(model) -> str:
         return "its cycles are too few or too many"
     if _holds(model) and not f.static > 0:
         return "nothing rubs"
-    return "" if engine_of(model) is (EXACT if _holds(model) else PIECES) else "its engine is not that of pieces"
+    return "" if engine_of(model) is (EXACT if _holds(model) else PIECES) else "its engine is not the piecewise one"
 
 
 def _holds(model) -> bool:

@@ -58,7 +58,7 @@ def refuses(model: Model) -> str:
         return "its points do not yield at a force"
     if not pieces.SHORTEST <= model.rig.cycles <= pieces.LONGEST:
         return "its cycles are too few or too many"
-    return "" if engine_of(model) is PIECES else "its engine is not that of pieces"
+    return "" if engine_of(model) is PIECES else "its engine is not the piecewise one"
 
 
 def group(model: Model) -> tuple:

@@ -28,7 +28,7 @@ from ..solution import Solution, sampled_loop
 from .curves import LAST, SHOWN, Shown, unlasting
 from .marched import disturbed, lasts, left_grooves
 
-ADRIFT = ("the steady motion that the balance found over the grooves is unstable: another one is reached from rest; "
+ADRIFT = ("the steady motion that harmonic balance found on the grooves is unstable: another one is reached from rest; "
           'use accuracy.method = "march"')
 CYCLES, STEPS, FEW = 30, 256, 31  # of the march that a balance over grooves starts from, and its harmonics
 SAMPLES = 4096  # of the cycle that measures are read off

@@ -153,7 +153,7 @@ def motion_at_levels(finder, drive):
         sine = BaseSine(level, drive.segments[0].omega, drive.moving)
         return finder.shown(sine, points[number].near if number >= 0 else None).level
 
-    lost_ones = f"{len(said)} of {len(points)} levels have no steady motion that was found: "
+    lost_ones = f"{len(said)} of {len(points)} levels no steady motion was found: "
     notes = tuple(f"{lost_ones}{one}" for one in said[:1])
     return replace(best[0], extra=best[0].extra | {"curve": curve_columns(points), "at": best[1]}, probe=probe,
                    levels=tuple(one.level for one in points), notes=(*best[0].notes, *notes))
