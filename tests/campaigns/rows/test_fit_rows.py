@@ -256,7 +256,7 @@ def test_a_motion_without_a_bound_counts_as_a_thousand(tmp_path, wanted):
 @pytest.mark.parametrize("sets, wanted, match", [
     (["drive.waveform=step"], LINEAR_FREE, "one sine of the base"),
     ([], ("drive.cycles=10..20",), "the drive is given by the rows"),
-    ([], (*LINEAR_FREE, "structure.moving_mass=1 kg..2 kg"), "cannot determine 3 values")])
+    ([], (*LINEAR_FREE, "structure.moving_mass=1 kg..2 kg"), "too few to determine 3 values")])
 def test_refuses_what_rows_do_not_speak_of(tmp_path, sets, wanted, match):
     path = table(tmp_path, [(143.0, 20.0, 30.0, "", ""), (150.0, 20.0, 30.0, "", ""),
                             (155.0, 20.0, 30.0, "", "")])
