@@ -1,4 +1,4 @@
-"""How far a swept key may go: until any measure of the motion changes by 5 %, and until the largest pressure doubles.
+"""How far a swept key may go: until a measure of the motion changes by 5 %, and until the largest pressure doubles.
 
 A limit stands between two cases, the last one surely within and the first one surely beyond; where these are
 neighbours, a straight line between them (over the logarithm of a key that grows by factors) says about where, unless a
@@ -142,8 +142,8 @@ def as_json(limits: Limits) -> list:
 
 
 def sentence(limits: Limits) -> str:
-    """How far the key may go, as one sentence: what moves, the largest pressure, the stiffness; "" where the cases do
-    not show it."""
+    """How far the key may go, as one sentence: the MOVES by name, the largest pressure, the stiffness; "" where the
+    cases do not show it."""
     if limits.key is None:
         return ""
     moving, ends = _moving(limits), [one for one in limits.found if one.beyond is not None and one.resolved()]
@@ -157,18 +157,20 @@ def sentence(limits: Limits) -> str:
 
 
 def _moving(limits: Limits) -> str:
-    """How far the key may go before any measure of the motion changes; "" where the cases do not show it."""
+    """How far the key may go before one of the MOVES that it names changes; "" where the cases do not show it."""
     moving = [one for one in limits.found if one.name in MOVES]
     if not moving or not all(one.resolved() for one in moving):
         return ""
     name = OPENS.get(limits.key["name"], (limits.key["name"],))[0]
+    *others, final = (label(one.name) for one in moving)
+    within, others = f"{100 * WITHIN:g} %", ", ".join(others)
     ends = sorted((one for one in moving if one.beyond is not None or not one.whole), key=lambda one: one.value)
     if not ends:
         far = _at(limits, moving[0], limits.most) + _brackets(_gap(limits, moving[0], limits.most))
-        return "" if limits.lost else f"{name} may reach {far}: no measure of the motion changes by {100 * WITHIN:g} %"
+        told = f"{others} and {final} change" if others else f"{final} changes"
+        return "" if limits.lost else f"{name} may reach {far}: {told} by less than {within}"
     least, *_, last = *ends, ends[-1]
-    what = "the " + " or the ".join(label(one.name) for one in moving) if limits.lost else "any measure of the motion"
-    held = f"before {what} changes by {100 * WITHIN:g} %"
+    held = f"before {f'{others} or ' if others else ''}{final} changes by {within}"
     if least.beyond is None:
         far = _at(limits, least) + _brackets(_gap(limits, least))
         return f"{name} may reach at least {far} {held}; the limit lies beyond, where no case decides it"
