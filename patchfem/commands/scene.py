@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from .. import rates
 from ..campaigns.sweeps import ask, estimate
 from ..effects import shown_absent
+from ..export.written import brief
 from ..mesh import files as mesh_files
 from ..model import files as model_files
 from ..runs import plan as plans
@@ -88,6 +89,8 @@ def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> No
     if json_:
         print(json.dumps(answer))
         return
+    print("case     " + ", ".join(f"{key} {brief(text)}" for key, text in answer["case"].items())
+          + ", the first: all below but the cost and the last line is of this case")
     _print_plan(answer, False, verbose)
     print(f"sweep    {answer['cases']} cases of " + ", ".join(f"{n} {key}" for key, n in answer["values"].items())
           + f"; about {answer['seconds_per_case']:.2g} s each on one core, {answer['disk_bytes'] / 1e6:.2g} MB on disk")

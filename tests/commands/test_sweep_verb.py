@@ -438,3 +438,12 @@ def test_exact_the_plan_of_a_sweep_counts_its_cases(scene):
     assert more["seconds"] - told["seconds"] == pytest.approx(1994 * told["seconds_per_case"], rel=0.01)
     assert (told["kind"], told["engine"], told["effects"]) == (one["kind"], one["engine"], one["effects"])
     assert "6 cases of 3 normal.load, 2 drive.acceleration" in cli("plan", scene, *OVER).out
+
+
+def test_exact_the_plan_of_a_sweep_names_the_case_whose_values_it_prints(scene):
+    """Groups of the first case once stood there as if they were those of the scene."""
+    swept = "--over", "friction.static=0.41,0.1"
+    told = json.loads(cli("plan", scene, *swept, "--json").out)
+    assert told["case"] == {"friction.static": "0.41"}
+    assert told["groups"] == json.loads(cli("plan", scene, "--set", "friction.static=0.41", "--json").out)["groups"]
+    assert cli("plan", scene, *swept).out.startswith("case     friction.static 0.41, the first: ")

@@ -18,15 +18,17 @@ DISK, COLUMNS, BARE = 6000, 1600, 400
 
 
 def estimate(asked: Asked, cases: Cases) -> dict:
-    """The plan of a sweep: that of its first valid case, with seconds of all cases on one core, the bytes that a case
-    needs at most, how many cases there are, how many values of each key, and bytes on disk.
+    """The plan of a sweep: that of its first valid case, named by `case` {key: value as written}, with seconds of all
+    cases on one core, the bytes that a case needs at most, how many cases there are, how many values of each key, and
+    bytes on disk.
 
     PatchfemError where none of the planned cases can run.
     """
-    plans, wrong = [], None
+    plans, numbers, wrong = [], [], None
     for number in range(0, len(cases), -(-len(cases) // LOOKED)):
         try:
             plans.append(plan(asked.model(cases.sets(number))))
+            numbers.append(number)
         except PatchfemError as error:
             wrong = wrong or error
     if not plans:
@@ -41,6 +43,7 @@ def estimate(asked: Asked, cases: Cases) -> dict:
     return plans[0].as_json() | {
         "compile_seconds": compiles, "seconds": round(once + each * len(cases), 2), "seconds_per_case": round(each, 4),
         "bytes": max(one.bytes for one in plans), "cases": len(cases),
+        "case": {axis.key: text for axis, text in zip(cases.axes, cases.texts(numbers[0]))},
         "disk_bytes": (DISK if len(cases) <= FEW else COLUMNS if len(cases) <= TABLED else BARE) * len(cases),
         "values": {axis.key: len(set(axis.texts)) for axis in cases.axes}}
 

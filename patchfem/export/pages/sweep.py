@@ -2,7 +2,6 @@
 
 from collections import Counter
 from html import escape
-from math import isfinite
 
 import numpy as np
 
@@ -23,7 +22,7 @@ def page(table: dict, told: Lead | None = None) -> str:
     """The whole HTML page of a sweep; told: the `lead_of` its table, where it is known.
 
     table: `title`, `of` (the scene's own title; may be missing), `version`, `command` (the line that made it),
-    `scene` (its text), `seconds` of work (NaN: unknown); `grid`: whether the cases are all combinations of the keys'
+    `scene` (its text); `grid`: whether the cases are all combinations of the keys'
     values; `keys`: [{`name`, `unit`, `values` (n,) in SI, `texts` (n,) as written, `log`}];
     `measures`: {name: {`unit`, `means`, `values` (n,), `errors` (n,), `floors` (n,)}}, NaN where a case has none;
     `tolerance` of all cases or (n,) and `patch` {`length`, `width`} [m], where they are known; `outcome` (n,);
@@ -124,9 +123,8 @@ def _lead(table: dict, said: Lead) -> str:
     text = "".join(f"<p>{line}</p>" for line in lines)
     fault = document.warned([f"{count} case{'s' if count > 1 else ''} failed: {why}"
                              for why, count in Counter(table["messages"].values()).most_common(5)])
-    took = f" &middot; computed in {table['seconds']:.2f} s, all cases together" if isfinite(table["seconds"]) else ""
     scene = f"Scene: {escape(table['of'])} &middot; " if "of" in table else ""
-    return (f"<p class=soft>{scene}patchfem {escape(table['version'])}{took}</p>"
+    return (f"<p class=soft>{scene}patchfem {escape(table['version'])}</p>"
             f"<div class='verdict{' warn' * bool(said.missed)}'>{text}</div>{fault}")
 
 

@@ -41,7 +41,7 @@ def table_of(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Pat
                 for name in names_of(found) if name not in [axis.name for axis in cases.axes]}
     return {**titles(columns, tomllib.loads(asked.text).get("title") or asked.path.stem), "version": __version__,
             **_shared(facts(asked, cases), columns),
-            "command": command(asked, cases), "scene": asked.text, "seconds": float(np.sum(found.seconds)),
+            "command": command(asked, cases), "scene": asked.text,
             "grid": not cases.rows, "drawn": cases.drawn, "keys": columns, "measures": measures,
             "outcome": [str(one) for one in found.outcome],
             "messages": found.messages, "folders": [opened(folder, key) for key in keys] if len(keys) else None}
@@ -163,7 +163,7 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
     title = tomllib.loads(text).get("title") or folder.resolve().name
     wanted(isinstance(title, str) and isinstance(sets, list), "sweep.nc: its scene or its --set cannot be read")
     return {**titles(columns, title), **_shared(held, columns),
-            "version": str(file.attrs["source"]).removeprefix("patchfem "), "scene": text, "seconds": float("nan"),
+            "version": str(file.attrs["source"]).removeprefix("patchfem "), "scene": text,
             "command": shlex.join(["patchfem", "sweep", str(file.attrs["scene_file"]),
                                    *(word for one in sets for word in ("--set", one)), *overs]),
             "grid": "case" not in file.dimensions, "drawn": bool(file.attrs.get("drawn", 0)),
@@ -198,7 +198,7 @@ def joined(tables: list, names: list) -> dict:
         measures[name] = {"unit": first["unit"], "means": first["means"]} | {
             part: np.concatenate([np.full(count, np.nan) if one is None else one.get(part, np.zeros(count))
                                   for one, count in zip(own, counts)]) for part in ("values", "errors", "floors")}
-    return {"title": " and ".join(names), "own": False, "version": tables[0]["version"], "seconds": float("nan"),
+    return {"title": " and ".join(names), "own": False, "version": tables[0]["version"],
             "command": "\n".join(table["command"] for table in tables), "scene": "\n".join(
                 f"# {name}\n{table['scene']}" for name, table in zip(names, tables)),
             "tolerance": np.concatenate([np.broadcast_to(table.get("tolerance", np.nan), count)

@@ -14,7 +14,7 @@ def table() -> dict:
     outcome[7], outcome[11] = "failed", "grows"
     amplitude[7] = np.nan
     return {"title": "Tilt </script><b>&amp;", "version": "1.2.3", "command": "patchfem sweep a.toml --over x=1,2",
-            "scene": "# <i>a scene</i>", "seconds": 1.25, "grid": True,
+            "scene": "# <i>a scene</i>", "grid": True,
             "keys": [{"name": "contact.tilt.angle", "unit": "rad", "values": tilt, "log": True,
                       "texts": [f"{value * 1e3:g} mrad" for value in tilt]},
                      {"name": "normal.load", "unit": "N", "values": load, "log": False,

@@ -146,7 +146,7 @@ def swept() -> dict:
     measures = {name: {"unit": unit, "means": "m", "values": values, "errors": np.zeros(5)}
                 for name, (unit, values) in known.items()}
     measures["moment"]["errors"] = np.array([0, 0, 0, 0.2, 0.4])
-    return {"title": "t", "version": "0", "command": "c", "scene": "s", "seconds": 1.0, "grid": True, "keys": [tilt],
+    return {"title": "t", "version": "0", "command": "c", "scene": "s", "grid": True, "keys": [tilt],
             "measures": measures, "outcome": ["steady"] * 5, "messages": {}, "folders": None, "tolerance": 0.01,
             "patch": {"length": 12.7e-3}}
 

@@ -66,6 +66,7 @@ def test_exact_a_case_shows_its_error_where_its_digits_do_not(table, value, erro
 
 def test_exact_the_scene_is_named_beneath_the_keys_that_were_swept(table):
     text = own_part(page(table | {"of": "<a> rig tilted by 0.1 mrad"}))
+    assert "patchfem 1.2.3</p>" in text  # and no seconds: those of all processes are neither wall nor CPU
     assert "<p class=soft>Scene: &lt;a&gt; rig tilted by 0.1 mrad &middot; patchfem " in text
 
 
