@@ -15,12 +15,12 @@ from .summary import write_json
 
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error")
 HEAD = ("method", "amplitude [m]", "frequency [Hz]", "frequency_error [Hz]", "damping", "damping_error")
-WAYS = {"balance": "The periodic motion that the rig would have without a net loss of energy. A slow decay follows "
-                   "this motion, and so does a test in phase resonance.",
-        "decay": "A release from the largest amplitude; frequency and damping are read from one turning point to the "
-                 "next.",
-        "quasi-static": "One static force along the shape of the mode with the contact held, and the loops of the "
-                        "friction law."}
+WAYS = {"balance": "The curve is of the periodic motion that the rig would have without a net loss of energy. A slow "
+                   "decay follows this motion, and so does a test in phase resonance.",
+        "decay": "The curve is of a release from the largest amplitude; frequency and damping are read from one "
+                 "turning point to the next.",
+        "quasi-static": "The curve is computed from one static force, with the shape of the mode while the contact "
+                        "sticks, and from the loops of the friction law."}
 COLOURS = {"balance": "accent", "decay": "warm", "quasi-static": "#2f9e63"}
 LISTED, MOST_LISTED = 9, 25  # amplitudes in the table on the screen of a curve of more, and the most of others
 
@@ -125,13 +125,15 @@ def _told(one, k: int) -> tuple:
 
 def _held(found: Backbone) -> str:
     """Frequency with the contact held in words, with its error where one is known."""
-    return f"{found.stuck:.5g} Hz" if not found.stuck_error else scales.told(found.stuck, found.stuck_error, unit="Hz")
+    return scales.told(found.stuck, found.stuck_error, unit="Hz") if found.stuck_error else \
+        scales.short(found.stuck, "Hz", 5)
 
 
 def sentences(found: Backbone) -> list:
     """The answer in sentences: frequency and damping ratio at both ends of the amplitudes first."""
     held = "" if found.stuck is None else f", and {_held(found)} while the contact holds"
-    out = [f"The natural frequency of mode {found.mode} is {found.free:.5g} Hz without the contact{held}."]
+    free = scales.short(found.free, "Hz", 5)
+    out = [f"The natural frequency of mode {found.mode} is {free} without the contact{held}."]
     best = next((found.curves[way] for way in ("balance", "quasi-static", "decay") if way in found.curves), None)
     if best is not None:
         ends = [_told(best, k) for k in sorted({0, best.amplitude.size - 1})]
@@ -141,7 +143,7 @@ def sentences(found: Backbone) -> list:
         inside = 0 < k < best.amplitude.size - 1
         where = "Its damping ratio is largest" if inside else "Within these amplitudes its damping ratio is largest"
         out.append(f"{where} at {scales.short(best.amplitude[k], 'm', 3)}: {best.damping[k]:.3g}, at "
-                   f"{best.frequency[k]:.5g} Hz.")
+                   f"{scales.short(best.frequency[k], 'Hz', 5)}.")
     theory = "" if found.expected is None else f" (theory: {found.expected:.3g})"
     powers = [f"to the power {value:.3g} {where}" for value, where in (
         (found.micro, f"in micro-slip{theory}"), (found.gross, "in gross slip (theory: 1)")) if value is not None]

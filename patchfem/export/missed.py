@@ -9,6 +9,8 @@ from .written import label
 # what a case answers first, named before what misses its tolerance by more
 FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_ratio_peak",
          "pressure_peak", "contact_fraction")
+# a measure in a sentence where its name alone says too little
+LONGER = {"relative_displacement_amplitude_steady": "the displacement amplitude to which the motion would settle"}
 ZERO = 10.0  # times its value, an error beyond which a value is no more than 0
 
 
@@ -59,8 +61,9 @@ def sentence(measures: dict, tolerance, where) -> str:
     share = np.where(lost[name], _share(measures[name]), 0.0)
     count, case, others = int(lost[name].sum()), int(np.argmax(share)), len(lost) - 1
     known = f"{plain(100 * share[case], 2)} % of its value" if share[case] <= ZERO else "larger than the value"
+    called = LONGER.get(name) or label(name)
     more = f"; {others} other measure{'s' * (others > 1)} miss{'es' * (others == 1)} it somewhere" if others else ""
-    return (f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {label(name)}; the largest error is at "
+    return (f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {called}; the largest error is at "
             f"{where(case)}: {known}{more}.")
 
 

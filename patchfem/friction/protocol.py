@@ -91,8 +91,8 @@ class Element(NamedTuple):
     start; limit: largest force [N], or the size of the force where none is largest; length [m]: slide over which it
     stretches before it slips, 0 where nothing stretches; bounded: whether no force exceeds the limit. form: what the
     memory is made of, for engines that look inside: "parallel" elements side by side, "points" of bonds, "places" of
-    bonds under the pressure of the lower piece, "speed" alone and no memory, "flow" of one number, or "". sizes: of the
-    states of its rate form, None where it has none.
+    bonds under the pressure of the lower piece, "speed" alone and no memory, "flow" of one number, or "". sizes:
+    typical magnitudes of the states where the law is rate equations, None where it is not.
     """
 
     kernels: str

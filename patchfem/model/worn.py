@@ -23,7 +23,7 @@ UNREADABLE = OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError,
 class WornBefore:
     """The end of an earlier run.
 
-    depth (k,) [m] worn off both pieces and gap (k,) [m] of their new surfaces at x (k,) [m]; cycles: how many wore
+    depth (k,) [m] worn off both pieces and gap (k,) [m] of their unworn surfaces at x (k,) [m]; cycles: how many wore
     them; scene: of that run, as tables; measures: of that run, name -> value, error and more.
     """
 
@@ -42,7 +42,7 @@ class WornBefore:
         if self.cycles < asked * (1 - 1e-9):
             cycles += f" of {asked:.6g}"
         return (f"continues from {self.path.parent.name}/{self.path.name}, up to {say(float(self.depth.max()), 3)} "
-                f"worn off in {cycles} cycles; cycles count from there, but worn_volume and worn_depth_max from new "
+                f"worn off in {cycles} cycles; cycles count from there, but worn_volume and worn_depth_max from unworn "
                 "pieces")
 
     def on(self, x) -> np.ndarray:
@@ -51,12 +51,12 @@ class WornBefore:
         return np.interp(x, self.x, self.depth)
 
     def refuse_others(self, x, gap) -> None:
-        """PatchfemError unless the new surfaces leave the gap (m,) [m] at x (m,) [m], up to a straight line."""
+        """PatchfemError unless the unworn surfaces leave the gap (m,) [m] at x (m,) [m], up to a straight line."""
         self._as_long(x[0], x[-1])
         off = np.interp(x, self.x, self.gap) - gap
         off = float(np.abs(off - np.polyval(np.polyfit(x, off, 1), x)).max())
         if off > SAME * float(np.ptp(gap)) + FLAT:
-            raise PatchfemError(f"{self.path}: its new surfaces differ from those of this scene by {say(off, 3)}; "
+            raise PatchfemError(f"{self.path}: its unworn surfaces differ from those of this scene by {say(off, 3)}; "
                                 "choose a run of the same pieces, with elements of the same length if they are "
                                 "rough", KEY)
 

@@ -178,8 +178,8 @@ def _shaken(name: str, unit: str, floor: float, words: str) -> tuple:
     """Rows of a measure of a random drive, and of the scatter of records about it."""
     scatter = f"{name}_scatter"
     return (Row(name, unit, floor, words, lambda s: s.shaken.get(name)),
-            Row(scatter, unit, floor, f"half-width of the 95 % interval of {name} from the scatter between "
-                "finite records (other seeds)", lambda s: s.shaken.get(scatter),
+            Row(scatter, unit, floor, f"half-width of the 95 % interval of {name}, by the scatter between "
+                "records of this length with other random seeds", lambda s: s.shaken.get(scatter),
                 term=(name, lambda values: np.abs(values.get(name, 0.0)))))
 
 
@@ -250,7 +250,7 @@ ROWS = (
     Row("energy_dissipated", "J", 1e-10, "energy dissipated by friction in all interfaces over the run",
         lambda s: s.energies.get("energy_dissipated"), group="energy"),
     Row("energy_created", "J", 1e-10,
-        "energy created over the run by a law that is not passive, such as the law as printed in the report",
+        "energy created over the run by a law that is not passive, such as eq. 2.17 as printed in the report",
         lambda s: s.energies.get("energy_created"), group="energy"),
     Row("normal_load_least", "N", 1e-6, "smallest normal load in the last cycles", lambda s: s.of_load(np.min),
         group="friction"),
@@ -264,8 +264,8 @@ ROWS = (
     Row("friction_ratio_end", "1", 1e-9, "ratio of friction to normal load at the end of the slide", group="friction"),
     Row("friction_ratio_peak", "1", 1e-9, "largest ratio of friction to normal load over the run", group="friction"),
     Row("flutter_amplitude", "m", 1e-10,
-        "half peak-to-peak at the output of the unstable undriven motion in which friction dissipates exactly what a "
-        "mode of negative damping supplies: smaller motions decay, larger ones grow"),
+        "half peak-to-peak, at the output, of the unstable limit cycle without a drive: friction dissipates exactly "
+        "what a mode of negative damping supplies; smaller motions decay, larger motions grow"),
     Row("work_check", "1", 1e-2,
         "relative difference between the friction work by the trapezoidal rule on the samples of the run and that in "
         "its energy balance",

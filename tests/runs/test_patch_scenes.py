@@ -427,7 +427,7 @@ def test_refuses_a_run_that_the_memory_cannot_hold():
 @pytest.mark.parametrize("tables, keys, said", [
     ('[contact.upper]\nsubstrate = {young = "1 MPa", poisson = 0.3, density = "1 kg/m^3"}\n', "", "lowest Young"),
     ('[contact.upper]\nsubstrate = {young = "1 GPa", poisson = 0.4995, density = "1 kg/m^3"}\n', "",
-     "lock towards 0.5"),
+     "the elements lock as Poisson"),
     ("", 'element_size = "3 mm"', "no error is estimated on 5 elements"),
 ])
 def test_always_what_leaves_the_model_is_said(tables, keys, said):

@@ -109,7 +109,7 @@ def test_refuses_a_trace_that_was_not_worn(place):
     rows = (f"{x},{(x / 6400 - 1)**2}" for x in range(0, 12801, 100))
     (place / "bulge.csv").write_text("\n".join(("x_um,z_um", *rows)))
     scene = loads(SCENE, place / "a.toml", ["wear.start=one/result.nc", "contact.profile.file=bulge.csv"])
-    with pytest.raises(PatchfemError, match="its new surfaces differ from those of this scene"):
+    with pytest.raises(PatchfemError, match="its unworn surfaces differ from those of this scene"):
         pf.run(scene)
 
 

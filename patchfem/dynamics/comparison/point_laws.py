@@ -140,6 +140,6 @@ def sticking_warnings(modes: ModalBasis, laws, h: float, stick_speed: float | No
             out.append("limit*tanh(v/v_0) never sticks: under half of the friction limit the interface creeps at "
                        f"{speed:.3g} m/s without end")
         elif law.printed:
-            out.append("eq. 3.12 as printed keeps the force at its limit once it has reached it, whatever the motion "
-                       "does; use printed = false")
+            out.append("eq. 3.12 as printed in the report keeps the force at its limit once it has reached it, "
+                       "whatever the motion does; use printed = false")
     return list(dict.fromkeys(out))

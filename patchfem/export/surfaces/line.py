@@ -41,7 +41,7 @@ def _wide(depth) -> np.ndarray:
 def section(one: Change) -> Section:
     """The part of the page in which the line stands."""
     every = [-(-count // MOST) for count in one.volumes.filled.shape[::-1]]
-    sample = "" if max(every) == 1 else f" The page contains one of every {every[0]} x {every[1]} heights."
+    sample = "" if max(every) == 1 else f" The page shows one height of each block of {every[0]} x {every[1]}."
     text = ("Drag on the map to draw a line, or click to move it through a point; the sliders shift and turn it. "
             "Heights are about the plane of the scan before; the scan after is registered to it. Worn depth is "
             "positive where material was lost; missing depths are taken from the nearest neighbour." + sample)

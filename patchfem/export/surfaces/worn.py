@@ -274,7 +274,7 @@ def _waves(x, gaps: tuple) -> dict:
     if gaps[0].ndim == 2:
         return {f"{part}_ratio": refused("1", text, "the patch is in strips") for part, text in pairs}
     sides = [Profile(frozen_array(x), frozen_array(gap), "the patch") for gap in gaps]
-    why = "the new surfaces are flat" if level(sides[0]).z.std() < FLAT else ""
+    why = "the unworn surfaces are flat" if level(sides[0]).z.std() < FLAT else ""
     if not why:
         try:
             step = float(np.diff(x).min())
@@ -431,10 +431,8 @@ def _figures(one: Lost) -> list:
     """Pictures (svg, caption, alternative text): the surfaces with the wear on, and the worn depth."""
     if one.after.y is not None:
         return [(maps(one.after.x, one.after.y, (*one.gaps, one.depth)), "Left and middle: gap between the unloaded "
-                                                                         "surfaces before and after, wear included. "
-                                                                         "Right: depth that both pieces lost together "
-                                                                         "between the two runs; each strip at its "
-                                                                         "middle.",
+                 "surfaces before and after, wear included. Right: depth lost by both pieces together between the two "
+                 "runs. Each strip is shown at its middle.",
                  f"Maps of the gaps and of the worn depth: mean {say(one.values['worn_depth_mean'].value, 3)}")]
     x, under = one.after.x, hidden_line(one.after.x, one.depth)
     (along, mm), (up, um) = axis_unit(x, "m"), axis_unit(np.concatenate(one.gaps), "m")
@@ -449,8 +447,7 @@ def _figures(one: Lost) -> list:
     down = axis("worn depth", deep) | {"range": [(max(ends) + 0.05 * np.ptp(ends)) * scale,
                                                  (min(ends) - 0.05 * np.ptp(ends)) * scale]}
     return [(draw([chart("", place, axis("gap of the unloaded surfaces", up), marks)], height=2.9),
-             "Gap between the unloaded surfaces, wear included.", "Gap of the surfaces before and after"),
-            (draw([chart("", place, down, depths)], height=2.5), "Depth that both pieces together lost between the two "
-                                                                 "runs. Dashed: the part that a trace alone could not "
-                                                                 "show.",
+             "The gap between the unloaded surfaces includes the wear.", "Gap of the surfaces before and after"),
+            (draw([chart("", place, down, depths)], height=2.5), "The curve is the depth lost by both pieces together "
+             "between the two runs. The dashed line is the part that a trace alone could not show.",
              f"Worn depth: mean {say(one.values['worn_depth_mean'].value, 3)}")]

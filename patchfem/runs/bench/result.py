@@ -21,8 +21,8 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     if has(f.law, "bonds"):
         warnings = [*warnings, *unbounded_bonds(model.bonds), *unripe(model.bonds, model.speed)]
         if f.reading == "report" and model.load_varies:
-            warnings = [*warnings, "in the law as printed a bond keeps the pressure at which it formed, so friction "
-                                   'may exceed mu_s N while the load falls; set reading = "stretch" to avoid this']
+            warnings = [*warnings, "in the law as printed in the report, a bond keeps the pressure at which it formed, "
+                        'so friction may exceed mu_s N while the load falls; set reading = "stretch" to avoid this']
     steps = steps_of(model)
     frames = FRAMES if patch is not None else 0
     fine = bench.run(model, patch, steps, frames, watch=Watch(None, say, progress))
@@ -33,8 +33,8 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     found = with_errors(fine.values, *others, least=1e-10)
     fields, created, power = {}, fine.values["energy_created"], np.abs(np.diff(fine.ledger[0])).sum()
     if f.reading == "report" and created > 1e-6 * power:
-        warnings = [*warnings, f"the law as printed created {created:.3g} J, {100 * created / power:.2g} % of the work "
-                               'exchanged; reading = "stretch" creates none']
+        warnings = [*warnings, f"the law as printed in the report created {created:.3g} J, {100 * created / power:.2g} "
+                               '% of the work exchanged; reading = "stretch" creates none']
     warnings = [*warnings, *warming(model, patch, fine), *work_check_warning(found, steps)]
     if patch is not None:
         warnings = [*warnings, *_overhang(model.patch, patch, fine)]

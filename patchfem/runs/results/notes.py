@@ -81,7 +81,8 @@ def of_growth(law, peak: float | None) -> list:
         return []
     if law.reading == "report":
         return [] if law.initial == 0 else [
-            "in the law as printed the initial bonds keep the bond length eps_0, while bonds that form later grow"]
+            "in the law as printed in the report, the initial bonds keep the bond length eps_0, while bonds that form "
+            "later grow"]
     out = []
     if law.order > 1:
         out.append(f"order = {law.order:g} with growth does not limit friction: a bond that formed while short pulls "

@@ -87,7 +87,7 @@ class Friction(Table):
                                                   "contact") = 0.0
     viscous: key(quantity("damping", ge=0), "viscous force per sliding speed, for the whole contact") = 0.0
     reading: key(Literal["stretch", "report"], "'stretch': eq. 2.17 with the stretch of a bond kept apart from its "
-                 "damage, which never creates energy; 'report': eq. 2.17 as printed") = "stretch"
+                 "damage, which never creates energy; 'report': eq. 2.17 as printed in the report") = "stretch"
     order: key(number(le=100), "power p with which the strength of a bond rises along its path; > -1, and >= 0 with "
                "reading stretch") = 1.0
     rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (2.10); without it and slip_growth "
@@ -202,7 +202,8 @@ class Reduced(Table):
     moved: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)] | None, "coordinates that a base drive moves "
                "along x, by row, range a..b:n of rows, node or direction; unless given, all in direction x, or all "
                "if the files name no directions") = None
-    slide: key(Between | None, "the two boundary coordinates between which [contact] or [normal] slides; 0 is the base",
+    slide: key(Between | None, "the two boundary coordinates that the joint of [contact] or [normal] connects: "
+                                  "the first minus the second is the slide; 0 is the base",
                "with [friction]") = None
     unit: key(Length, 'length unit of the files, whose forces are in N; "1 mm" means N, mm and tonne') = 1.0
 
@@ -315,7 +316,8 @@ class Wear(Table):
     coefficient: key(quantity("wear coefficient", ge=0), "volume worn off both pieces per load and slip path; for form "
                      "'energy' per friction work")
     upper_share: key(Share, "share of the worn depth that is worn off the upper piece") = 0.5
-    cycles: key(Positive, "number of cycles over which material is removed, each like the converged last cycle")
+    cycles: key(Positive, "number of cycles over which material is removed, each assumed equal to the "
+                       "converged last cycle of the run")
     jumps: key(Literal["auto"] | whole(1, 1_000_000), "number of equal steps into which these cycles are divided; "
                                                       "default: set by the tolerance") = "auto"
     form: key(Literal["archard", "energy"], "'archard': depth proportional to pressure and slip path; 'energy': to "

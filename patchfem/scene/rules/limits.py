@@ -153,8 +153,9 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
 def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:
     if has(law.law, "bonds") and law.reading == "report" and _inside(law.order, -1, 0) and law.initial_bonds:
         draft.say("friction.initial_bonds", f"{law.initial_bonds:g} with order = {law.order:g} and {shear}: in "
-                                            "the law as printed, bonds at rest have an unbounded (R/eps)^order, so "
-                                            "that no force moves their point; set initial_bonds = 0 or use order >= 0")
+                                            "the law as printed in the report, bonds at rest have an unbounded "
+                                            "(R/eps)^order, so that no force moves their point; "
+                                            "set initial_bonds = 0 or use order >= 0")
     if not has(law.law, "bonds") and not carries(law, "shear"):
         draft.say("friction.law", unbuilt(f"'{law.law}' with {shear}", f"leave out {shear}, or {refusal('shear')}"))
     weakens = law.static is not None and _inside(law.kinetic, -1, law.static)

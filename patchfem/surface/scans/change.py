@@ -13,8 +13,9 @@ from .search import CLEAR, variant
 from .track import ScanTrack, track_of
 from .volumes import Volumes, measured, nothing
 
-SHIFT = "shift along {}: position in the scan after less position in the scan before, turned about its middle"
-ROTATION = "rotation of the scan after against the scan before, anticlockwise"
+SHIFT = "shift along {}: position in the scan after the wear minus that in the scan before it, which is rotated "\
+    "about its middle"
+ROTATION = "rotation of the scan after the wear relative to the scan before it, anticlockwise"
 ALIKE = 0.95  # correlation of the unworn heights of both scans, from which on they show the same place
 LIKELY = 0.98  # the same where the search is no clearer than chance, as on a lay that repeats itself
 SPECK = 12.0, 48.0, 192.0  # noises that a speck of the depths jumps by
@@ -212,9 +213,9 @@ def _track(one: ScanTrack) -> str:
 def _ways(one: Change) -> list:
     out, guess = [], one.found.guess
     if guess.mirrored:
-        out.append(f"The scan after is mirrored: its {guess.mirrored} counts from the other end.")
+        out.append(f"The scan after the wear is mirrored: its {guess.mirrored} counts from the other end.")
     if abs(abs(one.registration["rotation"].value) - np.pi) < 0.2:
-        out.append("The scan after is turned by 180 degrees.")
+        out.append("The scan after the wear is rotated by 180 degrees.")
     if guess.turned:
         out.append("The heights of both scans have opposite signs: one was inverted so that more wears than "
                    "grows; check in which file heights point into the material.")

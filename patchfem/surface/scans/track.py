@@ -22,9 +22,9 @@ GROUPS, LEAST = 16, 6  # of neighbouring sections, whose means are measured one 
 TOGETHER = 3.0  # neighbouring depths of a section that err alike, as between samples they are interpolated
 ENDS = 0.5  # of the median lost area, where a track ends along its direction
 TEXTS = {  # name: (unit, definition)
-    "direction": ("rad", "of the track, against x anticlockwise, from the gradients of the depths"),
-    "from": ("m", "position across the track at which it begins, from the middle of the scan before, positive to "
-                  "larger x or y"),
+    "direction": ("rad", "of the track, measured anticlockwise from x, by the gradients of the depths"),
+    "from": ("m", "position across the track at which it begins, from the middle of the scan before the wear, positive "
+                  "to larger x or y"),
     "to": ("m", "position across the track at which it ends"),
     "width": ("m", "width of the track"),
     "depth_mean": ("m", "lost area of a section over its width"),
