@@ -71,8 +71,8 @@ def test_exact_a_mesh_held_in_part_has_one_answer_in_three_formats_and_says_so(k
         found = ran(HELD.format(path))
         approaches.append(found.measures["approach"].value)
         said = [text for text in found.extra["notes"] if "lower_far" in text]
-        assert said == ([] if kept == 16 else ["contact.mesh: lower_far holds 0.0016 m of a face of 0.0128 m, 0.125 "
-                                               "of its length; the rest of it is free"])
+        assert said == ([] if kept == 16 else ["contact.mesh: lower_far covers 0.0016 m of a face of 0.0128 m, 0.125 "
+                                               "of its length; the rest of that face is free"])
     assert approaches == pytest.approx([approaches[0]] * 3, rel=1e-9)
     flat = 115.654 / (12.8e-3 * 12.7e-3) * 2 * 6.4e-3 / 121e9  # both pieces as bars
     assert (approaches[0] > 3 * flat) == (kept == 2)

@@ -91,7 +91,7 @@ def scatter(found: dict, of: int, settled: bool = True) -> str:
     said, most = [], max((found[name][2] for name in SPREAD if name in found), default=0)
     if most and most < SETTLED * of:
         missed = "have not settled within the tolerance" if settled else "have no value"
-        return (f"{of - most} of {of} drawn cases {missed}, perhaps those that move most: "
+        return (f"{of - most} of {of} random cases {missed}, perhaps those that move most: "
                 "how far the answers scatter is not known.")
     for name in [name for name in SPREAD if name in found]:
         unit, (low, _, high), count, misses = found[name]
@@ -101,8 +101,8 @@ def scatter(found: dict, of: int, settled: bool = True) -> str:
         said.append(f"{'an' if name[0] in 'aeio' else 'a'} {label(name)} from {low} to {high}"
                     + (f" ({'; '.join(some)})" if some else ""))
     count = "settled" if settled else "have a value"
-    whose = f"{of} drawn cases" if most == of else f"{most} of {of} drawn cases that {count}"
-    return f"Nine in ten of the {whose} have {', '.join(said)}." if said else ""
+    whose = f"{of} random cases" if most == of else f"{most} of {of} random cases that {count}"
+    return f"90 % of the {whose} have {', '.join(said)}." if said else ""
 
 
 def picture(ranks: dict) -> str:
@@ -140,5 +140,5 @@ def spread(found: dict) -> str:
     if not rows:
         return ""
     return (document.table(("measure", ">5 %", ">half", ">95 %", "unit", ">cases", ">miss the tolerance"), rows, "wide")
-            + "<p class=soft>Share of the drawn cases with less; if any case has settled, only settled ones count. "
-            "Cases that miss the tolerance count with their values.</p>")
+            + "<p class=soft>Share of the random cases with a smaller value; if any case has settled, only settled cases "
+            "count. Cases that miss the tolerance count with their values.</p>")

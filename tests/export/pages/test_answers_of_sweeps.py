@@ -85,7 +85,7 @@ def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
     assert {one["key"] for one in shares} == {"friction.static", "drive.acceleration", "structure.mode.0.damping"}
     assert all(set(one) == {"key", "first", "total", "low", "high"} and one["low"] <= one["total"] <= one["high"]
                for one in shares)
-    assert "depends most on" in told["answer"] and "Nine in ten of the 128 drawn cases have" in told["answer"]
+    assert "depends most on" in told["answer"] and "90 % of the 128 random cases have" in told["answer"]
     page = (out / "report.html").read_text("utf-8")
     assert "What matters most" in page and "Scatter of the answers" in page and "<svg viewBox" in page
     from patchfem.export.sweeps.page import read_table
@@ -100,10 +100,10 @@ def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
 def test_always_a_scatter_that_unsettled_cases_hide_is_not_told():
     found = {"loop_area": ("J", np.array([1.0, 2.0, 3.0]), 60, 0)}
     assert "is not known" in ranked.scatter(found, 100) and "40 of 100" in ranked.scatter(found, 100)
-    assert ranked.scatter(found, 60).startswith("Nine in ten of the 60 drawn cases have a loop area from 1 J to 3 J")
+    assert ranked.scatter(found, 60).startswith("90 % of the 60 random cases have a loop area from 1 J to 3 J")
     assert ranked.scatter({}, 100) == ""
     some = found | {"equivalent_damping": ("1", np.array([0.1, 0.2, 0.3]), 40, 3)}  # those that stick have none
-    assert ranked.scatter(some, 100).startswith("40 of 100 drawn cases have not settled")
+    assert ranked.scatter(some, 100).startswith("40 of 100 random cases have not settled")
     assert ranked.scatter(some, 60).endswith("an equivalent damping from 0.1 to 0.3 (in the 40 that have one; 3 of 40 "
                                              "miss the tolerance and count with their values).")
 
@@ -118,7 +118,7 @@ def test_exact_quantiles_are_those_of_all_cases_that_have_a_value():
     assert (unit, count, misses) == ("J", 40, 12)
     assert ends == pytest.approx(np.quantile(np.arange(1.0, 41), (0.05, 0.5, 0.95)))
     assert "(12 of 40 miss the tolerance and count with their values)" in ranked.scatter(found, 41)
-    assert "40 of 41 drawn cases that have a value" in ranked.scatter(found, 41, False)
+    assert "40 of 41 random cases that have a value" in ranked.scatter(found, 41, False)
 
 
 def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
