@@ -140,5 +140,5 @@ def spread(found: dict) -> str:
     if not rows:
         return ""
     return (document.table(("measure", ">5 %", ">half", ">95 %", "unit", ">cases", ">miss the tolerance"), rows, "wide")
-            + "<p class=soft>Share of the random cases with a smaller value; if any case has settled, only settled cases "
-            "count. Cases that miss the tolerance count with their values.</p>")
+            + "<p class=soft>Share of the random cases with a smaller value; if any case has settled, only settled "
+            "cases count. Cases that miss the tolerance count with their values.</p>")
