@@ -29,6 +29,7 @@ HALVES = 0.5 * np.array([1e-3, 5e-2])  # of frequency and damping, standard devi
 LEAST = 1e-6  # of a value, a standard deviation at least
 WAYS = ("balance", "quasi-static")  # the first tells, the last is quick
 OTHERS = 8  # values tried besides the scene's own, until a curve is known
+SECONDS = 10.0  # from line to line of progress
 ROUNDS, SAME = 8, 1e-3  # of the search, until the balance over the static curve changes by less standard deviations
 
 
@@ -105,10 +106,15 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
     amplitude, measured, error = read_curve(to)
     if 2 * amplitude.size <= len(wanted):
         raise PatchfemError(f"{to}: {amplitude.size} amplitudes cannot determine {len(wanted)} values")
-    base, apart = Base(scene), np.unique(amplitude)
+    base, apart, said, count = Base(scene), np.unique(amplitude), begin, 0
 
     @lru_cache(8)
     def computed(values: tuple, method: str) -> np.ndarray:
+        nonlocal said, count
+        if say and perf_counter() - said >= SECONDS:
+            said = perf_counter()
+            say(f"{count} curves of the model computed, {said - begin:.0f} s so far")
+        count += 1
         sets = [one.assigned(value) for one, value in zip(wanted, values)]
         try:
             model = joint.freed(build(base.changed(sets)))

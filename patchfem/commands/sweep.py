@@ -5,6 +5,7 @@ import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event, Thread
 from time import perf_counter
 from typing import Annotated, Literal, NamedTuple
 
@@ -121,7 +122,8 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
         say(f"{str(why) or 'interrupted'}; {line.done} of {len(cases)} cases are kept; continue with: patchfem "
             f"{shlex.join([word for word in sys.argv[1:] if word != '--resume'])} --resume")
         raise Ended(getattr(why, "code", 130)) from None
-    line.end()
+    finally:
+        line.end()
     if part is not None:
         if json_ or not quiet:
             print(json.dumps({"cases": line.done, "folder": str(target)}) if json_ else
@@ -144,22 +146,36 @@ class Told(NamedTuple):
 
 
 class Progress:
-    """Cases done and time left on stderr: a line that renews itself on a terminal, one every ten seconds elsewhere."""
+    """Cases done and time left on stderr: a line that renews itself on a terminal, one every WAIT seconds elsewhere.
+    While no case is done, how long the sweep has run: after WAIT seconds, then after twice as long each time."""
+
+    WAIT = 10.0
 
     def __init__(self, silent: bool):
-        self.silent, self.done, self.said = silent, 0, perf_counter()
-        self.open = sys.stderr.isatty()
+        self.silent, self.done, self.begin, self.text, self.over = silent, 0, perf_counter(), "", Event()
+        self.said, self.open = self.begin, sys.stderr.isatty()
 
     def __call__(self, done: int, total: int, left: float | None) -> None:
-        text, self.done = f"{done}/{total} cases", done
-        text += f", {sweeping.lasting(left)} left" if left is not None else ""
-        if self.silent or perf_counter() - self.said < (0.2 if self.open else 10.0):
-            return
+        if not self.text and not self.silent:
+            Thread(target=self._waits, daemon=True).start()
+        self.text, self.done = f"{done}/{total} cases", done
+        if not self.silent and perf_counter() - self.said >= (0.2 if self.open else self.WAIT):
+            self._show(f"{self.text}, {sweeping.lasting(left)} left" if left is not None else self.text)
+
+    def _waits(self) -> None:
+        wait = self.WAIT
+        while not self.over.wait(wait):
+            if perf_counter() - self.said >= wait:
+                self._show(f"{self.text}, {sweeping.lasting(perf_counter() - self.begin)} so far")
+                wait *= 2
+
+    def _show(self, text: str) -> None:
         self.said = perf_counter()
         print(f"\r\x1b[K{text}" if self.open else text, end="" if self.open else "\n", file=sys.stderr, flush=True)
 
     def end(self) -> None:
-        """Clear the line."""
+        """Clear the line, and say no more."""
+        self.over.set()
         if self.open and not self.silent:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 

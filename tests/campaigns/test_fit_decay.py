@@ -99,3 +99,17 @@ def test_the_verb_reads_a_curve_and_refuses_what_is_none(tmp_path, monkeypatch):
     both.write_text("amplitude [m],frequency [Hz],frequency_error [Hz],damping\n1e-6,100,-1,0.1\n2e-6,100,1,0.1\n")
     with pytest.raises(PatchfemError, match="an error is below 0"):
         read_curve(both)
+
+
+def test_always_a_fit_says_how_long_it_has_run(tmp_path, monkeypatch):
+    """A fit to 41 amplitudes printed nothing for four minutes."""
+    monkeypatch.setattr(fit_decay, "SECONDS", 0.0)
+    monkeypatch.setattr(fit_decay, "_curve", lambda model, amplitude, method: np.outer(
+        [1e-4 * model.friction.stiffness, 0.01], np.ones(amplitude.size)))
+    path = tmp_path / "decay.csv"
+    path.write_text("amplitude [m],frequency [Hz],damping\n" + "".join(f"{k}e-6,100,0.01\n" for k in range(1, 5)))
+    lines = []
+    found = fit_decay.fit_decay(pf.load(START), path, ["friction.stiffness=3e5 N/m..3e6 N/m"], lines.append)
+    assert found.found.values[0] == pytest.approx(1e6)
+    said = [line for line in lines if "s so far" in line]
+    assert said[0] == "0 curves of the model computed, 0 s so far" and len(said) > 3

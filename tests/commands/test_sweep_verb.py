@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import shutil
+from time import sleep
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from scene_texts import COULOMB, POINT, SHORT
 
 import patchfem as pf
 from patchfem.campaigns.sweeps import sweep
+from patchfem.commands.sweep import Progress
 from patchfem.export.summary import summary_of
 from patchfem.export.sweeps.folder import TABLES, Folder
 from patchfem.runs.many import many
@@ -399,7 +401,7 @@ def test_refuses_a_key_of_the_file_and_of_the_line(scene, tmp_path):
 @pytest.mark.parametrize("words, says", [
     (["--random", "4"], "need --over"),
     (["--random", "4", "--sobol", "4", "--over", "friction.static=0.1..0.2"], "one of them"),
-    (["--random", "4", "--over", "friction.static=0.1..0.2:3"], "leave :3 out"),
+    (["--random", "4", "--over", "friction.static=0.1..0.2:3"], "leave out :3"),
     (["--over", "friction.static=0.1,0.2", "--shard", "5/4"], "--shard 5/4"),
     (["--over", "friction.static=0.1,0.2", "-j", "0"], "at least one process"),
     (["--over", "friction.static=0.1,0.2", "--executor", "slurm"], "--executor slurm: unknown"),
@@ -447,3 +449,15 @@ def test_exact_the_plan_of_a_sweep_names_the_case_whose_values_it_prints(scene):
     assert told["case"] == {"friction.static": "0.41"}
     assert told["groups"] == json.loads(cli("plan", scene, "--set", "friction.static=0.41", "--json").out)["groups"]
     assert cli("plan", scene, *swept).out.startswith("case     friction.static 0.41, the first: ")
+
+
+def test_always_a_sweep_says_how_long_its_first_case_takes(capsys, monkeypatch):
+    """A sweep of costly cases printed nothing for five minutes."""
+    monkeypatch.setattr(Progress, "WAIT", 0.02)
+    line, silent = Progress(False), Progress(True)
+    for one in (line, silent):
+        one(0, 11, None)
+    sleep(0.4)
+    line.end()
+    said = capsys.readouterr().err.splitlines()
+    assert 2 <= len(said) <= 5 and set(said) == {"0/11 cases, 0 s so far"} and line.over.is_set()
