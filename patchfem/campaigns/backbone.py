@@ -65,6 +65,7 @@ SAMPLES = 4096  # of a cycle of a static loop, and that a largest motion is read
 SLIDES = 60  # tries of the slides whose static motion has the amplitudes that are asked for
 CLOSE = 1e-7  # of an amplitude, within which a free motion is at it
 PLAIN, BALANCED = (1e-6, 1e-3, 4), 8  # amplitudes [m] of a linear rig; steps to the damping that keeps it swinging
+SIZED, SLOW = 8, 0.1  # steps to a motion that has the amplitude asked for; least slope of both amplitudes that is taken
 CYCLES = (50.0, 200.0, 800.0)  # lengths of a decay that are tried
 STARTS = 12  # amplitudes on the way to the free motion that a release begins in
 DENSE = 400.0  # of them where several modes ring, whose samples are all kept
@@ -453,9 +454,9 @@ def _free(group: Group, joint: Joint, amplitudes, harmonics: int, count=None) ->
 
 
 def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
-    """The `harmonic.backbone.Free` motions at amplitudes (k,) [m] of the output from the first that is found, None
-    before it, as far as there is one near the one before. The first is sought beside the held mode, else on the way
-    from where the contact holds."""
+    """The `harmonic.backbone.Free` motions at amplitudes (k,) [m] of the output, None where none is found. Each is
+    sought from the one before; without one, as beyond a fold of the curve, beside the held mode, the first also on the
+    way from where the contact holds; then from the next larger one that was found."""
     modes = joint.modes
     omega, shape = modes.held(group.rows, group.stiffness(), joint.mode)
     reach = abs(float(modes.output @ shape))
@@ -465,26 +466,43 @@ def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
     balance = equations.balance
     y = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
     y[:, 1] = balance.faces @ shape
-    first, out = np.append(harmonics_packed(y), [1.0, 0.0]), []
-    x, done, small = first, 0.0, LOW * float(_amplitude_of(joint, _knee(joint))) / reach
-    for amplitude in amplitudes:
-        here = amplitude / reach
-        try:
-            x = equations.towards(x, done, here) if any(out) else _begun(equations, first, small, here)
-            for _ in range(6):
-                x, free = equations.solve(x, here)
-                size = _largest(free.modal @ modes.output)
-                if abs(size / amplitude - 1) < CLOSE:
-                    break
-                here *= amplitude / size
-        except NotConverged:
-            if any(out):
-                break
-            out.append(None)
-            continue
-        done, reach = here, amplitude / here
-        out.append(free)
-    return out
+    first, small = np.append(harmonics_packed(y), [1.0, 0.0]), LOW * float(_amplitude_of(joint, _knee(joint))) / reach
+
+    def at(amplitude: float, beside, begin: bool) -> tuple | None:
+        """(Free, unknowns (N,), reach) from those of another amplitude, else from the held mode; None where there is
+        none."""
+        for near in [beside] * (beside is not None) + [None] * begin:
+            here = amplitude / (near[2] if near else reach)
+            try:
+                x = equations.towards(near[1], near[0].amplitude, here) if near else \
+                    equations.solve(first, here)[0] if any(out) else _begun(equations, first, small, here)
+                return _sized(equations, joint, x, here, amplitude)
+            except NotConverged:
+                pass
+        return None
+
+    out, last = [None] * len(amplitudes), len(amplitudes) - 1
+    for k, amplitude in enumerate(amplitudes):
+        out[k] = at(amplitude, out[k - 1] if k else None, True)
+    for k in range(last - 1, -1, -1):
+        out[k] = out[k] or at(amplitudes[k], out[k + 1], False)
+    return [one and one[0] for one in out]
+
+
+def _sized(equations: FreeBalance, joint: Joint, x, here: float, amplitude: float) -> tuple:
+    """(Free, unknowns (N,), reach) of the motion that is as large at the output as `amplitude` [m], from x at an
+    amplitude `here` [m] of the coordinate."""
+    slope, before = 1.0, None
+    for _ in range(SIZED):
+        x, free = equations.solve(x, here)
+        off = float(np.log(_largest(free.modal @ joint.modes.output) / amplitude))
+        if abs(off) < CLOSE:
+            return free, x, amplitude / here
+        if before is not None:
+            slope = (off - before[1]) / np.log(here / before[0])
+        slope, before = slope if slope > SLOW else 1.0, (here, off)
+        here *= np.exp(-off / slope)
+    raise NotConverged(f"no free motion is {say(amplitude, 3)} large at the output")
 
 
 def _begun(equations: FreeBalance, first, small: float, here: float) -> np.ndarray:
@@ -684,7 +702,7 @@ def _start(joint: Joint, amplitude: float) -> Start:
             first = min(float(_amplitude_of(joint, LOW * _knee(joint))) or amplitude, amplitude)
             path = np.geomspace(first, amplitude, STARTS)
             found = _motions(_group(joint, joint.patch), joint, path := np.unique(path), LADDER[0])
-            if len(found) == path.size and found[-1] is not None:
+            if found[-1] is not None:
                 turn = 1j * found[-1].omega * np.arange(LADDER[0] + 1)[:, None]
                 return Start(found[-1].modal.real.sum(axis=0), (turn * found[-1].modal).real.sum(axis=0))
         except (NotConverged, PatchfemError):
@@ -834,7 +852,8 @@ def _unworn(model: Model) -> tuple:
     return () if model.wear is None else ("these curves are for unworn pieces: [wear] is ignored",)
 
 
-LEFT_OUT = {"balance": "no free oscillation was found there", "quasi-static": "the static curve ends there",
+LEFT_OUT = {"balance": "not computed: the balance did not converge there; the curve may fold, or the mode dies out",
+            "quasi-static": "the static curve ends there",
             "decay": "the release, or one of its coarser check runs, did not oscillate there"}
 
 

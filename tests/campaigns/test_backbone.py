@@ -194,10 +194,53 @@ static = 0.3
 load = "100 N"
 """
     rig = shaken(PLASTIC)
-    found = backbone(pf.build("[structure]\n" + structure + rig[rig.index("[drive]"):]), methods=("balance",))
+    a = np.array([2e-6, 9e-6, 12e-6, 30e-6])
+    found = backbone(pf.build("[structure]\n" + structure + rig[rig.index("[drive]"):]), "", a, ("balance",))
     one = found.curves["balance"]
-    assert 10 < one.amplitude.size < 30 and (np.diff(one.amplitude) > 0).all()
-    assert "left out" in found.notes[0] and found.notes[0].endswith("no free oscillation was found there")
+    assert one.amplitude == pytest.approx(a[:2]) and one.frequency == pytest.approx(found.stuck, rel=1e-6)
+    assert "left out" in found.notes[0] and "the balance did not converge there; the curve may fold" in found.notes[0]
+
+
+FOLDED = shaken('law = "elastic-plastic"\nbond_length = "1.80165 um"').replace('load = "100 N"', 'load = "12.011 N"')
+FOLDED = FOLDED[:FOLDED.index("[structure]")] + '''[structure]
+moving_mass = "1 kg"
+''' + "".join(f'''[[structure.mode]]
+name = "{name}"
+frequency = "{frequency} Hz"
+damping = 0.002
+slide = {slide}
+output = {output}
+base = 0.1
+''' for name, frequency, slide, output in (("first", 101.069, 1.0017, 2.17225), ("second", 634.018, -1.28353, 2.17435))
+                                          ) + FOLDED[FOLDED.index("[drive]"):]
+
+
+def test_beyond_a_fold_the_curve_goes_on():
+    """A blade with a damper: its curve folds near 26 um, beyond which these were left out. Asked for
+    alone, the motions beyond have the same frequency, damping and loss."""
+    a = np.array([25e-6, 28e-6, 40e-6])
+    found, alone = (backbone(pf.build(FOLDED, **{"accuracy.tolerance": 0.1}), "", one, ("balance",))
+                    for one in (a, a[1:]))
+    whole, beyond = found.curves["balance"], alone.curves["balance"]
+    assert whole.amplitude == pytest.approx(a) and beyond.amplitude == pytest.approx(a[1:])
+    assert not any("left out" in note for note in found.notes) and (np.diff(whole.frequency) < 0).all()
+    assert whole.frequency[1:] == pytest.approx(beyond.frequency, rel=1e-6)
+    assert whole.damping[1:] == pytest.approx(beyond.damping, rel=1e-5)
+
+
+def test_what_lies_below_the_first_motion_is_found_from_it(monkeypatch):
+    """Where nothing is found upwards until an amplitude, those before it are found downwards from it."""
+    a, plain = np.geomspace(1e-3, 3e-3, 3), backbone_module._begun
+    straight = backbone(model(PLASTIC), "", a, ("balance",)).curves["balance"]
+
+    def far(equations, first, small, here):
+        if here < 0.9 * a[-1]:
+            raise backbone_module.NotConverged("too far")
+        return plain(equations, first, small, here)
+
+    monkeypatch.setattr(backbone_module, "_begun", far)
+    found = backbone(model(PLASTIC), "", a, ("balance",)).curves["balance"]
+    assert found.frequency == pytest.approx(straight.frequency, rel=1e-9)
 
 
 def test_exact_no_held_mode_is_slower_than_the_free_one():
