@@ -90,7 +90,7 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
         print(text, flush=True)
     for text in answer["warnings"]:
         say(f"warning: {text}")
-    print("\n".join(words.table_of(answer["measures"])), flush=True)
+    print("\n".join(words.table_of(answer["measures"], answer["numerics"].get("engine", ""))), flush=True)
     for text in answer["notes"]:
         note(text)
     if verbose:

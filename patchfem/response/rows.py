@@ -242,7 +242,8 @@ ROWS = (
         "moving_mass omega_1^2 and A half the range of the slide in a cycle over the mode's `slide`, averaged over the "
         "last cycles; null if other modes carry more than 5 % of the slide",
         lambda s: s.cycle.get("equivalent_damping"), group="friction", halves=FOURTH),
-    Row("friction_work", "J", 1e-10, "work done on all interfaces together over the run",
+    Row("friction_work", "J", 1e-10, "work done on all interfaces together over the run; by method harmonic over "
+        "two cycles",
         lambda s: s.energies.get("friction_work"), group="energy"),
     Row("energy_stored", "J", 1e-10, "energy stored in all interfaces at the end: elastic energy, and over grooves the "
                                      "potential energy of the load or, for a load that changes, the work done against "

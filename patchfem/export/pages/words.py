@@ -23,6 +23,7 @@ WORKSHOP = {  # as scales.LADDERS
 GROUPS = ("motion", "friction", "energy", "patch", "wear")
 NO_SLIP = 1e-15  # m, the last digits of a slide
 WHOLE_RUN = "over the whole run"
+LOOPS = "over the two cycles of the steady motion that are kept"
 MARCHED = "over the cycles of the motion, not those of wear"
 OF_WHAT = {  # said behind a value that would otherwise be taken for another, or for more than it says
     "loop_area": "per cycle", "friction_work": WHOLE_RUN, "energy_dissipated": WHOLE_RUN, "energy_created": WHOLE_RUN,
@@ -247,14 +248,15 @@ def of_records(name: str, measures: dict) -> tuple:
     return f"{own} {unit}".strip(), f"95 % interval {low} to {high} {unit}".strip()
 
 
-def table_of(measures: dict) -> list[str]:
+def table_of(measures: dict, engine: str = "") -> list[str]:
     """Lines of all measures in their groups, each with its error in people's units, or why it has no value; under a
-    random drive with the interval of other records."""
+    random drive with the interval of other records. engine: as the summary names it."""
     every, measures = measures, in_order(measures)
     width = max(map(len, measures), default=0)
-    out, pressed, worn = [], "contact_fraction" in measures, "worn_volume" in measures
+    out, pressed = [], "contact_fraction" in measures
+    over = MARCHED if "worn_volume" in measures else LOOPS if engine == "harmonic" else WHOLE_RUN
     for group in GROUPS:
-        lines = [f"  {name:<{width}}  {_value(name, one, worn)}{_records(name, every)}"
+        lines = [f"  {name:<{width}}  {_value(name, one, over)}{_records(name, every)}"
                  for name, one in measures.items() if group_of(name, pressed) == group]
         out += [group, *lines] if lines else []
     return out
@@ -263,7 +265,7 @@ def table_of(measures: dict) -> list[str]:
 def fragment(summary: dict, sentence: str, cycles: float | None, released: str = "") -> str:
     """The answer as HTML without styles of its own, for a notebook; cycles and released as `headline` takes them."""
     rows, measures = [], summary["measures"]
-    for line in table_of(measures):
+    for line in table_of(measures, summary.get("numerics", {}).get("engine", "")):
         name, _, value = line.strip().partition(" ")
         cells = f"<td>{escape(name)}</td><td style='text-align:right'>{escape(value.strip())}</td>"
         rows.append(f"<tr>{cells if value else f'<th colspan=2>{escape(name)}</th>'}</tr>")
@@ -280,10 +282,10 @@ def _records(name: str, measures: dict) -> str:
     return f" ({numerics}{text} over records)" if text else ""
 
 
-def _value(name: str, one: dict, worn: bool) -> str:
+def _value(name: str, one: dict, over: str) -> str:
     if one.get("reason"):
         return f"- ({one['reason']})"
     of_what = OF_WHAT.get(re.sub(r"_\d+$", "", name))
-    of_what = MARCHED if worn and of_what == WHOLE_RUN else of_what
+    of_what = over if of_what == WHOLE_RUN else of_what
     unknown = UNKNOWN if one["error"] is None and one["value"] is not None else ""
     return f"{pair(name, one)}{unknown}{f', {of_what}' if of_what else ''}"

@@ -227,7 +227,7 @@ def figures(one: Comparison) -> list:
         tilt = np.polyval(np.polyfit(found.x, found.first, 1), found.x)
         worn = np.where(found.rest > 3 * found.noise, found.rest, 0.0)
         out.append((pictures.overlay(found.x, found.first - tilt, second - tilt, worn, _closer(found.x, worn)),
-                    "The trace after, moved by shift, tilt and offset, on the trace before.",
+                    "The trace after the wear, moved by shift, tilt and offset, is shown on the trace before.",
                     f"Both traces, registered: mean worn depth {' '.join(shown(one.worn.mean)[::2])}"))
         out.append((pictures.difference(found.x, found.rest, found.used, found.noise, None),
                     "Depth of the trace after below the trace before. Blue: the unworn heights to which shift, tilt "
