@@ -193,7 +193,7 @@ def test_exact_a_length_is_a_number_or_a_text(tmp_path, given):
 
 
 @pytest.mark.parametrize("given, said", [
-    ({"slide.amplitude": 2.0}, r"slide\.amplitude: 2 without a unit is 2 m, more than the patch is long \(0\.04 m\)"),
+    ({"slide.amplitude": 2.0}, r"slide\.amplitude: 2 without a unit means 2 m, more than the patch is long \(0\.04"),
     ({"contact": {"crown": {"radius": 3.0}}, "contact.length": 12.7}, r"contact\.length: 12\.7 .* any joint has")])
 def test_refuses_a_bare_length_that_nobody_means(given, said):
     scene, other = pf.load(pf.new("joint")), {key: f"{value!r} m" for key, value in given.items() if key != "contact"}

@@ -424,7 +424,7 @@ BODY = "0,0,0\n1,1,1\n2,2,1\n3,3,1\n4,4,1\n"
     (HEAD + "0,0,0\n1,1,\n", ":3: force: '' is not a finite number"),
     (HEAD + "0,0,0\n1,1,1\n1,2,1\n", ":4: time 1 s does not follow 1 s"),
     (HEAD + "0,5,0\n1,5,1\n", "displacement is the same in every row"),
-    (HEAD + "0,0,0\n1,5,0\n", "force is 0 in every row"), (HEAD + "0,0,0\n1,5,1\n", "2 rows that are not held out"),
+    (HEAD + "0,0,0\n1,5,0\n", "force is 0 in every row"), (HEAD + "0,0,0\n1,5,1\n", "2 rows are not held out"),
 ])  # fmt: skip
 def test_refuses_a_broken_loop_by_line(asked, text, says, tmp_path):
     (tmp_path / "loop.csv").write_text(text)

@@ -38,7 +38,7 @@ def ran(path: Path, out: Path, *words) -> list:
     for text in (answer.out, answer.err, texts_of(page)):
         assert [text[max(0, one.start() - 40):one.end() + 20] for one in UGLY.finditer(text)] == []
     found = [line.removeprefix("warning: ") for line in answer.err.splitlines() if line.startswith("warning: ")]
-    assert ("class='verdict warn'" in page) == bool(found)
+    assert ("<div class='verdict warn'>" in page) == bool(found)
     return found
 
 

@@ -125,7 +125,7 @@ def test_exact_a_vanishing_load(share, moment):
 
 @pytest.mark.parametrize("load", [1e-300, 5e-324, 1e-201])
 def test_refuses_a_load_without_digits(load):
-    with pytest.raises(PatchfemError, match=r"contact\.load: .* too small .* take 0"):
+    with pytest.raises(PatchfemError, match=r"contact\.load: .* too small .* give 0"):
         press(coated_pair(100), np.zeros(101), load)
 
 

@@ -180,7 +180,7 @@ def test_refuses_a_film_without_fields_of_one_frame_or_of_a_named_one(small, tmp
     assert answer.code == 4 and "only a run with [contact] writes one" in answer.err
     write_small(tmp_path / "still", 1)
     answer = cli("view", tmp_path / "still", "-o", tmp_path / "a.gif")
-    assert answer.code == 2 and "nothing moves" in answer.err and "-o FILE.png" in answer.err
+    assert answer.code == 2 and "no motion to show" in answer.err and "-o FILE.png" in answer.err
     answer = cli("view", small, "-o", tmp_path / "a.gif", "--frame", "1")
     assert answer.code == 2 and "--frame" in answer.err
     for more in (("--frame", "1"), ("--magnify", "2")):

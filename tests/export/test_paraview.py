@@ -128,7 +128,7 @@ def test_exact_a_script_shows_where_the_interface_sticks_and_slips(bench, tmp_pa
 
 def test_refuses_a_stress_that_is_none(bench, tmp_path):
     wrong = cli("export", bench, "-o", tmp_path / "play.py", "--of", "sigma")
-    assert wrong.code == 2 and "use one of von_mises, sigma_xx" in wrong.err
+    assert wrong.code == 2 and "the stresses are von_mises, sigma_xx" in wrong.err
     other = cli("export", bench, "-o", tmp_path / "a.csv", "--of", "tau_xy")
     assert other.code == 2 and "-o play.py" in other.err and not list(tmp_path.iterdir())
 
@@ -157,7 +157,7 @@ def test_refuses_a_script_without_its_fields_or_of_nothing_that_moves(bench, wri
         played(tmp_path / "alone.py", monkeypatch)
     write_small(tmp_path / "still", 1)
     answer = cli("export", tmp_path / "still", "-o", tmp_path / "a.py")
-    assert answer.code == 2 and "nothing moves" in answer.err
+    assert answer.code == 2 and "no motion to show" in answer.err
     answer = cli("export", bench, "-o", tmp_path / "a.py", "--frame", "1")
     assert answer.code == 2 and "--frame" in answer.err
     (tmp_path / "lumped").mkdir()

@@ -419,7 +419,7 @@ def test_refuses_a_run_that_the_memory_cannot_hold():
     from patchfem.core import Missing
 
     found = plan(scene(keys='load = "26 lbf"\nelement_size = "0.2 um"'))
-    assert any("run will refuse" in sentence for sentence in found.verdict)
+    assert any("`run` will refuse this scene" in sentence for sentence in found.verdict)
     with pytest.raises(Missing, match="GB are needed"):
         run(found)
 

@@ -80,4 +80,4 @@ def test_exact_a_rig_under_a_swinging_load(law):
 def test_refuses_heave_and_pitch_beside_a_point():
     message = only(POINT, "structure.mode.axial.normal=0.1")
     assert message.startswith("--set: structure.mode.axial.normal: ") and "use [contact] in place of" in message
-    assert "no exact solution exists beside normal.amplitude" in only(POINT, *SWING, "accuracy.method=exact")
+    assert "no exact solution exists with normal.amplitude" in only(POINT, *SWING, "accuracy.method=exact")

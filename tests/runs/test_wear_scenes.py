@@ -237,7 +237,7 @@ def test_refuses_what_wear_does_not_go_with():
     assert any("wear" in line for line in mistakes(TILTED + WEAR))
     free = POINT + COULOMB + MODE + '[drive]\nkind = "free"\ndisplacement = "1 mm"\ncycles = 5\n' + WEAR
     assert "steady motion" in only(free)
-    with pytest.raises(pf.PatchfemError, match=r"wear\.scheme: .*longer than the critical"):
+    with pytest.raises(pf.PatchfemError, match=r"wear\.scheme: .*longer than the stability limit"):
         ran(text + 'scheme = "explicit"\njumps = 2\n')
 
 

@@ -153,7 +153,7 @@ def test_exact_ledger_of_a_free_slide():
     (newmark, {"stick_speed": np.nan}, "accuracy.stick_speed"),
     (euler, {"steps_per_cycle": 2}, "steps_per_cycle"),
     (euler, {"duration": 1e12}, "drive.cycles"),
-    (euler, {"start": Start(np.zeros(2), np.zeros(2))}, "1 coordinates"),
+    (euler, {"start": Start(np.zeros(2), np.zeros(2))}, "1 displacements"),
     (euler, {"duration": np.nan}, "drive.cycles"),
     (duhamel, {"tolerance": np.inf}, "convergence_tolerance"),
     (newmark, {"start": Start(np.array([np.nan]), np.zeros(1))}, "finite"),

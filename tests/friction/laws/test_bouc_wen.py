@@ -146,5 +146,5 @@ def test_refuses_what_the_law_cannot_do():
     assert "friction.exponent" in only(scene, "friction.exponent=0")
     assert "friction.shape" in only(scene, "friction.shape=0") and "friction.shape" in only(scene, "friction.shape=1.1")
     assert "'bouc-wen' with [contact.shear]" in only(COATED + "[contact.shear]\n[friction]\n" + LAW + MODE + DRIVE)
-    assert "'bouc-wen' beside normal.amplitude" in mistakes(scene, "normal.amplitude=1 N", "normal.frequency=3 Hz")[0]
+    assert "'bouc-wen' with normal.amplitude" in mistakes(scene, "normal.amplitude=1 N", "normal.frequency=3 Hz")[0]
     assert loads(scene).friction.exponent == 2.0 and loads(scene.replace("exponent = 2.0\n", "")).friction.exponent == 1
