@@ -392,7 +392,8 @@ def _group(joint: Joint, patch) -> Group:
         return Group(rig.modes, [(k, models.element_model(interface.element_of(one, one.load, rig.speed)))
                                  for k, one in enumerate(rig.interfaces)])
     except PatchfemError:
-        raise PatchfemError(UNKNOWN) from None
+        benched = not rig.bends and len(rig.interfaces) < 2
+        raise PatchfemError(UNKNOWN + "; use --method quasi-static" * benched) from None
 
 
 def _steady(model: Model) -> Model:

@@ -139,11 +139,11 @@ def sentences(found: Backbone) -> list:
         ends = [_told(best, k) for k in sorted({0, best.amplitude.size - 1})]
         said = "; at ".join(f"{place}: {frequency}, damping ratio {damping}" for place, frequency, damping in ends)
         out.insert(0, f"Mode {found.mode} at {said}.")
-        k = int(np.argmax(best.damping))
-        inside = 0 < k < best.amplitude.size - 1
-        where = "Its damping ratio is largest" if inside else "Within these amplitudes its damping ratio is largest"
-        out.append(f"{where} at {scales.short(best.amplitude[k], 'm', 3)}: {best.damping[k]:.3g}, at "
-                   f"{scales.short(best.frequency[k], 'Hz', 5)}.")
+        if (count := best.amplitude.size) > 1:
+            k = int(np.argmax(best.damping))
+            out.append(f"Of these {count} amplitudes the damping ratio is largest at "
+                       f"{scales.short(best.amplitude[k], 'm', 3)}: {best.damping[k]:.3g}, at "
+                       f"{scales.short(best.frequency[k], 'Hz', 5)}.")
     theory = "" if found.expected is None else f" (theory: {found.expected:.3g})"
     powers = [f"to the power {value:.3g} {where}" for value, where in (
         (found.micro, f"in micro-slip{theory}"), (found.gross, "in gross slip (theory: 1)")) if value is not None]

@@ -379,6 +379,13 @@ def test_a_loop_that_remembers_is_read_when_it_has_settled():
     assert abs(found[0].values[name] / many[name] - 1) < 2e-3
 
 
+def test_bonds_without_a_closed_loop_name_the_method_that_works():
+    bonds = model('law = "nonlocal"\nreading = "stretch"\norder = 2\nbond_length = "1 um"')
+    (said,) = backbone(bonds, "", [3e-7], ("balance",)).missing.values()
+    assert said.endswith("; use --method quasi-static")
+    assert not backbone(bonds, "", [3e-7], ("quasi-static",)).missing
+
+
 def test_a_static_curve_ends_where_its_force_falls():
     """An interlock gives way at a quarter of its wave: 20 um of 80."""
     bonded = '[structure.bonded]\nstiffness = "4.6e6 N/m"\nwavelength = "80 um"\n[[structure.mode]]'
