@@ -902,6 +902,9 @@ def _differences(curves: dict) -> list:
             if share.size and share.max() > 0:
                 k = int(np.argmax(share))
                 lost = -np.expm1(-2 * np.pi * one.damping[k])
-                out.append(f"{what} by {way} and by balance differ most at {say(one.amplitude[k], 3)}, by "
-                           f"{100 * share[k]:.2g} %: {why.format(lost)}")
+                times = getattr(one, what)[k] / beside[k]
+                by = f"where that by {way} is {times:.2g} times as large" if times >= 2 else \
+                    f"by {100 * share[k]:.2g} %"
+                out.append(f"{what} by {way} and by balance differ most at {say(one.amplitude[k], 3)}, {by}: "
+                           f"{why.format(lost)}")
     return out

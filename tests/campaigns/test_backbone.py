@@ -24,6 +24,16 @@ def segalman(u):
     return force, 8 * scale * 2.7e-3 * (0.75 * r**2 - r**2.5 / 3.75) - 4 * u * force
 
 
+def test_exact_methods_that_differ_by_more_than_their_value_differ_by_a_factor():
+    """"by 9.6e+03 %" stood there for a damping ratio that was 97 times as large."""
+    a, f, z, none = np.array([1e-6, 1e-5]), np.array([100.0, 90.0]), np.array([1e-3, 2e-3]), np.zeros(2)
+    balance = backbone_module.Curve(a, f, none, z, none, none)
+    decay = balance._replace(frequency=f * [1, 1.5], damping=z * [97, 1])
+    frequency, damping = backbone_module._differences({"balance": balance, "decay": decay})
+    assert "frequency by decay and by balance differ most at 10 um, by 50 %: a decay" in frequency
+    assert "differ most at 1 um, where that by decay is 97 times as large: a decay" in damping
+
+
 def test_exact_the_static_curve_of_an_iwan_joint_is_segalmans():
     a = np.array([1e-5, 1e-4, 1e-3, 2.5e-3])
     found = backbone(model(IWAN), "", a, ("quasi-static",))
@@ -162,7 +172,7 @@ def test_amplitudes_stay_within_the_stop():
     found = backbone(stopped, methods=("decay", "quasi-static"))
     assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(0.2e-3 / 1.15)
     assert 1.5e-4 < found.curves["decay"].amplitude[-1] < 0.2e-3
-    with pytest.raises(pf.PatchfemError, match=r"structure\.travel: an amplitude of 300 um lies beyond it"):
+    with pytest.raises(pf.PatchfemError, match=r"structure\.travel: the amplitude 300 um lies beyond it"):
         backbone(stopped, "", [1e-4, 3e-4])
 
 

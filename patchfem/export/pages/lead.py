@@ -74,11 +74,12 @@ def lead_of(table: dict) -> Lead:
         return ", ".join(f"{one['name']} {shown[one['name']](case) if one['name'] in shown else one['texts'][case]}"
                          for one in keys if len(set(one["texts"])) > 1 or len(keys) == 1)
 
-    tops = peaks.found(keys, columns(table), trusted, table["grid"])
+    tops, edge = (find(keys, columns(table), trusted, table["grid"]) for find in (peaks.found, peaks.edge))
     return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
                 allowed.sentence(limits), span(columns(table), trusted, settled),
                 changes(keys, columns(table), outcome, table["grid"]), *ranked.told(table, trusted, settled.any()),
-                tops, peaks.sentence(tops), _left(outcome), least(keys, columns(table), trusted, shown))
+                tops, f"{peaks.sentence(tops)} {edge}".strip(), _left(outcome),
+                least(keys, columns(table), trusted, shown))
 
 
 def _left(outcome: np.ndarray) -> str:
@@ -121,8 +122,9 @@ def span(measures: dict, trusted: dict, settled: np.ndarray) -> str:
 
 def least(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
     """Where between other cases the motion is least, as over the load of a friction damper, and its peak frequency
-    there; "" where its least is at an end of the swept key, below the ends by less than 5 %, or where a case that does
-    not count may lie below it. Several keys count as one where all rise or fall with the first of them.
+    there, or from where on it is 0; "" where its least is at an end of the swept key, below the ends by less than 5 %,
+    or where a case that does not count may lie below it. Several keys count as one where all rise or fall with the
+    first of them.
 
     keys: as of `changes`; measures and trusted: as of `span`; shown: {name: `shown_of` the key}, of keys of numbers.
     """
@@ -139,6 +141,14 @@ def least(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
         return ""
     height = value[order]
     low = int(np.argmin(np.where(trusted[name][order], height, np.inf)))
+    still = height <= zero_below(name)
+    if still.any():  # from a case on to the last, or it is no least
+        low = int(np.argmax(still))
+        if low == 0 or not still[low:].all() or not trusted[name][order].all():
+            return ""
+        first = ", ".join(f"{one['name']} {shown[one['name']](int(order[low]))}" for one in swept)
+        last = " with ".join(shown[one["name"]](int(order[low - 1])) for one in swept)
+        return f"{label(name).capitalize()} is 0 from {first} on (not yet at {last})."
     known = trusted[name][order] | (height - error[order] > height[low] + error[order[low]])
     if min(height[0], height[-1]) < 1.05 * height[low] or not known.all():
         return ""

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...scales import plain, told
+from ...scales import plain, short, told
 from ..written import label
 from . import document
 from .changes import lines_of, shown_of
@@ -130,6 +130,25 @@ def sentence(peaks: list) -> str:
     """Where the peak is, or from where to where it moves; "" without one."""
     known, lost = ([one for one in peaks if np.isfinite(one.height[0]) == there] for there in (True, False))
     return " ".join(said for said in (_known(known), _lost(lost, bool(known))) if said)
+
+
+def edge(keys: list, measures: dict, trusted: dict, grid: bool) -> str:
+    """That the largest value of all cases stands at an end of the swept frequencies, so that it may be larger beyond;
+    "" where it does not. Arguments as of `allowed.allowed`."""
+    key = next((one for one in keys if one["name"] in KEYS and not one["words"]), None)
+    name = next((one for one in HEIGHTS if one in measures), None)
+    if key is None or name is None or (len(keys) > 1 and not grid):
+        return ""
+    height, frequency = _heights(name, measures, trusted)[0], np.asarray(key["values"], float)
+    if np.unique(frequency[np.isfinite(height)]).size < LEAST or not np.nanmax(height) > zero_below(name):
+        return ""
+    top = int(np.nanargmax(height))
+    if np.nanmin(height) > (1 - KNOWN) * height[top] or frequency[top] not in (frequency.min(), frequency.max()):
+        return ""
+    place = ", ".join(f"{one['name']} {one['texts'][top] if one['words'] else shown_of(one)(top)}" for one in keys
+                      if len(set(one["texts"])) > 1)
+    return (f"The largest {label(name)}, {short(height[top], measures[name][2], 4)}, lies at {place}, on the edge of "
+            "the swept frequencies; it may be larger beyond.")
 
 
 def _lost(peaks: list, others: bool) -> str:

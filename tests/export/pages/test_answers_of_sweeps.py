@@ -50,6 +50,21 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
     assert "not known" in peaks.table(found) and peaks.sentence(found[:1]).startswith("Where relative displacement am")
 
 
+def test_exact_a_largest_value_on_the_edge_of_the_swept_frequencies_is_told():
+    x, name = np.linspace(80, 120, 41), "relative_displacement_amplitude"
+    keys = [key("drive.frequency", np.tile(x, 2)),
+            key("drive.acceleration", np.repeat([1.0, 2.0], 41), ["1 g"] * 41 + ["2 g"] * 41)]
+
+    def edge(*centres):
+        both = np.concatenate([curve(x, centre, 0.02) for centre in centres])
+        return peaks.edge(keys, {name: (both, 0 * both, "m")}, {name: np.ones(82, bool)}, True)
+
+    assert edge(130, 121) == (
+        f"The largest relative displacement amplitude, {1e6 * curve(120, 121, 0.02):.4g} um, lies at drive.frequency "
+        "120 Hz, drive.acceleration 2 g, on the edge of the swept frequencies; it may be larger beyond.")
+    assert edge(100, 95) == ""
+
+
 def test_always_a_peak_at_an_end_is_none_and_a_side_that_stays_up_has_no_width():
     name, x = "relative_displacement_amplitude", np.linspace(80, 120, 41)
     for values in (x, -x + 200, np.where(x < 99, np.nan, curve(x, 98, 0.05))):

@@ -367,6 +367,13 @@ def test_exact_the_load_that_lets_a_blade_move_least():
     assert swept(np.array([9, 5, 1, 2, 3, 4, 4]) * 1e-6, known=0.1) == ""
 
 
+def test_exact_a_motion_that_is_0_from_a_case_on_says_from_where():
+    """"is least at friction.static 0.3051: 0" stood there, though all later cases had 0 too."""
+    assert swept(np.array([9, 5, 1, 0, 0, 0, 0]) * 1e-6) == \
+        "Relative displacement amplitude is 0 from normal.load 32 N on (not yet at 10 N)."
+    assert swept(np.array([9, 5, 0, 0, 1, 2, 3]) * 1e-6) == swept(np.zeros(7)) == swept(np.eye(7)[6]) == ""
+
+
 def test_always_a_browser_that_cannot_unpack_says_so(chromium, table):
     text = page(table)
     chromium.opened(text)
