@@ -679,7 +679,7 @@ def _decayed(joint: Joint, amplitudes) -> Curve:
         found = engine.run(what, how, joint.patch, 0, None, None)
     error += reading
     if not known.any():
-        raise NotConverged("the release did not decay through these amplitudes")
+        raise NotConverged("the release gave no frequency and damping at these amplitudes")
     return Curve(amplitudes, best[0], error[0], best[1], error[1], np.full(amplitudes.size, np.nan)).at(known)
 
 
@@ -855,7 +855,7 @@ def _unworn(model: Model) -> tuple:
 
 LEFT_OUT = {"balance": "not computed: the balance did not converge there; the curve may fold, or the mode dies out",
             "quasi-static": "the static curve ends there",
-            "decay": "the release, or one of its coarser check runs, did not oscillate there"}
+            "decay": "not computed: the release, or one of its coarser check runs, gave no frequency and damping there"}
 
 
 def _gaps(wanted, curves: dict) -> list:

@@ -147,7 +147,7 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: list) -> list:
         out.append(f"`run` will refuse this scene: {text}")
     out += [*said[1], *said[2]]
     if "slip_length" in groups:
-        about = f"by about {say(groups['slip_length'], 3)} before the patch slips"
+        about = f"by {say(groups['slip_length'], 3)} or more before the whole patch slips"
         out.append(f"the pieces shear elastically {about}" if model.patch.shear else
                    f"the pieces are rigid in shear in this scene; elastic pieces would shear {about}: add "
                    "[contact.shear] to include it")

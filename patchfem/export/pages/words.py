@@ -100,7 +100,7 @@ def verdict(summary: dict) -> str:
     """
     outcome, measures = Outcome(summary["outcome"]), summary["measures"]
     if summary["kind"] == "bench" and outcome is Outcome.DONE:
-        return _slid(measures.get("slip_amplitude"), outcome.sentence)
+        return _slid(measures.get("slip_amplitude"), outcome.sentence, "contact_fraction" in measures)
     if outcome is not Outcome.STUCK or not {"loop_area", "slip_amplitude"} & measures.keys():
         return outcome.sentence
     force, motion = (measures.get(name, {}).get("value") or 0.0 for name in
@@ -112,15 +112,22 @@ def verdict(summary: dict) -> str:
         name = max(found, key=lambda each: found[each]["value"], default="")
         if name and found[name]["value"] > max(_open(found[name]), least):
             return f"The interface as a whole sticks, but {part} ({form.format(pair(name, found[name]))})."
-    return "The interface sticks: no slip in the last cycles."
+    return _holds("contact_fraction" in measures, "cycles")
 
 
-def _slid(slip: dict | None, done: str) -> str:
+def _holds(patch: bool, cycles: str) -> str:
+    """The sentence where no slip is found. On a patch an edge where the pressure ends slips under any force: on a mesh
+    that does not show it, nothing is said of what lies within an element."""
+    return f"The interface sticks: no slip in the last {cycles}" + \
+        (" beyond the error of this mesh; a slip zone smaller than an element is not seen." if patch else ".")
+
+
+def _slid(slip: dict | None, done: str, patch: bool) -> str:
     """The sentence of a bench: its slip, the mean weighted by the pressure, where that is more than what is open."""
     if slip is None or slip["value"] is None:
         return done
     if slip["value"] <= max(_open(slip), NO_SLIP):
-        return f"{done} The interface sticks: no slip in the last cycle."
+        return f"{done} {_holds(patch, 'cycle')}"
     return f"{done} Slip amplitude {pair('slip_amplitude', slip)}, half peak-to-peak, averaged over the interface."
 
 
