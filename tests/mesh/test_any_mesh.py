@@ -205,7 +205,7 @@ SPOILT = {
     "foreign node": (lambda m: m.edges.__setitem__((np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])[0], 0),
                                                    interface_node(m)), "lower_far contains 1 nodes that belong to no "
                                                                        "cell"),
-    "doubled cell": (lambda m: m.quads.__setitem__(3, m.quads[4]), "overlap|has a hole|far holds"),
+    "doubled cell": (lambda m: m.quads.__setitem__(3, m.quads[4]), "overlap|has a hole|far contains"),
     "twisted": (lambda m: m.quads.__setitem__((5, [1, 2]), m.quads[5, [2, 1]]), "1 cells are twisted"),
     "no area": (lambda m: m.quads.__setitem__((5, 1), m.quads[5, 0]), "1 cells are twisted or have no area"),
     "not finite": (lambda m: move(m, 7, (np.nan, 0)), "not finite"),

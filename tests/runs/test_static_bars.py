@@ -161,7 +161,7 @@ def test_always_unlike_pieces_say_what_friction_would_change():
 
     (one,) = [text for text in notes(0.0) if "Dundurs" in text]
     assert "beta 0.5 at the interface" in one
-    assert float(one.split("normal_stiffness by ")[1].split(" %")[0]) > 0
+    assert float(one.split("normal_stiffness would be ")[1].split(" %")[0]) > 0
     assert not any("Dundurs" in text for text in pf.run(NARROW).extra["notes"])
 
 

@@ -145,7 +145,7 @@ def test_exact_the_other_theory_is_the_exponential_law():
     """The law that the note names has the stiffness that the note tells, in the middle of its range."""
     note = next(text for text in pf.plan(PATCH + RMS).verdict if "Persson" in text)
     decay = note.split('decay_length = "')[1].split('"')[0]
-    soft, stiff = (float(word) for word in note.split("lengths gives ")[1].split(" Pa/m")[0].split(" to "))
+    soft, stiff = (float(word) for word in note.split("lengths, gives ")[1].split(" Pa/m")[0].split(" to "))
     pressure = 26 * 4.4482216152605 / 12.7e-3**2
     assert (soft, stiff) == pytest.approx(persson_stiffness(pressure, 0.5e-6), rel=5e-3)
     other = PATCH.replace("hertz", "exponential") + f'decay_length = "{decay}"\n'
