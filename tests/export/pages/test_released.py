@@ -24,8 +24,8 @@ def test_exact_a_block_on_a_rubbing_spring_turns_where_the_closed_form_says(tmp_
     scene.write_text(re.sub(r"damping = \S+", "damping = 0", text), "utf-8")
     answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
     said = next(line for line in answer.out.splitlines() if line.startswith("Released at "))
-    found = re.match(r"Released at 500 um, the output swings to -(\S+) um first, turns (\d+) times and comes to rest "
-                     r"at (\S+) um after (\S+) ms; friction dissipates (\S+) (\S+) in all\.$", said)
+    found = re.match(r"Released at 500 um, the output first swings to -(\S+) um, reverses (\d+) times and comes to "
+                     r"rest at (\S+) um after (\S+) ms; friction dissipates (\S+) (\S+) in all\.$", said)
     assert found, said
     load, mass, static = (float(re.search(pattern, text)[1]) for pattern in
                           (r'load = "(\S+) N"', r'moving_mass = "(\S+) kg"', r"static = (\S+)"))
