@@ -96,7 +96,7 @@ def walk(text: str, sets: list) -> str:
 def walked(name: str, law: str, every: int = 1) -> None:
     """What check lets through of the effects and engines beside a law runs; every: the share of them that is tried."""
     text, at, effects, engines = RUNS[name]
-    needed = [f"law={law}", *(f"{key}={VALUES[key]}" for key in KEYS[law][0].split())]
+    needed = [f"law={law}", *(f"{key}={VALUES[key]}" for key in KEYS[law][0].replace("|stiffness", "").split())]
     cases = [(variant, effect, engine) for variant in ([], *VARIANTS.get(law, ()))
              for effect, engine in product(effects, engines)]
     first = (list(RUNS).index(name) + list(LAWS).index(law)) % every  # another share for each law and kind

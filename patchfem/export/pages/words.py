@@ -24,6 +24,7 @@ GROUPS = ("motion", "friction", "energy", "patch", "wear")
 NO_SLIP = 1e-15  # m, the last digits of a slide
 WHOLE_RUN = "over the whole run"
 LOOPS = "over the two cycles of the steady motion that are kept"
+OVER = {"harmonic": LOOPS}  # what energies are told over, by engine
 MARCHED = "over the cycles of the motion, not those of wear"
 OF_WHAT = {  # said behind a value that would otherwise be taken for another, or for more than it says
     "loop_area": "per cycle", "friction_work": WHOLE_RUN, "energy_dissipated": WHOLE_RUN, "energy_created": WHOLE_RUN,
@@ -261,7 +262,7 @@ def table_of(measures: dict, engine: str = "") -> list[str]:
     every, measures = measures, in_order(measures)
     width = max(map(len, measures), default=0)
     out, pressed = [], "contact_fraction" in measures
-    over = MARCHED if "worn_volume" in measures else LOOPS if engine == "harmonic" else WHOLE_RUN
+    over = MARCHED if "worn_volume" in measures else OVER.get(engine, WHOLE_RUN)
     for group in GROUPS:
         lines = [f"  {name:<{width}}  {_value(name, one, over)}{_records(name, every)}"
                  for name, one in measures.items() if group_of(name, pressed) == group]

@@ -18,6 +18,7 @@ from .engines import ENGINES, PIECES, steady_by
 from .numerics import choose
 
 OF_EVENTS = "exact", "piecewise"  # engines whose loop runs as Python where it is over soon
+RESAMPLED = *OF_EVENTS, "smooth"  # engines whose last cycles are kept at SAMPLES instants each, not at their steps
 SAMPLES = 400  # of a kept cycle, of `dynamics.events.histories` and `dynamics.smooth`
 CURVE = 160, 250  # points over a frequency, with those that its bends and its peak ask for: by a map, by a balance
 MARCHED = 400.0  # cycles of the marches until a motion repeats, of all steps
@@ -75,7 +76,7 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
 
 def kept_samples(numerics) -> float:
     """Samples of the last cycles that a run keeps."""
-    each = SAMPLES if numerics.engine in (*OF_EVENTS, "smooth") else numerics.steps
+    each = SAMPLES if numerics.engine in RESAMPLED else numerics.steps
     return float(max(2, numerics.window) * each)
 
 
@@ -224,7 +225,7 @@ def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:
 
 def _steady_point(model: Model, by: str) -> float:
     """Seconds of a point of a curve of steady motions that is found `by` the finder of that name."""
-    rig, (ringing, events) = model.rig, ringing_and_events(model)
+    rig = model.rig
     if by == "balance":
         size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.interfaces))
         return rates.BALANCED_POINT + rates.BALANCE * size**3
@@ -232,5 +233,6 @@ def _steady_point(model: Model, by: str) -> float:
         return MARCHED * steps_per_cycle(model) * rates.CLIMB
     if not rig.interfaces:
         return rates.CLOSED_POINT
+    ringing, events = ringing_and_events(model)
     return rates.MAPPED_POINT + rates.EVENT * events + ringing * (
         rates.RINGING_PIECE + rates.RINGING_MODES * len(rig.frequencies)**2)
