@@ -32,7 +32,7 @@ def test_exact_new_writes_what_it_prints(tmp_path):
         assert f"patchfem {verb} FILE" in " ".join(text_of(kind).replace("\n#", " ").split())
     path.write_text("mine", "utf-8")
     answer = cli("new", "rig", "-o", path)
-    assert answer.code == 2 and "is there already" in answer.err and path.read_text("utf-8") == "mine"
+    assert answer.code == 2 and "already exists" in answer.err and path.read_text("utf-8") == "mine"
 
 
 def test_exact_new_names_its_kinds():

@@ -113,7 +113,7 @@ def test_always_the_results_are_in_place_before_the_page(scene, tmp_path, monkey
         monkeypatch.setattr("command_line.io.StringIO", lambda: said)
         answer = cli("run", scene, "-o", out)
     assert seen == [(WHOLE, True)]
-    assert answer.code == code and text in answer.err and "are whole" in answer.err
+    assert answer.code == code and text in answer.err and "are complete except for" in answer.err
     assert set(kept()) == WHOLE and json.loads(kept()["summary.json"])["outcome"] == "done"
     with xr.open_dataset(out / "result.nc", engine="h5netcdf") as data:
         assert data.friction_force.size == data.time.size > 0

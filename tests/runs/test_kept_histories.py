@@ -152,7 +152,7 @@ def test_exact_how_runs_end():
         found = run(plan(loads(text)), estimate=False)
         assert found.outcome == outcome, (text, found.outcome)
         if found.outcome is Outcome.TRANSIENT and "sweep" in text:
-            assert any("changes to the end" in line for line in found.warnings)
+            assert any("changes until the end" in line for line in found.warnings)
             assert "relative_displacement_amplitude_steady" not in found.measures
 
 

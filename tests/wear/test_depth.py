@@ -106,7 +106,7 @@ def test_order_of_the_explicit_step_and_its_limit():
         pressure = force / area
         assert (np.ptp(pressure) < 1e-4 * pressure.mean()) == even
         assert (force.min() > 0) == even  # beyond the limit every second node lifts off
-    with pytest.raises(PatchfemError, match=r"critical .*leave wear\.scheme out"):
+    with pytest.raises(PatchfemError, match=r"longer than the stability limit .*leave wear\.scheme out"):
         refuse_explicit(1.05 * critical, critical)
     refuse_explicit(0.95 * critical, critical)
 

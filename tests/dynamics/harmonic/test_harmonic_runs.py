@@ -138,7 +138,7 @@ def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit
     """The threshold pi/4 of the notes: below it no motion balances, and the reason is named."""
     modes, law = sdof(0.0), Jenkins([20.0], [limit / 20.0])
     if not bounded:
-        with pytest.raises(NotConverged, match="undamped mode driven at its own frequency"):
+        with pytest.raises(NotConverged, match="undamped mode driven at its natural frequency"):
             point(modes, DRIVE, law)
         return
     p = point(modes, DRIVE, law, tolerance=1e-4)
