@@ -7,6 +7,7 @@ import os
 import re
 import shlex
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,15 @@ PAGES = ("README.md", "patchfem/CHANGES.md", "patchfem/scene/GUIDE.md", "patchfe
          "patchfem/scene/LIMITS.md", "patchfem/scene/MATERIALS.md", "patchfem/scene/MEASURES.md", "studies/README.md",
          "studies/drift/README.md", "studies/friction_ladder/README.md", "studies/report/README.md",
          "studies/report/conclusions.md", "studies/report/items.md", "studies/table_1/README.md", "tests/README.md")
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists() or shutil.which("git") is None, reason="no clone")
+def test_always_the_top_level_holds_what_it_should():
+    """No file that a program left there is committed."""
+    kept = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\n")
+    assert {name.partition("/")[0] for name in kept if name} == {
+        ".ci", ".gitignore", "CITATION.cff", "LICENSE", "README.md", "meshes", "patchfem", "pyproject.toml", "studies",
+        "tests"}
 
 
 def text(page: str) -> str:

@@ -160,8 +160,9 @@ def by_nlvib(folder: Path, harmonics: int, samples: int) -> float:
         raise Missing(f"install Octave, clone github.com/maltekrack/NLvib and name its folder SRC in {NLVIB} (now "
                       f"'{source}')")
     child = Path(__file__).parent / "nlvib_child.m"
-    found = subprocess.run([octave, "--no-gui", "--quiet", str(child), source, str(folder / "rig.mat"),
-                            str(harmonics), str(samples)], capture_output=True, text=True)
+    words = child, Path(source).resolve(), folder / "rig.mat", harmonics, samples
+    found = subprocess.run([octave, "--no-gui", "--quiet", *map(str, words)], capture_output=True, text=True,
+                           cwd=folder)  # where Octave leaves its workspace if it is killed
     if found.returncode or not found.stdout.strip().startswith("{"):
         raise NotConverged(f"NLvib: {found.stderr[-300:]}")
     return json.loads(found.stdout)["amplitude"]
