@@ -1,6 +1,7 @@
 """A table of measured responses: frequency, input, acceleration, displacement and a flag per row."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from ..faults import PatchfemError
@@ -55,3 +56,13 @@ def _row(path, number: int, cells: dict, factors: dict) -> Row:
     if values["frequency"] is None or values["input"] is None:
         raise PatchfemError(f"{path}:{number}: frequency and input are needed in every row")
     return Row(**values, flag=flag)
+
+
+@lru_cache(64)
+def reads(path: Path) -> bool:
+    """Whether there is a table of measured responses at the path; asked once, since many models name the same one."""
+    try:
+        read_table(path)
+    except PatchfemError:
+        return False
+    return True

@@ -11,6 +11,9 @@ from weakref import finalize
 
 import numpy as np
 
+from ...inputs import measured
+from ...model.model import Model
+
 MANY = 50_000  # cases from which on columns may lie on disk: those of a rig are 25 kB a thousand cases and measure
 FAILED = "failed"  # outcome of a case that was refused or that did not come to an end
 
@@ -152,3 +155,9 @@ def joined_answers(count: int, parts: Iterable[tuple[Sequence[int], Answers]]) -
     for cases, part in parts:
         out.place(cases, part)
     return out
+
+
+def unread(model: Model) -> bool:
+    """Whether a model names a table of measured responses that cannot be read, which its own run then tells; one that
+    can be changes no answer."""
+    return model.measured is not None and not measured.reads(model.measured[0])

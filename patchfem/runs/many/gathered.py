@@ -39,7 +39,7 @@ from ..rig.lists import quadrature_of
 from ..rig.numerics import choose
 from ..rig.remarks import law_warnings
 from . import one_by_one, patches
-from .answers import Answers
+from .answers import Answers, unread
 from .lumped.columns import MAIN, Runs, batch_answers, known_of
 from .lumped.lumped import take_out
 from .samples import Samples, peaks
@@ -97,8 +97,8 @@ def no_lanes(model: Model) -> str:
         return "it has too few or broken cycles"
     if law.grows or law.order != 1 or law.initial != 1 or law.breakaway or law.ratio != 1 or not law.static > 0:
         return "its bonds change in number or length"
-    if model.measured is not None or model.heat is not None or model.accuracy.shear_modes is not None:
-        return "it is held against a measurement, warms, or names its modes"
+    if model.heat is not None or model.accuracy.shear_modes is not None or unread(model):
+        return "it warms, names its modes, or its table of measured responses cannot be read"
     return "" if lanes.fits(rig.modes) else "its modes are too many"
 
 

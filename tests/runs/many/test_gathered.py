@@ -56,6 +56,17 @@ def test_always_few_points_are_within_the_bars_of_all():
     assert count > 60 and outside == 0 and wide <= 0.03 * count
 
 
+def test_a_table_of_measured_responses_keeps_no_batch_away_unless_it_cannot_be_read(tmp_path):
+    table = tmp_path / "rows.csv"
+    table.write_text("frequency [Hz],input [g],displacement [mil],flag\n143,5,0.4,\n")
+    beside = pf.build(SCENE + f'[measured]\nfile = "{table}"\n')
+    assert gathered.no_lanes(beside) == ""
+    lost = replace(beside, measured=(tmp_path / "none.csv", *beside.measured[1:]))
+    assert "cannot be read" in gathered.no_lanes(lost)
+    found = many.answers([lost], study=32)
+    assert "none.csv" in found.messages[0]
+
+
 @pytest.mark.slow
 def test_always_few_points_are_within_the_bars_of_all_many():
     count, wide, outside = held(2, 60)

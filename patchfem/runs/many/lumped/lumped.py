@@ -9,7 +9,7 @@ from ....core import BaseSine
 from ....model.model import Model
 from ...rig.engines import engine_of
 from .. import one_by_one
-from ..answers import Answers
+from ..answers import Answers, unread
 from . import pieces
 from .columns import batch_answers
 
@@ -24,8 +24,8 @@ def refuses(model: Model) -> str:
 def not_one_point(model: Model) -> str:
     """Why a model is not one mode under one sine behind a point under a constant load; "" where it is."""
     rig = model.rig
-    if model.kind != "rig" or model.patch is not None or model.wear is not None or model.measured is not None:
-        return "it is not one lumped contact"
+    if model.kind != "rig" or model.patch is not None or model.wear is not None or unread(model):
+        return "it is not one lumped contact, or its table of measured responses cannot be read"
     if model.heat is not None or rig.load_varies or rig.names or rig.bends or len(rig.interfaces) != 1 \
             or not model.point.load > 0:
         return "its interface is not one point under a constant load"

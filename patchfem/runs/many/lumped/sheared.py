@@ -25,7 +25,7 @@ from ...rig.engines import PIECES, engine_of
 from ...rig.numerics import choose
 from ...rig.pieces import YieldingElements
 from .. import one_by_one, patches
-from ..answers import Answers
+from ..answers import Answers, unread
 from . import pieces
 from .columns import batch_answers, known_of
 from .lumped import not_one_sine, take_out
@@ -49,8 +49,8 @@ def refuses(model: Model) -> str:
     """Why the batch does not take a model; "" where it does."""
     if model.patch is None or not model.soft or model.patch.strips is not None or model.grooves is not None:
         return "it is not a patch that slips part by part"
-    if model.wear is not None or model.measured is not None or model.heat is not None:
-        return "it wears, warms or is held against a measurement"
+    if model.wear is not None or model.heat is not None or unread(model):
+        return "it wears, warms, or its table of measured responses cannot be read"
     if why := not_one_sine(model.rig):
         return why
     if model.friction.law != "elastic-plastic" and (not has(model.friction.law, "set-valued")
