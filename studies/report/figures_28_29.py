@@ -1,4 +1,4 @@
-"""Does a rig that climbs its grooves move as in Figs 28 and 29: distorted at 5 g, and at 8 g both stable and unstable?
+"""Does a rig whose surfaces ride up grooves move as in Figs 28 and 29: distorted at 5 g, at 8 g stable or unstable?
 
 In part: at 143 Hz it stays at 0.83 mil at 7.9 g and runs away at 8.0 g after 9 cycles, and 2 % more friction keeps it
 at 0.82 mil at 8 g; the rig was unstable at 8 g, and later stable. Peaks at 135 Hz and 5 g are 6.9 g and 0.39 mil for
