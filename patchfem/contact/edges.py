@@ -39,6 +39,16 @@ def behind(aspect: float) -> float:
     return float(np.interp(aspect, ASPECT, BEHIND))
 
 
+def set_back(inner, outer, share, row: float | None = None):
+    """Lengths [m], a number or an array, by which edges lie behind where `End.share` puts them.
+
+    inner, outer [m]: lengths of the last cell in contact and of the one beyond it. As the edge passes from the one to
+    the other it takes over the other's length, so that it does not jump where cells of two lengths meet.
+    """
+    cell = (1 - share) * inner + share * outer
+    return np.interp(1.0 if row is None else row / cell, ASPECT, BEHIND) * cell
+
+
 def ends(normal, x, force, gap, softness=None, row: float | None = None) -> list:
     """Ends inside the interface of a contact set, as a list of End by rising x.
 
@@ -63,8 +73,7 @@ def ends(normal, x, force, gap, softness=None, row: float | None = None) -> list
             share = leave / (leave + enter) if leave + enter > 0 else 0.5
         stiff = 1.0 if softness is None else 1 - softness[node] / normal[node, node]
         inner = node - side if 0 <= node - side < x.size else after
-        cell = abs(x[node] - x[inner])
-        off = stiff * behind(1.0 if row is None else row / cell) * cell
+        off = stiff * set_back(abs(x[node] - x[inner]), abs(x[after] - x[node]), share, row)
         place = x[node] + share * (x[after] - x[node]) - side * off
         out.append(End(int(node), side, float(share), float(place)))
     return out

@@ -10,19 +10,23 @@ import numpy as np
 
 PARTS = 4  # of an element, and of each halving of the first one
 OCTAVES = 8  # of the first element: slides down to a 256th of it are told
+TOGETHER = 1e-6  # of a yield slide, within which nodes at both ends of a contact count as one
 
 
 def spread(stiffness, yield_slide) -> tuple:
     """(stiffness [N/m], yield slide [m]) of parallel elements (t,) spread evenly over the ranges about their own.
 
     yield_slide: increasing. The sum of the stiffnesses and the friction limit stay. One element alone stays as it is.
+    A range is as wide as the gap to the farther neighbour: the nearer may be at the other end of the contact.
     """
     k, y = np.asarray(stiffness, float), np.asarray(yield_slide, float)
+    starts = np.flatnonzero(np.diff(y, prepend=-np.inf) > TOGETHER * y)
+    k, y = (total := np.add.reduceat(k, starts)), np.add.reduceat(k * y, starts) / total
     if y.size < 2:
         return k, y
-    width = np.empty(y.size)
-    width[1:-1] = (y[2:] - y[:-2]) / 2
-    width[-1] = y[-1] - y[-2]
+    gap, width = np.diff(y), np.empty(y.size)
+    width[1:-1] = np.maximum(gap[1:], gap[:-1])
+    width[-1] = gap[-1]
     width[0] = 2 * min(y[0], y[min(2, y.size - 1)] - y[0])  # the second may be at the other end of the contact
     width = np.minimum(width, 2 * y)
     even = (np.arange(PARTS) + 0.5) / PARTS - 0.5

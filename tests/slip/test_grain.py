@@ -38,9 +38,20 @@ def test_order_small_slides_lose_by_their_third_power(amplitude):
 
 def test_exact_large_slides_lose_as_before_but_for_the_widths():
     """An element whose range w lies below the slide loses k w^2/3 less."""
-    wide = np.array([4e-8, 4.5e-8, 3e-8, 2e-8])
+    wide = np.array([4e-8, 5e-8, 4e-8, 2e-8])
     gone = work(*ELEMENTS, 1e-6) - work(*spread(*ELEMENTS), 1e-6)
     assert gone == pytest.approx(float(ELEMENTS[0] @ wide**2) / 3, rel=0.07)  # four parts have 15/16 of it
+
+
+def test_exact_mirrored_nodes_that_round_off_parts_have_the_grain_of_one():
+    """Nodes of a symmetric contact yield in twos, which solvers part by 1e-10 and a small tilt by more: the ranges
+    were then half as wide, and the bar a quarter. Parted by a tilt they now keep three fifths of it."""
+    k, y = np.array([1e6, 2e6, 3e6, 4e6, 5e6]), np.array([2e-8, 5e-8, 9e-8, 14e-8, 16e-8])
+    slides = 1e-8, 6e-8, 2e-7
+    whole = [work(*spread(k, y), at) - work(k, y, at) for at in slides]
+    for apart, within in ((1e-10, 1e-6), (1e-4, 0.4)):  # the middle node stands alone
+        two = np.append(np.repeat(k[:-1] / 2, 2), k[-1]), np.append((y[:-1, None] * [1.0, 1.0 + apart]).ravel(), y[-1])
+        assert [work(*spread(*two), at) - work(*two, at) for at in slides] == pytest.approx(whole, rel=within)
 
 
 def test_exact_what_yields_together_stays_together():

@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import compiled
 from ..active_set import ROUND, factor
-from ..edges import ASPECT, BEHIND, parabola
+from ..edges import parabola, set_back
 from . import arrays
 
 kernels = compiled.load("contact.many.interval_kernels")
@@ -117,8 +117,9 @@ class Intervals:
         x, m, out = self.x, self.x.size, []
         for node, side, share in zip((found.first, found.stop - 1), (-1, 1), found.shares.T):
             after, inner = np.clip([node + side, node - side], 0, m - 1)
-            cell = np.abs(x[node] - x[np.where(inner == node, after, inner)])
-            off = (1 - softness[node] / self.c.diagonal()[node]) * np.interp(row / cell, ASPECT, BEHIND) * cell
+            cells = [np.abs(x[node] - x[np.where(one == node, other, one)]) for one, other in
+                     ((inner, after), (after, inner))]
+            off = (1 - softness[node] / self.c.diagonal()[node]) * set_back(*cells, share, row)
             out.append(np.where(after == node, x[node], x[node] + share * (x[after] - x[node]) - side * off))
         return np.clip(out, x[0], x[-1])
 
