@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from array import array
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, get_origin
@@ -23,14 +24,32 @@ _TEN = 10  # ratio of the ends from which a range of positive numbers is logarit
 _ENDS = {"]": "[", "}": "{"}
 
 
+class Written(Sequence):
+    """Numbers as a scene would hold them, each written when it is asked for: texts of a million cases would fill the
+    memory. numbers: float64 in this unit, "" of plain numbers."""
+
+    __slots__ = "numbers", "unit"
+
+    def __init__(self, numbers: array, unit: str):
+        self.numbers, self.unit = numbers, unit
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def __getitem__(self, place: int | slice) -> str | list[str]:
+        if isinstance(place, slice):
+            return [_written(number, self.unit) for number in self.numbers[place]]
+        return _written(self.numbers[place], self.unit)
+
+
 @dataclass(frozen=True, slots=True)
 class Axis:
     """A key with its values: texts as a scene would hold them; values: floats in SI, or the texts where these are no
     numbers; unit: that of the values in SI, "1" for plain numbers, "" for texts."""
 
     key: str
-    texts: tuple
-    values: tuple
+    texts: Sequence[str]
+    values: Sequence[float | str]
     unit: str
 
     @property
@@ -52,8 +71,9 @@ class Span:
 
     def axis(self, shares: Iterable[float]) -> Axis:
         """The values at shares of the way from low to high, each in [0, 1]."""
-        return values_of(self.key, [_written(_between(self.low, self.high, share, self.log), self.unit)
-                                    for share in shares], False)
+        texts = Written(array("d", (_between(self.low, self.high, share, self.log) for share in shares)), self.unit)
+        read = _reading(self.key)
+        return Axis(self.key, texts, array("d", map(read, texts)), _unit_of(self.key))
 
 
 def read(texts: Iterable[str], sampled: bool = False) -> tuple[list[Axis | Span], list[str]]:
@@ -139,11 +159,14 @@ def values_of(key: str, texts: Iterable[str], distinct: bool = True) -> Axis:
         wrong.append(f"{twice} is given twice")
     if wrong:
         raise ValueError("\n".join(wrong))
-    model, name = owner_of(key)
     if not all(isinstance(value, float) for value in values):
         return Axis(key, texts, texts, "")
-    kind = kind_of(model, name)
-    return Axis(key, texts, tuple(values), next(iter(quantities.KINDS[kind])) if kind else "1")
+    return Axis(key, texts, tuple(values), _unit_of(key))
+
+
+def _unit_of(key: str) -> str:
+    kind = kind_of(*owner_of(key))
+    return next(iter(quantities.KINDS[kind])) if kind else "1"
 
 
 def of_table(table: Any) -> tuple[list[Axis | Span], list[tuple[str, str]]]:

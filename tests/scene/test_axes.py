@@ -7,6 +7,7 @@ from scene_texts import BENCH, line_of, mistakes
 import patchfem as pf
 from patchfem.core import PatchfemError
 from patchfem.scene.axes import Span, read
+from patchfem.scene.keys.quantities import parse
 from patchfem.scene.scene import loads
 from patchfem.scene.sets import texts
 
@@ -88,6 +89,15 @@ def test_refuses_all_at_once():
     _, wrong = read(["contact.load=5 lb,3", "friction.static=a", "contact.pairs=1", "contact.pairs=2"])
     assert [line.partition(":")[0] for line in wrong] == ["contact.load", "contact.load", "friction.static",
                                                           "contact.pairs"]
+
+
+def test_exact_a_draw_holds_16_bytes_a_value_and_reads_what_it_writes():
+    span = axis("contact.length=1 mm..9 mm", sampled=True)
+    drawn = span.axis(np.linspace(0, 1, 1001))
+    assert drawn.texts[0] == "1 mm" and drawn.texts[-1] == "9 mm" and len(drawn.texts) == 1001
+    assert drawn.texts[1:3] == [drawn.texts[1], drawn.texts[2]] == ["1.008 mm", "1.016 mm"]
+    assert list(drawn.values) == [parse(text, "length") for text in drawn.texts]
+    assert drawn.texts.numbers.itemsize + drawn.values.itemsize == 16
 
 
 def test_exact_drawn_values_lie_between_the_ends():

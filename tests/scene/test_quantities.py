@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -54,6 +55,13 @@ def test_exact_pound_force_per_inch_and_its_relatives():
     assert parse("1 ksi", "pressure") == float(1000 * pound * gravity / inch**2)
     assert parse("1 Msi", "pressure") == float(10**6 * pound * gravity / inch**2)
     assert parse("1 lb/in^3", "density") == float(pound / inch**3)
+
+
+@pytest.mark.parametrize("unit", KINDS["length"])
+def test_exact_drawn_numbers_are_rounded_once(unit):
+    for number in np.random.default_rng(7).lognormal(0, 20, 300).tolist():
+        exact = Fraction(repr(number)) * Fraction(repr(KINDS["length"][unit]))
+        assert parse(f"{number!r} {unit}", "length") == float(exact)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
 
 from ...scene.axes import Axis, read
+from ...scene.keys.quantities import NUMBER
 from ...scene.lines import pieces_of
 from ...scene.scene import SceneError, text_of
 from . import samples, table
@@ -104,6 +106,7 @@ def _refuse_all(asked: Asked, cases: Cases) -> None:
         mistakes = asked.mistakes(cases.sets(number))
         if not mistakes:
             return
-        found |= dict.fromkeys(mistakes)
-    lines = list(found)
+        for one in mistakes:  # drawn values differ, and what is wrong with them does not
+            found.setdefault(re.sub(NUMBER, "", one) if cases.drawn else one, one)
+    lines = list(found.values())
     raise SceneError(lines[:SHOWN] + ([f"and {len(lines) - SHOWN} more"] if len(lines) > SHOWN else []))

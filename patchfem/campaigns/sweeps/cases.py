@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from hashlib import sha256
 from math import isfinite, prod
 
@@ -64,7 +65,7 @@ class Cases:
         if not all(isinstance(axis.values[0], float) for axis in self.axes):
             return None
         places = [numbers] * len(self.axes) if self.rows else np.unravel_index(numbers, self.shape)
-        return np.array([[axis.values[place] for place in np.asarray(some).tolist()]
+        return np.array([np.array([axis.values[place] for place in np.asarray(some).tolist()])
                          for axis, some in zip(self.axes, places)]).T
 
     def spread(self, most: int) -> list[int]:
@@ -106,13 +107,13 @@ class Cases:
         in other units or another order have the same name, and also as part of another sweep of the same scene, unless
         all cases of a sweep share a mesh that is chosen for them.
         """
-        axes = sorted(self.axes, key=lambda axis: json.dumps(axis.key))  # of all cases alike
-        marks = [_marks(axis, asked) for axis in axes]
-        at = [self.axes.index(axis) for axis in axes]
+        order = sorted(range(len(self.axes)), key=lambda k: json.dumps(self.axes[k].key))  # of all cases alike
+        keys = [json.dumps(axis.key) for axis in self.axes]
+        mark = lru_cache(0 if self.drawn else None)(lambda k, place: _mark(keys[k], self.axes[k].values[place], asked))
 
         def signs(shared: str, of: Sequence[int]) -> np.ndarray:
             placed = (self.places(number) for number in of)
-            own = ("\n".join([shared, *(mark[places[k]] for mark, k in zip(marks, at))]) for places in placed)
+            own = ("\n".join([shared, *(mark(k, places[k]) for k in order)]) for places in placed)
             return np.fromiter((int(sha256(one.encode()).hexdigest()[:16], 16) for one in own), np.uint64, len(of))
 
         shared = asked.digest()
@@ -121,16 +122,17 @@ class Cases:
         return signs(shared, range(len(self)) if numbers is None else numbers)
 
 
-def _marks(axis: Axis, asked: Asked) -> list[str]:
-    """JSON of the key, each of its values, and the sign of the file that such a value names."""
-    key = json.dumps(axis.key)
-    return [f'[{key}, {value!r}, ""]' if isinstance(value, float) and isfinite(value) else
-            json.dumps([axis.key, value, asked.content(value) if isinstance(value, str) else ""])
-            for value in axis.values]
+def _mark(key: str, value: float | str, asked: Asked) -> str:
+    """JSON of a key, which is JSON itself, a value of it, and the sign of the file that this names."""
+    if isinstance(value, float) and isfinite(value):
+        return f'[{key}, {value!r}, ""]'
+    return f"[{key}, {json.dumps(value)}, {json.dumps(asked.content(value) if isinstance(value, str) else '')}]"
 
 
 def product(parts: Sequence[Cases]) -> Cases:
     """All combinations of the cases of the parts, the last part fastest; rows where one of the parts has rows."""
+    if len(parts) == 1:
+        return parts[0]
     if not any(part.rows for part in parts):
         return Cases(tuple(axis for part in parts for axis in part.axes))
     count, axes, inner = prod(map(len, parts)), [], prod(map(len, parts))

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...core import PatchfemError
 from ...runs.many.many import batch_compile_seconds, batch_of
 from ...runs.plan import plan
+from ...scene.axes import Axis
 from .asked import Asked
 from .cases import Cases
 
@@ -45,5 +48,9 @@ def estimate(asked: Asked, cases: Cases) -> dict:
         "bytes": max(one.bytes for one in plans), "cases": len(cases),
         "case": {axis.key: text for axis, text in zip(cases.axes, cases.texts(numbers[0]))},
         "disk_bytes": (DISK if len(cases) <= FEW else COLUMNS if len(cases) <= TABLED else BARE) * len(cases),
-        "values": {axis.key: len(set(axis.texts)) for axis in cases.axes}}
+        "values": {axis.key: _values(axis) for axis in cases.axes}}
 
+
+def _values(axis: Axis) -> int:
+    """How many values a key has; those of numbers are counted without their texts."""
+    return np.unique(axis.values).size if axis.unit else len(set(axis.texts))

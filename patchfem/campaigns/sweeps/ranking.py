@@ -40,7 +40,7 @@ def ranking(keys: Sequence[tuple], measures: dict, shape: tuple | None) -> dict:
     of values of the keys where the cases are all their combinations, the last key fastest, None for drawn ones. A
     measure that a tenth of the cases lacks is left out: those that have it are no fair draw.
     """
-    moving = [(name, np.asarray(values)) for name, values in keys if len(set(np.asarray(values).tolist())) > 1]
+    moving = [(name, np.asarray(values)) for name, values in keys if np.unique(values).size > 1]
     changing = {name: np.asarray(values, float) for name, (values, errors) in measures.items()
                 if _changes(np.asarray(values, float), np.asarray(errors, float))}
     if len(moving) < 2 or not changing:

@@ -62,6 +62,12 @@ def changes(keys: list, measures: dict, outcome: Sequence, grid: bool = True) ->
     return ""
 
 
+def varies(key: dict) -> bool:
+    """Whether a key has more than one value."""
+    texts = key["texts"]
+    return any(text != texts[0] for text in texts)
+
+
 def shown_of(key: dict) -> Callable[[int], str]:
     """A function from a case to the value that a key has in it, as people read it."""
     values = np.asarray(key["values"], float)

@@ -11,7 +11,7 @@ from ...scales import plain, short
 from .. import missed
 from ..written import NUMBER, label
 from . import allowed, peaks, ranked
-from .changes import changes, shown_of
+from .changes import changes, shown_of, varies
 from .words import zero_below
 
 EXACT = 1e-6  # of a value, up to which no error is told: the values are shown to four digits
@@ -72,7 +72,7 @@ def lead_of(table: dict) -> Lead:
 
     def where(case: int) -> str:
         return ", ".join(f"{one['name']} {shown[one['name']](case) if one['name'] in shown else one['texts'][case]}"
-                         for one in keys if len(set(one["texts"])) > 1 or len(keys) == 1)
+                         for one in keys if varies(one) or len(keys) == 1)
 
     tops, edge = (find(keys, columns(table), trusted, table["grid"]) for find in (peaks.found, peaks.edge))
     return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
@@ -128,7 +128,7 @@ def least(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
 
     keys: as of `changes`; measures and trusted: as of `span`; shown: {name: `shown_of` the key}, of keys of numbers.
     """
-    swept, name = [one for one in keys if len(set(one["texts"])) > 1], FIRST[0]
+    swept, name = [one for one in keys if varies(one)], FIRST[0]
     if not swept or name not in measures or not all(one["name"] in shown and one["name"] not in peaks.KEYS
                                                     for one in swept):
         return ""

@@ -8,7 +8,7 @@ import numpy as np
 from ...scales import plain, short, told
 from ..written import label
 from . import document
-from .changes import lines_of, shown_of
+from .changes import lines_of, shown_of, varies
 from .words import linked, zero_below
 
 KEYS = ("drive.frequency",)
@@ -39,7 +39,7 @@ def found(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
     name = next((one for one in HEIGHTS if one in measures), None)
     if key is None or name is None or (len(keys) > 1 and not grid):
         return []
-    others = [one for one in keys if one is not key and len(set(one["texts"])) > 1]
+    others = [one for one in keys if one is not key and varies(one)]
     shown = {one["name"]: str if one["words"] else shown_of(one) for one in others}
     out, (height, error) = [], _heights(name, measures, trusted)
     for line in lines_of(key, others):
@@ -146,7 +146,7 @@ def edge(keys: list, measures: dict, trusted: dict, grid: bool) -> str:
     if np.nanmin(height) > (1 - KNOWN) * height[top] or frequency[top] not in (frequency.min(), frequency.max()):
         return ""
     place = ", ".join(f"{one['name']} {one['texts'][top] if one['words'] else shown_of(one)(top)}" for one in keys
-                      if len(set(one["texts"])) > 1)
+                      if varies(one))
     return (f"The largest {label(name)}, {short(height[top], measures[name][2], 4)}, lies at {place}, on the edge of "
             "the swept frequencies; it may be larger beyond.")
 

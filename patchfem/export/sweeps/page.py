@@ -8,6 +8,7 @@ import os
 import re
 import shlex
 import tomllib
+from array import array
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +52,8 @@ def columns_of(cases: Cases) -> list:
     """The swept keys, each with its values in SI and as written in every case."""
     every = np.arange(len(cases))
     places = [every] * len(cases.axes) if cases.rows else np.unravel_index(every, cases.shape)
-    return [{"name": axis.key, "unit": axis.unit or "1", "texts": [axis.texts[k] for k in place],
+    return [{"name": axis.key, "unit": axis.unit or "1",
+             "texts": axis.texts if cases.rows else [axis.texts[k] for k in place],
              "values": numbers(axis.values)[place], "log": wide(axis.values)}
             for axis, place in zip(cases.axes, places)]
 
@@ -75,7 +77,7 @@ def opened(folder: Path, key: str) -> str:
 
 def numbers(values) -> np.ndarray:
     """Values along an axis: numbers as they are, words numbered in the order they come."""
-    if all(isinstance(one, int | float) for one in values):
+    if isinstance(values, array) or all(isinstance(one, int | float) for one in values):
         return np.asarray(values, float)
     order = {one: place for place, one in enumerate(dict.fromkeys(values))}
     return np.array([order[one] for one in values], float)
@@ -87,11 +89,13 @@ def wide(values) -> bool:
     A zero has no place on such an axis: the page tells that case in words. Where the second value above it is twice the
     first or less, as in 0, 1, 2, .. 10, the axis is linear.
     """
-    if not all(isinstance(one, int | float) and one >= 0 for one in values):
+    if not isinstance(values, array) and not all(isinstance(one, int | float) for one in values):
         return False
-    above = sorted({one for one in values if one > 0})
-    steps = min(values, default=0) == 0 and len(above) > 1 and above[1] <= 2 * above[0]
-    return not steps and bool(above) and above[-1] >= 10 * above[0]
+    all_of = np.unique(np.asarray(values, float))
+    above = all_of[all_of > 0]
+    if not above.size or all_of[0] < 0 or (all_of[0] == 0 and above.size > 1 and above[1] <= 2 * above[0]):
+        return False
+    return bool(above[-1] >= 10 * above[0])
 
 
 def command(asked: Asked, cases: Cases) -> str:

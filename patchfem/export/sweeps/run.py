@@ -19,6 +19,7 @@ from ...campaigns.sweeps.executors.cluster import own_of
 from ...campaigns.sweeps.sweep import Clock, Work, solved
 from ...core import Missing, PatchfemError
 from ...runs.many.answers import Answers
+from ...scene.axes import Axis, Written
 from .. import netcdf
 from ..pages.lead import lead_of
 from .answer import answer_of, read_answer, write_answer
@@ -150,9 +151,15 @@ def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> Answ
 
 def sign_of(asked: Asked, cases: Cases, folder: Folder, page: bool) -> str:
     """Sign of all that the tables of a whole sweep are made of: where it is that of sweep.json, they are there."""
-    made = [own_of()["patchfem"], asked.text, [(axis.key, axis.texts) for axis in cases.axes], command(asked, cases),
+    made = [own_of()["patchfem"], asked.text, [(axis.key, *_shown(axis)) for axis in cases.axes], command(asked, cases),
             page, [opened(folder.target, key) for key in folder.keys()]]
     return sha256(json.dumps(made).encode() + folder.chunks.names.tobytes()).hexdigest()
+
+
+def _shown(axis: Axis) -> tuple:
+    """What of an axis stands in the tables: its texts, or the sign of the numbers that these are written from."""
+    texts = axis.texts
+    return (texts.unit, sha256(texts.numbers).hexdigest()) if isinstance(texts, Written) else (texts,)
 
 
 def _written(sign: str, folder: Folder, page: bool) -> bool:

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import re
-from fractions import Fraction
+from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal
+from functools import cache, lru_cache
 
 _POUND_FORCE = 4.4482216152605
 
@@ -64,6 +65,7 @@ _BARE = re.compile(NUMBER)
 _GLUED = re.compile(rf"({NUMBER})([^\s0-9.,#+±-].*)")
 _COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
 _LONGEST = 100
+_EXACT = Context(prec=2 * _LONGEST, Emax=MAX_EMAX, Emin=MIN_EMIN)  # of a product of all digits that a value has
 
 
 def parse(text: object, kind: str) -> float:
@@ -103,7 +105,7 @@ def _value(number: str, factor: float, words: str, kind: str) -> float:
         return 0.0
     if math.isinf(rough) or math.isinf(rough * factor):
         raise ValueError(f"'{words}' is too large for a finite number; {wanted(kind)}")
-    value = float(Fraction(number) * Fraction(repr(factor)))
+    value = rough if factor == 1.0 else float(_EXACT.multiply(Decimal(number), _decimal(factor)))
     if value == 0.0:
         raise ValueError(f"'{words}' is too small for a floating-point number; {wanted(kind)}")
     if kind == "temperature" and value < 0.0:
@@ -111,6 +113,12 @@ def _value(number: str, factor: float, words: str, kind: str) -> float:
     return value
 
 
+@cache
+def _decimal(factor: float) -> Decimal:
+    return Decimal(repr(factor))
+
+
+@lru_cache(256)
 def _plain(unit: str) -> str:
     """One spelling per unit: u for both micro signs, ^ for superscripts, one blank for a product."""
     for sign, letter in (("µ", "u"), ("μ", "u"), ("²", "^2"), ("³", "^3"), ("·", " ")):

@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 from scene_texts import BENCH, PATCH, SMALL_PATCH
 
+from patchfem.campaigns.sweeps.ask import Request, cases_of
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.campaigns.sweeps.cases import Cases, product
 from patchfem.scene.axes import read
-from patchfem.scene.scene import loads
+from patchfem.scene.scene import SceneError, loads
 
 THREE = ["normal.load=1 N,2 N", "friction.static=0.1,0.2,0.3", "slide.speed=1 mm/s,2 mm/s"]
 
@@ -113,3 +114,10 @@ def test_always_spread_cases_hold_the_ends_of_every_axis():
     for axis, size in enumerate(found.shape):
         assert {0, size - 1} <= {found.places(one)[axis] for one in some}
     assert found.spread(720) == list(range(720))
+
+
+def test_exact_a_mistake_of_all_drawn_cases_is_told_once():
+    text = BENCH.replace("static = 0.3", "static = 0.3\nkinetic = 0.3")
+    with pytest.raises(SceneError) as refused:
+        cases_of(Asked(Path("a.toml"), text), Request(("friction.static=0.2..0.25",), None, 100))
+    assert str(refused.value).count("is larger than static") == 1 and "more" not in str(refused.value)
