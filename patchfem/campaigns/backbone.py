@@ -37,11 +37,12 @@ from ..runs.bench.engine import steps_of
 from ..runs.bench.errors import errors_of
 from ..runs.bench.shear import GRAIN, STIFF
 from ..runs.joint import held_patch
+from ..runs.patch import faces
 from ..runs.patch import result as patch_result
 from ..runs.plan import plan
 from ..runs.rig import interface, numerics
 from ..runs.rig.engines import ENGINES
-from ..runs.rig.plan import held_stiffness
+from ..runs.rig.plan import held_by
 from ..runs.rig.steady.balance import BalanceFinder
 from ..slip.grain import spread, stiffer
 from ..structure import drives
@@ -205,8 +206,7 @@ def _joint(model: Model, name: str) -> Joint:
     alone = (None, np.eye(modes.omega.size)[number])
     joint = Joint(model, patch, apart[0], number, alone, np.zeros(len(modes.interfaces)), tuple(apart))
     if not joint.linear:
-        stiffness = _held_by(joint._replace(stiffness=np.full(len(modes.interfaces),
-                                                              held_stiffness(plan(model).chain))))
+        stiffness = _held_by(joint._replace(stiffness=held_by(model.rig, plan(model).chain)))
         joint = joint._replace(held=modes.held(modes.interfaces, stiffness, number), stiffness=stiffness)
     if not _limit(joint) and model.rig.bends and (model.friction is not None or model.rig.interfaces):
         raise PatchfemError("the load or the coefficient of friction is 0, so no friction acts; leave out [friction] "
@@ -379,18 +379,18 @@ def _refuse(joint: Joint, way: str) -> None:
 
 def _rigid(model: Model) -> bool:
     """Whether friction holds without any stretch."""
-    return not model.soft and any(has(one.numbers.law, "set-valued") for one in model.rig.interfaces)
+    return not model.soft and any(has(one.numbers.law, "set-valued") and not one.soft for one in model.rig.interfaces)
 
 
-def _group(joint: Joint, patch) -> Group:
-    """Laws on the rows of a rig on one of its meshes; PatchfemError where a law has no steady loop of its own."""
+def _group(joint: Joint, patch, meshed: tuple = ()) -> Group:
+    """Laws on the rows of a rig on one of its meshes; meshed: interfaces whose own patches are those on a coarser one.
+    PatchfemError where a law has no steady loop of its own."""
     model, rig = joint.model, joint.model.rig
     try:
         if len(rig.interfaces) < 2:
-            return BalanceFinder(model, numerics.choose(_steady(model)), patch).group
+            return BalanceFinder(model, replace(numerics.choose(_steady(model)), meshed=meshed), patch).group
         load("dynamics.harmonic.cycle_kernels", None)
-        return Group(rig.modes, [(k, models.element_model(interface.element_of(one, one.load, rig.speed)))
-                                 for k, one in enumerate(rig.interfaces)])
+        return Group(rig.modes, list(enumerate(map(models.element_model, interface.own_elements(model, meshed)))))
     except PatchfemError:
         benched = not rig.bends and len(rig.interfaces) < 2
         raise PatchfemError(UNKNOWN + "; use --method quasi-static" * benched) from None
@@ -408,17 +408,19 @@ def _in_space(joint: Joint, read) -> np.ndarray:
     as a motion that turns where both have a border changes nothing."""
     model, error = joint.model, 0.0
     celled = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
-    if not celled and not model.soft:
+    soft = model.soft or model.rig.soft
+    if not celled and not soft:
         return error
     fine = _group(joint, joint.patch)
     best = read(fine)
-    if model.soft:
-        apart = [GRAIN * np.abs(read(_remade(fine, _spread)) - best)]
-        if joint.coarse is not None:
-            rough = _group(joint, joint.coarse)
-            stiff = stiffer(float(fine.stiffness()[0]), float(rough.stiffness()[0]))
-            apart += [np.abs(read(rough) - best), STIFF * np.abs(read(_remade(fine, stiff)) - best)]
-        error = error + np.fmax.reduce(apart)
+    if soft:
+        rough = [(0, _group(joint, joint.coarse))] if joint.coarse is not None else []
+        rough += [(one[0], _group(joint, None, one)) for one in faces.meshed(model)]
+        apart = 0.0
+        for k, other in rough:
+            stiff = stiffer(float(fine.stiffness()[k]), float(other.stiffness()[k]))
+            apart = apart + np.fmax(np.abs(read(other) - best), STIFF * np.abs(read(_remade(fine, stiff)) - best))
+        error = error + np.fmax(GRAIN * np.abs(read(_remade(fine, _spread)) - best), apart)
     if celled:
         apart = [np.abs(read(_remade(fine, partial(cells_joined, *one))) - best) for one in JOINED]
         gap = np.max(apart, axis=0) / CELLS
@@ -585,7 +587,7 @@ def _rising(best, error) -> Curve:
 def _in_closed_form(joint: Joint, amplitudes) -> Curve | None:
     """Static curve of one interface whose law knows its loop; None where there is more, or the loop is not known."""
     model, modes = joint.model, joint.modes
-    if model.friction is None or model.soft or model.rig.bends or len(model.rig.interfaces) > 1:
+    if model.friction is None or model.soft or model.rig.soft or model.rig.bends or len(model.rig.interfaces) > 1:
         return None
     slides = np.abs(modes.interfaces[0] @ joint.held[1]) * amplitudes / joint.reach
     for _ in range(SLIDES):
@@ -818,7 +820,7 @@ def _expected(joint: Joint) -> float | None:
         return None
     if has(f.law, "cells"):
         return f.chi + 3
-    return 3.0 if has(f.law, "bonds") or joint.model.soft else None
+    return 3.0 if has(f.law, "bonds") or joint.model.soft or joint.model.rig.soft else None
 
 
 def _regimes(joint: Joint, wanted, micro: float | None) -> list:

@@ -26,6 +26,8 @@ def contents(result: Result) -> netcdf.Contents:
     data = netcdf.of_run(found, modal, fields, x, weight, strips, levels, names)
     if patch is not None:
         data = netcdf.with_surfaces(data, patch.gap)
+    if "faces" in extra:
+        data = netcdf.with_faces(data, extra["faces"])
     if "events" in extra:
         e = extra["events"]
         data = netcdf.with_events(data, e.time, e.interface, e.kind, e.slide, e.count, MEANINGS, e.source)

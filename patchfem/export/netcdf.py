@@ -212,6 +212,20 @@ def with_surfaces(data: Contents, gap) -> Contents:
     return data.also({"unloaded_gap": (("strip", "x")[-np.ndim(gap):], np.asarray(gap), _attributes("unloaded_gap"))})
 
 
+def with_faces(data: Contents, faces) -> Contents:
+    """The contents with the pressed patches of interfaces (`runs.patch.faces.Face`), each on nodes of its own; the
+    number behind a name is that of the interface from 1."""
+    out, places = {}, {}
+    for face in faces:
+        over, pressure = f"x_{face.number + 1}", face.patch.pressure
+        places[over] = (over, face.patch.x, {"units": "m", "long_name": f"position along the sliding direction of "
+                                                                        f"interface {face.name}"})
+        for name, values in (("normal_stress", pressure.sigma_n), ("gap", pressure.gap),
+                             ("weight", face.patch.pieces.interface.weight)):
+            out[f"{name}_{face.number + 1}"] = (over, values, _attributes(name))
+    return data.also(out, places)
+
+
 def with_wear(data: Contents, history: dict, units: dict) -> Contents:
     """The contents with the measures over the cycles of wear: history name -> (j,), with `cycle`; units by name."""
     out = {f"wear_{name}": ("wear_cycle", values, {"units": units[name], "long_name": name.replace("_", " ")})

@@ -165,6 +165,13 @@ def _interface(data: dict) -> Picture | None:
     return Picture(charts.interface, (data["x"], fields), caption + ".")
 
 
+def _faces(data: dict) -> Picture | None:
+    found = [one for one in data.get("faces", ()) if np.any(one[2] > 0)]
+    part = any(charts.part_in_contact(x, sigma) for _, x, sigma in found)
+    return Picture(charts.faces, (found,), "Normal stress of the patch of each interface, pressed, before any slide" +
+                   (". Only the part in contact is drawn." if part else ".")) if found else None
+
+
 def _bodies(data: dict) -> Picture | None:
     if "bodies" not in data or not pressed(data):
         return None
@@ -260,8 +267,8 @@ def _measured(data: dict) -> Picture | None:
 
 # in the order of the page
 PICTURES = {"wear": _wear, "worn": _worn_map, "curve": _curve, "spectra": _spectra, "decay": _decay,
-            "levels": _levels, "pressure": _interface, "bodies": _bodies, "loop": _loop, "history": _histories,
-            "measured": _measured}
+            "levels": _levels, "pressure": _interface, "faces": _faces, "bodies": _bodies, "loop": _loop,
+            "history": _histories, "measured": _measured}
 
 
 def _factors(measured: dict) -> tuple:

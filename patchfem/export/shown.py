@@ -34,6 +34,8 @@ def report_data(result: Result) -> dict:
             "width": None if result.patch is None else result.plan.model.patch.width, "versions": versions(),
             "means": {name: one.text for name, one in result.measures.items()}}
     data |= {name: result.extra[name] for name in ("curve", "decay", "spectra") if name in result.extra}
+    if "faces" in result.extra:
+        data["faces"] = [(one.name, one.patch.x, one.patch.pressure.sigma_n) for one in result.extra["faces"]]
     if "wear" in result.extra:
         count, period = result.extra["wear_shown"]["states"], result.extra["wear_shown"]["period"]
         data["wear"] = {"history": result.extra["wear"], "period": period,

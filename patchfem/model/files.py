@@ -27,16 +27,26 @@ def faults(tables, folder: Path, whole: bool = True, notes: list | None = None) 
     """
     found = []
     for key, file in files_of(tables):
-        path = folder / file
+        path, (at, own, beside) = folder / file, _of_interface(key, tables)
         if not is_there(path):
             continue
         try:
-            said = READERS[key](path, tables, whole)
+            said = READERS[own](path, beside, whole)
             if notes is not None:
                 notes += [text.replace(str(path), path.name) for text in said or ()]
         except PatchfemError as error:
-            found.append((error.key or key, str(error).removeprefix(f"{key}: ")))
+            found.append((at + (error.key or own), str(error).removeprefix(f"{own}: ")))
     return found if found or not whole else [*found, *_reduced(tables, folder)]
+
+
+def _of_interface(key: str, tables) -> tuple:
+    """(what stands before the key of a patch's file, its key below that, tables whose [contact] is that patch); as they
+    are of a key of no interface."""
+    at, found, own = key.partition(".contact.")
+    if not found:
+        return "", key, tables
+    face = tables.structure.interface[int(at.rpartition(".")[2])]
+    return f"{at}.", f"contact.{own}", tables.model_copy(update={"contact": face.contact})
 
 
 def _reduced(tables, folder: Path) -> list:

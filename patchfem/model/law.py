@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..core import PatchfemError
 from ..effects import either, module_of
 from ..friction.bonds import parameters, spread
+from .patch import PatchModel, patch_asked
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -16,12 +17,18 @@ class InterfaceLaw:
     """One interface that rubs, with its law.
 
     key: of its table, for messages; numbers: keys of the law as they act; load: normal load [N] of an interface between
-    masses, None where the patch or the point of the model carries it.
+    masses, None where the patch or the point of the model carries it; patch: that bears this load, None of a point.
     """
 
     key: str
     numbers: object
     load: float | None
+    patch: PatchModel | None = None
+
+    @property
+    def soft(self) -> str:
+        """What lets its patch slip part by part, as the scene writes it; "" where nothing does."""
+        return self.patch.gives_way if self.patch is not None else ""
 
     def limits(self, load: float) -> tuple:
         """Static and kinetic friction force [N], >= 0, of the interface under a load [N]."""
@@ -81,11 +88,23 @@ def interface_laws_of(scene) -> tuple:
     None, as an empty tuple, without either. PatchfemError where a rate of growth leaves the range of numbers.
     """
     if scene.structure.interface:
-        return tuple(InterfaceLaw(f"structure.interface.{k}", acting(one, None, scene.where, one.load), one.load)
+        return tuple(InterfaceLaw(f"structure.interface.{k}", acting(one, None, scene.where, one.pressing),
+                                  one.pressing, _patch_of(scene, k, one))
                      for k, one in enumerate(scene.structure.interface))
     if scene.friction is None:
         return ()
     return (InterfaceLaw("friction", acting(scene.friction, pad_width(scene), scene.where, load_of(scene)), None),)
+
+
+def _patch_of(scene, number: int, one) -> PatchModel | None:
+    """The patch of an interface, None of one without; PatchfemError with the key of a file at fault."""
+    if one.contact is None:
+        return None
+    try:
+        return replace(patch_asked(one.contact, scene.kind, scene.beside), gives_way=one.gives_way)
+    except PatchfemError as error:
+        error.key = error.key and f"structure.interface.{number}.{error.key}"
+        raise
 
 
 def load_of(scene) -> float | None:

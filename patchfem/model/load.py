@@ -72,7 +72,7 @@ def point_asked(scene) -> PointLoad | None:
     None where a patch carries it or nothing does.
     """
     if scene.structure is not None and scene.structure.interface:
-        return PointLoad(scene.structure.interface[0].load)
+        return PointLoad(scene.structure.interface[0].pressing)
     normal = scene.normal
     if normal is None:
         return None

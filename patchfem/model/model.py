@@ -142,7 +142,7 @@ def _law(scene: Scene) -> tuple:
     """Law of the first interface: (keys as they act, surface temperature table, spread [m], width of the pad [m])."""
     given, load = scene.friction, load_of(scene)
     if scene.structure is not None and scene.structure.interface:
-        given, load = scene.structure.interface[0], scene.structure.interface[0].load
+        given, load = scene.structure.interface[0], scene.structure.interface[0].pressing
     if given is None:
         return None, None, None, None
     pad = pad_width(scene)

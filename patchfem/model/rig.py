@@ -107,6 +107,11 @@ class Rig:
         return float(np.ptp(moved[:, 1:], axis=0).max(initial=0.0)) / whole if whole > 0 else 0.0
 
     @property
+    def soft(self) -> bool:
+        """Whether a patch of an interface of its own slips part by part."""
+        return any(one.soft for one in self.interfaces)
+
+    @property
     def bends(self) -> bool:
         """Whether springs beside the contact are not linear."""
         return self.cubic is not None or self.interlock is not None
@@ -117,13 +122,13 @@ def rig_asked(scene, joint: float | None = None) -> Rig:
 
     joint: stiffness [N/m] of a pressed patch, taken off modes that were measured with it.
     """
-    more, kept = richer_modes(scene)
-    return replace(_rig(scene, own_modes(scene, joint), joint), richer=None if more is None else _rig(scene, more),
-                   kept=tuple(kept), taken=joint)
+    (more, kept), faces = richer_modes(scene), interface_laws_of(scene)
+    return replace(_rig(scene, own_modes(scene, joint), faces, joint), kept=tuple(kept), taken=joint,
+                   richer=None if more is None else _rig(scene, more, faces))
 
 
-def _rig(scene, alone: ModalBasis, joint: float | None = None) -> Rig:
-    """The rig of a scene with the coordinates `alone`, as `own_modes` gives them."""
+def _rig(scene, alone: ModalBasis, faces: tuple, joint: float | None = None) -> Rig:
+    """The rig of a scene with the coordinates `alone`, as `own_modes` gives them; faces: its InterfaceLaws."""
     structure, asked = scene.structure, scene.drive
     modes = modes_of(scene, alone)
     drive, bonded = drive_of(scene, modes), structure.bonded
@@ -134,7 +139,7 @@ def _rig(scene, alone: ModalBasis, joint: float | None = None) -> Rig:
     return Rig(modes, drive, start_of(scene, modes), asked.kind, asked.waveform, asked.frequency,
                tuple(part.amplitude for part in drive.segments) if rows else (),
                cycles_per_level(asked) if rows else 0.0, float(cycles_of(asked, drive)),
-               asked.force if asked.kind == "force" else None, interface_laws_of(scene),
+               asked.force if asked.kind == "force" else None, faces,
                tuple(interface_names(structure)),
                acts(scene), yaws(scene),
                structure.travel or (BEYOND if decay_rate(modes) < 0 or (cubic or 0.0) < 0 else np.inf), cubic,

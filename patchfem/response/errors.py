@@ -231,11 +231,11 @@ def pieces_error(fine: dict, coarse: dict) -> dict:
     """Error by name of the mesh of pieces that slip part by part, from a run on a coarser one, or (n,) of many.
 
     The change, times OF_MESH. A peak of a start that rings, and an amplitude, can agree by chance on both meshes; so of
-    those of OF_STIFFNESS each errs by at least OF_MOST of the share that the most changed of them does, but for one
-    that a limit holds.
+    those of OF_STIFFNESS, of any interface, each errs by at least OF_MOST of the share that the most changed of them
+    does, but for one that a limit holds.
     """
     gaps = {name: gap if name in GAPS else OF_MESH * gap for name, gap in change(fine, coarse).items()}
-    size, least = {name: np.abs(fine[name]) for name in OF_STIFFNESS if name in gaps}, 0.0
+    size, least = {name: np.abs(fine[name]) for name in gaps if of_first(name) in OF_STIFFNESS}, 0.0
     for name, whole in size.items():
         least = np.fmax(least, OF_MOST * np.divide(gaps[name], whole, out=np.zeros(np.shape(whole)), where=whole > 0))
     return {name: np.where(gap > ROUND * size[name], np.fmax(gap, least * size[name]), gap)[()] if name in size else gap

@@ -35,10 +35,10 @@ def cycle_spans(time, period: float) -> list:
 
 def at_turns(model) -> str:
     """How the force is read where the slide of a Model turns, as `turns_of` takes it."""
-    law = model.friction.law
-    if has(law, "memoryless") and not model.soft:
+    law, soft = model.friction.law, model.soft or (model.rig is not None and model.rig.interfaces[0].soft)
+    if has(law, "memoryless") and not soft:
         return "jumps"
-    return "slide" if model.soft or has(law, "timeless") or has(law, "bonds") else "rate"
+    return "slide" if soft or has(law, "timeless") or has(law, "bonds") else "rate"
 
 
 def turns_of(time, slide, rate, force, period: float, by: str = "rate") -> list:

@@ -304,8 +304,8 @@ def measures_of(seen: Seen) -> dict:
     """
     out = {row.name: seen.known[row.name] if row.name in seen.known else row.of(seen) if row.of is not None else None
            for row in ROWS}
-    for number, other in enumerate(seen.others(), 2):
-        out |= {f"{name}_{number}": TABLE[name].of(other) for name in OF_EACH}
+    for number, other in enumerate(seen.others(), 1):
+        out |= {of_number(name, number): TABLE[name].of(other) for name in OF_EACH}
     return {name: value for name, value in (out | seen.known).items() if value is not None}
 
 
@@ -318,6 +318,11 @@ def of_first(name: str) -> str:
     """Name of a measure without the number of its interface: slip_amplitude_2 becomes slip_amplitude."""
     head, _, number = name.rpartition("_")
     return head if number.isdigit() else name
+
+
+def of_number(name: str, number: int) -> str:
+    """Name of a measure of the interface of this number, from 0; the first has none behind its name."""
+    return f"{name}_{number + 1}" if number else name
 
 
 def floor_of(name: str, size=np.inf):

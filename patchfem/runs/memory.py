@@ -116,9 +116,10 @@ def needs(model: Model, engine: str, steps: int, unknowns: dict, numerics=None, 
         runs = NONE
     parts = [Need(PACKAGES, "packages", ""), Need(runs.bytes, CODE_PART if runs.compile else "code", "")]
     if points:
-        key = "contact.mesh" if model.patch.mesh else "contact.element_size"
+        asked = [model.patch] if model.patch is not None else [one.patch for one in model.rig.interfaces if one.patch]
+        key = "contact.mesh" if any(one.mesh for one in asked) else "contact.element_size"
         parts.append(Need(pressed, f"{points} nodes of the interface", key))
-        strips = model.patch.strips[0] if model.patch.strips else 1
+        strips = max(one.strips[0] if one.strips else 1 for one in asked)
         parts.append(Need(3000.0 * strips * points, f"{strips} strips of them", "contact.strips.count"))
         modes = unknowns.get("shear_modes", 0)
         parts.append(Need(24.0 * modes * points, f"{modes} shear modes", "accuracy.shear_modes"))

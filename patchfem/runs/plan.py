@@ -11,6 +11,7 @@ from ..friction.bonds import spread
 from ..inputs import measured
 from ..model.model import Model, build
 from ..model.source import placed
+from ..response.rows import of_number
 from . import memory
 from .bench import engine as of_bench
 from .patch import grids as patch_grids
@@ -118,6 +119,16 @@ def _planned(model: Model, per_point: bool) -> Plan:
         seconds, pressed = patch_plan.effort(model.patch, grids, tolerance)
         groups |= patch_plan.groups(model)
         said[1] = patch_plan.verdict(groups, model.patch)
+    for number, one in enumerate(model.rig.interfaces if model.rig is not None else ()):
+        if one.patch is not None:
+            grids = patch_grids.expected_grids(one.patch, model.accuracy.tolerance)
+            for name, size in patch_plan.sizes(grids).items():
+                unknowns[name] = unknowns.get(name, 0) + size
+            chain |= {of_number(name, number): link for name, link in patch_plan.chain(one.patch).items()
+                      if link != "rigid"}
+            more, size = patch_plan.effort(one.patch, grids, model.accuracy.tolerance)
+            seconds, pressed = seconds + more, pressed + size
+            said[1] = [*said[1], *patch_plan.face_words(model.rig.names[number], one)]
     if model.rig is not None:
         engine, steps, more = of_rig.cost(model, per_point, unknowns)
         seconds, numerics = seconds + more, rig_numerics.choose(model, per_point)

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from ..core import say
 from ..effects import has
-from .patch import high_order, ladder
+from ..response.rows import of_number
+from .patch import faces, high_order, ladder
 from .results import notes, patch_rows
 from .rig import costs, engines
 
@@ -44,11 +45,20 @@ def beyond_tolerance(seen: Finding, coarse=()) -> list:
     model = seen.model
     tolerance = model.accuracy.tolerance
     wide = {name: min(times, MOST) for name, m in seen.measures.items() if (times := m.beyond(tolerance)) > 1}
-    pressed = patch_rows.TABLE if seen.patch is not None else ()
+    pressed = patch_rows.TABLE if seen.patch is not None else faces.measured(model)
     static = {name: times for name, times in wide.items() if name in pressed}
     moving = {name: times for name, times in wide.items() if name not in pressed}
-    out = [_said(seen, static, _finer_mesh(seen, static, coarse))] if static else []
+    if seen.patch is None:
+        out = faces.together(model, lambda face: beyond_tolerance(_of_face(seen, face), face.patches[1:]))
+    else:
+        out = [_said(seen, static, _finer_mesh(seen, static, coarse))] if static else []
     return [*out, _said(seen, moving, _finer_motion(seen, moving, coarse))] if moving else out
+
+
+def _of_face(seen, face) -> Finding:
+    """What is told of the patch of an interface: its static measures, which have no number behind their names."""
+    return Finding(face.model, {name: found for name in patch_rows.TABLE
+                                if (found := seen.measures.get(of_number(name, face.number))) is not None}, face.patch)
 
 
 def _first(seen, wide: dict) -> list:
@@ -235,12 +245,14 @@ def _unproven(model, steps: int, name: str, wide: dict) -> str:
 
 def _finer_under(seen, coarse) -> str:
     """What refines the mesh that leaves a motion open."""
-    asked, nodes = seen.model.patch, seen.patch.x.size
-    if asked.mesh is not None:
-        return "the mesh causes this; split the elements of contact.mesh"
-    if not asked.chosen:
-        return f"the mesh causes this; leave out {SIZE}"
-    tighter = _climbing(seen, coarse)
+    every = [(seen, coarse)] if seen.patch is not None else [
+        (_of_face(seen, face), face.patches[1:]) for face in faces.faces_of(seen.model) if face.soft]
+    asked, nodes = [one.model.patch for one, _ in every], max(one.patch.x.size for one, _ in every)
+    if any(one.mesh is not None for one in asked):
+        return faces.in_scene(seen.model, "the mesh causes this; split the elements of contact.mesh")
+    if not all(one.chosen for one in asked):
+        return faces.in_scene(seen.model, f"the mesh causes this; leave out {SIZE}")
+    tighter = min((found for one in every if (found := _climbing(*one)) is not None), default=None)
     if tighter is None:
         return (f"the mesh ({nodes} interface nodes) causes this, and a finer one would take too long; use the value "
                 "with its stated error")

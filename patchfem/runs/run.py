@@ -16,6 +16,7 @@ from ..dynamics import resume
 from ..model.model import Model
 from ..model.source import placed
 from . import joint, memory
+from .patch import faces
 from .patch import result as patch_result
 from .plan import Plan, plan, refuse_size
 from .remedies import Finding, beyond_tolerance
@@ -72,6 +73,12 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             fewer = "split the elements of contact.mesh" if model.patch.mesh else "leave out contact.element_size"
             warnings.append(f"no error is estimated on {patch.x.size - 1} elements along the interface; {fewer}")
         notes += patch_result.left_out(model, patch, coarse)
+    if model.rig is not None and any(one.patch for one in model.rig.interfaces):
+        if fresh:
+            faces.condensed_anew(model)
+        warnings += faces.warnings_of(model)
+        notes += faces.notes_of(model)
+        seconds["contact"] = perf_counter() - begin
     if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and model.kind != "patch":
         warnings.append("no friction acts and no motion was computed")
         result = patch_result.static(what, patch, coarse, seconds, warnings)
@@ -101,6 +108,9 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         if patch is not None and what.kind != "patch":
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
             result = replace(result, measures=patch_result.measured(model, patch, coarse) | found)
+        if own := faces.measured(model):
+            result = replace(result, extra=result.extra | {"faces": tuple(faces.faces_of(model))},
+                             measures=own | {name: m for name, m in result.measures.items() if name not in own})
         if model.wear is not None:
             result = measures.worn(replace(result, plan=what), evolved, estimate)
     if what.compile_seconds and estimate:

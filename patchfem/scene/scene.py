@@ -34,6 +34,7 @@ from .rules.structure import unseen
 from .sets import assignments, sized
 from .text import effects, toml
 
+AT = "structure.interface"
 LARGEST = 32 * 2**20  # bytes of a scene
 _VALUE = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")  # a key with a value that opens no quotes and no bracket
 
@@ -146,14 +147,23 @@ def with_files(found: Scene) -> Scene:
 
 def files_of(found: tables.Tables | Scene) -> list[tuple[str, str]]:
     """(key, file) of every file that the tables of a scene name."""
-    profile, rough = (found.contact and getattr(found.contact, name) for name in ("profile", "asperities"))
-    named = [("contact.mesh", found.contact and found.contact.mesh), ("contact.profile.file", profile and profile.file),
-             ("contact.asperities.from", rough and rough.law == "hertz" and rough.from_),
+    own = (found.structure and found.structure.interface) or ()
+    named = [*_contact_files(found.contact, "contact"),
+             *(one for k, face in enumerate(own) for one in _contact_files(face.contact, f"{AT}.{k}.contact")),
              ("slide.file", found.slide and found.slide.file), ("drive.file", found.drive and found.drive.file),
              ("structure.file", found.structure and found.structure.file), *_reduced_files(found.structure),
              ("measured.file", found.measured and found.measured.file),
              ("wear.start", found.wear and found.wear.start)]
     return [(key, file) for key, file in named if file]
+
+
+def _contact_files(contact: tables.Contact | None, at: str) -> list[tuple[str, Any]]:
+    """(key, file or nothing) of the files of a patch."""
+    if contact is None:
+        return []
+    profile, rough = contact.profile, contact.asperities
+    return [(f"{at}.mesh", contact.mesh), (f"{at}.profile.file", profile and profile.file),
+            (f"{at}.asperities.from", rough and rough.law == "hertz" and rough.from_)]
 
 
 def _reduced_files(structure: tables.Structure | None) -> list[tuple[str, Any]]:
@@ -318,7 +328,8 @@ def _slide(slide: tables.Slide) -> tables.Slide:
 @once
 def _structure(structure: tables.Structure) -> tables.Structure:
     update: dict[str, Any] = {"mode": tuple(_mode(mode, not index) for index, mode in enumerate(structure.mode))}
-    update["interface"] = tuple(map(_law, structure.interface))
+    update["interface"] = tuple(one if one.contact is None else one.model_copy(
+        update={"contact": _contact(one.contact)}) for one in map(_law, structure.interface))
     if (structure.masses or structure.reduced) and structure.output_mass is None:
         update["output_mass"] = 1
     return structure.model_copy(update=update)

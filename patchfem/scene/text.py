@@ -10,7 +10,7 @@ from typing import Any
 from .keys.contact import Material, OnePiece
 from .keys.quantities import format_si
 from .keys.same import once
-from .keys.tables import Accuracy, Drive, Measured, Tables
+from .keys.tables import Accuracy, Drive, Interface, Measured, Tables
 from .keys.types import Table, keys, kind_of, model_of
 from .rules.draft import SELECTORS, unused
 from .rules.drive import drive_unused, waveform_unused
@@ -29,13 +29,13 @@ def effects(root: Any) -> list[str]:
     root: Tables, or what has their attributes.
     """
     tables = ((name, getattr(root, name)) for name in Tables.model_fields)
-    return [effect for name, table in tables if table is not None for effect in _named(table, name)]
+    return list(dict.fromkeys(effect for name, table in tables if table is not None for effect in _named(table, name)))
 
 
 @once
 def _named(table: Any, at: str) -> tuple[str, ...]:
     """The effects of a table of the scene."""
-    return tuple(_effects(table, at))
+    return tuple(dict.fromkeys(_effects(table, at)))
 
 
 def _effects(table: Any, at: str) -> Iterator[str]:
@@ -48,7 +48,10 @@ def _effects(table: Any, at: str) -> Iterator[str]:
             yield f"{at}.reading={table.reading}"
     elif isinstance(table, tuple):
         for item in table:
-            yield from (effect for effect in _effects(item, at) if "=" in effect)
+            yield from (effect for effect in _effects(item, at) if "=" in effect and ".contact" not in effect)
+        for item in table:
+            if isinstance(item, Interface) and item.contact is not None:  # named as the effects of [contact]
+                yield from _effects(item.contact, "contact")
     elif isinstance(table, Table) and not isinstance(table, Material):
         selectors, inner = _named_by(type(table))
         without = _unused(table) if selectors else ()

@@ -169,18 +169,17 @@ PATCH = '[contact]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "5 mm"\nload = "
 OTHER = '[[structure.interface]]\nbetween = [2, 0]\nlaw = "coulomb"\nstatic = 0.4\nload = "9 N"\n[drive]'
 
 
-@pytest.mark.parametrize("text, says", [
-    (PATCH + SCENE, "use [friction] with structure.reduced.slide = [1, 0] instead of the interface"),
-    (PATCH + SCENE.replace("[drive]", OTHER), "find its law of one point by `patchfem fit SCENE --from-patch`")])
-def test_refuses_patches_of_interfaces_with_what_goes(folder, text, says):
-    """What is advised for one interface is a scene that can run."""
-    answer = cli("check", _written(folder, text))
-    assert answer.code == 2 and says in answer.err, answer.err
-    head, law = SCENE.split("[[structure.interface]]\nbetween = [1, 0]\n")
-    law = "[friction]\n" + law.replace('load = "50 N"\n', "").replace("elastic-plastic", "coulomb").replace(
-        'bond_length = "1 um"\n', "")
-    answer = cli("check", _written(folder, PATCH + head.replace("modes = 4\n", "modes = 4\nslide = [1, 0]\n") + law))
-    assert answer.code == 0, answer.err
+def test_refuses_a_patch_beside_interfaces_with_what_goes(folder):
+    """What is advised, for one interface or several, is a scene that can run."""
+    for text in (SCENE, SCENE.replace("[drive]", OTHER)):
+        answer = cli("check", _written(folder, PATCH + text))
+        assert answer.code == 2 and "write it as [structure.interface.contact] below the interface" in answer.err
+        own = PATCH.replace("[contact", "[structure.interface.contact")
+        for load in ('load = "50 N"\n', 'load = "9 N"\n'):
+            text = text.replace(load, "")
+        text = text.replace("[[structure.interface]]\nbetween = [2", own + "[[structure.interface]]\nbetween = [2")
+        answer = cli("check", _written(folder, text.replace("[drive]", own + "[drive]")))
+        assert answer.code == 0, answer.err
 
 
 def test_exact_a_point_and_a_start_stand_on_the_boundary(folder):

@@ -96,13 +96,8 @@ def part_in_contact(x, sigma) -> tuple | None:
 def interface(x, fields: dict) -> list:
     """Pressure, and shear stress in every frame with that of the largest resultant in colour."""
     sigma, tau = fields["normal_stress"][0], fields.get("shear_stress")
-    part = part_in_contact(x, sigma) or (x[0], x[-1])
-    along, size = axis_unit(part, "m")
-    place = axis("x", along) | {"range": [part[0] * size, part[1] * size]}
-    unit, scale = axis_unit(sigma, "Pa")
-    out = [chart("Pressure on the interface", place, axis("normal stress", unit),
-                 [mark("band", "accent", x=x * size, low=0 * x, high=sigma * scale),
-                  line(x * size, sigma * scale, "accent")])]
+    place, size = _along(x, sigma)
+    out = [_pressure("Pressure on the interface", x, sigma)]
     if tau is not None and np.any(tau):
         unit, scale = axis_unit(tau, "Pa")
         frame = int(np.argmax(np.abs(tau @ np.gradient(x))))
@@ -112,6 +107,26 @@ def interface(x, fields: dict) -> list:
         out.append(chart(title, place, axis("shear stress", unit),
                          [*frames, line(x * size, tau[frame] * scale, "warm")]))
     return out
+
+
+def _along(x, sigma) -> tuple:
+    """(axis of the places, its scale) of the part of an interface that is worth showing."""
+    part = part_in_contact(x, sigma) or (x[0], x[-1])
+    along, size = axis_unit(part, "m")
+    return axis("x", along) | {"range": [part[0] * size, part[1] * size]}, size
+
+
+def _pressure(title: str, x, sigma) -> dict:
+    """The chart of a pressure (m,) [Pa] at x (m,) [m]."""
+    (place, size), (unit, scale) = _along(x, sigma), axis_unit(sigma, "Pa")
+    return chart(title, place, axis("normal stress", unit),
+                 [mark("band", "accent", x=x * size, low=0 * x, high=sigma * scale),
+                  line(x * size, sigma * scale, "accent")])
+
+
+def faces(found: list) -> list:
+    """Pressure on every interface that has a patch of its own, (name, x (m,) [m], pressure (m,) [Pa]) each."""
+    return [_pressure(f"Pressure on interface {name}", x, sigma) for name, x, sigma in found]
 
 
 def closer(x, depth, sigma, ratio: float) -> tuple:

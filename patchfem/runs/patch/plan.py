@@ -3,6 +3,7 @@
 from math import log10, sqrt
 
 from ... import rates
+from ...core import say
 from ...model.model import Model
 from ...model.patch import bars, block_shear
 from . import skin
@@ -60,6 +61,14 @@ def groups(model: Model) -> dict:
         approach = load * bars(asked, lambda m: (1 - m.poisson**2) / m.young)
         out["tilt_over_first_opening"] = asked.gap.tilt * asked.length / (2 * approach)
     return out
+
+
+def face_words(name: str, one) -> list:
+    """Sentences of a plan on the patch of an InterfaceLaw between the places that `name` says."""
+    shears = say(one.numbers.static * one.load / block_shear(one.patch), 3)
+    found = f"its pieces shear elastically by {shears} or more before it slips as a whole" if one.soft else \
+        "it moves as one point under the same load; add [structure.interface.contact.shear] to let it slip part by part"
+    return [f"interface {name} has a patch of its own: {found}"]
 
 
 def assembled(asked) -> str:

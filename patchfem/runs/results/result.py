@@ -55,11 +55,9 @@ def meaning(name: str, apart: str = "interface") -> str:
 
     slip_amplitude_2 is that of the second interface, or of what `apart` names.
     """
-    if name in patch_rows.TABLE:
-        return patch_rows.TABLE[name].text
-
     first = rows.of_first(name)
-    return rows.row_of(name).text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")
+    row = patch_rows.TABLE.get(first) or rows.row_of(name)
+    return row.text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")
 
 
 def at_rest(patch) -> dict:
@@ -120,6 +118,8 @@ def choices(result) -> dict:
         out["quadrature"] = summed
     if (window := extra.get("window")) is not None:
         out["window_cycles"] = int(window)
+    for face in extra.get("faces", ()):
+        out[rows.of_number("interface_nodes", face.number)] = int(face.patch.x.size)
     if patch is not None:
         out["interface_nodes"] = int(patch.x.size)
         if patch.averaging is not None:

@@ -59,7 +59,7 @@ def pairs_of(model: Model) -> int:
     """How often each two cells of a density count as one at first: what cells leave open falls with their square, and
     where the error of a run shows too much it is made again with more (`Numerics.finer`)."""
     laws = [one.numbers.law for one in model.rig.interfaces]
-    if model.soft or not all(has(law, "cells") for law in laws):
+    if model.soft or model.rig.soft or not all(has(law, "cells") for law in laws):
         return 0
     return int(min(max(MOST_PAIRS + log2(model.accuracy.tolerance / AT) / 2, 0), MOST_PAIRS))
 
@@ -77,8 +77,8 @@ def expected_elements(model: Model) -> tuple:
             element = record.law_from(one.numbers, load).element(load)
             mine = int(element.numbers[1]) >> pairs_of(model)
             most = float(element.numbers[2:2 + int(element.numbers[1])].sum())
-        if model.soft:
-            patch = model.patch
+        if model.soft or one.soft:
+            patch = one.patch or model.patch
             most = 1 / (1 / most + 1 / patch_model.block_shear(patch))
             mine = patch_model.CHOSEN_POINTS if patch.chosen else round(patch.length / patch.size) + 1
         count, stiff = count + mine, max(stiff, most if most < inf else 0.0)

@@ -22,6 +22,7 @@ from ...response.errors import cells_error, change, modes_error, pieces_error, s
 from ...scene.rules import methods
 from ...scene.rules.draft import acts, pinned
 from ...slip import shear_modes
+from ..patch import faces
 from .costs import dear_elements, dear_events, not_smooth, pieces_per_cycle
 from .solution import gauged
 
@@ -120,7 +121,7 @@ def _met(model: Model, steady: bool = False) -> methods.Motion:
         "structure.bonded.wavelength" if rig.interlock is not None else \
         f"[{model.grooves.key}]" if model.grooves is not None else ""
     waveform = "" if steady or rig.kind == "free" else rig.waveform
-    return methods.Motion([one.numbers for one in rig.interfaces], model.soft,
+    return methods.Motion([one.numbers for one in rig.interfaces], [model.soft or one.soft for one in rig.interfaces],
                           "under a load that changes" if rig.load_varies else "", rig.strips_slide_apart, spring,
                           waveform)
 
@@ -183,11 +184,17 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """The coarser runs of the engine of pieces: the mesh, where its nodes make the elements, and fewer cells of
     a density."""
     out = [Coarser((Variant(numerics, coarse),), pieces_error, of="mesh")] if coarse is not None and model.soft else []
+    out += [Coarser((Variant(one, patch),), pieces_error, of="mesh") for one in _meshed(model, numerics)]
     cells = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
     if not cells:
         return out
     return [*out, Coarser(tuple(Variant(replace(numerics, joined=one), patch) for one in JOINED), cells_error,
                           of="cells")]
+
+
+def _meshed(model: Model, numerics) -> list:
+    """Numerics with a coarser mesh of one patch of interfaces after the other."""
+    return [replace(numerics, meshed=one) for one in faces.meshed(model)]
 
 
 def _fewer(numerics, share: int):
@@ -216,6 +223,7 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     if coarse is not None and (varies or model.soft):
         fixed = few if shape is None else replace(few, shear_modes=shape.size)  # one change at a time
         out.append(coarser_space(Variant(fixed, coarse), quarter))
+    out += [coarser_space(Variant(one, patch), quarter) for one in _meshed(model, few)]
     climbs, gathers = model.grooves is not None, model.patch is not None and model.patch.gathers
     pointed = coarse is not None and not gathers  # few points state themselves what their modes leave out
     if shape is not None and (varies or climbs or (pointed and has(model.friction.law, "bonds"))):

@@ -18,6 +18,7 @@ from ...slip.fields import shear_of
 from ...slip.shear_modes import FEW, gathered, on_gauss
 from ...structure.drive_sizes import omega_of
 from ..bench import averaged, rigid, shear
+from ..patch import faces
 from ..patch.kept import elements, strip_elements
 from . import strips, varying_load
 from .lists import quadrature_of
@@ -41,13 +42,7 @@ def contact_of(model: Model, numerics: Numerics, patch):
 
     rows, found = [*rig.modes.interfaces], []
     if many:
-        loads = strips.strip_loads(patch) if patch is not None else [one.load for one in rig.interfaces]
-        parts = [element_of(rig.interfaces[k if patch is None else 0], load, rig.speed) for k, load in enumerate(loads)]
-        if model.soft:  # strips, each with the elements of its own
-            f = model.friction
-            length = law_from(f, patch.pressure.load).element(patch.pressure.load).length
-            parts = [parallel(*one) for one in strip_elements(patch, f.static, length)]
-        found += [joints.Joint(k, one) for k, one in enumerate(parts)]
+        found += [joints.Joint(k, one) for k, one in enumerate(_side_by_side(model, numerics, patch))]
     if rig.interlock is not None:
         found.append(joints.interlock(0, *rig.interlock))
     if rig.cubic is not None:
@@ -56,6 +51,23 @@ def contact_of(model: Model, numerics: Numerics, patch):
     size = rig.modes.mass * omega_of(rig.drive) * rig.speed
     beside = alone if alone is not None and alone.limit > 0 else None
     return joints.JointsModel(beside, tuple(found), np.array(rows), size)
+
+
+def _side_by_side(model: Model, numerics: Numerics, patch) -> list:
+    """The Elements of interfaces, or of the strips of the one patch, each of which slides by itself."""
+    if patch is None:
+        return own_elements(model, numerics.meshed)
+    f = model.friction
+    if model.soft:
+        length = law_from(f, patch.pressure.load).element(patch.pressure.load).length
+        return [parallel(*one) for one in strip_elements(patch, f.static, length)]
+    return [element_of(model.rig.interfaces[0], load, model.rig.speed) for load in strips.strip_loads(patch)]
+
+
+def own_elements(model: Model, meshed: tuple) -> list:
+    """The Element of every interface under a load of its own; meshed: interfaces whose patches are the coarser ones."""
+    return [parallel(*faces.elements_of(one, model.accuracy.tolerance, k in meshed)[:2]) if one.soft else
+            element_of(one, one.load, model.rig.speed) for k, one in enumerate(model.rig.interfaces)]
 
 
 def _climbing(model: Model, patch, count: int | None = None):
@@ -97,6 +109,9 @@ def contact_model(model: Model, numerics: Numerics, patch):
         return models.free_model()
     if model.rig.load_varies:
         return varying_load.varying_load_model(model, numerics, patch)
+    if model.rig.soft:
+        return models.jenkins_model(*faces.elements_of(model.rig.interfaces[0], model.accuracy.tolerance,
+                                                       0 in numerics.meshed))
     load = patch.pressure.load if patch is not None else model.point.load
     if has(f.law, "bonds"):
         return _bonds(model, numerics, patch, load)

@@ -23,7 +23,8 @@ class Numerics:
     how bonds are summed, None: by the tolerance and the steps; whole: whether the run keeps its histories from before
     the last cycles, which a run for an error need not; local: relative error that a step of the smooth engine may
     make; pairs: how often each two cells of a law's density count as one; joined: (how many of those do so besides in a
-    run for an error, from which on), () for none; richer: whether the run has more modes of a reduced structure."""
+    run for an error, from which on), () for none; richer: whether the run has more modes of a reduced structure;
+    meshed: numbers of the interfaces whose patches are those on a coarser mesh."""
 
     engine: str
     steps: int
@@ -38,6 +39,7 @@ class Numerics:
     pairs: int = 0
     joined: tuple = ()
     richer: bool = False
+    meshed: tuple = ()
 
     def finer(self):
         """The choices with four times the cells where some count as one, with twice the steps, or a hundredth of the

@@ -14,7 +14,6 @@ from ...dynamics.events.reading import Reading
 from ...dynamics.integrated import Integrated, Loop
 from ...dynamics.work_check import gap
 from ...effects import has
-from ...friction import record
 from ...response import run_events
 from ...response.loops import interface_loops
 from ...response.measures import REST, harmonic, window_amplitudes
@@ -196,16 +195,17 @@ class YieldingElements:
     def __init__(self, model, numerics, patch):
         rig, self.contact, begin = model.rig, None, perf_counter()
         if len(rig.modes.interfaces) > 1:
-            parts = [record.law_from(one.numbers, one.load).element(one.load) for one in rig.interfaces]
+            parts = interface.own_elements(model, numerics.meshed)
         else:
             self.contact = interface.contact_model(model, numerics, patch)
             parts = [self.contact.element]
-        self.held = 1e-3 * min(one.length for one in parts)
+        self.held = 1e-3 * min((one.length for one in parts if one.limit > 0), default=0.0)
         self.groups = tuple(elements_of_law(one) for one in parts)
         for _ in range(numerics.pairs):
             self.groups = tuple(map(elements.merged, self.groups))
         if numerics.joined:
-            self.groups = tuple(elements.merged(one, *numerics.joined) for one in self.groups)
+            self.groups = tuple(elements.merged(one, *numerics.joined) if has(law.numbers.law, "cells") else one
+                                for one, law in zip(self.groups, rig.interfaces))
         self.seconds = perf_counter() - begin
 
 

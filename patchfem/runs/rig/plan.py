@@ -10,6 +10,7 @@ from ...core import PatchfemError
 from ...effects import has
 from ...friction.bonds import parameters
 from ...model.model import Model
+from ...response.rows import of_first, of_number
 from ...slip import shear_modes
 from ...structure.drive_sizes import largest, omega_of
 from . import lists
@@ -30,15 +31,22 @@ def chain(rig) -> dict:
     return {"mode": rig.stiffness} | ({"bonded": rig.bonded} if rig.bonded is not None else {})
 
 
-def held_stiffness(chain: dict) -> float:
-    """Tangential stiffness [N/m] of an interface while nothing slips: the links of a plan's chain in series; infinite
-    where all are rigid, 0 of a law that creeps."""
-    links = {name: link for name, link in chain.items() if name not in ("mode", "bonded", "grooves")
-             and not name.startswith("bonds_")}
+def held_stiffness(chain: dict, number: int = 0) -> float:
+    """Tangential stiffness [N/m] of the interface of a number, from 0, while nothing slips: its links of a plan's chain
+    in series; infinite where all are rigid, 0 of a law that creeps."""
+    links = {of_first(name): link for name, link in chain.items() if name not in ("mode", "bonded", "grooves")
+             and name == of_number(of_first(name), number)}
     if str(links.get("bonds", "")).startswith("none"):
         return 0.0
     soft = sum(1 / link for link in links.values() if not isinstance(link, str) and link > 0)
     return 1 / soft if soft else inf
+
+
+def held_by(rig, chain: dict) -> np.ndarray:
+    """`held_stiffness` (i,) of every slide of a Rig, infinite without friction; strips have that of their patch."""
+    faces = len(rig.interfaces)
+    return np.array([held_stiffness(chain, k if k < faces else 0) if faces else inf
+                     for k in range(len(rig.modes.interfaces))])
 
 
 def foreseen(rig, links: dict):
@@ -53,8 +61,7 @@ def foreseen(rig, links: dict):
 def modes_of(rig, chain: dict) -> list:
     """Name, free and stuck frequency [Hz] of each mode: without the contact, and with it held by the links of a chain;
     None where nothing gives way, and without friction."""
-    modes, rows = rig.modes, rig.modes.interfaces
-    stiffness = np.full(len(rows), held_stiffness(chain) if rig.interfaces else inf)
+    modes, rows, stiffness = rig.modes, rig.modes.interfaces, held_by(rig, chain)
     named = rig.by_modes and modes.shapes is None
     out = []
     for k, omega in enumerate(modes.omega):
@@ -99,6 +106,8 @@ def march_cost(model: Model, numerics, unknowns: dict) -> tuple:
         each = _of_modes(numerics, points, unknowns, True)
     elif soft:
         each = rates.SLIP_NODE * points + rates.LIST_STEP
+    elif rig.soft:
+        each += rates.SLIP_NODE * points
     elif rig.load_varies and model.patch is not None:
         each = rates.PRESSING_STEP + rates.PRESSING_NODE * points
     passes = 0.75 + 2**(lists.halvings(model) + 1) - 1  # a half and a quarter of the steps, and each halving of them
@@ -216,7 +225,8 @@ def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:
     modes of a reduced structure among them."""
     rig, by = model.rig, steady_by(model).name
     points = CURVE[by == "balance"] if rig.waveform == "sweep" else max(1, len(rig.levels))
-    passes = 1.5 if by == "yields" and model.soft else 1.0  # a coarser mesh has half the elements
+    soft = [one for one in rig.interfaces if one.soft or model.soft] if by == "yields" else ()
+    passes = 1.0 + 0.5 * len(soft)  # a coarser mesh of each has half the elements
     seconds = points * passes * _steady_point(model, by)
     if rig.richer is not None:
         seconds += points * _steady_point(replace(model, rig=rig.richer), by)

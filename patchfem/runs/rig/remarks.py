@@ -6,12 +6,17 @@ from ...core import Outcome
 from ...core import say as length
 from ...effects import has
 from ...response.outcome import changing_note
+from ..patch import faces
 from ..results.notes import climbing_as_one, creeping, of_growth, unbounded_bonds, unripe, warming, work_check_warning
 from ..results.travel import travelled
 from . import pieces, strips
 from .costs import dear_elements
 from .engines import ENGINES, PIECES
 from .solution import borne
+
+AS_ONE_POINT = ("the shape of the patch does not affect the motion: with a rigid slide, constant load and the pressure "
+                "on the upper piece the patch moves exactly as one point under the same load; add [contact.shear] to "
+                "let it slip part by part")
 
 
 def warnings_of(run) -> list:
@@ -24,6 +29,7 @@ def warnings_of(run) -> list:
                                                                                  book["friction"])]
     if run.rubs:
         out += law_warnings(model, run.outcome, found, float(np.abs(raw.window.slide_rate).max()))
+    out += faces.together(model, lambda face: [] if face.soft else [AS_ONE_POINT])
     out += created_warning(model, book, model.rig.cycles)
     if patch is not None and model.rig.load_varies and raw.contact is not None and raw.contact.reduction is not None:
         out += modes_note(model, raw.contact.reduction.stiffness.size, raw.contact.sets.x.size)
@@ -32,7 +38,8 @@ def warnings_of(run) -> list:
     out += [*work_check_warning(found, steps, harmonics), *changing_note(run.outcome, run.drive), *raw.notes]
     if raw.message and raw.outcome is not Outcome.LEAVES_GROOVES:
         out.append(raw.message)
-    return [*out, *(travelled(patch, raw.response.slide) if patch is not None else ())]
+    return [*out, *(travelled(patch, raw.response.slide) if patch is not None else ()),
+            *faces.together(model, lambda face: travelled(face.patch, face.slide(raw.response)))]
 
 
 def notes_of(run) -> list:
@@ -74,9 +81,7 @@ def _as_one_point(model, patch, numerics) -> list:
     f, moves = model.friction, model.rig.load_varies or model.rig.strips_slide_apart
     if patch is None or f is None or has(f.law, "averaged") or model.soft or numerics.per_point or moves:
         return []
-    return ["the shape of the patch does not affect the motion: with a rigid slide, constant load and the pressure on "
-            "the upper piece the patch moves exactly as one point under the same load; add [contact.shear] to let it "
-            "slip part by part"]
+    return [AS_ONE_POINT]
 
 
 def _of_bonds(model, patch, raw) -> list:

@@ -15,6 +15,7 @@ from ...response.rows import judged
 from ...response.run_events import events_of, with_own
 from ...response.settling import slip_period
 from ...structure.drive_sizes import decay_rate, sinusoidal
+from ..patch import faces
 from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_errors
 from ..results.travel import outcome_on_piece
 from . import decays, flutter, levels, lists, remarks, start_ring
@@ -64,7 +65,8 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     raw, numerics, measures = _solved(model, numerics, patch, coarse[0], seconds, say, progress, estimate)
     if wrong := unbalanced(engine, measures):
         raw = replace(raw, outcome=Outcome.NOT_CONVERGED, message=raw.message or wrong)
-    known = estimate and raw.outcome is not Outcome.NOT_CONVERGED and on_a_mesh_of_known_error(model, patch, coarse)
+    known = estimate and raw.outcome is not Outcome.NOT_CONVERGED and \
+        on_a_mesh_of_known_error(model, patch, coarse) and (not rig.soft or faces.known(model))
     run = Coupled(model, numerics, patch, raw, raw.extra.get("at", rig.drive), known, measures)
     for go in (_levelled, _settled, _started, _reasoned):
         run = go(run)
@@ -74,6 +76,8 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         run, notes = replace(run, measures=run.measures | fluttering), [*notes, *more]
     run = _judged(run)
     outcome = outcome_on_piece(run.outcome, model.patch, patch, raw.response.slide)
+    for face in faces.faces_of(model):
+        outcome = outcome_on_piece(outcome, face.model.patch, face.patch, face.slide(raw.response))
     fields = {} if patch is None else fields_of(model, numerics, patch, raw)
     return Result(what, outcome, run.measures, raw.response, raw.window, patch, fields, seconds, [*warnings, *warned],
                   _extra(run, notes))
@@ -102,7 +106,7 @@ def _settled(run: Coupled) -> Coupled:
 def _started(run: Coupled) -> Coupled:
     """With what the ringing of the start leaves open behind a patch that holds."""
     rings = start_ring.StartRing(run.measures, {}, [])
-    if run.patch is not None and not run.raw.levels:
+    if (run.patch is not None or run.model.rig.soft) and not run.raw.levels:
         rings = start_ring.start_ring(run.outcome, run.measures, run.raw.window, run.drive, run.numerics.cycles,
                            run.model.accuracy.tolerance)
     return replace(run, measures=rings.measures, rings=rings)
@@ -233,7 +237,8 @@ def _foreseen(engine, model, numerics, patch, coarse, estimated: bool) -> float:
         return numerics.steps
     ways = [*engine.in_time(model, numerics, patch), *engine.in_modes(model, numerics, patch)]
     each = {numerics: numerics.steps} | {run.numerics: run.numerics.steps for way in ways for run in way.runs}
-    return sum(each.values()) + (min(each.values()) if coarse is not None and model.soft else 0)
+    meshed = (coarse is not None and bool(model.soft)) + len(faces.meshed(model))
+    return sum(each.values()) + meshed * min(each.values())
 
 
 def _halved(engine, model, numerics, patch) -> tuple:

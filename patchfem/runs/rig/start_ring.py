@@ -9,6 +9,7 @@ from math import ceil, log, log10, pi
 from typing import NamedTuple
 
 from ...core import Measure, Outcome
+from ...response.rows import of_first
 from ...structure.drive_sizes import sinusoidal, whole
 
 LEAST_DAMPING = 1e-6  # of a ring, below which no number of cycles is named
@@ -36,7 +37,8 @@ def start_ring(outcome, measures: dict, window, drive, cycles: float, tolerance:
             or not sinusoidal(drive) or not whole(span, drive):
         return StartRing(measures, {}, [])
     change = abs(float(ledger[1][-1] - ledger[1][0])) * drive.period / span
-    wide = {name: _wider(measures[name], change / abs(loop.value)) for name in OF_WORK if name in measures}
+    wide = {name: _wider(one, change / abs(work)) for name, one in measures.items() if of_first(name) in OF_WORK
+            and (work := measures[name.replace("equivalent_damping", "loop_area")].value) and one.error is not None}
     missed = {name: one for name, one in wide.items()
               if one.beyond(tolerance) > 1 and one.error > 2 * measures[name].error}  # most of it by the change
     if not missed:

@@ -174,11 +174,25 @@ class Damper(Table):
 
 
 class Interface(Friction):
-    """A friction interface between two masses, with its own law and load."""
+    """A friction interface between two masses, with its own law, and its own load or its own patch: below it,
+    [structure.interface.contact] takes the keys and tables of [contact] but approach and grooves."""
 
     between: key(Between, "the two masses that rub, counted from 1, 0 for the base; the slide is the motion of the "
                  "first minus that of the second")
-    load: key(Force, "normal force on the interface")
+    load: key(Force | None, "normal force on the interface; or give a patch, [structure.interface.contact], with the "
+              "keys of [contact]", "unless [structure.interface.contact]") = None
+    contact: Contact | None = None
+
+    @property
+    def pressing(self) -> float | None:
+        """Normal force [N] on the interface or on its patch."""
+        return self.load if self.contact is None else self.contact.load
+
+    @property
+    def gives_way(self) -> str:
+        """What lets its patch slip part by part, as written; empty where nothing does."""
+        found = self.contact.gives_way if self.contact is not None else ""
+        return found.replace("contact", "structure.interface.contact", 1)
 
 
 MOST_ROWS = 2_000_000

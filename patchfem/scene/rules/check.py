@@ -9,7 +9,7 @@ from __future__ import annotations
 from ...effects import has
 from ..keys.tables import Friction
 from .accuracy import _knobs, _quadrature
-from .contact import _contact, _load_line
+from .contact import check_contacts
 from .draft import SLIDES, Draft, _needs
 from .drive import check_drive, check_length
 from .friction import _frictions
@@ -20,7 +20,7 @@ from .wear import check_wear
 
 def check(draft: Draft) -> str:
     """Say every mistake of the whole draft; the kind of run (``patch``, ``bench``, ``rig``, ``linear`` or empty)."""
-    for rule in (_contact, _load_line, _normal, _frictions, _slide, check_structure, check_drive, _measured):
+    for rule in (check_contacts, _normal, _frictions, _slide, check_structure, check_drive, _measured):
         rule(draft)
     kind = _kind(draft)
     for rule in (_quadrature, _knobs, _idle, _sliding, check_length, check_wear, check_grooves, check_gains):
@@ -76,11 +76,11 @@ def _kind(draft: Draft) -> str:
     has = {name for name in ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
            if draft.given(name)}  # fmt: skip
     if draft.given("structure.interface"):
-        instead = modes_instead(draft) if "contact" in has else ""
         for name in sorted(has & {"friction", "normal", "contact"}):
+            instead = "; write it as [structure.interface.contact] below the interface that it presses, in place of " \
+                      "that interface's load" if name == "contact" else ""
             draft.say(name, f"[{name}] and [[structure.interface]] exclude each other: each interface has its own "
-                            "law and load" +
-                      (f"; {instead}" if instead and name == "contact" else ""))
+                            f"law and load{instead}")
         has = has - {"contact"} | {"friction", "normal"}  # an interface's load is no [normal] that someone wrote
     if {"contact", "normal"} <= has:
         draft.say("normal", "[contact] and [normal] exclude each other: keep one source of the normal load")

@@ -1,4 +1,7 @@
-"""Rules of [contact]: keys that exclude or need one another."""
+"""Rules of [contact], and of the patch of an interface: keys that exclude or need one another."""
+
+from collections.abc import Iterator
+from typing import Any
 
 from ..keys.contact import outermost
 from .draft import ASPERITIES, PEAKS, Draft, _needs
@@ -8,10 +11,47 @@ TALLEST = 10_000  # times the length: at 80 000 the stiffness of a piece is lost
 MOST_ELEMENTS = 100_000  # over the interface; the patch of a tenth of them takes gigabytes
 
 
+class OfInterface:
+    """A Draft in which [contact] is the patch of an interface, whose mistakes are told at its own keys."""
+
+    def __init__(self, draft: Draft, number: int, law: Any) -> None:
+        self._draft, self.at = draft, f"structure.interface.{number}"
+        self.tables = draft.tables.model_copy(update={"contact": law.contact, "friction": law, "normal": None})
+
+    def given(self, key: str) -> bool:
+        return self._draft.given(self._there(key))
+
+    def say(self, key: str, message: str) -> None:
+        self._draft.say(self._there(key), message)
+
+    def lacks(self, key: str, reason: str) -> None:
+        self._draft.lacks(self._there(key), reason)
+
+    def remark(self, sentence: str) -> None:
+        self._draft.remark(f"{self.at}.{sentence}" if sentence.startswith("contact.") else sentence)
+
+    def _there(self, key: str) -> str:
+        return f"{self.at}.{key.removeprefix('friction.')}" if key.startswith(("contact", "friction")) else key
+
+
+def of_interfaces(draft: Draft) -> Iterator[OfInterface]:
+    """The drafts of the interfaces that have a patch."""
+    structure = draft.tables.structure
+    for number, one in enumerate((structure.interface if structure is not None else ()) or ()):
+        if one.contact is not None:
+            yield OfInterface(draft, number, one)
+
+
+def check_contacts(draft: Draft) -> None:
+    """Say every mistake of [contact] and of the patches of interfaces by themselves."""
+    for one in (draft, *of_interfaces(draft)):
+        if one.tables.contact is not None:
+            _contact(one)
+            _load_line(one)
+
+
 def _contact(draft: Draft) -> None:
     contact = draft.tables.contact
-    if contact is None:
-        return
     load, approach = draft.given("contact.load"), draft.given("contact.approach")
     if load and approach:
         draft.say("contact.approach", "[contact.approach] and contact.load exclude each other: keep one")
@@ -94,8 +134,7 @@ def _free_roll(draft: Draft, contact) -> None:
 
 
 def _load_line(draft: Draft) -> None:
-    contact = draft.tables.contact
-    line = contact and contact.load_line
+    contact, line = draft.tables.contact, draft.tables.contact.load_line
     if not line:
         return
     at = "contact.load_line"

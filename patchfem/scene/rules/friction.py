@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ...effects import either, has, takes, using
+from ..keys.contact import Contact
 from ..keys.tables import Friction
 from .draft import LAWS, Draft, _needs
 from .methods import changing_load, climbed
@@ -37,13 +38,13 @@ def temperature_unused(law: Friction) -> bool:
 
 def _frictions(draft: Draft) -> None:
     if draft.tables.friction is not None:
-        _friction(draft, "friction", draft.tables.friction)
+        _friction(draft, "friction", draft.tables.friction, draft.tables.contact)
     if draft.tables.structure is not None:
         for index, interface in enumerate(draft.tables.structure.interface or ()):
-            _friction(draft, f"structure.interface.{index}", interface)
+            _friction(draft, f"structure.interface.{index}", interface, interface.contact)
 
 
-def _friction(draft: Draft, at: str, law: Friction) -> None:
+def _friction(draft: Draft, at: str, law: Friction, contact: Contact | None) -> None:
     _needs(draft, at, law, "law", LAWS)
     if draft.given(f"{at}.kinetic") and not takes(law.law, "kinetic"):
         draft.say(f"{at}.kinetic", f"law '{law.law}' has only one coefficient; a kinetic one exists for "
@@ -68,9 +69,8 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
     if law.breakaway and law.reading == "report":
         draft.say(f"{at}.breakaway", "reading 'report' has no breakaway; use reading = 'stretch' or leave breakaway "
                                      "out")
-    contact = draft.tables.contact
     if either(law.law) and law.stiffness is not None:
-        _stretches(draft, at, law)
+        _stretches(draft, at, contact)
     if law.static == 0 and law.stiffness is not None and takes(law.law, "stiffness"):
         draft.say(f"{at}.static", f"0 with law '{law.law}', whose springs need a slip force; static > 0 is "
                                   "needed")  # fmt: skip
@@ -79,9 +79,9 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
                                   f"leave out {contact.gives_way}")  # fmt: skip
 
 
-def _stretches(draft: Draft, at: str, law: Friction) -> None:
+def _stretches(draft: Draft, at: str, contact: Contact | None) -> None:
     """Say a stiffness beside a load that changes or is not given."""
-    contact, cause = draft.tables.contact, changing_load(draft.tables) or climbed(draft.tables)
+    cause = changing_load(draft.tables) or climbed(draft.tables)
     if cause:
         draft.say(f"{at}.stiffness", f"{cause} changes the load, and springs come and go with it; give bond_length in "
                                      "its place")

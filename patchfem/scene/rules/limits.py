@@ -9,7 +9,8 @@ from collections.abc import Iterator
 
 from ...effects import MEANWHILE, carries, has, listed, named, refusal, takes, unbuilt
 from ..keys.contact import Contact
-from ..keys.tables import Friction, Tables
+from ..keys.tables import Friction, Interface, Tables
+from .contact import OfInterface, of_interfaces
 from .draft import Draft
 from .methods import beside_load, changing_load, check_method, climbed, turning
 
@@ -66,10 +67,39 @@ def _interfaces(draft: Draft, interfaces: tuple) -> None:
     """Interfaces between masses are points without a width; beside one another they take laws of one point each."""
     for index, one in enumerate(interfaces):
         at = f"structure.interface.{index}"
+        if one.contact is None and one.load is None and not draft.given(f"{at}.load"):
+            draft.lacks(f"{at}.load", "or give it a patch, [structure.interface.contact]")
         if one.spread is not None and takes(one.law, "spread"):
             draft.say(f"{at}.spread", unbuilt("with masses, where an interface has no width", "out"))
         if len(interfaces) > 1 and one.law is not None and not carries(one, "joints"):
             draft.say(f"{at}.law", unbuilt(f"{named(one)} with other interfaces", refusal("joints", odd=one)))
+    for own in of_interfaces(draft):
+        _of_patch(own, own.tables.contact, own.tables.friction, len(interfaces) == 1)
+
+
+def _of_patch(draft: OfInterface, contact: Contact, law: Interface, alone: bool) -> None:
+    """The patch of an interface has a constant load, shapes on its upper piece, and elements where it gives way; alone:
+    there is no other interface."""
+    patch, soft = "[structure.interface.contact]", law.gives_way
+    if draft.given("friction.load"):
+        draft.say("friction.load", f"{patch} has a load of its own; leave this one out")
+    for key, instead in (("approach", "give contact.load in its place"), ("grooves", "out")):
+        if draft.given(f"contact.{key}"):
+            draft.say(f"contact.{key}", unbuilt("with [[structure.interface]]", instead))
+    _on_pieces(draft, contact, "with [[structure.interface]]")
+    if law.law is None:
+        return
+    if alone and not carries(law, "joints") and not soft:
+        draft.say("friction.law", unbuilt(f"{named(law)} with {patch}", refusal("joints", odd=law)))
+    if not soft:
+        return
+    if not (carries(law, "pieces") and carries(law, "shear")):
+        draft.say("friction.law", unbuilt(f"{named(law)} with {soft}", f"leave out {soft}, or "
+                                          f"{refusal('pieces', 'shear')}"))
+    else:
+        _behind_shear(draft, law, soft)
+    if contact.strips is not None and not _slips_in_strips("rig", contact, law):
+        draft.say("contact.strips", unbuilt(f"with {soft}", "either"))
 
 
 def _quadrature(draft: Draft, kind: str, law: Friction, shear: str) -> None:

@@ -5,26 +5,31 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from ...effects import WAVEFORMS, carries, has, named, refusal, unbuilt, waves
-from ..keys.tables import Tables
+from ..keys.tables import Interface, Tables
 from .draft import Draft
 
 KEY = "accuracy.method"
 
 
 class Motion(NamedTuple):
-    """What a method meets: tables of the laws of all interfaces; soft: what lets the patch slip part by part; varies:
-    how the load changes; yaws: strips slide each by themselves; spring that bends, or grooves; waveform of the drive,
-    none of a release and of the sine of a curve; drive as its table; lower: the key that puts the pressure on the lower
-    piece. Texts are empty where there is nothing."""
+    """What a method meets: tables of the laws of all interfaces; give: what lets the patch of each slip part by part;
+    varies: how the load changes; yaws: strips slide each by themselves; spring that bends, or grooves; waveform of the
+    drive, none of a release and of the sine of a curve; drive as its table; lower: the key that puts the pressure on
+    the lower piece. Texts are empty where there is nothing."""
 
     laws: list
-    soft: str
+    give: list
     varies: str
     yaws: bool
     spring: str
     waveform: str
     drive: Any = None
     lower: str = ""
+
+    @property
+    def soft(self) -> str:
+        """What lets the first patch that slips part by part do so."""
+        return next(filter(None, self.give), "")
 
 
 class Takes(NamedTuple):
@@ -60,7 +65,8 @@ def lacking(engine: str, m: Motion) -> str:
     takes = TAKES[engine]
     odd = _odd(takes.law, m)
     if odd is not None:
-        return f"for law '{odd.law}'" + (f" with {m.soft}" if m.soft else "")
+        soft = next(give for one, give in zip(m.laws, m.give) if one is odd)
+        return f"for law '{odd.law}'" + (f" with {soft}" if soft else "")
     beside = takes.beside.split()
     return next((words for word, of in BESIDE.items() if word not in beside and (words := of(m))), "")
 
@@ -72,9 +78,10 @@ def _odd(word: str, m: Motion):
     An exact engine of slips as a whole has no law beside pieces that give way; one of yields has elements behind a
     law that holds without a stretch only there.
     """
-    behind = {"exact": lambda law: not m.soft, "pieces": lambda law: m.soft or not has(law, "set-valued")}.get(
-        word, lambda law: True)
-    return next((one for one in m.laws if word and not (carries(one, word) and behind(one.law))), None)
+    behind = {"exact": lambda law, soft: not soft,
+              "pieces": lambda law, soft: soft or not has(law, "set-valued")}.get(word, lambda law, soft: True)
+    return next((one for one, soft in zip(m.laws, m.give)
+                 if word and not (carries(one, word) and behind(one.law, soft))), None)
 
 
 def check_method(draft: Draft, kind: str) -> None:
@@ -105,7 +112,9 @@ def motion(tables: Tables, kind: str) -> Motion:
     lower = [f"contact.{name}.on = 'lower'" for name, one in (contact.shapes if contact is not None else {}).items()
              if one.on == "lower"]
     drive = tables.drive
-    return Motion(laws, contact.gives_way if rubs and contact is not None else "", beside_load(cause), apart,
+    give = [one.gives_way if isinstance(one, Interface) else contact.gives_way if contact is not None else ""
+            for one in laws]
+    return Motion(laws, give, beside_load(cause), apart,
                   bending(structure) or (climbed(tables) if rubs else ""),
                   drive.waveform or "" if drive is not None and drive.kind != "free" else "", drive,
                   lower[0] if rubs and lower else "")

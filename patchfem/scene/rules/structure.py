@@ -57,14 +57,6 @@ def modes_instead(draft: Draft) -> str:
     """What to write beside [contact] instead of masses: one mass on springs to the base is the mode sqrt(k/m)/(2 pi)
     with the damping ratio c/(2 sqrt(k m)), in numbers where all of them are there; "" for a rig from a file."""
     structure = draft.tables.structure
-    if structure is None or draft.given("structure.file"):
-        return ""
-    if draft.given("structure.reduced"):
-        pairs = [list(one.between) for one in structure.interface or () if one.between]
-        if len(pairs) == 1:
-            return f"for this patch use [friction] with structure.reduced.slide = {pairs[0]} instead of the interface"
-        return ("one patch can act, with [friction] and structure.reduced.slide; for a patch at each interface find "
-                "its law of one point by `patchfem fit SCENE --from-patch`, from a scene of that patch alone")
     masses = structure.masses or (structure.moving_mass,)
     springs, dampers = ([(one.between, getattr(one, value)) for one in getattr(structure, name) or ()]
                         for name, value in (("spring", "stiffness"), ("damper", "coefficient")))  # fmt: skip
@@ -256,7 +248,8 @@ def _bolted(draft: Draft, structure: Any) -> None:
                           ("grooves", under is not None and under.grooves is not None),
                           ("a load that changes", bool(getattr(tables.normal, "amplitude", None)) or any(
                               mode.normal or mode.pitch for mode in structure.mode or ())),
-                          ("strips that yaw", any(mode.yaw for mode in structure.mode or ()))):
+                          ("strips that yaw", any(mode.yaw for mode in structure.mode or ())),
+                          ("[structure.interface.contact]", any(one.contact for one in structure.interface or ()))):
         if holds:
             draft.say(key, f"'stuck' cannot be used with {reason}: there is no single joint stiffness to subtract; "
                            "give the modes without the joint")

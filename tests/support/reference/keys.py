@@ -7,7 +7,7 @@ from typing import Literal, get_args, get_origin
 from patchfem.effects import EFFECTS, WAVEFORMS
 from patchfem.scene.keys.contact import Coating, Material
 from patchfem.scene.keys.quantities import EXAMPLES, KINDS
-from patchfem.scene.keys.tables import Tables
+from patchfem.scene.keys.tables import Interface, Tables
 from patchfem.scene.keys.types import keys, kind_of, meaning, model_of, parts, record
 from patchfem.scene.reader import is_value
 from patchfem.scene.rules.draft import SELECTORS, each
@@ -45,7 +45,7 @@ def tables(model: type = Tables, at: str = "") -> Iterator[tuple]:
     """
     yield (at, model)
     for key, name in keys(model).items():
-        if _is_table(model, name):
+        if _is_table(model, name) and (model, name) != (Interface, "contact"):  # it has the tables of [contact]
             path = f"{at.strip('[]')}.{key}".strip(".")
             many = get_origin(model.model_fields[name].annotation) is tuple
             yield from tables(model_of(model, name), f"[[{path}]]" if many else f"[{path}]")

@@ -63,9 +63,10 @@ from friction does not change that temperature.
 
 **Partial slip.** At constant load and tilt the elements are exact for pieces of equal elasticity. Under a changing load
 the shear compliance is represented by modes, whose number follows from the tolerance. For pieces of unlike sections the
-effect of shear on the pressure is neglected. If friction falls as a point slides on (bonds that weaken, equation 2.17
-as printed), several states can be in equilibrium. The run continues with the state of lower energy that
-lies in the direction of its last steps. The energy difference counts as dissipated.
+effect of shear on the pressure is neglected. A patch of `[[structure.interface]]` keeps its load and pressure, does not
+wear and writes no fields. If friction falls as a point slides on (bonds that weaken, equation 2.17 as printed), several
+states can be in equilibrium. The run continues with the state of lower energy that lies in the direction of its last
+steps. The energy difference counts as dissipated.
 
 **Modes.** The rig is linear except for its joints, `[structure.stiffening]` and an interlocking bonded spring. Damping
 is viscous; hysteretic damping in a file is treated as viscous. A complex mode is replaced by its real part.

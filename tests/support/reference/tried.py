@@ -82,8 +82,10 @@ MORE = (Beside("grooves of a point", POINT + GROOVES.format("normal") + RIG),
         Beside("a cubic spring", POINT + RIG, ("structure.stiffening.cubic=1e10 N/m^3",)),
         Beside("an interlocking spring", POINT + RIG, ("structure.bonded.stiffness=1e5 N/m",
                                                        "structure.bonded.wavelength=80 um")),
-        Beside("several interfaces", MASSES), Beside("`[wear]`", PATCH + RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\n'
-                                                     "cycles = 1000\n"))
+        Beside("several interfaces", MASSES),
+        Beside("their patches", MASSES + "# each presses a patch\n"),
+        Beside("patches and shear", MASSES + "# each presses a patch that gives way\n"),
+        Beside("`[wear]`", PATCH + RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'))
 BENCHES = (Beside("one point", POINT + BENCH), Beside("a patch", PATCH + BENCH),
            Beside("`[contact.shear]`", PATCH + "[contact.shear]\n" + BENCH),
            Beside("`[contact.strips]`", PATCH + STRIPS + BENCH),
@@ -109,8 +111,11 @@ def laws() -> dict:
 def refused(keys: str, beside: Beside, method: str = "") -> tuple:
     """Sentences with which a scene is refused, without their places; () where it is read without a mistake."""
     if "masses" in beside.text:
-        text = beside.text + "".join(f'[[structure.interface]]\nbetween = [{k}, 0]\nload = "100 N"\n{keys}'
-                                     for k in (1, 2))
+        own = 'load = "100 N"\n'
+        if "patch" in beside.text:
+            own = (PATCH + "[contact.shear]\n" * ("gives" in beside.text)).replace("[contact",
+                                                                                    "[structure.interface.contact")
+        text = beside.text + "".join(f"[[structure.interface]]\nbetween = [{k}, 0]\n{keys}{own}" for k in (1, 2))
     else:
         text = beside.text + f"[friction]\n{keys}"
     sets = (*beside.sets, *([f"accuracy.method={method}"] if method else ()))

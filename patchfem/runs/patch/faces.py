@@ -1,0 +1,150 @@
+"""The patches of the interfaces of a rig: each is pressed once, and then is elements that its interface moves."""
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import PatchfemError
+from ...friction import record
+from ...response.rows import of_number
+from . import kept, result
+from .condensed import Keyed
+from .press import Patch
+
+KEPT = 16  # patches with those of their errors
+
+
+class Face(NamedTuple):
+    """A patch of an interface of a rig.
+
+    number: of the interface, from 0; name: as the scene's places, "1-0"; model: of the rig, with this patch and law as
+    its own; patches: the pressed Patch and those on coarser meshes, None where one is lacking.
+    """
+
+    number: int
+    name: str
+    model: object
+    patches: tuple
+
+    @property
+    def patch(self) -> Patch:
+        """The pressed Patch."""
+        return self.patches[0]
+
+    @property
+    def soft(self) -> str:
+        """What lets it slip part by part; "" where nothing does."""
+        return self.model.patch.gives_way
+
+    def slide(self, response) -> np.ndarray:
+        """Slide (k,) [m] of its interface in a Response."""
+        slides = response.extra.get("slides")
+        return response.slide if slides is None else slides[:, self.number]
+
+
+def faces_of(model) -> Iterator[Face]:
+    """The interfaces of a model that have a patch, pressed."""
+    rig = model.rig
+    for number, one in enumerate(rig.interfaces if rig is not None else ()):
+        if one.patch is not None:
+            own = replace(model, patch=one.patch, friction=one.numbers)
+            yield Face(number, rig.names[number], own, patches_of(one, model.accuracy.tolerance))
+
+
+def patches_of(one, tolerance: float) -> tuple:
+    """The Patch of an InterfaceLaw and those on coarser meshes, pressed once for all runs of one process that ask for
+    the same; a patch with files, which may change, once for its model. PatchfemError with the key at fault."""
+    asked = one.patch
+    files = asked.mesh is not None or asked.gap.profile is not None
+    try:
+        return _patches(asked, tolerance) if files else _alike(kept.by_content(asked), tolerance)
+    except PatchfemError as error:
+        error.key = error.key and f"{one.key}.{error.key}"
+        raise
+
+
+@lru_cache(maxsize=KEPT)
+def _patches(asked, tolerance: float) -> tuple:
+    return result.solve_all(asked, tolerance)
+
+
+@lru_cache(maxsize=KEPT)
+def _alike(asked: Keyed, tolerance: float) -> tuple:
+    return result.solve_all(asked.asked, tolerance)
+
+
+def condensed_anew(model) -> None:
+    """Condense the pieces of every interface again, whatever is kept of them."""
+    _patches.cache_clear()
+    _alike.cache_clear()
+    for one in model.rig.interfaces if model.rig is not None else ():
+        if one.patch is not None:
+            result.solve_all(one.patch, model.accuracy.tolerance, fresh=True)
+
+
+def elements_of(one, tolerance: float, coarser: bool = False) -> tuple:
+    """(stiffness (t,) [N/m], yield slide (t,) [m], JenkinsSet or None of strips) of the parallel elements of an
+    InterfaceLaw whose patch gives way; coarser: on the mesh of its error. One that bears nothing yields at once."""
+    patch, static = patches_of(one, tolerance)[int(coarser)], one.numbers.static
+    if not patch.pressure.load > 0:
+        return np.array([1 / patch.giving.mean()]), np.zeros(1), None
+    length = record.law_from(one.numbers, one.load).element(one.load).length
+    if patch.strips is not None:
+        return *map(np.concatenate, zip(*kept.strip_elements(patch, static, length))), None
+    found = kept.elements(patch, static, length)
+    return found.stiffness, found.yield_slide, found
+
+
+def meshed(model) -> list:
+    """Numbers of the interfaces whose patches have a coarser mesh, in a tuple for each patch that is another one."""
+    out = {}
+    for face in faces_of(model):
+        if face.soft and face.patches[1] is not None:
+            out.setdefault(face.patches, []).append(face.number)
+    return [tuple(numbers) for numbers in out.values()]
+
+
+def known(model) -> bool:
+    """Whether every patch that gives way has a coarser mesh to tell its error."""
+    return all(face.patches[1] is not None for face in faces_of(model) if face.soft)
+
+
+def measured(model) -> dict:
+    """Static measures of the patches by name, of an interface after the first with its number behind the name."""
+    return {of_number(name, face.number): found for face in faces_of(model)
+            for name, found in result.measured(face.model, face.patch, face.patches[1:]).items()}
+
+
+def warnings_of(model) -> list:
+    """Warnings of the pressed patches."""
+    return together(model, lambda face: [*result.strained(face.model.patch, face.patch), *face.patch.notes,
+                                         *([UNKNOWN] if face.patches[1] is None else [])])
+
+
+UNKNOWN = "no error is estimated on so few elements along the interface; leave out contact.element_size"
+
+
+def notes_of(model) -> list:
+    """Notes on what the static model of the patches leaves out."""
+    return together(model, lambda face: result.left_out(face.model, face.patch, face.patches[1:]))
+
+
+def together(model, told: Callable) -> list:
+    """The sentences told(Face) of all patches, each once behind the names of its interfaces and with its keys as they
+    stand in the scene."""
+    out: dict = {}
+    for face in faces_of(model):
+        for text in told(face):
+            out.setdefault(in_scene(model, text), []).append(face.name)
+    return [f"interface{'s' * (len(names) > 1)} {', '.join(names)}: {text}" for text, names in out.items()]
+
+
+def in_scene(model, text: str) -> str:
+    """A sentence on a patch with the keys of [contact] as they stand in the scene, below their interface where the
+    model has no patch of its own."""
+    return text if model.patch is not None else re.sub(r"(?<![\w.])contact\.(?=[a-z])", "structure.interface.contact.",
+                                                       text)

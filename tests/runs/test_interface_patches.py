@@ -1,0 +1,286 @@
+"""Interfaces that have a patch of their own: against the rig of one patch, against an integration and a slip of nodes
+written here, in any order and alone; their bars, files and refusals."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import cli
+
+import patchfem as pf
+from patchfem.runs.patch import faces
+from patchfem.runs.plan import plan
+
+SPRING, DAMPER, MASS = 1e6, 10.0, 0.5
+LAW = 'law = "coulomb"\nstatic = 0.3\n'
+STIFF = 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "50 nm"\n'
+DRIVE = '[drive]\nkind = "base"\nfrequency = "240 Hz"\nacceleration = "8 g"\ncycles = 40\n'
+
+
+def contact(at: str, load: float, radius: float, more: str = "") -> str:
+    """The tables of a crowned patch that shears."""
+    return (f'[{at}]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "8 mm"\nload = "{load} N"\nsubstrate = "steel"\n'
+            f'{more}[{at}.crown]\nradius = "{radius} m"\n[{at}.shear]\n')
+
+
+def face(between: str, load: float, radius: float, law: str = LAW, more: str = "") -> str:
+    """An interface with a patch."""
+    return f"[[structure.interface]]\nbetween = {between}\n{law}" + contact("structure.interface.contact", load, radius,
+                                                                           more)
+
+
+def held(mass: int, to: int, stiffness: float = SPRING) -> str:
+    """A spring and a damper between two masses."""
+    pair = f"between = [{mass}, {to}]\n"
+    return f'[[structure.spring]]\n{pair}stiffness = "{stiffness} N/m"\n[[structure.damper]]\n{pair}' \
+           f'coefficient = "{DAMPER} N s/m"\n'
+
+
+def masses(count: int) -> str:
+    """The head of a structure of equal masses."""
+    return f'[structure]\nmasses = {json.dumps([f"{MASS} kg"] * count)}\n'
+
+
+ALONE = masses(1) + held(1, 0) + face("[1, 0]", 100, 0.5) + DRIVE
+CHAIN = masses(2) + held(1, 0) + held(2, 1) + face("[1, 0]", 100, 0.5) + face("[2, 1]", 60, 2.0) + DRIVE
+
+
+def rig_of_one(law: str = LAW) -> str:
+    """The rig of [contact] whose mode is the mass of ALONE on its spring."""
+    return (contact("contact", 100, 0.5) + f'[friction]\n{law}[structure]\nmoving_mass = "{MASS} kg"\n'
+            '[[structure.mode]]\nname = "a"\nslide = 1.0\n'
+            f'frequency = "{float(np.sqrt(SPRING / MASS)) / (2 * np.pi)!r} Hz"\n'
+            f"damping = {DAMPER / (2 * float(np.sqrt(SPRING * MASS)))!r}\n" + DRIVE)
+
+
+@pytest.mark.parametrize("law, method", [(LAW, "auto"), (STIFF, "auto"), (LAW, "march"), (LAW, "harmonic")])
+def test_exact_one_interface_with_a_patch_is_the_rig_of_that_patch(law, method):
+    """Every measure and every error, of both ways to write one scene."""
+    more = f'[accuracy]\nmethod = "{method}"\n'
+    mine, want = pf.run(ALONE.replace(LAW, law) + more), pf.run(rig_of_one(law) + more)
+    assert mine.outcome == want.outcome and mine.measures.keys() == want.measures.keys()
+    for name, one in want.measures.items():
+        ours = mine.measures[name]
+        if one.value is None:
+            assert ours.value is None
+            continue
+        size = max(abs(one.value), one.error or 0.0, one.floor)
+        assert ours.value == pytest.approx(one.value, abs=1e-9 * size), name
+        assert (ours.error or 0.0) == pytest.approx(one.error or 0.0, rel=1e-6, abs=1e-9 * size), name
+    slipped = mine.measures["slip_amplitude"]
+    assert slipped.value > 100 * slipped.error > 0
+
+
+@pytest.fixture(scope="module")
+def chain():
+    """The chain of two masses with a patch at each of its interfaces, run."""
+    return pf.run(CHAIN)
+
+
+def test_exact_structures_that_do_not_meet_move_as_each_alone():
+    """Two of them side by side, each behind its own patch, of which the second is the first."""
+    both = pf.run(masses(2) + held(1, 0) + held(2, 0) + face("[1, 0]", 100, 0.5) + face("[2, 0]", 100, 0.5)
+                  + DRIVE).measures
+    alone = pf.run(ALONE).measures
+    for name in ("slip_amplitude", "stick_fraction", "loop_area", "friction_force_peak", "pressure_peak",
+                 "contact_half_width", "normal_load"):
+        for one in (both[name], both[f"{name}_2"]):
+            assert one.value == pytest.approx(alone[name].value, rel=1e-9), name
+            assert one.error <= 3 * alone[name].error + 1e-12 * abs(one.value), name
+    for name in ("friction_work", "energy_dissipated"):
+        assert both[name].value == pytest.approx(2 * alone[name].value, rel=1e-9)
+
+
+def swapped(name: str) -> str:
+    """Name of a measure where the two interfaces stand the other way round."""
+    return name[:-2] if name.endswith("_2") else f"{name}_2"
+
+
+def test_exact_the_order_of_interfaces_does_not_matter(chain):
+    other = pf.run(masses(2) + held(1, 0) + held(2, 1) + face("[2, 1]", 60, 2.0) + face("[1, 0]", 100, 0.5) + DRIVE)
+    assert other.outcome == chain.outcome
+    pairs = [(name, swapped(name) if swapped(name) in chain.measures else name) for name in chain.measures]
+    assert sum(one != two for one, two in pairs) > 20
+    for one, two in pairs:
+        if one.startswith(("slip_start", "equivalent", "secant", "drift")):  # of the first interface alone
+            continue
+        ours, want = other.measures[two], chain.measures[one]
+        assert ours.value == pytest.approx(want.value, rel=1e-8, abs=want.floor), one
+        assert ours.error <= 3 * want.error + want.floor  # the secant stiffness of the first alone is among the signs
+        assert want.error <= 3 * ours.error + want.floor
+
+
+def slipping_nodes(giving, limit) -> tuple:
+    """(stiffness, yield slide) of what nodes (m,) of a compliance (m, m) [m/N] and of friction limits [N] do under one
+    rising slide: those that stick carry t of giving t = q - what the others bend them, and one after the other slips.
+    """
+    sticks, slides, forces = np.ones(limit.size, bool), [0.0], [0.0]
+    while sticks.any():
+        per = np.linalg.solve(giving[np.ix_(sticks, sticks)], np.stack(
+            [np.ones(sticks.sum()), giving[np.ix_(sticks, ~sticks)] @ limit[~sticks]], axis=1))
+        at = (limit[sticks] + per[:, 1]) / per[:, 0]  # the slide at which each of those that stick reaches its limit
+        slides.append(at.min())
+        forces.append(float((per[:, 0] * at.min() - per[:, 1]).sum() + limit[~sticks].sum()))
+        sticks[np.flatnonzero(sticks)[at <= at.min() * (1 + 1e-9)]] = False
+    slope = np.diff(forces) / np.diff(slides)
+    return slope - np.append(slope[1:], 0.0), np.array(slides[1:])
+
+
+def integrated(model, cycles: int, steps: int) -> tuple:
+    """(motion of mass 1 [m], friction work [J]) at the end of `cycles` of CHAIN relative to its base, in leapfrog
+    steps; its patches are nodes that slip."""
+    sets = []
+    for one in model.rig.interfaces:
+        patch = faces.patches_of(one, model.accuracy.tolerance)[0]
+        bears, load = patch.active, patch.pressure.sigma_n * patch.pieces.interface.weight
+        sets.append(slipping_nodes(patch.giving[np.ix_(bears, bears)], one.numbers.static * load[bears]))
+    rows, omega, peak = np.array([[1.0, 0.0], [-1.0, 1.0]]), 2 * np.pi * 240, 8 * 9.80665
+    h = 1 / (240 * steps)
+    place, half, work, held = np.zeros(2), np.zeros(2), 0.0, [np.zeros(k.size) for k, _ in sets]
+    total = np.zeros(2)
+    for n in range(cycles * steps):
+        before = total
+        rate = half
+        for _ in range(3):  # the rate at the step is the mean of those half a step before and after
+            push = -SPRING * rows.T @ rows @ place - DAMPER * rows.T @ rows @ rate - rows.T @ total
+            after = half + h * (push / MASS - peak * np.sin(omega * n * h)) * (0.5 if n == 0 else 1.0)
+            rate = (half + after) / 2 if n else np.zeros(2)
+        half = after
+        place = place + h * half
+        move, total = rows @ half * h, np.zeros(2)
+        for k, (stiffness, most) in enumerate(sets):
+            held[k] = np.clip(held[k] + move[k], -most, most)
+            total[k] = stiffness @ held[k]
+        work += float((before + total) / 2 @ move)
+    return place[0], work
+
+
+def test_an_integration_of_its_own_agrees():
+    """Three cycles of the chain from rest: the slip of the nodes and the motion in leapfrog steps, both written here;
+    what half of the steps change shows the error of these."""
+    cycles = 3
+    found = pf.run(CHAIN, **{"drive.cycles": float(cycles)})
+    model = pf.build(pf.load(CHAIN))
+    coarse, fine = (np.array(integrated(model, cycles, steps)) for steps in (4000, 8000))
+    best, open_ = fine + (fine - coarse) / 3, np.abs(fine - coarse)
+    response = found.response
+    ours = np.array([response.extra["slides"][-1, 0], found.measures["friction_work"].value])
+    assert (open_ < 2e-4 * np.abs(fine)).all()
+    assert (np.abs(ours - best) < open_ + 1e-6 * np.abs(best)).all(), (ours, best, open_)
+
+
+def test_the_march_and_the_balance_agree_with_the_exact_motion(chain):
+    for method in ("march", "harmonic"):
+        other = pf.run(CHAIN, **{"accuracy.method": method})
+        for name in ("relative_displacement_amplitude", "loop_area", "loop_area_2", "slip_amplitude_2"):
+            one, two = chain.measures[name], other.measures[name]
+            assert abs(one.value - two.value) <= one.error + two.error, (method, name)
+
+
+def test_bars_hold_the_change_to_finer_meshes(chain):
+    fine = pf.run(CHAIN, **{"accuracy.tolerance": "1e-4"}).measures
+    for name, one in chain.measures.items():
+        if one.value is not None and one.error is not None and name in fine:
+            assert abs(one.value - fine[name].value) <= one.error + fine[name].error + one.floor * 1e-3, name
+    assert 0 < chain.measures["loop_area_2"].error < 1e-2 * chain.measures["loop_area_2"].value
+
+
+def test_exact_a_patch_beside_a_point_and_one_that_bears_nothing():
+    """A rigid point leaves the exact engine of elements; a patch without a load changes nothing."""
+    point = f'[[structure.interface]]\nbetween = [2, 1]\n{LAW}load = "0 N"\n'
+    head = masses(2) + held(1, 0) + held(2, 1) + face("[1, 0]", 100, 0.5)
+    one, two = (pf.run(head + other + DRIVE) for other in (face("[2, 1]", 0, 2.0), point.replace(LAW, STIFF)))
+    for name in ("relative_displacement_amplitude", "loop_area", "friction_work"):
+        assert one.measures[name].value == pytest.approx(two.measures[name].value, rel=1e-9), name
+    assert one.measures["normal_load_2"].value == 0
+    text = head + point.replace('"0 N"', '"20 N"') + DRIVE
+    assert plan(pf.load(text)).engine == "march"
+
+
+def test_exact_elements_of_strips_are_those_of_one_patch():
+    """Strips of equal pressure, side by side behind one slide, slip as the whole."""
+    strips = "[structure.interface.contact.strips]\ncount = 3\n"
+    wide, whole = (pf.build(pf.load(ALONE.replace("[drive]", more + "[drive]"))).rig.interfaces[0]
+                   for more in (strips, ""))
+    for slide in (2e-8, 1e-7, 1e-6):
+        force = [float(k @ np.minimum(slide, most)) for k, most, _ in (faces.elements_of(one, 1e-3)
+                                                                       for one in (wide, whole))]
+        assert force[0] == pytest.approx(force[1], rel=1e-3)
+
+
+def test_a_plan_counts_the_patches_and_names_their_links(chain):
+    found = plan(pf.load(CHAIN))
+    assert found.engine == chain.extra["engine"] == "piecewise"
+    one, two = (plan(pf.load(text)) for text in (ALONE, rig_of_one()))
+    assert one.unknowns == two.unknowns and one.seconds == pytest.approx(two.seconds, rel=0.2)
+    assert one.modes(one.chain)[0]["stuck_frequency"] == pytest.approx(two.modes(two.chain)[0]["stuck_frequency"])
+    assert found.unknowns["interface_points"] > one.unknowns["interface_points"]
+    assert found.chain["pieces_shear_2"] == found.chain["pieces_shear"]  # the same pieces, whatever presses them
+    assert sum("has a patch of its own" in one for one in found.verdict) == 2
+    rigid = plan(pf.load(CHAIN.replace("[structure.interface.contact.shear]\n", "")))
+    assert "pieces_shear_2" not in rigid.chain and "one point" in " ".join(rigid.verdict)
+
+
+def test_a_rigid_patch_moves_as_a_point_and_says_so():
+    rigid = ALONE.replace("[structure.interface.contact.shear]\n", "")
+    point = masses(1) + held(1, 0) + f'[[structure.interface]]\nbetween = [1, 0]\n{LAW}load = "100 N"\n' + DRIVE
+    one, two = pf.run(rigid), pf.run(point)
+    for name, want in two.measures.items():
+        assert one.measures[name].value == want.value, name
+    assert one.measures["pressure_peak"].value > 1e7
+    assert any("interface 1-0: the shape of the patch does not affect" in text and
+               "[structure.interface.contact.shear]" in text for text in one.warnings)
+
+
+def test_files_of_a_run_have_the_pressure_of_every_interface(tmp_path, monkeypatch, chain):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "chain.toml").write_text(CHAIN)
+    answer = cli("run", "chain.toml", "-o", "out")
+    assert answer.code == 0 and "pressure_peak_2" in answer.out
+    with xr.open_dataset("out/result.nc") as data:
+        for number, load in ((1, 100.0), (2, 60.0)):
+            total = float((data[f"normal_stress_{number}"] * data[f"weight_{number}"]).sum())
+            assert total == pytest.approx(load, rel=1e-9)
+    page = (tmp_path / "out/report.html").read_text()
+    assert "Pressure on interface 1-0" in page and "Pressure on interface 2-1" in page
+    told = json.loads((tmp_path / "out/summary.json").read_text())
+    assert told["numerics"]["interface_nodes_2"] == data.sizes["x_2"]
+    assert told["measures"]["contact_half_width_2"]["value"] == chain.measures["contact_half_width_2"].value
+    assert pf.load("out/scene.resolved.toml").structure.interface[1].contact.load == 60
+    assert cli("export", "chain.toml", "-o", "elements.npz").code == 0
+    assert np.load("elements.npz", allow_pickle=True)
+
+
+def test_a_backbone_is_that_of_the_rig_of_one_patch():
+    one, two = (pf.backbone(pf.load(text), method="quasi-static") for text in (ALONE, rig_of_one()))
+    for name in two.data_vars:
+        if name.startswith("quasi_static"):
+            np.testing.assert_allclose(one[name], two[name], rtol=1e-4, err_msg=name)
+    assert one["quasi_static_damping"].size > 10
+
+
+@pytest.mark.parametrize("old, new, says", [
+    ("[drive]", '[structure.interface.contact.approach]\ndistance = "1 um"\n[drive]', "contact.approach"),
+    ("[drive]", '[structure.interface.contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"\n[drive]',
+     "structure.interface[2].contact.grooves: not supported yet with [[structure.interface]]; leave it out"),
+    ('static = 0.3\n[structure', 'static = 0.3\nload = "5 N"\n[structure', "has a load of its own; leave this one out"),
+    ('radius = "2.0 m"', 'radius = "2.0 m"\non = "lower"', "put the shapes on the upper piece"),
+    ('load = "60 N"\n', "", "structure.interface[2].contact.load: missing"),
+    ('height = "8 mm"\nload = "60', 'height = "8 mm"\nelement_size = "20 mm"\nload = "60', "contact.element_size"),
+    (LAW + "[structure.interface.contact]\nlength", 'law = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\n'
+     "[structure.interface.contact]\nlength", "or use law 'coulomb' or 'elastic-plastic'"),
+    (LAW, LAW + "kinetic = 0.2\n", "structure.interface[1].kinetic: 0.2 below static = 0.3 with "
+     "[structure.interface.contact.shear] is not supported yet; leave kinetic out"),
+    ("[drive]", '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n[drive]', "wear: not supported yet"),
+    ("cycles = 40\n", 'cycles = 40\n[accuracy]\nmethod = "newmark"\n', "use 'march'"),
+    ("[drive]", '[structure.interface.contact.profile]\nfile = "none.csv"\n[drive]',
+     "structure.interface[2].contact.profile.file: there is no file"),
+])
+def test_refuses_what_a_patch_of_an_interface_cannot_be(old, new, says, tmp_path):
+    """Each mistake at its own line, with what to do."""
+    text = CHAIN.replace(old, new)
+    assert text != CHAIN
+    (tmp_path / "chain.toml").write_text(text)
+    answer = cli("check", str(tmp_path / "chain.toml"))
+    assert answer.code == 2 and says in answer.err and "chain.toml:" in answer.err, answer.err
