@@ -549,10 +549,11 @@ class Plots:
         self._result = result
 
     def pressure(self, ax: Axes | None = None) -> Axes:
-        """Normal stress along the interface, and the shear stress if there is any. `ax` shows the normal stress
-        only.
+        """Normal stress along the interface, and the shear stress if there is any; of interfaces with a patch of their
+        own the normal stress on each. `ax` shows the first normal stress only.
         """
-        return self._drawn(ax, ("pressure",), "the scene has no [contact]" if self._result.patch is None else
+        bare = self._result.patch is None and not self._result.extra.get("faces")
+        return self._drawn(ax, ("pressure", "faces"), "the scene has no [contact]" if bare else
                            "the pieces do not touch")
 
     def loop(self, ax: Axes | None = None) -> Axes:

@@ -15,6 +15,7 @@ from .pages.words import SHARP, G, headline, in_order, linked, of_records, other
 
 SETTLED = ("steady", "stuck", "done")
 DASH = "&ndash;"
+MOST = 6  # charts of a picture that has one for each interface
 ROOM = 700_000  # characters that the numbers of all charts may take: with library and player below 3 MB
 FILES = (("fields.vtkhdf", "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)"),
          ("summary.json", "measures, outcome, warnings, effects and numerics"),
@@ -168,8 +169,13 @@ def _interface(data: dict) -> Picture | None:
 def _faces(data: dict) -> Picture | None:
     found = [one for one in data.get("faces", ()) if np.any(one[2] > 0)]
     part = any(charts.part_in_contact(x, sigma) for _, x, sigma in found)
-    return Picture(charts.faces, (found,), "Normal stress of the patch of each interface, pressed, before any slide" +
-                   (". Only the part in contact is drawn." if part else ".")) if found else None
+    return Picture(charts.faces, (found[:MOST],), "Normal stress of the patch of each interface, pressed, before any "
+                   f"slide.{' Only the part in contact is drawn.' * part}{_first(found)}") if found else None
+
+
+def _first(found: list) -> str:
+    """The sentence on charts that are left out, behind a caption."""
+    return f" The first {MOST} of {len(found)} are shown." if len(found) > MOST else ""
 
 
 def _bodies(data: dict) -> Picture | None:
@@ -209,6 +215,9 @@ def _loop(data: dict) -> Picture | None:
     title = "Friction force against slide" if part_of_cycle(data) or data.get("cycles") is None else "Friction loop"
     read = data.get("recorded")
     beside = "" if read is None else f" Grey: the force measured in {read['file']}."
+    if each := own.get("each"):
+        return Picture(charts.loops, (each[:MOST],), f"Friction force against the slide of each interface, over {span}."
+                       f"{_under(data)}{_first(each)}")
     return Picture(charts.loop, (own["slide"], own["force"], title, read and (read["slide"], read["force"])),
                    f"Resultant friction force against the slide of the interface, over {span}.{_under(data)}{beside}")
 

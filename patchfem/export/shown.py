@@ -35,7 +35,10 @@ def report_data(result: Result) -> dict:
             "means": {name: one.text for name, one in result.measures.items()}}
     data |= {name: result.extra[name] for name in ("curve", "decay", "spectra") if name in result.extra}
     if "faces" in result.extra:
-        data["faces"] = [(one.name, one.patch.x, one.patch.pressure.sigma_n) for one in result.extra["faces"]]
+        alike: dict = {}
+        for one in result.extra["faces"]:
+            alike.setdefault(one.patch, []).append(one.name)
+        data["faces"] = [(", ".join(names), one.x, one.pressure.sigma_n) for one, names in alike.items()]
     if "wear" in result.extra:
         count, period = result.extra["wear_shown"]["states"], result.extra["wear_shown"]["period"]
         data["wear"] = {"history": result.extra["wear"], "period": period,
@@ -59,6 +62,8 @@ def report_data(result: Result) -> dict:
             data["window"] = {"time": w.time, "displacement": w.output, "acceleration": w.acceleration,
                               "base": w.base_acceleration, "force": w.force, "slide": w.slide}
             data["loop"] |= {"period": result.extra["period"]}
+            if model.rig.names and "slides" in w.extra:
+                data["loop"]["each"] = list(zip(model.rig.names, w.extra["slides"].T, w.extra["forces"].T))
     if model.measured is not None:
         path, gains, kind, cutoff = model.measured
         rig = model.rig

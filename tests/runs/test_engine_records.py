@@ -58,7 +58,7 @@ def motions():
             LAWS, ("", "[contact.shear]"), ("", "with normal.amplitude"), (False, True),
             ("", "[structure.stiffening]", "[normal.grooves]"), ("sine", "levels")):
         for count in (1, 2):
-            yield Motion([Friction(law=law, static=0.3)] * count, soft, varies, yaws, spring, waveform)
+            yield Motion([Friction(law=law, static=0.3)] * count, [soft] * count, varies, yaws, spring, waveform)
 
 
 def reasons(m) -> list:
@@ -76,9 +76,9 @@ def test_exact_the_march_takes_all_that_others_lack():
 def test_exact_what_has_no_solution_between_events_is_named():
     ep, coulomb, tanh = (Friction(law=law, static=0.3) for law in ("elastic-plastic", "coulomb", "tanh"))
     for laws, soft in (([], ""), ([coulomb], ""), ([coulomb], "[contact.shear]"), ([ep], ""), ([ep], "a holder")):
-        assert "" in reasons(Motion(laws, soft, "", False, "", "sine"))
-    for m, said in ((Motion([tanh], "", "", False, "", "sine"), "for law 'tanh'"),
-                    (Motion([ep], "", "", True, "", "sine"), "with strips that yaw"),
-                    (Motion([coulomb], "", "", True, "", "levels"), "with strips that yaw and waveform 'levels'"),
-                    (Motion([coulomb], "", "", False, "[normal.grooves]", "sine"), "with [normal.grooves]")):
+        assert "" in reasons(Motion(laws, [soft] * len(laws), "", False, "", "sine"))
+    for m, said in ((Motion([tanh], [""], "", False, "", "sine"), "for law 'tanh'"),
+                    (Motion([ep], [""], "", True, "", "sine"), "with strips that yaw"),
+                    (Motion([coulomb], [""], "", True, "", "levels"), "with strips that yaw and waveform 'levels'"),
+                    (Motion([coulomb], [""], "", False, "[normal.grooves]", "sine"), "with [normal.grooves]")):
         assert all(reasons(m)) and said in reasons(m)

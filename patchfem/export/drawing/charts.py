@@ -7,6 +7,7 @@ its numbers, in the units of the axes.
 """
 
 from itertools import pairwise
+from textwrap import shorten
 
 import numpy as np
 
@@ -126,7 +127,8 @@ def _pressure(title: str, x, sigma) -> dict:
 
 def faces(found: list) -> list:
     """Pressure on every interface that has a patch of its own, (name, x (m,) [m], pressure (m,) [Pa]) each."""
-    return [_pressure(f"Pressure on interface {name}", x, sigma) for name, x, sigma in found]
+    return [_pressure(f"Pressure on interface{'s' * (',' in name)} {shorten(name, 40, placeholder=' ...')}", x, sigma)
+            for name, x, sigma in found]
 
 
 def closer(x, depth, sigma, ratio: float) -> tuple:
@@ -214,6 +216,11 @@ def loop(slide, force, title: str, measured: tuple | None = None) -> list:
                                               alpha=0.55)
     return [chart(title, axis("slide", along), axis("friction force", up),
                   [read, line(slide * size, force * scale, "accent", "computed" if read else "")])]
+
+
+def loops(found: list) -> list:
+    """The friction force against the slide of every interface, (name, slide [m], force [N]) each."""
+    return [one for name, slide, force in found for one in loop(slide, force, f"Friction loop of interface {name}")]
 
 
 def envelope(time, value, period: float) -> tuple:
