@@ -13,7 +13,7 @@ from ..export.written import brief
 from ..mesh import files as mesh_files
 from ..model import files as model_files
 from ..runs import plan as plans
-from ..runs.patch import result
+from ..runs.patch import faces, result
 from ..scales import short, tidied
 from ..scene import scene as scenes
 from .shared import Json, Refused, Sets, flag, model_of, note, say, scene_of
@@ -70,13 +70,14 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
         _plan_sweep(scene, set_, over or Over(), json_, verbose)
         return
     found = plans.plan(read)
-    answer, asked = found.as_json(), found.model.patch
+    answer = found.as_json()
     if probe:
         answer["seconds"] = round(answer["seconds"] * rates.speed(), 2)
-    if probe and asked is not None:
-        solved = result.probed(found.model)
-        answer["stiffness_chain"]["pieces_shear"] = solved["tangential_stiffness"] if asked.shear else "rigid"
-        answer["probe"], answer["modes"] = solved, found.modes(answer["stiffness_chain"])
+    if probe and (solved := faces.probed(found.model)):
+        chain = answer["stiffness_chain"]
+        chain |= {name: solved[name.replace("pieces_shear", "tangential_stiffness")] for name, link in chain.items()
+                  if name.startswith("pieces_shear") and link != "rigid"}
+        answer["probe"], answer["modes"] = solved, found.modes(chain)
     if json_:
         print(json.dumps(answer))
         return
@@ -141,7 +142,8 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"],
     """
     found = model_of(scene, set_)
     if found.patch is None:
-        raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")
+        raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh; write that of an interface "
+                      "as the [contact] of a scene of its own")
     low, high = result.bodies(found)
     mesh_files.write_mesh(low, out, high)
     for name, body in (("lower", low), ("upper", high or low)):

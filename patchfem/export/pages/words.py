@@ -9,6 +9,7 @@ from types import MappingProxyType
 from ... import scales
 from ...core import Outcome
 from ...response.rows import TABLE as MOTION
+from ...response.rows import of_first, of_number
 from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.result import Result
 from ..summary import measure_object
@@ -21,6 +22,7 @@ WORKSHOP = {  # as scales.LADDERS
     "Pa": (("psi", INCH**2 / LBF), ("ksi", 1e-3 * INCH**2 / LBF)),
     "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF))}
 GROUPS = ("motion", "friction", "energy", "patch", "wear")
+FEW = 3  # interfaces that are all told of first
 NO_SLIP = 1e-15  # m, the last digits of a slide
 WHOLE_RUN = "over the whole run"
 LOOPS = "over the two cycles of the steady motion that are kept"
@@ -156,6 +158,14 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
             parts.append(text.format(value if number is None else number(value, name))
                          + (f" ({interval})" if interval else ""))
 
+    def of_each(name: str, text: str) -> None:
+        """`said` of every interface, of the first alone where they are many; strips are no interfaces."""
+        count = sum(of_first(one) == name for one in measures)
+        apart = count > 1 and not any(one["effect"] == "contact.strips" for one in summary["effects"])
+        for k in range(count if apart and count <= FEW else 1):
+            at = f" at interface {k + 1}" + f" of {count}" * (count > FEW)
+            said(of_number(name, k), text + at * apart)
+
     if summary["outcome"] != "no_contact":
         worn = next((name for name in ("worn_depth_max", "worn_volume") if name in measures), "")
         said(worn, "{} worn off at the deepest place" if worn == "worn_depth_max" else "{} worn off")
@@ -172,8 +182,8 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
         if "relative_displacement_amplitude" not in measures:
             said("friction_ratio_peak", "friction ratio peaks at {}")
         if whole and not released:
-            said("loop_area", "{} dissipated per cycle")
-        said("contact_fraction", "{} of the length in contact")
+            of_each("loop_area", "{} dissipated per cycle")
+        of_each("contact_fraction", "{} of the length in contact")
         if summary["kind"] == "patch":
             said("pressure_peak", "peak pressure {}")
     text = "; ".join(parts)

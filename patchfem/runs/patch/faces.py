@@ -10,10 +10,12 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...friction import record
+from ...model.source import placed
 from ...response.rows import of_number
 from . import kept, result
 from .condensed import Keyed
 from .press import Patch
+from .values import values
 
 KEPT = 16  # patches with those of their errors
 
@@ -111,6 +113,16 @@ def meshed(model) -> list:
 def known(model) -> bool:
     """Whether every patch that gives way has a coarser mesh to tell its error."""
     return all(face.patches[1] is not None for face in faces_of(model) if face.soft)
+
+
+def probed(model) -> dict:
+    """Static measures by name of the patch of a model or of its interfaces, solved alone and without errors; {} without
+    any."""
+    if model.patch is not None:
+        return result.probed(model)
+    with placed(model.source):
+        return {of_number(name, face.number): found for face in faces_of(model)
+                for name, found in values(face.patch).items()}
 
 
 def measured(model) -> dict:
