@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..core import PatchfemError
 from ..effects import either, module_of
 from ..friction.bonds import parameters, spread
-from .patch import PatchModel, patch_asked
+from . import patch as patch_model
+
+if TYPE_CHECKING:
+    from .patch import PatchModel
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -101,7 +105,7 @@ def _patch_of(scene, number: int, one) -> PatchModel | None:
     if one.contact is None:
         return None
     try:
-        return replace(patch_asked(one.contact, scene.kind, scene.beside), gives_way=one.gives_way)
+        return replace(patch_model.patch_asked(one.contact, scene.kind, scene.beside), gives_way=one.gives_way)
     except PatchfemError as error:
         error.key = error.key and f"structure.interface.{number}.{error.key}"
         raise

@@ -72,6 +72,11 @@ class Model:
         return self.patch.gives_way if self.patch is not None else ""
 
     @property
+    def faced(self) -> bool:
+        """Whether an interface has a patch of its own."""
+        return self.rig is not None and any(one.patch is not None for one in self.rig.interfaces)
+
+    @property
     def load_varies(self) -> bool:
         """Whether the normal load is prescribed as a function of time."""
         return self.point is not None and bool(self.point.amplitude)

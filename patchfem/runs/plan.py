@@ -11,7 +11,7 @@ from ..friction.bonds import spread
 from ..inputs import measured
 from ..model.model import Model, build
 from ..model.source import placed
-from ..response.rows import of_number
+from ..response import rows
 from . import memory
 from .bench import engine as of_bench
 from .patch import grids as patch_grids
@@ -124,7 +124,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
             grids = patch_grids.expected_grids(one.patch, model.accuracy.tolerance)
             for name, size in patch_plan.sizes(grids).items():
                 unknowns[name] = unknowns.get(name, 0) + size
-            chain |= {of_number(name, number): link for name, link in patch_plan.chain(one.patch).items()
+            chain |= {rows.of_number(name, number): link for name, link in patch_plan.chain(one.patch).items()
                       if link != "rigid"}
             more, size = patch_plan.effort(one.patch, grids, model.accuracy.tolerance)
             seconds, pressed = seconds + more, pressed + size

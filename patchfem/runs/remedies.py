@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ..core import say
 from ..effects import has
-from ..response.rows import of_number
+from ..response import rows
 from .patch import faces, high_order, ladder
 from .results import notes, patch_rows
 from .rig import costs, engines
@@ -45,10 +45,11 @@ def beyond_tolerance(seen: Finding, coarse=()) -> list:
     model = seen.model
     tolerance = model.accuracy.tolerance
     wide = {name: min(times, MOST) for name, m in seen.measures.items() if (times := m.beyond(tolerance)) > 1}
-    pressed = patch_rows.TABLE if seen.patch is not None else faces.measured(model)
+    faced = seen.patch is None and model.faced
+    pressed = faces.measured(model) if faced else patch_rows.TABLE if seen.patch is not None else ()
     static = {name: times for name, times in wide.items() if name in pressed}
     moving = {name: times for name, times in wide.items() if name not in pressed}
-    if seen.patch is None:
+    if faced:
         out = faces.together(model, lambda face: beyond_tolerance(_of_face(seen, face), face.patches[1:]))
     else:
         out = [_said(seen, static, _finer_mesh(seen, static, coarse))] if static else []
@@ -57,8 +58,8 @@ def beyond_tolerance(seen: Finding, coarse=()) -> list:
 
 def _of_face(seen, face) -> Finding:
     """What is told of the patch of an interface: its static measures, which have no number behind their names."""
-    return Finding(face.model, {name: found for name in patch_rows.TABLE
-                                if (found := seen.measures.get(of_number(name, face.number))) is not None}, face.patch)
+    own = {name: seen.measures.get(rows.of_number(name, face.number)) for name in patch_rows.TABLE}
+    return Finding(face.model, {name: found for name, found in own.items() if found is not None}, face.patch)
 
 
 def _first(seen, wide: dict) -> list:

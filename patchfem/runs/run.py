@@ -73,7 +73,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             fewer = "split the elements of contact.mesh" if model.patch.mesh else "leave out contact.element_size"
             warnings.append(f"no error is estimated on {patch.x.size - 1} elements along the interface; {fewer}")
         notes += patch_result.left_out(model, patch, coarse)
-    if model.rig is not None and any(one.patch for one in model.rig.interfaces):
+    if model.faced:
         if fresh:
             faces.condensed_anew(model)
         warnings += faces.warnings_of(model)
@@ -108,7 +108,8 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         if patch is not None and what.kind != "patch":
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
             result = replace(result, measures=patch_result.measured(model, patch, coarse) | found)
-        if own := faces.measured(model):
+        if model.faced:
+            own = faces.measured(model)
             result = replace(result, extra=result.extra | {"faces": tuple(faces.faces_of(model))},
                              measures=own | {name: m for name, m in result.measures.items() if name not in own})
         if model.wear is not None:

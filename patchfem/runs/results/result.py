@@ -55,6 +55,9 @@ def meaning(name: str, apart: str = "interface") -> str:
 
     slip_amplitude_2 is that of the second interface, or of what `apart` names.
     """
+    if name in patch_rows.TABLE:
+        return patch_rows.TABLE[name].text
+
     first = rows.of_first(name)
     row = patch_rows.TABLE.get(first) or rows.row_of(name)
     return row.text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")

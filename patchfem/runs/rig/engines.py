@@ -194,7 +194,7 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 def _meshed(model: Model, numerics) -> list:
     """Numerics with a coarser mesh of one patch of interfaces after the other."""
-    return [replace(numerics, meshed=one) for one in faces.meshed(model)]
+    return [replace(numerics, meshed=one) for one in faces.meshed(model)] if model.rig.soft else []
 
 
 def _fewer(numerics, share: int):

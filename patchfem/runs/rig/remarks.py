@@ -29,7 +29,6 @@ def warnings_of(run) -> list:
                                                                                  book["friction"])]
     if run.rubs:
         out += law_warnings(model, run.outcome, found, float(np.abs(raw.window.slide_rate).max()))
-    out += faces.together(model, lambda face: [] if face.soft else [AS_ONE_POINT])
     out += created_warning(model, book, model.rig.cycles)
     if patch is not None and model.rig.load_varies and raw.contact is not None and raw.contact.reduction is not None:
         out += modes_note(model, raw.contact.reduction.stiffness.size, raw.contact.sets.x.size)
@@ -38,8 +37,9 @@ def warnings_of(run) -> list:
     out += [*work_check_warning(found, steps, harmonics), *changing_note(run.outcome, run.drive), *raw.notes]
     if raw.message and raw.outcome is not Outcome.LEAVES_GROOVES:
         out.append(raw.message)
-    return [*out, *(travelled(patch, raw.response.slide) if patch is not None else ()),
-            *faces.together(model, lambda face: travelled(face.patch, face.slide(raw.response)))]
+    out += travelled(patch, raw.response.slide) if patch is not None else ()
+    return out if not model.faced else [*out, *faces.together(model, lambda face: [
+        *([] if face.soft else [AS_ONE_POINT]), *travelled(face.patch, face.slide(raw.response))])]
 
 
 def notes_of(run) -> list:

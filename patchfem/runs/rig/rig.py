@@ -76,7 +76,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         run, notes = replace(run, measures=run.measures | fluttering), [*notes, *more]
     run = _judged(run)
     outcome = outcome_on_piece(run.outcome, model.patch, patch, raw.response.slide)
-    for face in faces.faces_of(model):
+    for face in faces.faces_of(model) if model.faced else ():
         outcome = outcome_on_piece(outcome, face.model.patch, face.patch, face.slide(raw.response))
     fields = {} if patch is None else fields_of(model, numerics, patch, raw)
     return Result(what, outcome, run.measures, raw.response, raw.window, patch, fields, seconds, [*warnings, *warned],
@@ -237,7 +237,7 @@ def _foreseen(engine, model, numerics, patch, coarse, estimated: bool) -> float:
         return numerics.steps
     ways = [*engine.in_time(model, numerics, patch), *engine.in_modes(model, numerics, patch)]
     each = {numerics: numerics.steps} | {run.numerics: run.numerics.steps for way in ways for run in way.runs}
-    meshed = (coarse is not None and bool(model.soft)) + len(faces.meshed(model))
+    meshed = (coarse is not None and bool(model.soft)) + (len(faces.meshed(model)) if model.rig.soft else 0)
     return sum(each.values()) + meshed * min(each.values())
 
 
