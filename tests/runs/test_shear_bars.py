@@ -8,7 +8,7 @@ import patchfem as pf
 from patchfem.scene.scene import loads
 
 
-@pytest.mark.parametrize("kind, seeds", [("joint", (3024,)), ("rig", (3000,))])
+@pytest.mark.parametrize("kind, seeds", [("joint", (3024,)), ("rig", (3000,)), ("chain", (3000,))])
 def test_always_the_bars_of_random_pieces_behind_their_shear_hold(kind, seeds):
     """By the change on a coarser mesh alone joint 3024 missed the bar of its work 22 times, rig 3000 its peak 2.3."""
     for seed in seeds:
@@ -17,7 +17,7 @@ def test_always_the_bars_of_random_pieces_behind_their_shear_hold(kind, seeds):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind, first, count", [("joint", 3000, 40), ("rig", 3000, 40)])
+@pytest.mark.parametrize("kind, first, count", [("joint", 3000, 40), ("rig", 3000, 40), ("chain", 3000, 40)])
 def test_always_19_of_20_bars_of_random_pieces_behind_their_shear_hold(kind, first, count):
     found = np.concatenate([list(misses(kind, seed).values()) for seed in range(first, first + count)])
     assert (found <= 1).mean() >= 0.95 and (found <= 2).mean() >= 0.97

@@ -1,7 +1,8 @@
 """Random joints and rigs behind [contact.shear], and how far their bars miss what far finer settings give.
 
-`python shear_bars.py joint 2000 60` scores 60 joints from seed 2000 on, `rig` as many rigs. The finer settings are a
-tolerance: its mesh is graded to the corners. A uniform mesh of 1600 nodes errs by more in the stiffness than many bars.
+`python shear_bars.py joint 2000 60` scores 60 joints from seed 2000 on, `rig` as many rigs, `chain` as many chains of
+two masses with a patch at each of their interfaces. The finer settings are a tolerance: its mesh is graded to the
+corners. A uniform mesh of 1600 nodes errs by more in the stiffness than many bars.
 """
 
 import re
@@ -11,9 +12,10 @@ from collections import defaultdict
 import numpy as np
 
 import patchfem as pf
+from patchfem.response.rows import OF_EACH
 from patchfem.scene.scene import Scene, loads
 
-FINER = {"joint": "1e-6", "rig": "1e-5"}  # tolerance of the truth
+FINER = {"joint": "1e-6", "rig": "1e-5", "chain": "1e-5"}  # tolerance of the truth
 BENCH = ("loop_area", "friction_force_peak", "secant_stiffness", "energy_stored", "slip_amplitude", "energy_dissipated",
          "equivalent_stiffness")
 MOTION = ("relative_displacement_amplitude", "absolute_acceleration_peak", *BENCH, "equivalent_damping")
@@ -85,13 +87,53 @@ def rig(seed: int) -> tuple:
                         "drive.acceleration": f"{10**draw.uniform(-1, 1.5):.3g} g"}
 
 
+FACE = """
+[[structure.interface]]
+between = [{pair}]
+law = "coulomb"
+static = {static:.3f}
+"""
+CHAIN = """
+[structure]
+masses = ["0.3 kg", "0.5 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "{one:.4g} N/m"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "{two:.4g} N/m"
+[[structure.damper]]
+between = [1, 0]
+coefficient = "5 N s/m"
+[[structure.damper]]
+between = [2, 1]
+coefficient = "5 N s/m"
+"""
+
+
+def chain(seed: int) -> tuple:
+    """(text, sets) of two masses in a row, each behind a patch of its own, at frequencies about those of both."""
+    draw = np.random.default_rng(seed)
+    one, two = 10**draw.uniform(5, 7, 2)
+    pieces, rest = RIG.split("[friction]")
+    text, sets = CHAIN.format(one=one, two=two), {}
+    for k, pair in enumerate(("1, 0", "2, 1")):
+        text += FACE.format(pair=pair, static=draw.uniform(0.1, 0.6)) + pieces.replace(
+            "[contact", "[structure.interface.contact")
+        own = {"contact.load": f"{10**draw.uniform(1, 3):.3g} N"} | _shaped(draw, (0.5, 3), (-5.5, -3.5))
+        sets |= {f"structure.interface.{k}.{key}": value for key, value in own.items()}
+    frequency = 10**draw.uniform(1.8, 3)
+    return text + "[drive]" + rest.partition("[drive]")[2], sets | {
+        "drive.frequency": f"{frequency:.1f} Hz", "drive.acceleration": f"{10**draw.uniform(-1, 1.5):.3g} g"}
+
+
 def misses(kind: str, seed: int) -> dict:
     """How far each measure of a random scene lies from the truth, over its bar; below a thousandth of its floor it does
     not count."""
-    text, sets = {"joint": joint, "rig": rig}[kind](seed)
+    text, sets = {"joint": joint, "rig": rig, "chain": chain}[kind](seed)
     found, true = (pf.run(_scene(text, sets | more)).measures
                    for more in ({}, {"accuracy.tolerance": FINER[kind]}))
-    names = [name for name in (BENCH if kind == "joint" else MOTION)
+    names = [name for name in (BENCH if kind == "joint" else (*MOTION, *(f"{name}_2" for name in OF_EACH)))
              if name in found and name in true and None not in (found[name].value, true[name].value)]
     return {name: abs(found[name].value - true[name].value) / max(found[name].error, 1e-3 * found[name].floor)
             for name in names}
