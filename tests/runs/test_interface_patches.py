@@ -166,7 +166,7 @@ def test_an_integration_of_its_own_agrees():
     best, open_ = fine + (fine - coarse) / 3, np.abs(fine - coarse)
     response = found.response
     ours = np.array([response.extra["slides"][-1, 0], found.measures["friction_work"].value])
-    assert (open_ < 2e-4 * np.abs(fine)).all()
+    assert (open_ < 1e-5 * np.abs(fine)).all()
     assert (np.abs(ours - best) < open_ + 1e-6 * np.abs(best)).all(), (ours, best, open_)
 
 
@@ -194,8 +194,11 @@ def test_exact_a_patch_beside_a_point_and_one_that_bears_nothing():
     for name in ("relative_displacement_amplitude", "loop_area", "friction_work"):
         assert one.measures[name].value == pytest.approx(two.measures[name].value, rel=1e-9), name
     assert one.measures["normal_load_2"].value == 0
-    text = head + point.replace('"0 N"', '"20 N"') + DRIVE
-    assert plan(pf.load(text)).engine == "march"
+    mixed, stiff = (pf.run(head + point.replace('"0 N"', '"20 N"').replace(LAW, law) + DRIVE)
+                    for law in (LAW, STIFF.replace("50 nm", "1 nm")))
+    assert (mixed.extra["engine"], stiff.extra["engine"]) == ("march", "piecewise")
+    for name in ("relative_displacement_amplitude", "loop_area", "loop_area_2"):
+        assert mixed.measures[name].value == pytest.approx(stiff.measures[name].value, rel=1e-2), name
 
 
 def test_exact_elements_of_strips_are_those_of_one_patch():
@@ -238,11 +241,18 @@ def test_files_of_a_run_have_the_pressure_of_every_interface(tmp_path, monkeypat
     (tmp_path / "chain.toml").write_text(CHAIN)
     answer = cli("run", "chain.toml", "-o", "out")
     assert answer.code == 0 and "pressure_peak_2" in answer.out
+    assert "dissipated per cycle at interface 1; " in answer.out and "in contact at interface 2" in answer.out
+    assert chain.plot.pressure().get_title() == "Pressure on interface 1-0"
     with xr.open_dataset("out/result.nc") as data:
         for number, load in ((1, 100.0), (2, 60.0)):
             total = float((data[f"normal_stress_{number}"] * data[f"weight_{number}"]).sum())
             assert total == pytest.approx(load, rel=1e-9)
+    probed = json.loads(cli("plan", "chain.toml", "--probe", "--json").out)
+    for ours, name in (("pieces_shear", "tangential_stiffness"), ("pieces_shear_2", "tangential_stiffness_2")):
+        want = chain.measures[name]
+        assert probed["stiffness_chain"][ours] == pytest.approx(want.value, rel=1e-2)
     page = (tmp_path / "out/report.html").read_text()
+    assert "Friction loop of interface 2-1" in page
     assert "Pressure on interface 1-0" in page and "Pressure on interface 2-1" in page
     told = json.loads((tmp_path / "out/summary.json").read_text())
     assert told["numerics"]["interface_nodes_2"] == data.sizes["x_2"]

@@ -111,7 +111,9 @@ def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[st
         draft.lacks_table("friction", f"{others} without it do not make a run")
     if friction and draft.given("structure.masses") and not draft.given("structure.interface"):
         if "contact" in has:
-            draft.say("structure.masses", f"structure.masses cannot be used with [contact]; {modes_instead(draft)}")
+            draft.say("structure.masses", f"structure.masses cannot be used with [contact]; {modes_instead(draft)}, or "
+                                          "keep the masses and write law and patch below [[structure.interface]], as "
+                                          "[structure.interface.contact]")
         else:
             draft.lacks("structure.interface", "friction between masses needs an interface: write "
                                                "[[structure.interface]] with its law and load instead of [friction]")

@@ -55,7 +55,7 @@ def check_structure(draft: Draft) -> None:
 
 def modes_instead(draft: Draft) -> str:
     """What to write beside [contact] instead of masses: one mass on springs to the base is the mode sqrt(k/m)/(2 pi)
-    with the damping ratio c/(2 sqrt(k m)), in numbers where all of them are there; "" for a rig from a file."""
+    with the damping ratio c/(2 sqrt(k m)), in numbers where all of them are there."""
     structure = draft.tables.structure
     masses = structure.masses or (structure.moving_mass,)
     springs, dampers = ([(one.between, getattr(one, value)) for one in getattr(structure, name) or ()]
